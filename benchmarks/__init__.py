@@ -1,0 +1,1 @@
+"""Speed against error: one file a study."""

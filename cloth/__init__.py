@@ -1,0 +1,1 @@
+"""Continuous collision detection for deforming triangle meshes, on plain arrays."""

@@ -1,0 +1,1 @@
+"""Plug-in contact checkers, their comparison and the guarded stepper."""

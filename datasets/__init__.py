@@ -1,0 +1,1 @@
+"""Generation of labelled episodes, and loaders of real logs."""

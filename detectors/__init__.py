@@ -1,0 +1,1 @@
+"""Momentum observer, features, collision detectors, event matching and metrics."""

@@ -1,0 +1,1 @@
+"""How it runs: the simulation loop, motions, injected collisions and environments."""

@@ -1,0 +1,209 @@
+// Exact arithmetic on dyadic rationals m * 2^e. Every finite double is one, and sums, differences and
+// products of dyadics are dyadics, so polynomial signs computed here are right for *any* finite input:
+// no overflow, no underflow, no dependence on the rounding mode. It is the last resort behind a
+// floating-point filter (a product costs tens of nanoseconds), never the common path.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace tauguard::geometry {
+
+class Dyadic {
+ public:
+  Dyadic() = default;
+
+  // Exact; x must be finite.
+  explicit Dyadic(double x) {
+    if (x == 0.0) return;
+    int exponent = 0;
+    const double fraction = std::frexp(std::fabs(x), &exponent);  // in [0.5, 1)
+    const auto mantissa = static_cast<std::uint64_t>(std::ldexp(fraction, 53));
+    sign_ = x < 0 ? -1 : 1;
+    exponent_ = exponent - 53;
+    limbs_ = {static_cast<std::uint32_t>(mantissa), static_cast<std::uint32_t>(mantissa >> 32)};
+    normalize();
+  }
+
+  static Dyadic from_int(std::int64_t x) {
+    Dyadic r;
+    if (x == 0) return r;
+    const std::uint64_t m = x < 0 ? ~static_cast<std::uint64_t>(x) + 1 : static_cast<std::uint64_t>(x);
+    r.sign_ = x < 0 ? -1 : 1;
+    r.limbs_ = {static_cast<std::uint32_t>(m), static_cast<std::uint32_t>(m >> 32)};
+    r.normalize();
+    return r;
+  }
+
+  int sign() const { return sign_; }
+  bool is_zero() const { return sign_ == 0; }
+
+  Dyadic operator-() const {
+    Dyadic r = *this;
+    r.sign_ = -sign_;
+    return r;
+  }
+
+  friend Dyadic operator+(const Dyadic& a, const Dyadic& b) {
+    if (a.is_zero()) return b;
+    if (b.is_zero()) return a;
+    const std::int64_t exponent = std::min(a.exponent_, b.exponent_);
+    const Limbs x = shifted(a, exponent), y = shifted(b, exponent);
+    Dyadic r;
+    r.exponent_ = exponent;
+    if (a.sign_ == b.sign_) {
+      r.limbs_ = sum(x, y);
+      r.sign_ = a.sign_;
+    } else {
+      const int order = compare_magnitude(x, y);
+      if (order == 0) return Dyadic();
+      r.limbs_ = order > 0 ? difference(x, y) : difference(y, x);
+      r.sign_ = order > 0 ? a.sign_ : b.sign_;
+    }
+    r.normalize();
+    return r;
+  }
+
+  friend Dyadic operator-(const Dyadic& a, const Dyadic& b) { return a + (-b); }
+
+  friend Dyadic operator*(const Dyadic& a, const Dyadic& b) {
+    if (a.is_zero() || b.is_zero()) return Dyadic();
+    Dyadic r;
+    r.sign_ = a.sign_ * b.sign_;
+    r.exponent_ = a.exponent_ + b.exponent_;
+    r.limbs_.assign(a.limbs_.size() + b.limbs_.size(), 0);
+    for (std::size_t i = 0; i < a.limbs_.size(); ++i) {
+      std::uint64_t carry = 0;
+      for (std::size_t j = 0; j < b.limbs_.size(); ++j) {
+        const std::uint64_t t =
+            static_cast<std::uint64_t>(a.limbs_[i]) * b.limbs_[j] + r.limbs_[i + j] + carry;
+        r.limbs_[i + j] = static_cast<std::uint32_t>(t);
+        carry = t >> 32;
+      }
+      r.limbs_[i + b.limbs_.size()] = static_cast<std::uint32_t>(carry);
+    }
+    r.normalize();
+    return r;
+  }
+
+  Dyadic& operator+=(const Dyadic& o) { return *this = *this + o; }
+  Dyadic& operator-=(const Dyadic& o) { return *this = *this - o; }
+  Dyadic& operator*=(const Dyadic& o) { return *this = *this * o; }
+
+  // Multiplication by 2^k, exact and free.
+  Dyadic scaled(std::int64_t k) const {
+    Dyadic r = *this;
+    if (!r.is_zero()) r.exponent_ += k;
+    return r;
+  }
+
+  friend int compare(const Dyadic& a, const Dyadic& b) { return (a - b).sign(); }
+  friend bool operator<(const Dyadic& a, const Dyadic& b) { return compare(a, b) < 0; }
+  friend bool operator<=(const Dyadic& a, const Dyadic& b) { return compare(a, b) <= 0; }
+  friend bool operator==(const Dyadic& a, const Dyadic& b) { return compare(a, b) == 0; }
+
+  // Truncation towards zero to about 53 bits; +-inf or 0 where the value leaves the range of double.
+  double to_double() const {
+    if (is_zero()) return 0.0;
+    // The three leading limbs hold at least 65 significant bits: keep the upper 53.
+    const std::size_t n = limbs_.size();
+    std::uint64_t head = 0;
+    std::int64_t shift = exponent_;
+    if (n == 1) {
+      head = limbs_[0];
+    } else {
+      head = (static_cast<std::uint64_t>(limbs_[n - 1]) << 32) | limbs_[n - 2];
+      shift += 32 * static_cast<std::int64_t>(n - 2);
+      int lead = 0;
+      while (!((head << lead) >> 63)) ++lead;
+      if (lead > 0) {
+        head <<= lead;
+        if (n >= 3) head |= limbs_[n - 3] >> (32 - lead);
+        shift -= lead;
+      }
+    }
+    int drop = 0;
+    while ((head >> drop) >> 53) ++drop;
+    head >>= drop;
+    shift += drop;
+    const std::int64_t bounded = std::clamp<std::int64_t>(shift, -5000, 5000);
+    return sign_ * std::ldexp(static_cast<double>(head), static_cast<int>(bounded));
+  }
+
+ private:
+  using Limbs = std::vector<std::uint32_t>;
+
+  void normalize() {
+    while (!limbs_.empty() && limbs_.back() == 0) limbs_.pop_back();
+    if (limbs_.empty()) {
+      sign_ = 0;
+      exponent_ = 0;
+      return;
+    }
+    std::size_t zeros = 0;
+    while (limbs_[zeros] == 0) ++zeros;
+    if (zeros) {
+      limbs_.erase(limbs_.begin(), limbs_.begin() + static_cast<std::ptrdiff_t>(zeros));
+      exponent_ += 32 * static_cast<std::int64_t>(zeros);
+    }
+  }
+
+  static Limbs shifted(const Dyadic& a, std::int64_t exponent) {
+    const std::int64_t by = a.exponent_ - exponent;
+    Limbs r(static_cast<std::size_t>(by / 32), 0);
+    const int bits = static_cast<int>(by % 32);
+    std::uint64_t carry = 0;
+    for (std::uint32_t limb : a.limbs_) {
+      const std::uint64_t t = (static_cast<std::uint64_t>(limb) << bits) | carry;
+      r.push_back(static_cast<std::uint32_t>(t));
+      carry = t >> 32;
+    }
+    if (carry) r.push_back(static_cast<std::uint32_t>(carry));
+    return r;
+  }
+
+  static Limbs sum(const Limbs& x, const Limbs& y) {
+    Limbs r;
+    r.reserve(std::max(x.size(), y.size()) + 1);
+    std::uint64_t carry = 0;
+    for (std::size_t i = 0; i < std::max(x.size(), y.size()); ++i) {
+      carry += (i < x.size() ? x[i] : 0ull) + (i < y.size() ? y[i] : 0ull);
+      r.push_back(static_cast<std::uint32_t>(carry));
+      carry >>= 32;
+    }
+    if (carry) r.push_back(static_cast<std::uint32_t>(carry));
+    return r;
+  }
+
+  // x - y for x >= y.
+  static Limbs difference(const Limbs& x, const Limbs& y) {
+    Limbs r(x.size());
+    std::int64_t borrow = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      std::int64_t t = static_cast<std::int64_t>(x[i]) - (i < y.size() ? y[i] : 0) - borrow;
+      borrow = t < 0;
+      if (t < 0) t += std::int64_t{1} << 32;
+      r[i] = static_cast<std::uint32_t>(t);
+    }
+    return r;
+  }
+
+  static int compare_magnitude(const Limbs& x, const Limbs& y) {
+    std::size_t nx = x.size(), ny = y.size();
+    while (nx && x[nx - 1] == 0) --nx;
+    while (ny && y[ny - 1] == 0) --ny;
+    if (nx != ny) return nx > ny ? 1 : -1;
+    for (std::size_t i = nx; i-- > 0;)
+      if (x[i] != y[i]) return x[i] > y[i] ? 1 : -1;
+    return 0;
+  }
+
+  int sign_ = 0;
+  std::int64_t exponent_ = 0;
+  Limbs limbs_;  // little endian, no zero limb at either end
+};
+
+}  // namespace tauguard::geometry

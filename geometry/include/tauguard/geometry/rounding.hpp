@@ -1,0 +1,24 @@
+// The derived error bounds assume round-to-nearest. A caller (or a library it loaded) may have left
+// another mode behind; the guard sets ours and puts theirs back, exceptions included.
+#pragma once
+
+#include <cfenv>
+
+namespace tauguard::geometry {
+
+class RoundToNearest {
+ public:
+  RoundToNearest() : saved_(std::fegetround()) {
+    if (saved_ != FE_TONEAREST) std::fesetround(FE_TONEAREST);
+  }
+  ~RoundToNearest() {
+    if (saved_ != FE_TONEAREST) std::fesetround(saved_);
+  }
+  RoundToNearest(const RoundToNearest&) = delete;
+  RoundToNearest& operator=(const RoundToNearest&) = delete;
+
+ private:
+  int saved_;
+};
+
+}  // namespace tauguard::geometry

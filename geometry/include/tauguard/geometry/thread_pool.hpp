@@ -1,0 +1,125 @@
+// A small persistent thread pool. Work is cut into chunks whose bounds depend on the problem alone, never
+// on the number of threads: a kernel that writes into slots indexed by item or by chunk gives the same
+// bits for any thread count.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "tauguard/geometry/rounding.hpp"
+
+namespace tauguard::geometry {
+
+class ThreadPool {
+ public:
+  // One pool per native module, grown to the largest number of threads asked for.
+  static ThreadPool& shared() {
+    static ThreadPool pool;
+    return pool;
+  }
+
+  // The default for `threads=0`: the processors there are.
+  static int hardware() { return std::max(1u, std::thread::hardware_concurrency()); }
+
+  // Calls body(begin, end, chunk) for consecutive chunks of `grain` items covering [0, n), on up to
+  // `threads` threads (the caller is one of them; 0 means all processors). Rounding is to nearest in
+  // every thread. The first exception thrown is rethrown here after all chunks have stopped.
+  void parallel_for(std::size_t n, int threads, std::size_t grain,
+                    const std::function<void(std::size_t, std::size_t, std::size_t)>& body) {
+    if (n == 0) return;
+    grain = std::max<std::size_t>(grain, 1);
+    const std::size_t chunks = (n + grain - 1) / grain;
+    const RoundToNearest guard;
+    const std::size_t wanted = std::min<std::size_t>(threads <= 0 ? hardware() : threads, chunks);
+    if (wanted <= 1) {
+      for (std::size_t c = 0; c < chunks; ++c) body(c * grain, std::min(n, (c + 1) * grain), c);
+      return;
+    }
+    const std::lock_guard<std::mutex> one_caller(caller_);
+    job_.body = &body;
+    job_.n = n;
+    job_.grain = grain;
+    job_.chunks = chunks;
+    job_.next.store(0);
+    job_.error = nullptr;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      while (workers_.size() + 1 < wanted) workers_.emplace_back([this, i = workers_.size()] { serve(i); });
+      helpers_ = wanted - 1;
+      busy_ = helpers_;
+      ++generation_;
+    }
+    wake_.notify_all();
+    work();
+    std::unique_lock<std::mutex> lock(mutex_);
+    done_.wait(lock, [this] { return busy_ == 0; });
+    if (job_.error) std::rethrow_exception(job_.error);
+  }
+
+  ~ThreadPool() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stop_ = true;
+      ++generation_;
+    }
+    wake_.notify_all();
+    for (auto& w : workers_) w.join();
+  }
+
+ private:
+  struct Job {
+    const std::function<void(std::size_t, std::size_t, std::size_t)>* body = nullptr;
+    std::size_t n = 0, grain = 1, chunks = 0;
+    std::atomic<std::size_t> next{0};
+    std::exception_ptr error;
+    std::mutex error_mutex;
+  };
+
+  void work() {
+    for (;;) {
+      const std::size_t c = job_.next.fetch_add(1);
+      if (c >= job_.chunks) return;
+      try {
+        (*job_.body)(c * job_.grain, std::min(job_.n, (c + 1) * job_.grain), c);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(job_.error_mutex);
+        if (!job_.error) job_.error = std::current_exception();
+        job_.next.store(job_.chunks);
+      }
+    }
+  }
+
+  void serve(std::size_t index) {
+    const RoundToNearest guard;
+    std::size_t seen = 0;
+    for (;;) {
+      {
+        std::unique_lock<std::mutex> lock(mutex_);
+        // A worker that this job does not count (or one born after it started) sleeps through it.
+        wake_.wait(lock, [&] { return generation_ != seen; });
+        seen = generation_;
+        if (stop_) return;
+        if (index >= helpers_) continue;
+      }
+      work();
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (--busy_ == 0) done_.notify_one();
+    }
+  }
+
+  std::mutex caller_, mutex_;
+  std::condition_variable wake_, done_;
+  std::vector<std::thread> workers_;
+  Job job_;
+  std::size_t helpers_ = 0, busy_ = 0, generation_ = 0;
+  bool stop_ = false;
+};
+
+}  // namespace tauguard::geometry

@@ -1,0 +1,36 @@
+"""Exact orientation signs (Shewchuk 1997, with dyadic big numbers behind the filter)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.geometry import _geometry
+from tauguard.geometry.arrays import finite
+
+
+def orient3d(points: ArrayLike, threads: int = 1) -> NDArray[np.int8]:
+    """Sign of ``((b - a) x (c - a)) . (d - a)`` for rows ``a, b, c, d``.
+
+    Args:
+        points: Shape (N, 4, 3), any unit. Every finite double is legal.
+        threads: 0 means all processors; the answer does not depend on it.
+
+    Returns:
+        Shape (N,), each -1, 0 or 1, never wrong.
+
+    Raises:
+        ValueError: wrong shape, or an entry that is not finite.
+    """
+    array = finite("points", points, (None, 4, 3))
+    out = np.empty(len(array), dtype=np.int8)
+    _geometry.orient3d(array, out, threads)
+    return out
+
+
+def orient2d(points: ArrayLike, threads: int = 1) -> NDArray[np.int8]:
+    """Sign of ``(b - a) x (c - a)`` for rows ``a, b, c``, shape (N, 3, 2); see :func:`orient3d`."""
+    array = finite("points", points, (None, 3, 2))
+    out = np.empty(len(array), dtype=np.int8)
+    _geometry.orient2d(array, out, threads)
+    return out

@@ -1,0 +1,1 @@
+"""Playback of traces in rerun."""

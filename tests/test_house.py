@@ -1,0 +1,63 @@
+"""The house rules that imports can show: dependencies point one way, and light rooms stay light."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+ALLOWED = {
+    "geometry": set(),
+    "traces": set(),
+    "models": set(),
+    "cloth": {"geometry"},
+    "rigid": {"geometry"},
+    "detectors": {"traces", "models"},
+    "contacts": {"cloth", "rigid", "models", "traces"},
+    "envs": {"models", "contacts", "detectors", "traces"},
+    "datasets": {"envs", "traces", "models", "detectors"},
+    "replay": {"traces", "models"},
+}
+
+
+def rooms_imported(path: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = [node.module] + [f"{node.module}.{alias.name}" for alias in node.names]
+        for name in names:
+            parts = name.split(".")
+            if parts[0] == "tauguard" and len(parts) > 1:
+                found.add(parts[1])
+    return found
+
+
+@pytest.mark.parametrize("room", sorted(ALLOWED))
+def test_imports_point_one_way(room):
+    for path in (ROOT / room).rglob("*.py"):
+        backward = (rooms_imported(path) & ALLOWED.keys()) - ALLOWED[room] - {room}
+        assert not backward, f"{path.relative_to(ROOT)} imports {sorted(backward)}"
+
+
+@pytest.mark.parametrize("room", ["geometry", "cloth", "rigid", "traces"])
+def test_light_rooms_leave_heavy_libraries_unloaded(room):
+    code = (
+        f"import sys, tauguard.{room}; "
+        "print([m for m in ('mujoco', 'pinocchio', 'sklearn', 'rerun') if m in sys.modules])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "[]"
+
+
+def test_nothing_generic_is_importable_by_itself():
+    code = "import datasets"
+    out = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT / "tests"
+    )
+    assert "ModuleNotFoundError" in out.stderr

@@ -1,0 +1,1 @@
+../../../src/tauguard/__init__.py

@@ -1,0 +1,1 @@
+"""The typed values that flow through tauguard, and their MCAP form."""
