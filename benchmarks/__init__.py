@@ -1,1 +1,10 @@
-"""Speed against error: one file a study."""
+"""Speed against error: one file a study, one table and one figure each.
+
+A study is a module ``tauguard.benchmarks.<name>`` with two functions::
+
+    def run(quick: bool, seed: int) -> list[dict[str, object]]   # flat rows
+    def draw(rows: list[dict[str, object]], figure: matplotlib.figure.Figure) -> None
+"""
+
+#: Every study and its one-line description, in the order of ``tauguard bench list``.
+STUDIES: dict[str, str] = {}

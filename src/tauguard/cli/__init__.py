@@ -1,8 +1,64 @@
-"""The command line: one file a command, heavy imports inside the command."""
+"""The command line: one file a command, heavy imports inside the command.
+
+A command is a module ``tauguard.cli.<name>`` with a function ``command`` whose signature tyro turns
+into flags. It raises ``ValueError`` or ``OSError`` with one helpful line for bad input (exit code 2)
+and ``SystemExit`` with its own code where a script needs to tell outcomes apart.
+"""
 
 from __future__ import annotations
 
+import difflib
+import importlib
+import sys
+from collections.abc import Sequence
 
-def main() -> None:
-    """Entry point of ``tauguard``."""
-    raise SystemExit("tauguard: no command is built yet")
+COMMANDS = {
+    "bench": "run one study of speed against error: a table, a figure, --json",
+}
+
+EPILOG = """\
+`tauguard COMMAND --help` explains a command. Exit codes: 0 done, 1 a defect of tauguard, 2 bad input.
+tauguard is a research tool, not a certified safety function."""
+
+
+def usage() -> str:
+    """The text of ``tauguard --help``."""
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:<{width}}  {line}" for name, line in COMMANDS.items()]
+    return "\n".join(["usage: tauguard COMMAND [OPTIONS]", "", *lines, "", EPILOG])
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Entry point of ``tauguard``: find the command, parse its flags, run it."""
+    args = list(sys.argv[1:] if argv is None else argv)
+    if not args or args[0] in ("-h", "--help"):
+        print(usage())
+        return
+    if args[0] == "--version":
+        from tauguard import __version__
+
+        print(__version__)
+        return
+    name = args[0]
+    if name not in COMMANDS:
+        near = difflib.get_close_matches(name, COMMANDS, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"commands: {', '.join(COMMANDS)}"
+        fail(f"unknown command {name!r}: {hint}")
+    module = importlib.import_module(f"tauguard.cli.{name.replace('-', '_')}")
+
+    import tyro
+
+    try:
+        tyro.cli(module.command, args=args[1:], prog=f"tauguard {name}")
+    except BrokenPipeError:
+        sys.stderr.close()
+    except KeyboardInterrupt:
+        raise SystemExit(130) from None
+    except (ValueError, OSError) as error:
+        fail(f"{name}: {error}")
+
+
+def fail(message: str) -> None:
+    """One line on the standard error stream, exit code 2."""
+    print("tauguard " + " ".join(message.split()), file=sys.stderr)
+    raise SystemExit(2)

@@ -1,0 +1,186 @@
+"""What every study shares: rates with intervals, timings with spread, the table, the JSON form."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import json
+import os
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tauguard.benchmarks import STUDIES
+
+Row = dict[str, Any]
+
+_PACKAGES = (
+    "tauguard",
+    "mujoco",
+    "pin",
+    "coal",
+    "numpy",
+    "scipy",
+    "scikit-learn",
+    "gymnasium",
+    "ipctk",
+)
+
+
+def rate(successes: int, trials: int) -> dict[str, float | int | None]:
+    """A proportion with its Wilson 95 % interval (Wilson 1927); all ``None`` where n is 0."""
+    if trials == 0:
+        return {"value": None, "low": None, "high": None, "n": 0}
+    z = 1.959963984540054
+    p = successes / trials
+    centre = (p + z * z / (2 * trials)) / (1 + z * z / trials)
+    half = z / (1 + z * z / trials) * np.sqrt(p * (1 - p) / trials + z * z / (4 * trials**2))
+    low = 0.0 if successes == 0 else max(0.0, float(centre - half))
+    high = 1.0 if successes == trials else min(1.0, float(centre + half))
+    return {"value": p, "low": low, "high": high, "n": trials}
+
+
+def measure(
+    calls: Mapping[str, Callable[[], object]], repeats: int = 5
+) -> dict[str, dict[str, float]]:
+    """Seconds of each call, the calls taken in turn (A B A B ...) after one warm-up each.
+
+    Taking turns lets a drift of the machine's speed hit every competitor alike.
+
+    Returns:
+        Per name ``{"median", "low", "high"}``: the median, minimum and maximum over the repeats [s].
+    """
+    for call in calls.values():
+        call()
+    times: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(repeats):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            call()
+            times[name].append(time.perf_counter() - start)
+    return {
+        name: {"median": float(np.median(t)), "low": min(t), "high": max(t)}
+        for name, t in times.items()
+    }
+
+
+def machine() -> Row:
+    """What the figures were measured on."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
+        model = names[0].split(":", 1)[1].strip() if names else model
+    return {"processor": model, "cores": os.cpu_count(), "system": platform.system()}
+
+
+def versions() -> dict[str, str]:
+    """The versions of what was measured; a package that is not installed is left out."""
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def cell(value: object) -> str:
+    """One value as the table shows it: three digits, a rate as value [low, high]."""
+    if value is None:
+        return "-"
+    if isinstance(value, Mapping) and "value" in value:
+        if value["value"] is None:
+            return "-"
+        return f"{value['value']:.3f} [{value['low']:.3f}, {value['high']:.3f}]"
+    if isinstance(value, Mapping) and "median" in value:
+        return f"{value['median']:.3g} [{value['low']:.3g}, {value['high']:.3g}]"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float | np.floating):
+        return f"{value:.3g}" if abs(value) < 1e5 else f"{value:.2e}"
+    return str(value)
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Rows of one study as aligned columns; rows with the same keys share a header."""
+    blocks: list[str] = []
+    start = 0
+    while start < len(rows):
+        keys = list(rows[start])
+        stop = start
+        while stop < len(rows) and list(rows[stop]) == keys:
+            stop += 1
+        cells = [keys] + [[cell(row[key]) for key in keys] for row in rows[start:stop]]
+        widths = [max(len(line[i]) for line in cells) for i in range(len(keys))]
+        lines = [
+            "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip()
+            for line in cells
+        ]
+        lines.insert(1, "  ".join("-" * w for w in widths))
+        blocks.append("\n".join(lines))
+        start = stop
+    return "\n\n".join(blocks)
+
+
+def write_json(path: Path, payload: Mapping[str, object]) -> None:
+    """Write ``payload`` so that a reader never sees half a file (temporary file, then rename)."""
+    text = json.dumps(payload, indent=2, default=_plain, allow_nan=False) + "\n"
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
+    part = path.with_name(path.name + ".part")
+    part.write_text(text)
+    part.replace(path)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no JSON form")
+
+
+def run_study(
+    name: str, *, quick: bool, seed: int, json_path: Path | None, figure_path: Path | None
+) -> list[Row]:
+    """Run the study ``name``: print its table, draw its figure, write its JSON.
+
+    Raises:
+        ValueError: no such study; the message lists those there are.
+    """
+    if name not in STUDIES:
+        raise ValueError(f"no study {name!r}: there are {', '.join(STUDIES) or 'none yet'}")
+    study = importlib.import_module(f"tauguard.benchmarks.{name}")
+    rows: list[Row] = study.run(quick=quick, seed=seed)
+    print(table(rows))
+
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure_path = figure_path or Path(f"bench-{name}.png")
+    figure = plt.figure(figsize=(11, 7), layout="constrained")
+    study.draw(rows, figure)
+    figure.savefig(figure_path, dpi=120)
+    plt.close(figure)
+    print(f"figure: {figure_path}")
+    if json_path is not None:
+        write_json(
+            json_path,
+            {
+                "name": name,
+                "quick": quick,
+                "machine": machine(),
+                "versions": versions(),
+                "seed": seed,
+                "rows": rows,
+            },
+        )
+        print(f"json: {json_path}")
+    return rows

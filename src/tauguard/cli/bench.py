@@ -1,0 +1,34 @@
+"""``tauguard bench NAME``: one study of speed against error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+def command(
+    name: Annotated[str, tyro.conf.Positional],
+    /,
+    quick: bool = False,
+    seed: int = 0,
+    json: Path | None = None,
+    figure: Path | None = None,
+) -> None:
+    """Run one study of speed against error and print its table.
+
+    Args:
+        name: the study: one of those `tauguard bench list` names.
+        quick: a shorter run, 60 s or less on 2 cores (the full one takes up to 30 minutes).
+        seed: of every random input.
+        json: write the figures here as JSON.
+        figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
+    """
+    from tauguard.benchmarks import STUDIES, report
+
+    if name == "list":
+        for study, line in STUDIES.items():
+            print(f"  {study}  {line}")
+        return
+    report.run_study(name, quick=quick, seed=seed, json_path=json, figure_path=figure)
