@@ -52,7 +52,7 @@ def measure(
     Taking turns lets a drift of the machine's speed hit every competitor alike.
 
     Returns:
-        Per name ``{"median", "low", "high"}``: the median, minimum and maximum over the repeats [s].
+        Per name ``{"median", "low", "high"}``: median, minimum and maximum over the repeats [s].
     """
     for call in calls.values():
         call()
@@ -101,7 +101,9 @@ def cell(value: object) -> str:
         return f"{value['median']:.3g} [{value['low']:.3g}, {value['high']:.3g}]"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, float | np.floating):
+    if isinstance(value, np.floating):
+        value = float(value)
+    if isinstance(value, float):
         return f"{value:.3g}" if abs(value) < 1e5 else f"{value:.2e}"
     return str(value)
 

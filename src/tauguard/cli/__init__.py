@@ -1,8 +1,8 @@
 """The command line: one file a command, heavy imports inside the command.
 
-A command is a module ``tauguard.cli.<name>`` with a function ``command`` whose signature tyro turns
-into flags. It raises ``ValueError`` or ``OSError`` with one helpful line for bad input (exit code 2)
-and ``SystemExit`` with its own code where a script needs to tell outcomes apart.
+A command is a module ``tauguard.cli.<name>`` with a function ``command`` whose signature tyro
+turns into flags. It raises ``ValueError`` or ``OSError`` with one helpful line for bad input (exit
+code 2) and ``SystemExit`` with its own code where a script needs to tell outcomes apart.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ COMMANDS = {
 }
 
 EPILOG = """\
-`tauguard COMMAND --help` explains a command. Exit codes: 0 done, 1 a defect of tauguard, 2 bad input.
+`tauguard COMMAND --help` explains a command.
+Exit codes: 0 done, 1 a defect of tauguard, 2 bad input.
 tauguard is a research tool, not a certified safety function."""
 
 

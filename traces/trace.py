@@ -1,0 +1,122 @@
+"""The typed values that flow: what a robot gives, what is true, what a detector said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+KINDS = ("strike", "clamp", "pulse")
+
+
+@dataclass(frozen=True)
+class Collision:
+    """One labelled collision: what struck the arm, when, where and how hard."""
+
+    kind: str  #: "strike" (a moving obstacle), "clamp" (a fixed one) or "pulse" (a wrench pulse)
+    onset: float  #: time of the first sample with a contact force above 0 N [s]
+    end: float  #: time of the last such sample [s]
+    link: int  #: the struck link, 1-based: link i moves with joint i
+    point: Array  #: where, at the sample of peak force, world frame [m], shape (3,)
+    force: Array  #: peak contact force on the arm, world frame [N], shape (3,)
+    peak_tau: float  #: largest ``|tau_ext|`` over joints 1-4 [N m]: the severity axis
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is true and no real robot tells; rows are samples, as in :class:`Trace`."""
+
+    tau_ext: Array  #: torque of contacts and applied wrenches at the joints [N m], shape (T, n)
+    contact_force: Array  #: norm of the net external contact force on the arm [N], shape (T,)
+    collisions: tuple[Collision, ...]
+    payload: Array  #: mass carried at the flange and not told to the observer [kg], shape (T,)
+    contact_link: NDArray[np.int64]  #: link of the largest contact force, 0 for none, shape (T,)
+    contact_point: Array  #: its point, world frame [m], NaN where there is none, shape (T, 3)
+    contact_vector: Array  #: its force on the arm, world frame [N], 0 for none, shape (T, 3)
+    obstacle_names: tuple[str, ...] = ()  #: bodies of the scene that move by themselves
+    obstacle_poses: Array = field(default_factory=lambda: np.empty((0, 0, 4, 4)))
+    """World poses of the obstacles, homogeneous, shape (T, len(obstacle_names), 4, 4)."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One recording of an arm: measured signals in rows of samples, and the truth if it is known.
+
+    The current is signed and belongs to the same instant as ``q``; ``tau = gain * current`` is what
+    the drive applies at the joint, before joint friction.
+    """
+
+    joint_names: tuple[str, ...]
+    t: Array  #: strictly increasing [s], shape (T,)
+    q: Array  #: measured joint positions [rad], shape (T, n)
+    qd: Array  #: measured joint velocities [rad/s], shape (T, n)
+    current: Array  #: measured motor currents [A], shape (T, n)
+    q_des: Array | None = None  #: commanded positions [rad], shape (T, n)
+    qd_des: Array | None = None  #: commanded velocities [rad/s], shape (T, n)
+    qdd_des: Array | None = None  #: commanded accelerations [rad/s^2], shape (T, n)
+    truth: Truth | None = None
+    meta: Mapping[str, str] = field(default_factory=dict)
+    """Seed, versions, configuration hash, model hash and whatever else describes the run."""
+    attachments: Mapping[str, str] = field(default_factory=dict)
+    """Text files that belong to the run, by name: the MJCF of the scene, the configuration."""
+
+    def __post_init__(self) -> None:
+        """Check shapes and values.
+
+        Raises:
+            ValueError: a shape that does not fit, a value that is not finite, time not increasing;
+                the message names the field and the first bad row.
+        """
+        rows, joints = len(self.t), len(self.joint_names)
+        signals = {"q": self.q, "qd": self.qd, "current": self.current}
+        signals |= {
+            name: value
+            for name in ("q_des", "qd_des", "qdd_des")
+            if (value := getattr(self, name)) is not None
+        }
+        if self.truth is not None:
+            signals["truth.tau_ext"] = self.truth.tau_ext
+        for name, value in signals.items():
+            if value.shape != (rows, joints):
+                raise ValueError(
+                    f"{name}: shape {value.shape}, expected ({rows}, {joints}): "
+                    f"{rows} samples of joints {', '.join(self.joint_names)}"
+                )
+        for name, value in {"t": self.t, **signals}.items():
+            if not np.isfinite(value).all():
+                row = int(np.argwhere(~np.isfinite(value))[0][0])
+                raise ValueError(f"{name}: not finite in row {row}")
+        back = np.flatnonzero(np.diff(self.t) <= 0)
+        if back.size:
+            raise ValueError(f"t: not increasing at row {back[0] + 1}")
+
+    @property
+    def dt(self) -> float:
+        """Median sample interval [s]."""
+        return float(np.median(np.diff(self.t)))
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """A maximal run of filtered True; alarms closer than the merge gap are one."""
+
+    start: float  #: [s]
+    end: float  #: [s]
+
+
+@dataclass(frozen=True)
+class Detection:
+    """What a detector said about a trace; rows are the trace's samples."""
+
+    detector: str  #: the detector's name
+    t: Array  #: [s], shape (T,)
+    residual: Array  #: the observer's estimate of ``tau_ext`` [N m], shape (T, n)
+    score: Array  #: the detector's output; above ``threshold`` is a raw alarm, shape (T,)
+    threshold: float
+    alarm: Bools  #: after the output filter, shape (T,)
+    alarms: tuple[Alarm, ...]
