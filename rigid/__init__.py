@@ -1,1 +1,6 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
+
+from tauguard.rigid.results import Impacts, Overlap, Witness
+from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Tetrahedra
+
+__all__ = ["Boxes", "Hulls", "Impacts", "Overlap", "Parallelepipeds", "Tetrahedra", "Witness"]

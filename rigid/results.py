@@ -1,0 +1,60 @@
+"""What the queries answer, row by row: frozen values of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """Why a pair overlaps or not, to rounding; rows of the other case are NaN.
+
+    Attributes:
+        point: A common point where the pair overlaps. Shape (N, 3).
+        normal: Unit normal of a separating plane, from a to b, elsewhere. Shape (N, 3).
+        offset: The plane is ``normal @ x = offset``: a lies below it, b above. Shape (N,).
+    """
+
+    point: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    offset: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """Answer of an overlap query.
+
+    Attributes:
+        hit: True where the two sets share a point (touching counts). Shape (N,).
+    """
+
+    hit: NDArray[np.bool_]
+    _find_witness: Callable[[], Witness] = field(repr=False)
+
+    @cached_property
+    def witness(self) -> Witness:
+        """A common point or a separating plane of each row, computed at the first access."""
+        return self._find_witness()
+
+
+@dataclass(frozen=True, eq=False)
+class Impacts:
+    """First contact of two moving bodies, row by row.
+
+    Attributes:
+        hit: True where they touch within the step. Shape (N,).
+        toi: Time of impact in [0, 1] of the step; inf where there is no hit. Shape (N,).
+        point: A common point at that time, world frame; NaN where there is none. Shape (N, 3).
+        normal: Unit contact normal from a to b at that time; NaN where there is none, or where the
+            bodies overlap from the start and no normal is defined. Shape (N, 3).
+    """
+
+    hit: NDArray[np.bool_]
+    toi: NDArray[np.float64]
+    point: NDArray[np.float64]
+    normal: NDArray[np.float64]

@@ -1,0 +1,174 @@
+"""Batches of convex bodies on plain arrays: tetrahedra, boxes, parallelepipeds and vertex hulls.
+
+A batch holds N bodies of one kind. Degenerate bodies are legal: a flat tetrahedron, a box without
+thickness, a single point. Lengths are in any one unit, the same for both sides of a query.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.geometry import finite
+
+#: How far an entry of R^T R may be from the identity; beyond it R is refused as not a rotation.
+ORTHONORMAL_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Tetrahedra:
+    """The convex hulls of four points each, in any order and orientation.
+
+    Args:
+        vertices: Shape (N, 4, 3).
+
+    Raises:
+        ValueError: wrong shape, or an entry that is not finite (named with its row).
+    """
+
+    vertices: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", finite("vertices", self.vertices, (None, 4, 3)))
+
+    def __len__(self) -> int:
+        return len(self.vertices)
+
+    @cached_property
+    def packed(self) -> NDArray[np.float64]:
+        """The numbers of a body in one row, as the native kernels read them. Shape (N, 12)."""
+        return self.vertices.reshape(len(self), 12)
+
+
+@dataclass(frozen=True, eq=False)
+class Boxes:
+    """The sets ``center + rotation @ diag(half_extents) @ u``, ``|u| <= 1`` per coordinate.
+
+    The set is that of the doubles as given: a rotation that is orthonormal to rounding only spans a
+    slightly oblique box, and answers are about that one.
+
+    Args:
+        center: Shape (N, 3).
+        half_extents: Shape (N, 3), zero or more.
+        rotation: Shape (N, 3, 3), body to world; entries of R^T R within 1e-6 of the identity.
+
+    Raises:
+        ValueError: wrong shapes or lengths, an entry that is not finite, a negative half extent, a
+            rotation that is not orthonormal (named with its row).
+    """
+
+    center: NDArray[np.float64]
+    half_extents: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        center = finite("center", self.center, (None, 3))
+        half_extents = finite("half_extents", self.half_extents, (len(center), 3))
+        rotation = finite("rotation", self.rotation, (len(center), 3, 3))
+        if (half_extents < 0).any():
+            row, axis = np.argwhere(half_extents < 0)[0]
+            raise ValueError(
+                f"half_extents: {half_extents[row, axis]} in row {row}; expected 0 or more"
+            )
+        with np.errstate(over="ignore", invalid="ignore"):
+            deviation = np.abs(rotation.transpose(0, 2, 1) @ rotation - np.eye(3)).max(axis=(1, 2))
+        bad = ~(deviation <= ORTHONORMAL_TOLERANCE)
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise ValueError(
+                f"rotation: row {row} is off orthonormal by {deviation[row]:.3g}; "
+                f"expected at most {ORTHONORMAL_TOLERANCE:g}"
+            )
+        object.__setattr__(self, "center", center)
+        object.__setattr__(self, "half_extents", half_extents)
+        object.__setattr__(self, "rotation", rotation)
+
+    def __len__(self) -> int:
+        return len(self.center)
+
+    @cached_property
+    def packed(self) -> NDArray[np.float64]:
+        """Centre, half extents and rotation (row-major) of a body in one row. Shape (N, 15)."""
+        flat = self.rotation.reshape(len(self), 9)
+        return np.concatenate([self.center, self.half_extents, flat], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Parallelepipeds:
+    """The sets ``origin + s @ edges``, ``0 <= s <= 1`` per coordinate.
+
+    Args:
+        origin: A corner. Shape (N, 3).
+        edges: ``edges[n, k]`` is the k-th edge vector from it. Shape (N, 3, 3).
+
+    Raises:
+        ValueError: wrong shapes or lengths, or an entry that is not finite (named with its row).
+    """
+
+    origin: NDArray[np.float64]
+    edges: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "origin", finite("origin", self.origin, (None, 3)))
+        object.__setattr__(self, "edges", finite("edges", self.edges, (len(self.origin), 3, 3)))
+
+    def __len__(self) -> int:
+        return len(self.origin)
+
+    @cached_property
+    def packed(self) -> NDArray[np.float64]:
+        """Origin and the three edges of a body in one row. Shape (N, 12)."""
+        return np.concatenate([self.origin, self.edges.reshape(len(self), 9)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Hulls:
+    """The convex hulls of any number of points each.
+
+    Body n owns ``vertices[offsets[n]:offsets[n + 1]]``.
+
+    Args:
+        vertices: Shape (M, 3). Points inside the hull are legal.
+        offsets: Shape (N + 1,), integers, strictly increasing from 0 to M.
+
+    Raises:
+        ValueError: wrong shapes, an entry that is not finite, offsets that do not partition the
+            vertices, or an empty hull (named with its row).
+    """
+
+    vertices: NDArray[np.float64]
+    offsets: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        vertices = finite("vertices", self.vertices, (None, 3))
+        offsets = np.asarray(self.offsets)
+        if offsets.ndim != 1 or len(offsets) == 0 or not np.issubdtype(offsets.dtype, np.integer):
+            raise ValueError(
+                f"offsets: shape {offsets.shape} of {offsets.dtype}, expected (N + 1,) integers"
+            )
+        if offsets[0] != 0 or offsets[-1] != len(vertices):
+            raise ValueError(
+                f"offsets: run from {offsets[0]} to {offsets[-1]}, expected 0 to {len(vertices)}"
+            )
+        if (np.diff(offsets) <= 0).any():
+            row = int(np.argmax(np.diff(offsets) <= 0))
+            raise ValueError(
+                f"offsets: hull {row} is empty (offsets {offsets[row]} and {offsets[row + 1]}); "
+                "expected strictly increasing offsets"
+            )
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "offsets", np.ascontiguousarray(offsets, dtype=np.int64))
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    @property
+    def packed(self) -> NDArray[np.float64]:
+        """The vertices of all bodies. Shape (M, 3)."""
+        return self.vertices
+
+
+Bodies = Tetrahedra | Boxes | Parallelepipeds | Hulls
