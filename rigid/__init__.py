@@ -1,6 +1,16 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
+from tauguard.rigid.queries import overlap
 from tauguard.rigid.results import Impacts, Overlap, Witness
 from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Tetrahedra
 
-__all__ = ["Boxes", "Hulls", "Impacts", "Overlap", "Parallelepipeds", "Tetrahedra", "Witness"]
+__all__ = [
+    "Boxes",
+    "Hulls",
+    "Impacts",
+    "Overlap",
+    "Parallelepipeds",
+    "Tetrahedra",
+    "Witness",
+    "overlap",
+]

@@ -1,2 +1,26 @@
+import numpy as np
+from numpy.typing import NDArray
+
 # convex bodies
 def has_avx2() -> bool: ...
+def overlap(
+    kind_a: int,
+    a: NDArray[np.float64],
+    offsets_a: NDArray[np.int64],
+    kind_b: int,
+    b: NDArray[np.float64],
+    offsets_b: NDArray[np.int64],
+    method: int,
+    threads: int,
+    hit: NDArray[np.uint8],
+) -> int: ...
+def witnesses(
+    kind_a: int,
+    a: NDArray[np.float64],
+    offsets_a: NDArray[np.int64],
+    kind_b: int,
+    b: NDArray[np.float64],
+    offsets_b: NDArray[np.int64],
+    threads: int,
+    out: NDArray[np.float64],
+) -> None: ...

@@ -1,7 +1,25 @@
 // The convex half of tauguard.rigid._rigid.
 #include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include "convex_overlap.hpp"
 
 namespace nb = nanobind;
+using namespace tauguard::rigid;
+
+namespace {
+
+using Data = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Offsets = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+Bodies view(int kind, const Data& data, const Offsets& offsets) {
+  const bool hulls = kind == static_cast<int>(Kind::hulls);
+  return {static_cast<Kind>(kind), data.data(), offsets.data(), hulls ? offsets.shape(0) - 1 : data.shape(0)};
+}
+
+}  // namespace
 
 void bind_convex(nb::module_& m) {
   m.def("has_avx2", [] {
@@ -10,5 +28,16 @@ void bind_convex(nb::module_& m) {
 #else
     return false;
 #endif
+  });
+  m.def("overlap", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b, int method,
+                      int threads, Hits hit) {
+    nb::gil_scoped_release release;
+    return overlap(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
+                   static_cast<Method>(method), threads, hit.data());
+  });
+  m.def("witnesses", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
+                        int threads, Rows out) {
+    nb::gil_scoped_release release;
+    witnesses(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), out.shape(0), threads, out.data());
   });
 }

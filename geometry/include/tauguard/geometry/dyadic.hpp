@@ -105,6 +105,13 @@ class Dyadic {
   friend bool operator<=(const Dyadic& a, const Dyadic& b) { return compare(a, b) <= 0; }
   friend bool operator==(const Dyadic& a, const Dyadic& b) { return compare(a, b) == 0; }
 
+  // The e with 2^e <= |x| < 2^(e + 1); x must not be zero.
+  std::int64_t floor_log2() const {
+    int bits = 31;
+    while (!(limbs_.back() >> bits)) --bits;
+    return exponent_ + 32 * static_cast<std::int64_t>(limbs_.size() - 1) + bits;
+  }
+
   // Truncation towards zero to about 53 bits; +-inf or 0 where the value leaves the range of double.
   double to_double() const {
     if (is_zero()) return 0.0;

@@ -1,0 +1,88 @@
+"""coal's GJK, pair by pair: the peer behind ``method="gjk"`` and in the study ``rigid``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Tetrahedra
+
+_TETRAHEDRON_FACES = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+_BLOCK_FACES = (
+    *((0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4)),
+    *((2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6), (1, 3, 5), (3, 7, 5)),
+)
+
+
+def coal_module() -> Any:
+    """The module ``coal`` (it comes with ``pin``).
+
+    Raises:
+        ValueError: it is not installed.
+    """
+    try:
+        import coal
+    except ImportError as error:
+        raise ValueError(
+            f"method: gjk needs the package pin, which brings coal ({error})"
+        ) from None
+    return coal
+
+
+def collide(a: Bodies, b: Bodies, count: int) -> NDArray[np.bool_]:
+    """coal's boolean answer of ``count`` rows. Its tolerance is coal's own (1e-6 and the like)."""
+    coal = coal_module()
+    left, right = geometries(a), geometries(b)
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    hit = np.zeros(count, dtype=np.bool_)
+    for i in range(count):
+        result.clear()
+        ga, ta = left[i if len(left) > 1 else 0]
+        gb, tb = right[i if len(right) > 1 else 0]
+        hit[i] = coal.collide(ga, ta, gb, tb, request, result) > 0
+    return hit
+
+
+def geometries(bodies: Bodies) -> list[tuple[Any, Any]]:
+    """coal's shape and pose of each body."""
+    coal = coal_module()
+    if isinstance(bodies, Boxes):
+        return [
+            (coal.Box(2 * half), coal.Transform3s(rotation, center))
+            for center, half, rotation in zip(
+                bodies.center, bodies.half_extents, bodies.rotation, strict=True
+            )
+        ]
+    return [
+        (_convex(coal, points, faces), coal.Transform3s.Identity())
+        for points, faces in _hulls(bodies)
+    ]
+
+
+def _hulls(bodies: Bodies) -> list[tuple[NDArray[np.float64], Any]]:
+    if isinstance(bodies, Tetrahedra):
+        return [(points, _TETRAHEDRON_FACES) for points in bodies.vertices]
+    if isinstance(bodies, Parallelepipeds):
+        corners = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], dtype=np.float64)
+        points = bodies.origin[:, None] + corners @ bodies.edges
+        return [(p, _BLOCK_FACES) for p in points]
+    if isinstance(bodies, Hulls):
+        return [
+            (bodies.vertices[i:j], None)
+            for i, j in zip(bodies.offsets, bodies.offsets[1:], strict=False)
+        ]
+    raise TypeError(type(bodies).__name__)
+
+
+def _convex(coal: Any, points: NDArray[np.float64], faces: Any) -> Any:
+    cloud = coal.StdVec_Vec3s()
+    for p in points:
+        cloud.append(p)
+    if faces is None:
+        return coal.Convex.convexHull(cloud, False, None)
+    triangles = coal.StdVec_Triangle()
+    for face in faces:
+        triangles.append(coal.Triangle(*face))
+    return coal.Convex(cloud, triangles)

@@ -1,0 +1,255 @@
+// Overlap of two convex bodies by eliminating the separating plane.
+//
+// A plane f separates A (f >= 0) from B (f < 0). Its unknowns are the weights of A's facet functions,
+// f = sum_i p_i F_i with p_i >= 0, one row for each vertex b_j: sum_i p_i F_i(b_j) < 0 (a generator of B
+// enters by its absolute value). Facet functions are scaled by determinants, never divided.
+//   * a column all negative: p_i alone separates (a facet of A);
+//   * a row all positive: the vertex b_j is in A, no plane can exist;
+//   * eliminating p_k from a pair of columns combines the rows of opposite sign and leaves an interval
+//     for the ratio p_i / p_k: not empty, and a plane through that edge of A separates. Pairs of facets
+//     that share no edge are redundant (their zero sets meet in less than two bits) and are left out,
+//     and so are rows that the same rule drops;
+//   * the last elimination, of three unknowns, leaves planes through a facet of B, which are the columns
+//     of the transposed table.
+// Nothing else can separate bodies of full dimension, so where every step is certified to fail they
+// share an interior point.
+//
+// Every entry has an error bound E (derived at its place, u = 2^-53; the sum of the stated terms is
+// rounded up to a power of two, which also covers the rounding of E itself). Entries lowered by E that
+// still do not separate, or raised by E that still do, are certain: raising an entry can only hurt a
+// separation. What is certain in neither way is `undecided`. Sizes outside [1e-30, 1e30] are left
+// undecided, so products up to degree nine neither overflow nor lose their relative accuracy.
+#pragma once
+
+#include <algorithm>
+
+#include "convex_bodies.hpp"
+#include "convex_lanes.hpp"
+
+namespace tauguard::rigid {
+
+enum Verdict : std::int8_t { separated = -1, undecided = 0, common = 1 };
+
+inline constexpr double unit = 0x1p-53;
+
+TAUGUARD_INLINE bool in_range(double size) { return size >= 1e-30 && size <= 1e30; }
+TAUGUARD_INLINE double norm1(const double* x) { return std::fabs(x[0]) + std::fabs(x[1]) + std::fabs(x[2]); }
+TAUGUARD_INLINE void cross(const double* x, const double* y, double* out) {
+  out[0] = x[1] * y[2] - x[2] * y[1];
+  out[1] = x[2] * y[0] - x[0] * y[2];
+  out[2] = x[0] * y[1] - x[1] * y[0];
+}
+TAUGUARD_INLINE double dot(const double* x, const double* y) { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; }
+
+// Lanes whose columns x, y (four rows each) leave an interval of ratios r > 0 with x_j + r y_j < 0.
+// A rounding of r moves a row by u |y| r, which the callers' E covers with its slack.
+TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
+  Double4 low = splat(0.0), high = splat(HUGE_VAL);
+  for (int j = 0; j < 4; ++j) {
+    const Double4 ratio = -x[j] / y[j];
+    const Mask4 upper = y[j] >= 0.0;
+    const Double4 h = upper ? ratio : splat(HUGE_VAL), l = upper ? splat(0.0) : ratio;
+    high = min(h, high);
+    low = max(l, low);
+  }
+  return low < high;
+}
+
+// The facet functions of a tetrahedron, lane i the one that vanishes opposite vertex i, at points of
+// which `apex` is the offset from vertex 0: F = n . (p - a0) + c, positive inside.
+struct TetrahedronFacets {
+  Double4 n[3], c;
+  double determinant, size;
+  TAUGUARD_INLINE explicit TetrahedronFacets(const double* v) {
+    double e[3][3], m[4][3];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) e[i][k] = v[3 * (i + 1) + k] - v[k];
+    cross(e[1], e[2], m[1]), cross(e[2], e[0], m[2]), cross(e[0], e[1], m[3]);
+    determinant = dot(e[0], m[1]);
+    const double side = determinant < 0 ? -1.0 : 1.0;
+    for (int k = 0; k < 3; ++k) {
+      m[0][k] = -(m[1][k] + m[2][k] + m[3][k]);
+      n[k] = Double4{m[0][k], m[1][k], m[2][k], m[3][k]} * side;
+    }
+    determinant *= side;
+    c = Double4{determinant, 0.0, 0.0, 0.0};
+    size = std::max({norm1(e[0]), norm1(e[1]), norm1(e[2])});
+  }
+  TAUGUARD_INLINE Double4 at(const double* p) const { return n[0] * p[0] + n[1] * p[1] + n[2] * p[2] + c; }
+};
+
+// E of a tetrahedron's table at points p - a0 of 1-norm at most `reach`, a = the size of A: a component
+// of a normal is off by 4 u a^2 (that of facet 0 by 16 u a^2: a sum of three), the product with a point
+// (itself off by u) by (16 + 3 * 1 + 3 * 3) u a^2 reach and the sum of four by 3 u (a^3 + 3 a^2 reach);
+// the determinant by 8 u a^3, twice, since its sign may be wrong. 19 u a^3 + 37 u a^2 reach, and slack
+// of 8 u of every entry for the ratio of an interval: 64 u a^2 (a + reach).
+TAUGUARD_INLINE double tetrahedron_error(double a, double reach) { return 64 * unit * a * a * (a + reach); }
+
+TAUGUARD_INLINE Verdict abfme_tetrahedra(const double* a, const double* b) {
+  const TetrahedronFacets fa(a);
+  double p[4][3], reach = 0.0;
+  for (int j = 0; j < 4; ++j) {
+    for (int k = 0; k < 3; ++k) p[j][k] = b[3 * j + k] - a[k];
+    reach = std::max(reach, norm1(p[j]));
+  }
+  if (!in_range(fa.size) || !in_range(reach)) return undecided;
+  const double ea = tetrahedron_error(fa.size, reach);
+  Double4 row[4];
+  for (int j = 0; j < 4; ++j) row[j] = fa.at(p[j]);
+  const Double4 top_a = max(max(row[0], row[1]), max(row[2], row[3]));
+  if (any(top_a < -ea)) return separated;
+
+  const TetrahedronFacets fb(b);
+  if (!in_range(fb.size)) return undecided;
+  double far = 0.0;
+  Double4 top_b;
+  for (int j = 0; j < 4; ++j) {
+    double q[3];
+    for (int k = 0; k < 3; ++k) q[k] = a[3 * j + k] - b[k];
+    far = std::max(far, norm1(q));
+    const Double4 column = fb.at(q);
+    top_b = j == 0 ? column : max(top_b, column);
+  }
+  const double eb = tetrahedron_error(fb.size, far);
+  if (any(top_b < -eb)) return separated;
+  for (int j = 0; j < 4; ++j)
+    if (all(row[j] > ea)) return common;
+
+
+  bool certain = fa.determinant > ea && fb.determinant > eb && all(top_a > ea) && all(top_b > eb);
+  Double4 x[4], y[4];
+  for (int pass = 0; pass < 2; ++pass) {
+    const auto open = [&](double shift) __attribute__((always_inline)) {
+      for (int j = 0; j < 4; ++j) {
+        x[j] = row[j] + shift;
+        y[j] = pass == 0 ? turn1(x[j]) : turn2(x[j]);
+      }
+      return any(leaves_interval(x, y));
+    };
+    if (!open(-ea)) continue;
+    if (open(ea)) return separated;
+    certain = false;
+  }
+  return certain ? common : undecided;
+}
+
+// Slabs of a zonotope with three generators: |n_i . (p - centre)| <= determinant, lane i < 3 (lane 3 is
+// zero); n_i is the cross product of the other two generators.
+struct Slabs {
+  Double4 n[3];
+  double determinant, size;
+  TAUGUARD_INLINE explicit Slabs(const Zonotope& z) {
+    double m[3][3];
+    cross(z.g[1], z.g[2], m[0]), cross(z.g[2], z.g[0], m[1]), cross(z.g[0], z.g[1], m[2]);
+    for (int k = 0; k < 3; ++k) n[k] = Double4{m[0][k], m[1][k], m[2][k], 0.0};
+    determinant = std::fabs(dot(z.g[0], m[0]));
+    size = std::max({norm1(z.g[0]), norm1(z.g[1]), norm1(z.g[2])});
+  }
+  TAUGUARD_INLINE Double4 at(const double* p) const { return n[0] * p[0] + n[1] * p[1] + n[2] * p[2]; }
+};
+
+// Zonotope A against tetrahedron B. E of A's table at points p_j = (b_j - origin) - shift, `reach` the
+// largest 1-norm of b_j - origin plus 3 a: a point is off by 3 u reach, a normal by 4 u a^2, an entry by
+// (4 + 3 + 1 + 2) u a^2 reach, the determinant by 8 u a^3 (a <= reach / 3), their sum by one rounding
+// more: 14 u and the slack of 8 u, 32 u a^2 reach. B's planes at A's centre: as tetrahedron_error, with
+// 20 u b^2 for each of the three generators, covered by counting 6 a into the reach.
+TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const double* b) {
+  const Slabs sa(a);
+  double p[4][3], reach = 0.0;
+  for (int j = 0; j < 4; ++j) {
+    double from_origin[3];
+    for (int k = 0; k < 3; ++k) {
+      from_origin[k] = b[3 * j + k] - a.origin[k];
+      p[j][k] = from_origin[k] - a.shift[k];
+    }
+    reach = std::max(reach, norm1(from_origin));
+  }
+  reach += 3 * sa.size;
+  if (!in_range(sa.size) || !in_range(reach)) return undecided;
+  const double ea = 32 * unit * sa.size * sa.size * reach, wall = sa.determinant;
+  Double4 row[4];
+  for (int j = 0; j < 4; ++j) row[j] = sa.at(p[j]);
+  const Double4 top = max(max(row[0], row[1]), max(row[2], row[3]));
+  const Double4 bottom = min(min(row[0], row[1]), min(row[2], row[3]));
+  if (any((bottom > wall + ea) | (top < -wall - ea))) return separated;
+
+  const TetrahedronFacets fb(b);
+  if (!in_range(fb.size)) return undecided;
+  double q[3], far = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    q[k] = a.origin[k] - b[k];
+    far += std::fabs(q[k]);
+    q[k] += a.shift[k];
+  }
+  Double4 column = fb.at(q);
+  for (int i = 0; i < 3; ++i)
+    column += abs(fb.n[0] * a.g[i][0] + fb.n[1] * a.g[i][1] + fb.n[2] * a.g[i][2]);
+  const double eb = tetrahedron_error(fb.size, far + 6 * sa.size);
+  if (any(column < -eb)) return separated;
+  for (int j = 0; j < 4; ++j)
+    if (all(abs(row[j]) < wall - ea)) return common;
+
+  bool certain = wall > ea && fb.determinant > eb && all(column > eb) && all(bottom < wall - ea) &&
+                 all(top > ea - wall);
+  const Double4 side_x{1.0, 1.0, -1.0, -1.0}, side_y{1.0, -1.0, 1.0, -1.0};
+  Double4 x[4], y[4];
+  for (int i = 0; i < 3; ++i) {  // the four edges of A along generator i + 2, one a lane
+    const int k = i == 2 ? 0 : i + 1;
+    const auto open = [&](double shift) __attribute__((always_inline)) {
+      for (int j = 0; j < 4; ++j) {
+        x[j] = wall - side_x * row[j][i] + shift;
+        y[j] = wall - side_y * row[j][k] + shift;
+      }
+      return any(leaves_interval(x, y));
+    };
+    if (!open(-ea)) continue;
+    if (open(ea)) return separated;
+    certain = false;
+  }
+  return certain ? common : undecided;
+}
+
+// Two zonotopes: A's slabs with B's generators C_k = n_i . g_k (lane i) and the offset m of the centres.
+// w = |origin_b - origin_a|_1 + 3 (a + b) bounds every length; the offset is off by 4 u w.
+// Facets: m by 11 u a^2 w, the determinant by 8 u a^3, three entries by 8 u a^2 b each, four sums by
+// 8 u a^2 w: 32 u a^2 w. Edges: products of two such entries, |C| <= a^2 b: 42 u for the offset's minor,
+// 12 u for the determinant's terms, 24 u for the generators' minors, 20 u for the sums, of a^4 b w.
+// Twice the facets' bound and 128 u a^4 b w are used.
+TAUGUARD_INLINE Verdict abfme_zonotopes(const Zonotope& a, const Zonotope& b) {
+  const Slabs sa(a), sb(b);
+  double d[3], w = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    d[k] = b.origin[k] - a.origin[k];
+    w += std::fabs(d[k]);
+    d[k] += b.shift[k] - a.shift[k];
+  }
+  w += 3 * (sa.size + sb.size);
+  if (!in_range(sa.size) || !in_range(sb.size) || !in_range(w)) return undecided;
+  const double ea = 64 * unit * sa.size * sa.size * w, eb = 64 * unit * sb.size * sb.size * w;
+
+  const Double4 m = sa.at(d), c[3] = {sa.at(b.g[0]), sa.at(b.g[1]), sa.at(b.g[2])};
+  const Double4 gap_a = abs(m) - sa.determinant - abs(c[0]) - abs(c[1]) - abs(c[2]);
+  if (any(gap_a > ea)) return separated;
+  const Double4 gap_b =
+      abs(sb.at(d)) - sb.determinant - abs(sb.at(a.g[0])) - abs(sb.at(a.g[1])) - abs(sb.at(a.g[2]));
+  if (any(gap_b > eb)) return separated;
+
+  bool certain = all(gap_a < -ea) && all(gap_b < -eb);
+  const double ee = 128 * unit * sa.size * sa.size * sa.size * sa.size * sb.size * w;
+  const Double4 m1 = next3(m), c1[3] = {next3(c[0]), next3(c[1]), next3(c[2])};
+  const auto minor = [&](int l, Double4 x, Double4 x1) __attribute__((always_inline)) {
+    return abs(c[l] * x1 - c1[l] * x);
+  };
+  const Double4 m01 = minor(0, c[1], c1[1]), m12 = minor(1, c[2], c1[2]), m20 = minor(2, c[0], c1[0]);
+  const Double4 others[3] = {m01 + m20, m01 + m12, m12 + m20};
+  Double4 worst;
+  for (int l = 0; l < 3; ++l) {
+    Double4 gap = minor(l, m, m1) - sa.determinant * (abs(c[l]) + abs(c1[l])) - others[l];
+    gap[3] = gap[0];  // the fourth lane of a triple of generators
+    worst = l == 0 ? gap : max(worst, gap);
+  }
+  if (any(worst > ee)) return separated;
+  return certain && all(worst < -ee) ? common : undecided;
+}
+
+}  // namespace tauguard::rigid

@@ -1,0 +1,95 @@
+// Batches of convex bodies as the kernels read them, and their exact vertices.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "tauguard/geometry/dyadic.hpp"
+
+namespace tauguard::rigid {
+
+using geometry::Dyadic;
+
+enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 3 };
+
+// One body a row: tetrahedra 12 doubles (vertices), boxes 15 (centre, half extents, rotation by rows),
+// parallelepipeds 12 (origin, edges); hulls share one vertex array cut by offsets.
+struct Bodies {
+  Kind kind;
+  const double* data;
+  const std::int64_t* offsets;  // hulls only
+  std::size_t count;            // 1 broadcasts against the other side
+
+  static constexpr std::size_t strides[] = {12, 15, 12, 3};
+
+  std::size_t index(std::size_t row) const { return count == 1 ? 0 : row; }
+  const double* row(std::size_t r) const {
+    const std::size_t i = index(r);
+    return data + strides[static_cast<int>(kind)] * (kind == Kind::hulls ? offsets[i] : i);
+  }
+  std::size_t vertex_count(std::size_t r) const {
+    if (kind == Kind::tetrahedra) return 4;
+    if (kind != Kind::hulls) return 8;
+    const std::size_t i = index(r);
+    return static_cast<std::size_t>(offsets[i + 1] - offsets[i]);
+  }
+};
+
+template <class Number>
+using Points = std::vector<std::array<Number, 3>>;
+
+// The vertices of the body in `Number` arithmetic: exact with Dyadic, rounded with double.
+template <class Number>
+Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
+  const double* p = bodies.row(r);
+  Points<Number> out(bodies.vertex_count(r));
+  if (bodies.kind == Kind::tetrahedra || bodies.kind == Kind::hulls) {
+    for (std::size_t i = 0; i < out.size(); ++i)
+      for (int k = 0; k < 3; ++k) out[i][k] = Number(p[3 * i + k]);
+    return out;
+  }
+  const bool box = bodies.kind == Kind::boxes;
+  for (int k = 0; k < 3; ++k) {
+    const Number origin(p[k]);
+    Number g[3];
+    for (int axis = 0; axis < 3; ++axis)
+      g[axis] = box ? Number(p[6 + 3 * k + axis]) * Number(p[3 + axis]) : Number(p[3 + 3 * axis + k]);
+    for (int corner = 0; corner < 8; ++corner) {
+      Number x = origin;
+      for (int axis = 0; axis < 3; ++axis) {
+        if (corner >> axis & 1)
+          x += g[axis];
+        else if (box)
+          x -= g[axis];
+      }
+      out[static_cast<std::size_t>(corner)][k] = x;
+    }
+  }
+  return out;
+}
+
+// A centrally symmetric body as the kernels use it: twice the centre is kept apart from the origin so
+// that a far origin costs no accuracy. centre = origin + shift, set = centre + sum u_k g_k, |u_k| <= 1.
+// Relative errors: g and each entry of shift at most 3 u of the edges they come from.
+struct Zonotope {
+  double origin[3], shift[3], g[3][3];
+};
+
+inline __attribute__((always_inline)) Zonotope zonotope_of(Kind kind, const double* p) {
+  Zonotope z;
+  for (int k = 0; k < 3; ++k) z.origin[k] = p[k];
+  if (kind == Kind::boxes) {
+    for (int k = 0; k < 3; ++k) z.shift[k] = 0.0;
+    for (int axis = 0; axis < 3; ++axis)
+      for (int k = 0; k < 3; ++k) z.g[axis][k] = p[6 + 3 * k + axis] * p[3 + axis];
+  } else {
+    for (int axis = 0; axis < 3; ++axis)
+      for (int k = 0; k < 3; ++k) z.g[axis][k] = 0.5 * p[3 + 3 * axis + k];
+    for (int k = 0; k < 3; ++k) z.shift[k] = z.g[0][k] + z.g[1][k] + z.g[2][k];
+  }
+  return z;
+}
+
+}  // namespace tauguard::rigid

@@ -1,0 +1,34 @@
+// Four doubles or eight floats side by side, by the compiler's vector types: the same source is compiled
+// for the baseline and (by target attributes) for AVX2. No contraction, no reassociation: the same bits.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+// Kernels must be inlined into the function that carries the target attribute.
+#define TAUGUARD_INLINE inline __attribute__((always_inline))
+#if defined(__x86_64__)
+#define TAUGUARD_AVX2 __attribute__((target("avx2")))
+#endif
+
+namespace tauguard::rigid {
+
+using Double4 = double __attribute__((vector_size(32)));
+using Mask4 = std::int64_t __attribute__((vector_size(32)));
+using Float8 = float __attribute__((vector_size(32)));
+using Mask8 = std::int32_t __attribute__((vector_size(32)));
+
+TAUGUARD_INLINE Double4 splat(double x) { return Double4{x, x, x, x}; }
+TAUGUARD_INLINE Double4 abs(Double4 x) { return (Double4)((Mask4)x & INT64_MAX); }
+TAUGUARD_INLINE Float8 abs(Float8 x) { return (Float8)((Mask8)x & INT32_MAX); }
+TAUGUARD_INLINE Double4 max(Double4 x, Double4 y) { return x > y ? x : y; }
+TAUGUARD_INLINE Double4 min(Double4 x, Double4 y) { return x < y ? x : y; }
+TAUGUARD_INLINE Float8 max(Float8 x, Float8 y) { return x > y ? x : y; }
+TAUGUARD_INLINE bool any(Mask4 m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
+TAUGUARD_INLINE bool all(Mask4 m) { return (m[0] & m[1] & m[2] & m[3]) != 0; }
+// Lane k of the result is lane k + 1, k + 2 (of four), or the next of the first three.
+TAUGUARD_INLINE Double4 turn1(Double4 x) { return __builtin_shufflevector(x, x, 1, 2, 3, 0); }
+TAUGUARD_INLINE Double4 turn2(Double4 x) { return __builtin_shufflevector(x, x, 2, 3, 0, 1); }
+TAUGUARD_INLINE Double4 next3(Double4 x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); }
+
+}  // namespace tauguard::rigid

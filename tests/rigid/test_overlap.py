@@ -1,0 +1,162 @@
+"""Overlap of convex bodies against exact arithmetic: no wrong answer of either kind."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tauguard.benchmarks.rigid_cases import HARD, KINDS
+from tauguard.benchmarks.rigid_truth import exact_hit, float_bodies, truth
+from tauguard.geometry import _geometry
+from tauguard.rigid import Boxes, Hulls, Parallelepipeds, Tetrahedra, overlap
+from tauguard.rigid.queries import native_overlap
+
+EXACT_METHODS = ["abfme", "auto", "exact"]
+PAIRS = [(a, b) for a in KINDS for b in KINDS]
+
+
+def check(a, b, expected, methods=EXACT_METHODS):
+    for method in methods:
+        got, _ = native_overlap(a, b, method)
+        false_hit, false_clear = int((got & ~expected).sum()), int((~got & expected).sum())
+        assert (false_hit, false_clear) == (0, 0), method
+
+
+@pytest.mark.parametrize(("kind_a", "kind_b"), PAIRS)
+def test_random_bodies(kind_a, kind_b):
+    rng = np.random.default_rng(11)
+    a, b = KINDS[kind_a](rng, 4000), KINDS[kind_b](rng, 4000)
+    expected = truth(a, b, sample=(100, 0))
+    assert 0.1 < expected.mean() < 0.9
+    check(a, b, expected)
+
+
+@pytest.mark.parametrize("name", HARD)
+def test_hard_cases(name):
+    a, b = HARD[name](np.random.default_rng(7), 800)
+    expected = truth(a, b, sample=(100, 0))
+    assert 0.02 < expected.mean() < 0.98
+    check(a, b, expected)
+    check(b, a, expected)
+
+
+numbers = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False, width=64),
+    st.integers(-2, 2).map(float),
+    st.sampled_from([5e-324, -1e-300, 1e300, 1.7976931348623157e308]),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(numbers, min_size=24, max_size=24))
+def test_any_finite_tetrahedra(values):
+    v = np.array(values).reshape(2, 1, 4, 3)
+    a, b = Tetrahedra(v[0]), Tetrahedra(v[1])
+    check(a, b, np.array([exact_hit(a, b, 0)]))
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.lists(numbers, min_size=18, max_size=18))
+def test_any_finite_boxes_and_parallelepipeds(values):
+    v = np.array(values)
+    a = Boxes(v[None, :3], np.abs(v[None, 3:6]), np.eye(3)[None])
+    b = Parallelepipeds(v[None, 6:9], v[9:].reshape(1, 3, 3))
+    check(a, b, np.array([exact_hit(a, b, 0)]))
+
+
+def test_hulls_of_any_size_agree_with_the_truth():
+    rng = np.random.default_rng(4)
+    counts = rng.integers(1, 9, 300)
+    offsets = np.r_[0, np.cumsum(counts)]
+    a = Hulls(rng.integers(-3, 4, (offsets[-1], 3)), offsets)
+    b = Hulls(rng.integers(-2, 5, (offsets[-1], 3)), offsets)
+    expected = np.array([exact_hit(a, b, i) for i in range(len(a))])
+    assert 0.05 < expected.mean() < 0.95
+    check(a, b, expected)
+
+
+@pytest.mark.parametrize("scale", [2.0**-900, 2.0**-300, 2.0**300, 2.0**900])
+def test_power_of_two_scaling_changes_nothing(scale):
+    a, b = HARD["grid"](np.random.default_rng(3), 500)
+    expected, _ = native_overlap(a, b, "exact")
+    check(Tetrahedra(a.vertices * scale), Tetrahedra(b.vertices * scale), expected)
+
+
+def test_one_body_meets_every_other():
+    rng = np.random.default_rng(2)
+    one, many = KINDS["boxes"](rng, 1), KINDS["tetrahedra"](rng, 500)
+    tiled = Boxes(
+        *(np.repeat(x, 500, axis=0) for x in (one.center, one.half_extents, one.rotation))
+    )
+    for method in ("abfme", "auto"):
+        np.testing.assert_array_equal(
+            overlap(one, many, method).hit, overlap(tiled, many, method).hit
+        )
+        np.testing.assert_array_equal(
+            overlap(many, one, method).hit, overlap(many, tiled, method).hit
+        )
+
+
+@pytest.mark.parametrize("name", ["grid", "slivers", "touching boxes"])
+def test_witness_shows_why(name):
+    a, b = HARD[name](np.random.default_rng(5), 200)
+    result = overlap(a, b)
+    w = result.witness
+    assert np.isnan(w.point[~result.hit]).all()
+    assert np.isnan(w.normal[result.hit]).all()
+    (va, _), (vb, _) = float_bodies(a, len(a)), float_bodies(b, len(b))
+    tolerance = 1e-14 * np.abs(np.concatenate([va, vb], axis=1)).max()
+    clear = ~result.hit
+    below = np.einsum("nvk,nk->nv", va[clear], w.normal[clear]).max(axis=1)
+    above = np.einsum("nvk,nk->nv", vb[clear], w.normal[clear]).min(axis=1)
+    assert (below <= w.offset[clear] + tolerance).all()
+    assert (above >= w.offset[clear] - tolerance).all()
+    np.testing.assert_allclose(np.linalg.norm(w.normal[clear], axis=1), 1, rtol=1e-14)
+    for side, vertices in ((a, va), (b, vb)):
+        near = Boxes(w.point[result.hit], np.full((result.hit.sum(), 3), tolerance),
+                     np.broadcast_to(np.eye(3), (result.hit.sum(), 3, 3)))  # fmt: skip
+        count = vertices.shape[1]
+        mine = Hulls(vertices[result.hit].reshape(-1, 3), count * np.arange(result.hit.sum() + 1))
+        assert overlap(mine, near, "abfme").hit.all(), type(side).__name__
+
+
+@pytest.mark.parametrize("method", ["abfme", "auto"])
+def test_threads_change_nothing(method):
+    rng = np.random.default_rng(9)
+    a, b = KINDS["tetrahedra"](rng, 20_000), KINDS["boxes"](rng, 20_000)
+    one = overlap(a, b, method)
+    for threads in (2, 5):
+        np.testing.assert_array_equal(overlap(a, b, method, threads=threads).hit, one.hit)
+
+
+@pytest.mark.parametrize("mode", [1, 2, 3])
+def test_rounding_mode_of_the_caller_changes_nothing(mode):
+    a, b = HARD["gaps 1e-12"](np.random.default_rng(1), 500)
+    expected = overlap(a, b).hit
+    try:
+        _geometry.set_rounding(mode)
+        got = [native_overlap(a, b, method)[0] for method in EXACT_METHODS]
+        left = _geometry.get_rounding()
+    finally:
+        _geometry.set_rounding(0)
+    assert left == mode
+    for hit in got:
+        np.testing.assert_array_equal(hit, expected)
+
+
+def test_bad_arguments():
+    a, b = Tetrahedra(np.zeros((3, 4, 3))), Tetrahedra(np.zeros((2, 4, 3)))
+    with pytest.raises(ValueError, match="b: 2 bodies against 3; expected the same number, or 1"):
+        overlap(a, b)
+    with pytest.raises(ValueError, match="method: 'fast', expected one of abfme, sat, gjk, auto"):
+        overlap(a, a, method="fast")
+    with pytest.raises(ValueError, match="b: ndarray, expected one of Tetrahedra"):
+        overlap(a, np.zeros((3, 4, 3)))
+    with pytest.raises(ValueError, match="threads: -1"):
+        overlap(a, a, threads=-1)
+    none = Tetrahedra(np.zeros((0, 4, 3)))
+    assert (
+        overlap(none, none).hit.shape
+        == overlap(none, Tetrahedra(np.zeros((1, 4, 3)))).hit.shape
+        == (0,)
+    )
