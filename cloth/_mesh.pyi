@@ -1,0 +1,30 @@
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+class Mesh:
+    def __init__(
+        self,
+        faces: NDArray[np.int32],
+        ids: NDArray[np.int32],
+        meets: NDArray[np.uint8],
+        k: int,
+        moving: bool,
+        threads: int,
+    ) -> None: ...
+    def edges(self) -> NDArray[np.int32]: ...
+    def candidates(
+        self,
+        x_t0: NDArray[np.float64],
+        x_t1: NDArray[np.float64],
+        min_distance: float,
+        fresh: bool,
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], dict[str, Any]]: ...
+    def update_topology(
+        self, faces: NDArray[np.int32], ids: NDArray[np.int32], meets: NDArray[np.uint8]
+    ) -> dict[str, Any]: ...
+
+def overlap_rows(
+    variant: str, a: NDArray[np.float32], b: NDArray[np.float32]
+) -> NDArray[np.int32]: ...

@@ -1,0 +1,58 @@
+"""Which parts of a mesh may meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.geometry import indices
+
+
+@dataclass(frozen=True)
+class Groups:
+    """A group for every vertex and a table of the groups that meet.
+
+    Attributes:
+        ids: Shape (V,), the group of every vertex, 0 to G - 1. All vertices of a face belong to
+            one.
+        meets: Shape (G, G), symmetric. ``meets[a, b]`` is False where features of ``a`` and ``b``
+            are not to be tested; ``meets[a, a]`` is False for a body that is not tested against
+            itself.
+
+    Raises:
+        ValueError: the table is not square or not symmetric, or an id has no row in it.
+
+    Example:
+        A cloth (group 0) that meets itself and a rigid body (group 1) that meets the cloth only::
+
+            Groups(ids, [[True, True], [True, False]])
+    """
+
+    ids: NDArray[np.int32]
+    meets: NDArray[np.bool_]
+
+    def __init__(self, ids: ArrayLike, meets: ArrayLike) -> None:
+        """Check and convert both arrays."""
+        table = np.ascontiguousarray(meets, dtype=bool)
+        if table.ndim != 2 or table.shape[0] != table.shape[1]:
+            raise ValueError(f"meets: shape {table.shape}, expected (G, G)")
+        if (table != table.T).any():
+            a, b = np.argwhere(table != table.T)[0]
+            raise ValueError(f"meets: [{a}, {b}] is {table[a, b]} but [{b}, {a}] is {table[b, a]}")
+        object.__setattr__(self, "ids", indices("ids", ids, (None,), len(table)))
+        object.__setattr__(self, "meets", table)
+
+    def check_faces(self, faces: NDArray[np.int32]) -> None:
+        """Raise a ``ValueError`` for the first face outside ``ids`` or of more than one group."""
+        if faces.size and int(faces.max()) >= len(self.ids):
+            row = int(np.argmax((faces >= len(self.ids)).any(axis=1)))
+            raise ValueError(
+                f"faces: row {row} is {faces[row].tolist()}, groups has {len(self.ids)} ids"
+            )
+        of_face = self.ids[faces]
+        mixed = (of_face != of_face[:, :1]).any(axis=1)
+        if mixed.any():
+            row = int(np.argmax(mixed))
+            raise ValueError(f"faces: row {row} has vertices of groups {of_face[row].tolist()}")

@@ -1,0 +1,164 @@
+"""Continuous collision detection of a deforming triangle mesh, one call a frame.
+
+The broad phase keeps a hierarchy of k-DOPs (Klosowski et al. 1998), refitted every frame, and the
+front of its bounding-volume traversal tree (Li & Chen 1998; Tang et al. 2010). Three choices are
+ours. Vertices, edges and faces have a tree each, 16 features to a leaf, so that every elementary
+pair comes up exactly once. Volumes may *move*: an interval at each end of the step instead of one
+that sweeps it, which keeps fewer candidates and misses nothing (see ``k_dop.hpp``). And features
+come and go (``update_topology``) without a rebuild.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.cloth import _mesh
+from tauguard.cloth.groups import Groups
+from tauguard.geometry import finite, indices
+
+#: Bounding volumes by name: k, and whether they move with the step or sweep it.
+VOLUMES: dict[str, tuple[int, bool]] = {
+    f"{prefix}k_dop{k}": (k, bool(prefix))
+    for prefix in ("", "moving_")
+    for k in (6, 14, 16, 18, 26)
+} | {"aabb": (6, False), "moving_aabb": (6, True)}
+
+_NO_GROUPS = (np.zeros(0, dtype=np.int32), np.zeros((0, 0), dtype=np.uint8))
+
+
+class MeshCCD:
+    """Every collision of a deforming mesh with itself (or between its parts) in each step.
+
+    Args:
+        faces: Shape (F, 3), three different vertices each. Only vertices that a face uses take
+            part.
+        threads: 0 means all processors. Results do not depend on it.
+        groups: Which parts meet; ``None``: everything meets everything, itself included.
+        volume: One of :data:`VOLUMES`. Any of them finds the same collisions; they differ in cost.
+
+    The hierarchy is built in the first frame and kept; a call is one step of a motion in which
+    every vertex moves linearly. Calls from several Python threads on one object wait for each
+    other.
+
+    Raises:
+        ValueError: a face repeats a vertex, an index is negative, a face mixes groups, or there is
+            no such volume.
+    """
+
+    def __init__(
+        self,
+        faces: ArrayLike,
+        threads: int = 1,
+        groups: Groups | None = None,
+        volume: str = "moving_k_dop14",
+    ) -> None:
+        """Check the faces and number the edges; the hierarchy waits for positions."""
+        if volume not in VOLUMES:
+            raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
+        k, moving = VOLUMES[volume]
+        self.threads = threads
+        self.volume = volume
+        self.groups = groups
+        self.faces = _checked_faces(faces, groups)
+        #: Counts and seconds of the last broad phase.
+        self.broad_stats: dict[str, Any] = {}
+        self._vertices: int | None = None
+        self._mesh = _mesh.Mesh(self.faces, *_group_arrays(groups), k, moving, threads)
+        self.edges: NDArray[np.int32] = self._mesh.edges()
+
+    def candidates(
+        self, x_t0: ArrayLike, x_t1: ArrayLike, min_distance: float = 0.0, fresh: bool = False
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Pairs that the broad phase leaves: volumes overlap, no vertex is shared, groups meet.
+
+        Args:
+            x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
+            x_t1: Positions at its end. Shape (V, 3).
+            min_distance: Pairs that come this close count, in the unit of the positions.
+            fresh: Descend from the root instead of the last frame's front. The answer is the same.
+
+        Returns:
+            Rows (vertex, face), shape (M, 2), and rows of two edges (smaller first), shape (K, 2),
+            sorted.
+
+        Raises:
+            ValueError: positions that are not finite or not (V, 3), of different sizes at both
+                ends, of a size that the faces or earlier frames do not have; a negative distance.
+        """
+        vf, ee, self.broad_stats = self._mesh.candidates(
+            *self._checked(x_t0, x_t1, min_distance), fresh
+        )
+        return vf, ee
+
+    def update_topology(self, faces: ArrayLike, groups: Groups | None = None) -> dict[str, Any]:
+        """Go on with other faces: some gone, some new, some split (cutting, tearing).
+
+        Features that stay keep their places in the hierarchy, new ones settle near features that
+        share their vertices, and the front stays. Every later answer equals that of a new
+        ``MeshCCD`` of ``faces``; edges and faces are numbered as there. The number of vertices may
+        change as well.
+
+        Args:
+            faces: Shape (F', 3), the whole new list; rows that were there before count as kept.
+            groups: For the new vertices; ``None`` keeps the present ones.
+
+        Returns:
+            ``{"vertices", "edges", "faces"}``: (removed, added); ``"rebuilt"``: how many of the
+            three trees had no room left and are built anew in the next frame.
+
+        Raises:
+            ValueError: as the constructor.
+        """
+        groups = self.groups if groups is None else groups
+        checked = _checked_faces(faces, groups)
+        change = self._mesh.update_topology(checked, *_group_arrays(groups))
+        self.faces, self.groups, self._vertices = checked, groups, None
+        self.edges = self._mesh.edges()
+        return change
+
+    def _checked(
+        self, x_t0: ArrayLike, x_t1: ArrayLike, min_distance: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        start = finite("x_t0", x_t0, (None, 3))
+        end = finite("x_t1", x_t1, (None, 3))
+        if len(start) != len(end):
+            raise ValueError(f"x_t1: {len(end)} vertices, but x_t0 has {len(start)}")
+        if self._vertices is not None and len(start) != self._vertices:
+            raise ValueError(
+                f"x_t0: {len(start)} vertices, but the frames before had {self._vertices}; "
+                "update_topology comes first where the mesh changes"
+            )
+        if self.groups is not None and len(start) != len(self.groups.ids):
+            raise ValueError(f"x_t0: {len(start)} vertices, but groups has {len(self.groups.ids)}")
+        if self.faces.size and int(self.faces.max()) >= len(start):
+            row = int(np.argmax((self.faces >= len(start)).any(axis=1)))
+            raise ValueError(
+                f"faces: row {row} is {self.faces[row].tolist()}, "
+                f"but x_t0 has {len(start)} vertices"
+            )
+        if not (np.isfinite(min_distance) and min_distance >= 0):
+            raise ValueError(f"min_distance: {min_distance}, expected a finite number >= 0")
+        self._vertices = len(start)
+        return start, end, float(min_distance)
+
+
+def _group_arrays(groups: Groups | None) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    return _NO_GROUPS if groups is None else (groups.ids, groups.meets.astype(np.uint8))
+
+
+def _checked_faces(faces: ArrayLike, groups: Groups | None) -> NDArray[np.int32]:
+    array = np.asarray(faces)
+    if array.size == 0:
+        array = np.zeros((0, 3), dtype=np.int32)
+    checked = indices("faces", array, (None, 3), np.iinfo(np.int32).max)
+    a, b, c = checked.T
+    repeats = (a == b) | (b == c) | (c == a)
+    if repeats.any():
+        row = int(np.argmax(repeats))
+        raise ValueError(f"faces: row {row} is {checked[row].tolist()}: it repeats a vertex")
+    if groups is not None:
+        groups.check_faces(checked)
+    return checked

@@ -1,0 +1,29 @@
+// The pairs of features of two overlapping leaves that must be asked about.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "feature_tree.hpp"
+#include "front.hpp"
+
+namespace tauguard::cloth {
+
+// Candidates in the form the narrow phase takes: `rows` holds 4 vertices a query (vertex and face, or edge
+// and edge), `pairs` the numbers of the two features.
+struct CandidateBlock {
+  std::vector<std::int32_t> rows, pairs;
+  std::uint64_t adjacent = 0, kept_apart = 0;  // left out: sharing a vertex; of groups that do not meet
+  std::size_t size() const { return pairs.size() / 2; }
+  void clear() {
+    rows.clear();
+    pairs.clear();
+  }
+};
+
+// Appends the candidates of one leaf pair: features whose own volumes overlap, share no vertex and may meet.
+// Edges come smaller number first; vertices and faces come vertex first.
+void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves, const Groups& groups,
+                     CandidateBlock& out);
+
+}  // namespace tauguard::cloth

@@ -1,0 +1,258 @@
+#include "feature_tree.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "tauguard/geometry/aabb.hpp"
+#include "tauguard/geometry/thread_pool.hpp"
+
+namespace tauguard::cloth {
+namespace {
+
+using geometry::Aabb;
+using geometry::ThreadPool;
+
+// Features of a leaf at build, of 16 slots. Shares are rounded down to the left at every level, which lets a
+// leaf receive up to 2 more (1 + 1/2 + 1/4 + ...); the rest is room for features that come later.
+constexpr std::size_t fill = 13;
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+struct Centroid {
+  double x[3];
+  std::int32_t group;
+};
+
+// Sorts order[begin, end) so that its first `left` entries belong to the left child.
+void split(std::vector<std::int32_t>& order, std::size_t begin, std::size_t left, std::size_t end,
+           const std::vector<Centroid>& at) {
+  Aabb box;
+  bool mixed = false;
+  for (auto i = begin; i < end; ++i) {
+    box.add(at[order[i]].x);
+    mixed |= at[order[i]].group != at[order[begin]].group;
+  }
+  const int axis = box.longest_axis();
+  const auto before = [&](std::int32_t a, std::int32_t b) {
+    if (mixed && at[a].group != at[b].group) return at[a].group < at[b].group;
+    if (at[a].x[axis] != at[b].x[axis]) return at[a].x[axis] < at[b].x[axis];
+    return a < b;
+  };
+  std::nth_element(order.begin() + begin, order.begin() + begin + left, order.begin() + end, before);
+}
+
+std::vector<Centroid> centroids(const Features& features, const double* x, const Groups& groups) {
+  std::vector<Centroid> at(features.size());
+  const double share = 1.0 / features.arity;
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const std::int32_t* v = features.of(i);
+    at[i] = {{0, 0, 0}, groups.any() ? groups.of_vertex[v[0]] : 0};
+    for (int j = 0; j < features.arity; ++j)
+      for (int k = 0; k < 3; ++k) at[i].x[k] += share * x[3 * std::size_t(v[j]) + k];
+  }
+  return at;
+}
+
+}  // namespace
+
+void FeatureTree::build(const Features& features, const double* x, const Groups& groups, int threads) {
+  arity_ = features.arity;
+  leaves_ = static_cast<std::int32_t>(std::max<std::size_t>(1, (features.size() + fill - 1) / fill));
+  const std::size_t n = leaves_;
+  ids_.assign(n * lanes, -1);
+  vertices_.assign(n * lanes * arity_, -1);
+  occupied_.assign(n, 0);
+  free_.assign(2 * n, lanes);
+  nodes_.clear();
+  blocks_.clear();
+
+  const auto at = centroids(features, x, groups);
+  std::vector<std::int32_t> order(features.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::vector<std::size_t> count(2 * n, 1), begin(2 * n, 0), end(2 * n, 0);
+  for (std::size_t i = n - 1; i >= 1; --i) count[i] = count[2 * i] + count[2 * i + 1];
+  end[1] = order.size();
+  for (std::size_t level = 1; level < 2 * n; level *= 2) {
+    const std::size_t last = std::min(2 * level, 2 * n);
+    ThreadPool::shared().parallel_for(last - level, threads, 16, [&](auto from, auto to, auto) {
+      for (auto i = level + from; i < level + to; ++i) {
+        if (i >= n) {
+          for (auto s = begin[i]; s < end[i]; ++s)
+            put(static_cast<std::int32_t>(i - n), static_cast<int>(s - begin[i]), order[s], features);
+          continue;
+        }
+        const std::size_t left = (end[i] - begin[i]) * count[2 * i] / count[i];
+        if (left < end[i] - begin[i]) split(order, begin[i], left, end[i], at);
+        begin[2 * i] = begin[i];
+        end[2 * i] = begin[2 * i + 1] = begin[i] + left;
+        end[2 * i + 1] = end[i];
+      }
+    });
+  }
+  for (std::size_t i = n - 1; i >= 1; --i) free_[i] = free_[2 * i] + free_[2 * i + 1];
+  fill_groups(features, groups);
+}
+
+void FeatureTree::put(std::int32_t leaf, int lane, std::int32_t id, const Features& features) {
+  ids_[std::size_t(leaf) * lanes + lane] = id;
+  for (int j = 0; j < arity_; ++j)
+    vertices_[(std::size_t(leaf) * arity_ + j) * lanes + lane] = id < 0 ? -1 : features.of(id)[j];
+  const Mask bit = Mask(1) << lane;
+  if (id >= 0 && !(occupied_[leaf] & bit)) --free_[leaves_ + leaf];
+  if (id < 0 && (occupied_[leaf] & bit)) ++free_[leaves_ + leaf];
+  occupied_[leaf] = id < 0 ? occupied_[leaf] & ~bit : occupied_[leaf] | bit;
+}
+
+void FeatureTree::fill_groups(const Features& features, const Groups& groups) {
+  members_.assign(groups.any() ? 2 * std::size_t(leaves_) : 0, 0);
+  partners_ = members_;
+  if (!groups.any()) return;
+  std::vector<std::uint64_t> partners_of(groups.count, 0);
+  for (std::int32_t a = 0; a < groups.count; ++a)
+    for (std::int32_t b = 0; b < groups.count; ++b)
+      if (groups.meet(a, b)) partners_of[a] |= std::uint64_t(1) << (b % 64);
+  for (std::size_t slot = 0; slot < ids_.size(); ++slot) {
+    if (ids_[slot] < 0) continue;
+    const std::int32_t group = groups.of_vertex[features.of(ids_[slot])[0]];
+    members_[leaves_ + slot / lanes] |= std::uint64_t(1) << (group % 64);
+    partners_[leaves_ + slot / lanes] |= partners_of[group];
+  }
+  for (std::int32_t i = leaves_ - 1; i >= 1; --i) {
+    members_[i] = members_[2 * i] | members_[2 * i + 1];
+    partners_[i] = partners_[2 * i] | partners_[2 * i + 1];
+  }
+}
+
+void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
+  float* block = blocks_.data() + leaf * block_stride();
+  float* node = nodes_.data() + (leaves_ + std::size_t(leaf)) * node_stride();
+  const std::int32_t* v = vertices(leaf);
+  const int sweep = times_ == 1 ? 2 : 1;  // ends of the step that one interval covers
+  for (int lane = 0; lane < lanes; ++lane) {
+    if (!(occupied_[leaf] >> lane & 1)) {
+      for (int r = 0; r < 2 * times_ * axes_; ++r) block[r * lanes + lane] = r % 2 == 0 ? infinity : -infinity;
+      continue;
+    }
+    float low[2 * axis_slots], high[2 * axis_slots];
+    const float* first = points.of(v[lane]);
+    std::copy(first, first + 2 * axes_, low);
+    std::copy(first, first + 2 * axes_, high);
+    for (int j = 1; j < arity_; ++j) {
+      const float* p = points.of(v[j * lanes + lane]);
+      for (int r = 0; r < 2 * axes_; ++r) {
+        low[r] = std::min(low[r], p[r]);
+        high[r] = std::max(high[r], p[r]);
+      }
+    }
+    if (sweep == 2)
+      for (int k = 0; k < axes_; ++k) {
+        low[k] = std::min(low[k], low[axes_ + k]);
+        high[k] = std::max(high[k], high[axes_ + k]);
+      }
+    for (int k = 0; k < axes_; ++k)
+      for (int t = 0; t < times_; ++t) {
+        float* out = block + (k * times_ + t) * 2 * lanes + lane;
+        out[0] = low[t * axes_ + k] - points.pad(k);
+        out[lanes] = high[t * axes_ + k] + points.pad(k);
+      }
+  }
+  for (int t = 0; t < times_; ++t)
+    for (int k = 0; k < axis_slots; ++k) {
+      float lo = k < axes_ ? infinity : -infinity, hi = -lo;
+      const float* in = block + (k * times_ + t) * 2 * lanes;
+      for (int lane = 0; lane < lanes && k < axes_; ++lane) {
+        lo = std::min(lo, in[lane]);
+        hi = std::max(hi, in[lanes + lane]);
+      }
+      node[2 * t * axis_slots + k] = lo;
+      node[(2 * t + 1) * axis_slots + k] = hi;
+    }
+}
+
+void FeatureTree::fit_inner(std::int32_t i) {
+  float* out = nodes_.data() + i * node_stride();
+  const float *a = node(2 * i), *b = node(2 * i + 1);
+  for (int t = 0; t < times_; ++t, out += 2 * axis_slots, a += 2 * axis_slots, b += 2 * axis_slots)
+    for (int k = 0; k < axis_slots; ++k) {
+      out[k] = std::min(a[k], b[k]);
+      out[axis_slots + k] = std::max(a[axis_slots + k], b[axis_slots + k]);
+    }
+}
+
+void FeatureTree::refit(const Projection& points, int threads) {
+  axes_ = points.kind().axes();
+  times_ = points.kind().times();
+  const std::size_t n = leaves_;
+  blocks_.resize(n * block_stride());
+  nodes_.resize(2 * n * node_stride());
+  auto& pool = ThreadPool::shared();
+  pool.parallel_for(n, threads, 128, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i) fit_leaf(static_cast<std::int32_t>(i), points);
+  });
+  std::size_t level = 1;
+  while (2 * level < n) level *= 2;
+  for (; level >= 1 && n > 1; level /= 2)
+    pool.parallel_for(std::min(2 * level, n) - level, threads, 1024, [&](auto begin, auto end, auto) {
+      for (auto i = level + begin; i < level + end; ++i) fit_inner(static_cast<std::int32_t>(i));
+    });
+  spread_ = 0;
+  for (std::size_t i = n; i < 2 * n; ++i) {
+    const float* v = node(static_cast<std::int32_t>(i));
+    for (int k = 0; k < 3 && occupied_[i - n]; ++k) spread_ += double(v[axis_slots + k]) - v[k];
+  }
+}
+
+std::int32_t FeatureTree::free_leaf_near(std::int32_t leaf) const {
+  std::int32_t node = leaves_ + leaf;
+  while (node > 1 && free_[node] == 0) node /= 2;
+  if (free_[node] == 0) return -1;
+  while (!is_leaf(node)) node = free_[2 * node] > 0 ? 2 * node : 2 * node + 1;
+  return node - leaves_;
+}
+
+bool FeatureTree::update(const Features& features, const std::vector<std::int32_t>& new_id,
+                         const Groups& groups) {
+  std::vector<std::int32_t> missing;
+  std::vector<std::uint8_t> placed(features.size(), 0);
+  for (const auto id : new_id)
+    if (id >= 0) placed[id] = 1;
+  for (std::size_t i = 0; i < placed.size(); ++i)
+    if (!placed[i]) missing.push_back(static_cast<std::int32_t>(i));
+
+  for (std::int32_t leaf = 0; leaf < leaves_; ++leaf)
+    for (int lane = 0; lane < lanes; ++lane) {
+      const std::int32_t old = ids_[std::size_t(leaf) * lanes + lane];
+      if (old >= 0) put(leaf, lane, new_id[old], features);
+    }
+  for (std::int32_t i = leaves_ - 1; i >= 1; --i) free_[i] = free_[2 * i] + free_[2 * i + 1];
+
+  // A leaf that touches each vertex, for new features to settle near.
+  std::vector<std::int32_t> leaf_at;
+  if (!missing.empty()) {
+    leaf_at.assign(std::size_t(*std::max_element(features.vertices.begin(), features.vertices.end())) + 1, -1);
+    for (std::size_t i = 0; i < vertices_.size(); ++i)
+      if (vertices_[i] >= 0) leaf_at[vertices_[i]] = static_cast<std::int32_t>(i / (lanes * arity_));
+  }
+  std::int32_t near = 0;
+  for (const auto id : missing) {
+    for (int j = 0; j < arity_; ++j)
+      if (leaf_at[features.of(id)[j]] >= 0) near = leaf_at[features.of(id)[j]];
+    const std::int32_t leaf = free_leaf_near(near);
+    if (leaf < 0) return false;
+    const int lane = __builtin_ctz(~occupied_[leaf]);
+    put(leaf, lane, id, features);
+    for (std::int32_t i = (leaves_ + leaf) / 2; i >= 1; i /= 2) --free_[i];
+    for (int j = 0; j < arity_; ++j) leaf_at[features.of(id)[j]] = leaf;
+  }
+  fill_groups(features, groups);
+  return true;
+}
+
+std::size_t FeatureTree::bytes() const {
+  return (nodes_.capacity() + blocks_.capacity()) * sizeof(float) +
+         (ids_.capacity() + vertices_.capacity() + free_.capacity()) * sizeof(std::int32_t) +
+         occupied_.capacity() * sizeof(Mask) +
+         (members_.capacity() + partners_.capacity()) * sizeof(std::uint64_t);
+}
+
+}  // namespace tauguard::cloth

@@ -1,0 +1,81 @@
+// A bounding-volume tree over the features of a mesh (vertices, edges or faces), 16 to a leaf.
+//
+// The tree is a left-complete binary heap: node 1 is the root, the children of i are 2 i and 2 i + 1, leaf l
+// is node leaves() + l. It is built top-down (median of the centroids along the longest axis), refitted every
+// step, and keeps free slots in its leaves so that features come and go without a rebuild.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "k_dop.hpp"
+#include "overlap.hpp"
+
+namespace tauguard::cloth {
+
+// Features of one kind: row i holds the `arity` vertices of feature i.
+struct Features {
+  int arity = 1;
+  std::vector<std::int32_t> vertices;
+  std::size_t size() const { return vertices.size() / arity; }
+  const std::int32_t* of(std::size_t i) const { return vertices.data() + arity * i; }
+};
+
+// Which vertices may meet: a group per vertex, a symmetric table of groups. Empty: all meet.
+struct Groups {
+  std::vector<std::int32_t> of_vertex;
+  std::vector<std::uint8_t> meets;  // count x count
+  std::int32_t count = 0;
+  bool any() const { return count > 0; }
+  bool meet(std::int32_t a, std::int32_t b) const { return meets[std::size_t(a) * count + b] != 0; }
+};
+
+class FeatureTree {
+ public:
+  // Places every feature by the centroid of its vertices in x (n, 3). Groups are split before space is.
+  void build(const Features& features, const double* x, const Groups& groups, int threads);
+  // Bounds of every leaf and node for this step.
+  void refit(const Projection& points, int threads);
+  // The features are now `features`; old feature i is new_id[i], or gone (-1). New ones go near features
+  // that share their vertices. False where the free slots do not suffice: build again.
+  bool update(const Features& features, const std::vector<std::int32_t>& new_id, const Groups& groups);
+
+  std::int32_t leaves() const { return leaves_; }
+  int times() const { return times_; }
+  int axes() const { return axes_; }
+  bool is_leaf(std::int32_t node) const { return node >= leaves_; }
+  const float* node(std::int32_t i) const { return nodes_.data() + std::size_t(i) * node_stride(); }
+  const float* block(std::int32_t leaf) const { return blocks_.data() + std::size_t(leaf) * block_stride(); }
+  Mask occupied(std::int32_t leaf) const { return occupied_[leaf]; }
+  const std::int32_t* ids(std::int32_t leaf) const { return ids_.data() + std::size_t(leaf) * lanes; }
+  // [vertex of the feature][lane]
+  const std::int32_t* vertices(std::int32_t leaf) const {
+    return vertices_.data() + std::size_t(leaf) * lanes * arity_;
+  }
+  bool may_meet(std::int32_t i, const FeatureTree& other, std::int32_t j) const {
+    return members_.empty() || (members_[i] & other.partners_[j]) != 0;
+  }
+  // Sum over the leaves of the extents of their x, y, z intervals: how spread out the leaves are.
+  double spread() const { return spread_; }
+  std::size_t bytes() const;
+
+ private:
+  std::size_t node_stride() const { return 2 * axis_slots * times_; }
+  std::size_t block_stride() const { return 2 * std::size_t(lanes) * times_ * axes_; }
+  void fit_leaf(std::int32_t leaf, const Projection& points);
+  void fit_inner(std::int32_t node);
+  void put(std::int32_t leaf, int lane, std::int32_t id, const Features& features);
+  std::int32_t free_leaf_near(std::int32_t leaf) const;
+  void fill_groups(const Features& features, const Groups& groups);
+
+  int arity_ = 1, axes_ = 0, times_ = 0;
+  std::int32_t leaves_ = 0;
+  double spread_ = 0;
+  std::vector<float> nodes_, blocks_;
+  std::vector<std::int32_t> ids_, vertices_, free_;  // free_: empty slots below every node
+  std::vector<Mask> occupied_;
+  std::vector<std::uint64_t> members_, partners_;  // groups below a node, groups they meet; modulo 64
+};
+
+}  // namespace tauguard::cloth

@@ -1,0 +1,132 @@
+#include "front.hpp"
+
+#include "tauguard/geometry/thread_pool.hpp"
+
+namespace tauguard::cloth {
+namespace {
+
+constexpr std::size_t grain = 2048;  // front entries of a chunk
+constexpr int first_depth = 5;       // the cut to start from: all pairs at this depth
+
+int depth(std::int32_t node) { return 31 - __builtin_clz(static_cast<unsigned>(node)); }
+
+// One chunk's walk: reads a run of the old cut, writes its part of the new one.
+class Walk {
+ public:
+  Walk(const FeatureTree& a, const FeatureTree& b)
+      : a_(a), b_(b), self_(&a == &b), times_(a.times()) {}
+
+  bool overlap(NodePair p) {
+    ++tests;
+    return a_.may_meet(p.a, b_, p.b) && nodes_overlap(a_.node(p.a), b_.node(p.b), times_);
+  }
+
+  void descend(NodePair p) {
+    if (!overlap(p)) return cut.push_back(p);
+    if (a_.is_leaf(p.a) && b_.is_leaf(p.b)) {
+      cut.push_back(p);
+      return leaf_pairs.push_back({p.a - a_.leaves(), p.b - b_.leaves()});
+    }
+    NodePair child[4];
+    const int n = children(p, child);
+    for (int i = 0; i < n; ++i) descend(child[i]);
+  }
+
+  // At one depth both sides split, else the deeper one: the other is a leaf.
+  int children(NodePair p, NodePair* child) const {
+    const int gap = depth(p.a) - depth(p.b);
+    const bool split_a = gap >= 0 && !a_.is_leaf(p.a), split_b = gap <= 0 && !b_.is_leaf(p.b);
+    int n = 0;
+    for (int i = 0; i <= int(split_a); ++i)
+      for (int j = 0; j <= int(split_b); ++j) {
+        const NodePair c{split_a ? 2 * p.a + i : p.a, split_b ? 2 * p.b + j : p.b};
+        if (!(self_ && p.a == p.b && c.a > c.b)) child[n++] = c;
+      }
+    return n;
+  }
+
+  // The deeper side came from a split; at one depth both did.
+  NodePair parent(NodePair p) const {
+    const int gap = depth(p.a) - depth(p.b);
+    return {gap >= 0 ? p.a / 2 : p.a, gap <= 0 ? p.b / 2 : p.b};
+  }
+
+  // Entries [begin, end) of the old cut. Where all children of a pair stand in a row and the pair itself
+  // is apart, it takes their place.
+  void move(const NodePair* begin, const NodePair* end) {
+    while (begin < end) {
+      NodePair child[4];
+      const NodePair up = parent(*begin);
+      const int n = up.a > 0 && up.b > 0 ? children(up, child) : 0;
+      if (n > 0 && end - begin >= n && same(begin, child, n)) {
+        bool any = false;
+        for (int i = 0; i < n && !any; ++i) any = overlap(begin[i]);
+        if (!any && !overlap(up)) {
+          cut.push_back(up);
+        } else {
+          for (int i = 0; i < n; ++i) descend(begin[i]);
+        }
+        begin += n;
+      } else {
+        descend(*begin++);
+      }
+    }
+  }
+
+  std::vector<NodePair> cut, leaf_pairs;
+  std::size_t tests = 0;
+
+ private:
+  static bool same(const NodePair* x, const NodePair* y, int n) {
+    for (int i = 0; i < n; ++i)
+      if (x[i].a != y[i].a || x[i].b != y[i].b) return false;
+    return true;
+  }
+
+  const FeatureTree &a_, &b_;
+  bool self_;
+  int times_;
+};
+
+void append(std::vector<NodePair>& to, const std::vector<NodePair>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+}  // namespace
+
+const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTree& b, int threads) {
+  if (cut_.empty()) {
+    // Split every entry, without looking at the volumes, until it is `first_depth` deep or two leaves.
+    const Walk walk(a, b);
+    cut_.push_back({1, 1});
+    for (int level = 0; level < first_depth; ++level) {
+      std::vector<NodePair> next;
+      for (const auto p : cut_) {
+        NodePair child[4];
+        if (a.is_leaf(p.a) && b.is_leaf(p.b)) {
+          next.push_back(p);
+          continue;
+        }
+        const int n = walk.children(p, child);
+        next.insert(next.end(), child, child + n);
+      }
+      cut_.swap(next);
+    }
+  }
+  const std::size_t step = cut_.size() > 16 * grain ? grain : 16;
+  std::vector<Walk> walks((cut_.size() + step - 1) / step, Walk(a, b));
+  geometry::ThreadPool::shared().parallel_for(cut_.size(), threads, step, [&](auto begin, auto end, auto c) {
+    walks[c].move(cut_.data() + begin, cut_.data() + end);
+  });
+  cut_.clear();
+  leaf_pairs_.clear();
+  tests_ = 0;
+  for (const auto& w : walks) {
+    append(cut_, w.cut);
+    append(leaf_pairs_, w.leaf_pairs);
+    tests_ += w.tests;
+  }
+  return leaf_pairs_;
+}
+
+}  // namespace tauguard::cloth

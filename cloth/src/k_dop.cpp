@@ -1,0 +1,101 @@
+#include "k_dop.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+
+#include "tauguard/geometry/aabb.hpp"
+#include "tauguard/geometry/thread_pool.hpp"
+
+namespace tauguard::cloth {
+namespace {
+
+using geometry::Aabb;
+using geometry::ThreadPool;
+
+// Edge diagonals before corner diagonals, so that 16 is a prefix of 18 and 18 of 26.
+constexpr std::int8_t all_axes[13][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0},  {1, 0, 1},
+                                         {0, 1, 1},  {1, -1, 0}, {1, 0, -1}, {0, 1, -1}, {1, 1, 1},
+                                         {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
+constexpr std::int8_t corner_axes[7][3] = {{1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 1},
+                                           {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
+constexpr std::size_t grain = 4096;
+
+Aabb bounds(const double* x_t0, const double* x_t1, std::size_t n, int threads) {
+  Aabb all;
+  std::mutex mutex;
+  ThreadPool::shared().parallel_for(n, threads, grain, [&](auto begin, auto end, auto) {
+    Aabb part;
+    for (auto i = begin; i < end; ++i) {
+      part.add(x_t0 + 3 * i);
+      part.add(x_t1 + 3 * i);
+    }
+    const std::lock_guard<std::mutex> lock(mutex);  // minima and maxima: any order gives the same box
+    all.add(part);
+  });
+  return all;
+}
+
+// The power of two that brings |x| <= size to at most 1, within the range that doubles can hold.
+double shrink(double size) {
+  if (!(size > 0)) return 1;
+  return std::ldexp(1.0, std::clamp(-(std::ilogb(size) + 1), -1030, 1000));
+}
+
+}  // namespace
+
+const std::int8_t (*axes_of(int k))[3] {
+  switch (k) {
+    case 6: case 16: case 18: case 26: return all_axes;
+    case 14: return corner_axes;
+    default: throw std::invalid_argument("k_dop" + std::to_string(k) + ": k is 6, 14, 16, 18 or 26");
+  }
+}
+
+void Projection::set(const double* x_t0, const double* x_t1, std::size_t n, VolumeKind kind,
+                     double min_distance, int threads) {
+  kind_ = kind;
+  const int axes = kind.axes();
+  const auto* axis = axes_of(kind.k);
+  values_.resize(2 * axes * n);
+  double largest = 0;
+  const Aabb raw = bounds(x_t0, x_t1, n, threads);
+  for (int k = 0; k < 3 && n > 0; ++k) largest = std::max({largest, -raw.lo[k], raw.hi[k]});
+  const double first = shrink(largest);
+  double centre[3] = {0, 0, 0}, extent = 0;
+  for (int k = 0; k < 3 && n > 0; ++k) {
+    const double lo = raw.lo[k] * first, hi = raw.hi[k] * first;
+    centre[k] = (lo + hi) / 2;
+    extent = std::max({extent, hi - centre[k], centre[k] - lo});
+  }
+  const double second = shrink(extent);
+
+  for (int a = 0; a < axes; ++a) {
+    const int terms = std::abs(axis[a][0]) + std::abs(axis[a][1]) + std::abs(axis[a][2]);
+    // |axis| / 2^(terms - 1), times half of the distance in scaled units; a product that is too large for
+    // float32 becomes infinite: nothing is apart then, which is conservative.
+    const double margin = 0.5 * min_distance * first * second * std::sqrt(double(terms)) / (1 << (terms - 1));
+    const double padded = margin * (1 + 0x1p-20) + 0x1p-22;
+    pad_[a] = padded < 1e30 ? static_cast<float>(padded) : std::numeric_limits<float>::infinity();
+  }
+  ThreadPool::shared().parallel_for(n, threads, grain, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i) {
+      float* out = values_.data() + 2 * axes * i;
+      for (const double* x : {x_t0 + 3 * i, x_t1 + 3 * i}) {
+        double z[3];
+        for (int k = 0; k < 3; ++k) z[k] = (x[k] * first - centre[k]) * second;
+        for (int a = 0; a < 3; ++a) *out++ = static_cast<float>(z[a]);
+        for (int a = 3; a < axes; ++a) {
+          const auto& s = axis[a];
+          const double sum = s[0] * z[0] + s[1] * z[1] + s[2] * z[2];
+          *out++ = static_cast<float>(sum * (s[0] != 0 && s[1] != 0 && s[2] != 0 ? 0.25 : 0.5));
+        }
+      }
+    }
+  });
+}
+
+}  // namespace tauguard::cloth

@@ -1,0 +1,157 @@
+// tauguard.cloth._mesh: continuous collision detection of a mesh, one call a frame.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+
+#include <algorithm>
+#include <mutex>
+
+#include "mesh_ccd.hpp"
+
+namespace nb = nanobind;
+using namespace tauguard::cloth;
+
+namespace {
+
+using Faces = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Ids = nb::ndarray<const std::int32_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+using Table = nb::ndarray<const std::uint8_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+using Positions = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Pairs = nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 2>, nb::c_contig>;
+
+template <class Array, class T>
+Array array_of(std::vector<T> values, std::initializer_list<std::size_t> shape) {
+  auto* owned = new std::vector<T>(std::move(values));
+  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return Array(owned->data(), shape, owner);
+}
+
+std::vector<std::int32_t> list_of(const Faces& faces) {
+  return {faces.data(), faces.data() + faces.size()};
+}
+
+Groups groups_of(const Ids& ids, const Table& meets) {
+  Groups groups;
+  groups.of_vertex.assign(ids.data(), ids.data() + ids.size());
+  groups.meets.assign(meets.data(), meets.data() + meets.size());
+  groups.count = static_cast<std::int32_t>(meets.shape(0));
+  return groups;
+}
+
+// Feature numbers of a pair as one key: keys in order are rows in order.
+std::uint64_t key_of(const std::int32_t* pair) {
+  return std::uint64_t(std::uint32_t(pair[0])) << 32 | std::uint32_t(pair[1]);
+}
+
+// One step at a time, whatever Python threads do.
+struct Mesh {
+  Mesh(Faces faces, Ids ids, Table meets, int k, bool moving, int threads)
+      : ccd(list_of(faces), groups_of(ids, meets), VolumeKind{k, moving}, threads) {}
+  MeshCcd ccd;
+  std::mutex mutex;
+};
+
+std::vector<std::int32_t> sorted_candidates(MeshCcd& ccd, MeshCcd::Kind kind) {
+  std::vector<std::vector<std::uint64_t>> parts(ccd.chunks(kind));
+  ccd.for_each_block(kind, [&](const CandidateBlock& block, std::size_t chunk) {
+    for (std::size_t i = 0; i < block.size(); ++i) parts[chunk].push_back(key_of(&block.pairs[2 * i]));
+  });
+  std::vector<std::uint64_t> keys;
+  for (const auto& part : parts) keys.insert(keys.end(), part.begin(), part.end());
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::int32_t> pairs;
+  pairs.reserve(2 * keys.size());
+  for (const auto key : keys) {
+    pairs.push_back(static_cast<std::int32_t>(key >> 32));
+    pairs.push_back(static_cast<std::int32_t>(key));
+  }
+  return pairs;
+}
+
+nb::dict counts_of(const BroadCounts& c) {
+  nb::dict d;
+  d["node_tests"] = c.node_tests;
+  d["front"] = c.front;
+  d["leaf_pairs"] = c.leaf_pairs;
+  d["adjacent"] = c.adjacent;
+  d["kept_apart"] = c.kept_apart;
+  d["candidates"] = c.candidates;
+  return d;
+}
+
+nb::dict stats_of(const MeshCcd& ccd) {
+  const BroadStats& s = ccd.stats();
+  nb::dict seconds, d;
+  seconds["project"] = s.project_s;
+  seconds["build"] = s.build_s;
+  seconds["refit"] = s.refit_s;
+  seconds["traverse"] = s.traverse_s;
+  d["vf"] = counts_of(s.vf);
+  d["ee"] = counts_of(s.ee);
+  d["seconds"] = seconds;
+  d["builds"] = s.builds;
+  d["bytes"] = ccd.bytes();
+  return d;
+}
+
+nb::tuple candidates(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, bool fresh) {
+  std::vector<std::int32_t> vf, ee;
+  {
+    const nb::gil_scoped_release release;
+    const std::lock_guard<std::mutex> lock(mesh.mutex);
+    mesh.ccd.prepare(x_t0.data(), x_t1.data(), x_t0.shape(0), min_distance, fresh);
+    vf = sorted_candidates(mesh.ccd, MeshCcd::Kind::vf);
+    ee = sorted_candidates(mesh.ccd, MeshCcd::Kind::ee);
+  }
+  const std::size_t n_vf = vf.size() / 2, n_ee = ee.size() / 2;
+  return nb::make_tuple(array_of<Pairs>(std::move(vf), {n_vf, 2}), array_of<Pairs>(std::move(ee), {n_ee, 2}),
+                        stats_of(mesh.ccd));
+}
+
+nb::dict update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
+  TopologyChange change;
+  {
+    auto list = list_of(faces);
+    auto groups = groups_of(ids, meets);
+    const nb::gil_scoped_release release;
+    const std::lock_guard<std::mutex> lock(mesh.mutex);
+    change = mesh.ccd.update_topology(std::move(list), std::move(groups));
+  }
+  nb::dict d;
+  const char* kinds[] = {"vertices", "edges", "faces"};
+  for (int i = 0; i < 3; ++i) d[kinds[i]] = nb::make_tuple(change.removed[i], change.added[i]);
+  d["rebuilt"] = change.rebuilt;
+  return d;
+}
+
+}  // namespace
+
+NB_MODULE(_mesh, m) {
+  nb::class_<Mesh>(m, "Mesh")
+      .def(nb::init<Faces, Ids, Table, int, bool, int>(), nb::arg("faces"), nb::arg("ids"), nb::arg("meets"),
+           nb::arg("k"), nb::arg("moving"), nb::arg("threads"))
+      .def("edges",
+           [](const Mesh& mesh) {
+             auto list = mesh.ccd.topology().edges.vertices;
+             const std::size_t n = list.size() / 2;
+             return array_of<Pairs>(std::move(list), {n, 2});
+           })
+      .def("candidates", &candidates, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("min_distance"),
+           nb::arg("fresh"))
+      .def("update_topology", &update_topology, nb::arg("faces"), nb::arg("ids"), nb::arg("meets"));
+  // For tests: the lanes of each row that overlap, by the named variant; empty where it cannot run here.
+  m.def("overlap_rows", [](const std::string& variant,
+                           nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,
+                           nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> b) {
+    const OverlapKernels* kernels = overlap_kernels(variant.c_str());
+    std::vector<std::int32_t> rows;
+    if (kernels) {
+      std::uint16_t out[lanes];
+      kernels->rows_of_block(a.data(), 0xffff, b.data(), static_cast<int>(a.shape(0)),
+                             static_cast<int>(a.shape(1)), 0xffff, out);
+      rows.assign(out, out + lanes);
+    }
+    const std::size_t n = rows.size();
+    return array_of<nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1>>>(std::move(rows), {n});
+  });
+}

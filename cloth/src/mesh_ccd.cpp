@@ -1,0 +1,145 @@
+#include "mesh_ccd.hpp"
+
+#include <chrono>
+#include <mutex>
+
+#include "tauguard/geometry/thread_pool.hpp"
+
+namespace tauguard::cloth {
+namespace {
+
+constexpr std::size_t chunk_pairs = 512;   // leaf pairs of a chunk
+constexpr std::size_t block_rows = 2048;   // candidates handed over at a time, at least
+// Trees are built anew where the leaves have spread this much wider than when they were built.
+constexpr double worn = 2;
+
+class Clock {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    return seconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+MeshCcd::MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, int threads)
+    : groups_(std::move(groups)), volume_(volume), threads_(threads) {
+  axes_of(volume.k);  // throws where there is no such k
+  topology_.set(std::move(faces));
+}
+
+void MeshCcd::prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance,
+                      bool fresh) {
+  const geometry::RoundToNearest guard;
+  stats_ = {};
+  Clock clock;
+  points_.set(x_t0, x_t1, n, volume_, min_distance, threads_);
+  stats_.project_s = clock.lap();
+
+  FeatureTree* trees[] = {&vertices_, &edges_, &faces_};
+  const Features* features[] = {&topology_.vertices, &topology_.edges, &topology_.faces};
+  for (int i = 0; i < 3; ++i) {
+    if (built_spread_[i] >= 0) {
+      trees[i]->refit(points_, threads_);
+      stats_.refit_s += clock.lap();
+    }
+    // Spread is in units of the scene's extent, which also makes it comparable between steps.
+    if (built_spread_[i] < 0 || trees[i]->spread() > worn * built_spread_[i]) {
+      trees[i]->build(*features[i], x_t0, groups_, threads_);
+      ++stats_.builds;
+      stats_.build_s += clock.lap();
+      trees[i]->refit(points_, threads_);
+      built_spread_[i] = trees[i]->spread();
+      if (i != 1) vf_front_.reset();
+      if (i == 1) ee_front_.reset();
+      stats_.refit_s += clock.lap();
+    }
+  }
+  if (fresh) {
+    vf_front_.reset();
+    ee_front_.reset();
+  }
+  vf_pairs_ = &vf_front_.update(vertices_, faces_, threads_);
+  ee_pairs_ = &ee_front_.update(edges_, edges_, threads_);
+  stats_.vf.node_tests = vf_front_.tests();
+  stats_.ee.node_tests = ee_front_.tests();
+  stats_.vf.front = vf_front_.size();
+  stats_.ee.front = ee_front_.size();
+  stats_.vf.leaf_pairs = vf_pairs_->size();
+  stats_.ee.leaf_pairs = ee_pairs_->size();
+  stats_.traverse_s = clock.lap();
+}
+
+std::size_t MeshCcd::chunks(Kind kind) const {
+  const auto& pairs = kind == Kind::vf ? *vf_pairs_ : *ee_pairs_;
+  return (pairs.size() + chunk_pairs - 1) / chunk_pairs;
+}
+
+void MeshCcd::for_each_block(Kind kind, const Take& take) {
+  const bool vf = kind == Kind::vf;
+  const auto& pairs = vf ? *vf_pairs_ : *ee_pairs_;
+  const FeatureTree &a = vf ? vertices_ : edges_, &b = vf ? faces_ : edges_;
+  BroadCounts& counts = vf ? stats_.vf : stats_.ee;
+  std::mutex mutex;
+  geometry::ThreadPool::shared().parallel_for(
+      pairs.size(), threads_, chunk_pairs, [&](auto begin, auto end, auto chunk) {
+        static thread_local CandidateBlock block;
+        block.clear();
+        block.adjacent = block.kept_apart = 0;
+        std::uint64_t candidates = 0;
+        const auto flush = [&] {
+          if (block.size() == 0) return;
+          candidates += block.size();
+          take(block, chunk);
+          block.clear();
+        };
+        for (auto i = begin; i < end; ++i) {
+          leaf_candidates(a, b, pairs[i], groups_, block);
+          if (block.size() >= block_rows) flush();
+        }
+        flush();
+        const std::lock_guard<std::mutex> lock(mutex);
+        counts.candidates += candidates;
+        counts.adjacent += block.adjacent;
+        counts.kept_apart += block.kept_apart;
+      });
+}
+
+TopologyChange MeshCcd::update_topology(std::vector<std::int32_t> faces, Groups groups) {
+  Topology after;
+  after.set(std::move(faces));
+  const std::vector<std::int32_t> match[] = {match_sorted(topology_.vertices, after.vertices),
+                                             match_sorted(topology_.edges, after.edges),
+                                             match_faces(topology_.faces, after.faces)};
+  FeatureTree* trees[] = {&vertices_, &edges_, &faces_};
+  const Features* features[] = {&after.vertices, &after.edges, &after.faces};
+  TopologyChange change;
+  for (int i = 0; i < 3; ++i) {
+    std::uint64_t kept = 0;
+    for (const auto id : match[i]) kept += id >= 0;
+    change.removed[i] = match[i].size() - kept;
+    change.added[i] = features[i]->size() - kept;
+    if (built_spread_[i] >= 0 && !trees[i]->update(*features[i], match[i], groups)) {
+      built_spread_[i] = -1;
+      ++change.rebuilt;
+    }
+  }
+  topology_ = std::move(after);
+  groups_ = std::move(groups);
+  return change;
+}
+
+std::size_t MeshCcd::bytes() const {
+  const std::size_t lists = topology_.vertices.vertices.capacity() + topology_.edges.vertices.capacity() +
+                            topology_.faces.vertices.capacity() + groups_.of_vertex.capacity();
+  return lists * sizeof(std::int32_t) + points_.bytes() + vertices_.bytes() + edges_.bytes() +
+         faces_.bytes() + vf_front_.bytes() + ee_front_.bytes();
+}
+
+}  // namespace tauguard::cloth

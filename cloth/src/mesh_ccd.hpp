@@ -1,0 +1,71 @@
+// Continuous collision detection of a deforming mesh with itself: the broad phase kept between steps and
+// the narrow phase on what it leaves.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "candidates.hpp"
+#include "feature_tree.hpp"
+#include "front.hpp"
+#include "k_dop.hpp"
+#include "topology.hpp"
+
+namespace tauguard::cloth {
+
+// One kind of query (vertex-face or edge-edge) in the last step.
+struct BroadCounts {
+  std::uint64_t node_tests = 0, front = 0, leaf_pairs = 0, candidates = 0, adjacent = 0, kept_apart = 0;
+};
+
+struct BroadStats {
+  BroadCounts vf, ee;
+  double project_s = 0, build_s = 0, refit_s = 0, traverse_s = 0;
+  std::uint64_t builds = 0;  // of trees, in this step
+};
+
+struct TopologyChange {
+  std::array<std::uint64_t, 3> removed{}, added{};  // vertices, edges, faces
+  std::uint64_t rebuilt = 0;                        // trees that had no room
+};
+
+class MeshCcd {
+ public:
+  enum class Kind { vf, ee };
+
+  MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volume, int threads);
+
+  const Topology& topology() const { return topology_; }
+  int threads() const { return threads_; }
+
+  // Trees, volumes and fronts for this step. fresh: descend from the root instead of the last front.
+  void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance, bool fresh);
+  // After prepare: hands the candidates of one kind to `take(block, chunk)`, from several threads; a chunk
+  // is always the same candidates, taken in the same order, and comes in blocks of some thousand.
+  using Take = std::function<void(const CandidateBlock&, std::size_t)>;
+  std::size_t chunks(Kind kind) const;
+  void for_each_block(Kind kind, const Take& take);
+
+  TopologyChange update_topology(std::vector<std::int32_t> faces, Groups groups);
+
+  const BroadStats& stats() const { return stats_; }
+  std::size_t bytes() const;
+
+ private:
+  void build(FeatureTree& tree, const Features& features, const double* x, double& built_spread);
+
+  Topology topology_;
+  Groups groups_;
+  VolumeKind volume_;
+  int threads_;
+  Projection points_;
+  FeatureTree vertices_, edges_, faces_;
+  std::array<double, 3> built_spread_{-1, -1, -1};  // of vertices, edges, faces; -1: not built
+  Front vf_front_, ee_front_;
+  const std::vector<NodePair>*vf_pairs_ = nullptr, *ee_pairs_ = nullptr;
+  BroadStats stats_;
+};
+
+}  // namespace tauguard::cloth

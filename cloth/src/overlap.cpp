@@ -1,0 +1,145 @@
+#include "overlap.hpp"
+
+#include <cstring>
+#include <initializer_list>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace tauguard::cloth {
+namespace {
+
+// `row` points at one volume's first value; its values for axis k, end t and side s are
+// row[k * axis_stride + t * end_stride + s * side_stride].
+struct RowStride {
+  int axis, end, side;
+};
+RowStride in_block(int times) { return {2 * lanes * times, 2 * lanes, lanes}; }
+constexpr RowStride in_node{1, 32, 16};
+
+#define TAUGUARD_INLINE inline __attribute__((always_inline))
+
+TAUGUARD_INLINE Mask apart_portable(const float* row, RowStride s, const float* b, int axes, int times,
+                                    Mask wanted) {
+  std::int32_t apart[lanes] = {};
+  for (int k = 0; k < axes; ++k, row += s.axis, b += 2 * lanes * times) {
+    if (times == 1) {
+      const float low = row[0], high = row[s.side];
+      for (int i = 0; i < lanes; ++i) apart[i] |= -((high < b[i]) | (b[lanes + i] < low));
+    } else {
+      const float low0 = row[0], high0 = row[s.side], low1 = row[s.end], high1 = row[s.end + s.side];
+      const float* c = b + 2 * lanes;
+      for (int i = 0; i < lanes; ++i)
+        apart[i] |= -(((high0 < b[i]) & (high1 < c[i])) | ((b[lanes + i] < low0) & (c[lanes + i] < low1)));
+    }
+  }
+  Mask mask = 0;
+  for (int i = 0; i < lanes; ++i) mask |= Mask(apart[i] & 1) << i;
+  return wanted & ~mask;
+}
+
+Mask node_portable(const float* node, const float* block, int axes, int times, Mask wanted) {
+  return apart_portable(node, in_node, block, axes, times, wanted);
+}
+void rows_portable(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
+                   std::uint16_t* out) {
+  for (; rows; rows &= rows - 1) {
+    const int row = __builtin_ctz(rows);
+    out[row] = static_cast<std::uint16_t>(apart_portable(a + row, in_block(times), b, axes, times, wanted));
+  }
+}
+
+#if defined(__x86_64__)
+#define TAUGUARD_AVX2 __attribute__((target("avx2")))
+#define TAUGUARD_AVX512 __attribute__((target("avx512f")))
+
+TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const float* b, int times) {
+  const __m256 below = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
+  const __m256 above = _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
+  if (times == 1) return _mm256_or_ps(below, above);
+  row += s.end;
+  b += 2 * lanes;
+  const __m256 below1 = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
+  const __m256 above1 = _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
+  return _mm256_or_ps(_mm256_and_ps(below, below1), _mm256_and_ps(above, above1));
+}
+
+TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, const float* b, int axes,
+                                                int times, Mask wanted) {
+  for (int k = 0; k < axes && wanted; ++k, row += s.axis, b += 2 * lanes * times) {
+    const Mask left = _mm256_movemask_ps(apart8(row, s, b, times));
+    const Mask right = _mm256_movemask_ps(apart8(row, s, b + 8, times));
+    wanted &= ~(left | right << 8);
+  }
+  return wanted;
+}
+
+TAUGUARD_AVX2 Mask node_avx2(const float* node, const float* block, int axes, int times, Mask wanted) {
+  return overlap_avx2(node, in_node, block, axes, times, wanted);
+}
+TAUGUARD_AVX2 void rows_avx2(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
+                             std::uint16_t* out) {
+  for (; rows; rows &= rows - 1) {
+    const int row = __builtin_ctz(rows);
+    out[row] = static_cast<std::uint16_t>(overlap_avx2(a + row, in_block(times), b, axes, times, wanted));
+  }
+}
+
+TAUGUARD_AVX512 TAUGUARD_INLINE __mmask16 apart16(const float* row, RowStride s, const float* b, int times) {
+  __mmask16 below = _mm512_cmp_ps_mask(_mm512_set1_ps(row[s.side]), _mm512_loadu_ps(b), _CMP_LT_OQ);
+  __mmask16 above = _mm512_cmp_ps_mask(_mm512_loadu_ps(b + lanes), _mm512_set1_ps(row[0]), _CMP_LT_OQ);
+  if (times == 1) return below | above;
+  row += s.end;
+  b += 2 * lanes;
+  below = _mm512_mask_cmp_ps_mask(below, _mm512_set1_ps(row[s.side]), _mm512_loadu_ps(b), _CMP_LT_OQ);
+  above = _mm512_mask_cmp_ps_mask(above, _mm512_loadu_ps(b + lanes), _mm512_set1_ps(row[0]), _CMP_LT_OQ);
+  return below | above;
+}
+
+TAUGUARD_AVX512 TAUGUARD_INLINE Mask overlap_avx512(const float* row, RowStride s, const float* b, int axes,
+                                                    int times, Mask wanted) {
+  const int step = 2 * lanes * times;
+  const Mask box = apart16(row, s, b, times) | apart16(row + s.axis, s, b + step, times) |
+                   apart16(row + 2 * s.axis, s, b + 2 * step, times);
+  wanted &= ~box;
+  for (int k = 3; k < axes && wanted; ++k) wanted &= ~Mask(apart16(row + k * s.axis, s, b + k * step, times));
+  return wanted;
+}
+
+TAUGUARD_AVX512 Mask node_avx512(const float* node, const float* block, int axes, int times, Mask wanted) {
+  return overlap_avx512(node, in_node, block, axes, times, wanted);
+}
+TAUGUARD_AVX512 void rows_avx512(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
+                                 std::uint16_t* out) {
+  for (; rows; rows &= rows - 1) {
+    const int row = __builtin_ctz(rows);
+    out[row] = static_cast<std::uint16_t>(overlap_avx512(a + row, in_block(times), b, axes, times, wanted));
+  }
+}
+constexpr OverlapKernels avx2{node_avx2, rows_avx2}, avx512{node_avx512, rows_avx512};
+#endif
+constexpr OverlapKernels portable{node_portable, rows_portable};
+
+}  // namespace
+
+const OverlapKernels* overlap_kernels(const char* name) {
+  if (std::strcmp(name, "portable") == 0) return &portable;
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (std::strcmp(name, "avx2") == 0 && __builtin_cpu_supports("avx2")) return &avx2;
+  if (std::strcmp(name, "avx512") == 0 && __builtin_cpu_supports("avx512f")) return &avx512;
+#endif
+  return nullptr;
+}
+
+const OverlapKernels& overlap_kernels() {
+  static const OverlapKernels* best = [] {
+    for (const char* name : {"avx512", "avx2"})
+      if (const auto* found = overlap_kernels(name)) return found;
+    return &portable;
+  }();
+  return *best;
+}
+
+}  // namespace tauguard::cloth

@@ -1,0 +1,22 @@
+// What a list of faces implies: the vertices in use, the unique edges, and what changed since another list.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "feature_tree.hpp"
+
+namespace tauguard::cloth {
+
+struct Topology {
+  Features vertices{1, {}}, edges{2, {}}, faces{3, {}};
+  // faces: rows of three different vertices. Edges: rows (smaller, larger) in lexicographic order.
+  void set(std::vector<std::int32_t> face_vertices);
+};
+
+// For every old feature the number of the equal new one, or -1. Rows must be sorted and unique.
+std::vector<std::int32_t> match_sorted(const Features& before, const Features& after);
+// The same for faces: equal rows match in order of appearance.
+std::vector<std::int32_t> match_faces(const Features& before, const Features& after);
+
+}  // namespace tauguard::cloth
