@@ -1,5 +1,15 @@
 """The typed values that flow through tauguard, and their MCAP form."""
 
+from tauguard.traces.mcap import read_mcap, write_mcap
 from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
 
-__all__ = ["KINDS", "Alarm", "Collision", "Detection", "Trace", "Truth"]
+__all__ = [
+    "KINDS",
+    "Alarm",
+    "Collision",
+    "Detection",
+    "Trace",
+    "Truth",
+    "read_mcap",
+    "write_mcap",
+]

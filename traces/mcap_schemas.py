@@ -1,0 +1,94 @@
+"""The ROS 2 message types of a trace, as ``ros2msg`` schemas: what any MCAP reader decodes with."""
+
+from __future__ import annotations
+
+SEPARATOR = "=" * 80
+
+HEADER = "std_msgs/Header"
+TIME = "builtin_interfaces/Time"
+POINT = "geometry_msgs/Point"
+VECTOR = "geometry_msgs/Vector3"
+
+PARTS = {
+    HEADER: "builtin_interfaces/Time stamp\nstring frame_id\n",
+    TIME: "int32 sec\nuint32 nanosec\n",
+    POINT: "float64 x\nfloat64 y\nfloat64 z\n",
+    VECTOR: "float64 x\nfloat64 y\nfloat64 z\n",
+}
+
+JOINT_STATE = """\
+std_msgs/Header header
+string[] name
+float64[] position  # measured [rad]
+float64[] velocity  # measured [rad/s]
+float64[] effort    # empty: the current is on /motor_currents
+"""
+MOTOR_CURRENTS = """\
+std_msgs/Header header
+float64 time       # exact sample time [s]; header.stamp is rounded to 1 ns
+float64[] current  # measured, signed [A], one a joint
+"""
+JOINT_COMMAND = """\
+std_msgs/Header header
+float64[] position      # commanded [rad], empty where not recorded
+float64[] velocity      # commanded [rad/s], empty where not recorded
+float64[] acceleration  # commanded [rad/s^2], empty where not recorded
+"""
+CONTACT_TRUTH = """\
+std_msgs/Header header
+float64[] tau_ext            # torque of contacts and applied wrenches at the joints [N m]
+float64 contact_force        # norm of the net external contact force [N]
+float64 payload              # mass at the flange that the observer is not told of [kg]
+int64 link                   # link of the largest contact force, 0 for none
+geometry_msgs/Point point    # its point, world frame [m], NaN for none
+geometry_msgs/Vector3 force  # its force on the arm, world frame [N]
+"""
+OBSTACLES = """\
+std_msgs/Header header
+string[] name
+float64[] pose  # homogeneous world pose of each, 4 x 4, row by row
+"""
+COLLISION = """\
+uint8 STRIKE=0
+uint8 CLAMP=1
+uint8 PULSE=2
+std_msgs/Header header
+float64 onset                # first sample with contact force [s]
+float64 end                  # last such sample [s]
+float64 peak_tau             # largest |tau_ext| over joints 1-4 [N m]
+int64 link                   # the struck link, 1-based
+geometry_msgs/Point point    # at the sample of peak force, world frame [m]
+geometry_msgs/Vector3 force  # peak contact force on the arm, world frame [N]
+uint8 kind
+"""
+DETECTION = """\
+std_msgs/Header header
+float64 time        # exact sample time [s]
+float64[] residual  # the observer's estimate of tau_ext [N m]
+float64 score       # the detector's output
+float64 threshold   # above it is a raw alarm
+bool alarm          # after the output filter
+"""
+ALARM = """\
+std_msgs/Header header
+float64 start  # [s]
+float64 end    # [s]
+"""
+
+
+def complete(text: str, *parts: str) -> str:
+    """A message definition followed by those of the types it is made of."""
+    sections = [text, *(f"MSG: {name}\n{PARTS[name]}" for name in parts)]
+    return f"{SEPARATOR}\n".join(sections)
+
+
+SCHEMAS = {
+    "sensor_msgs/msg/JointState": complete(JOINT_STATE, HEADER, TIME),
+    "tauguard_msgs/msg/MotorCurrents": complete(MOTOR_CURRENTS, HEADER, TIME),
+    "tauguard_msgs/msg/JointCommand": complete(JOINT_COMMAND, HEADER, TIME),
+    "tauguard_msgs/msg/ContactTruth": complete(CONTACT_TRUTH, HEADER, TIME, POINT, VECTOR),
+    "tauguard_msgs/msg/Obstacles": complete(OBSTACLES, HEADER, TIME),
+    "tauguard_msgs/msg/Collision": complete(COLLISION, HEADER, TIME, POINT, VECTOR),
+    "tauguard_msgs/msg/Detection": complete(DETECTION, HEADER, TIME),
+    "tauguard_msgs/msg/Alarm": complete(ALARM, HEADER, TIME),
+}
