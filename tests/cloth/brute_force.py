@@ -1,7 +1,5 @@
 """The broad phase by its definition: all pairs of features, nothing shared with the package."""
 
-import itertools
-
 import numpy as np
 
 AXES = {
@@ -14,10 +12,10 @@ AXES[26] = [*AXES[18], *AXES[14][3:]]
 
 
 def edges_of(faces):
-    pairs = {
-        tuple(sorted(p)) for f in np.asarray(faces).tolist() for p in itertools.combinations(f, 2)
-    }
-    return np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2)
+    """The unique pairs of vertices of the faces, sorted."""
+    faces = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
+    pairs = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return np.unique(pairs, axis=0)
 
 
 def queries(faces):

@@ -1,0 +1,29 @@
+"""Deforming meshes to test and time with: generators of any size, and a loader of recorded ones.
+
+The generated motions are prescribed, not simulated: smooth formulas of time whose surfaces fold,
+touch and pass through themselves, which is what a collision query has to find. Each builder takes
+the number of triangles to aim for and a seed; the same arguments give the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tauguard.cloth.scenes.ball import turning_ball
+from tauguard.cloth.scenes.crumple import crumpling
+from tauguard.cloth.scenes.mats import twisting_mats
+from tauguard.cloth.scenes.pleats import pleats
+from tauguard.cloth.scenes.recorded import Recording, load_recording
+from tauguard.cloth.scenes.scene import Scene
+from tauguard.cloth.scenes.skirt import seated_skirt
+
+#: Builders by name: ``SCENES[name](triangles, seed)``.
+SCENES: dict[str, Callable[[int, int], Scene]] = {
+    "pleats": pleats,
+    "turning_ball": turning_ball,
+    "seated_skirt": seated_skirt,
+    "twisting_mats": twisting_mats,
+    "crumpling": crumpling,
+}
+
+__all__ = ["SCENES", "Recording", "Scene", "load_recording"]

@@ -1,0 +1,104 @@
+"""Recorded sequences: one mesh file a frame, the layout of the UNC dynamic-scene benchmarks."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Frames of one mesh, read when they are asked for.
+
+    Attributes:
+        faces: Shape (F, 3), the same in every frame.
+        files: One a frame, in order.
+    """
+
+    faces: NDArray[np.int32]
+    files: tuple[Path, ...]
+
+    def __len__(self) -> int:
+        """The number of frames."""
+        return len(self.files)
+
+    def positions(self, frame: int) -> Points:
+        """Positions of a frame, shape (V, 3), in the file's unit.
+
+        Raises:
+            ValueError: its faces differ from those of the first frame, or it cannot be read.
+        """
+        x, faces = read_mesh(self.files[frame])
+        if not np.array_equal(faces, self.faces):
+            raise ValueError(f"{self.files[frame]}: its faces differ from {self.files[0]}")
+        return x
+
+    def steps(self) -> Iterator[tuple[Points, Points]]:
+        """Positions at both ends of each step."""
+        end = self.positions(0)
+        for i in range(1, len(self.files)):
+            start, end = end, self.positions(i)
+            if len(start) != len(end):
+                raise ValueError(
+                    f"{self.files[i]}: {len(end)} vertices, {self.files[i - 1]} has {len(start)}"
+                )
+            yield start, end
+
+
+def load_recording(folder: str | Path, pattern: str = "*") -> Recording:
+    """The PLY or OBJ files of a folder as one sequence, ordered by the last number in their names.
+
+    Args:
+        folder: Where the frames are, for example of ``http://gamma.cs.unc.edu/DYNAMICB``.
+        pattern: Which files (a glob) where a folder holds several meshes, ``"cloth*.ply"``.
+
+    Raises:
+        ValueError: no file matches, or the first cannot be read as a triangle mesh.
+    """
+    files = sorted(
+        (p for p in Path(folder).glob(pattern) if p.suffix.lower() in (".ply", ".obj")), key=_order
+    )
+    if not files:
+        raise ValueError(f"{folder}: no .ply or .obj file matches {pattern!r}")
+    return Recording(read_mesh(files[0])[1], tuple(files))
+
+
+def read_mesh(path: str | Path) -> tuple[Points, NDArray[np.int32]]:
+    """Vertices, shape (V, 3), and faces, shape (F, 3), in the file's order, nothing merged."""
+    import trimesh
+
+    path = Path(path)
+    kind = path.suffix.lower().lstrip(".")
+    try:
+        content = path.read_bytes()
+        if kind == "obj":
+            content = _geometry_of_obj(content)
+        mesh = trimesh.load_mesh(
+            io.BytesIO(content), file_type=kind, process=False, maintain_order=True
+        )
+        vertices = np.array(mesh.vertices, dtype=np.float64)
+        faces = np.array(mesh.faces, dtype=np.int32)
+    except Exception as error:
+        raise ValueError(f"{path}: cannot be read as a triangle mesh ({error})") from error
+    if faces.ndim != 2 or faces.shape[1:] != (3,) or len(faces) == 0:
+        raise ValueError(f"{path}: has no triangles")
+    return vertices, faces
+
+
+def _geometry_of_obj(content: bytes) -> bytes:
+    """Positions and faces alone: texture and normal indices would renumber the vertices."""
+    lines = [line for line in content.splitlines() if line[:2] in (b"v ", b"f ")]
+    return re.sub(rb"/\S*", b"", b"\n".join(lines))
+
+
+def _order(path: Path) -> tuple[int, str]:
+    numbers = re.findall(r"\d+", path.stem)
+    return (int(numbers[-1]) if numbers else -1, path.name)
