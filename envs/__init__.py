@@ -1,1 +1,23 @@
 """How it runs: the simulation loop, motions, injected collisions and environments."""
+
+from tauguard.envs.episode import STRATA, CollisionPlan, Episode, PayloadPick
+from tauguard.envs.loop import Gains, Recording, SimulationDiverged, SimulationLoop
+from tauguard.envs.motions import Motion, Workspace, point_to_point, random_motion
+from tauguard.envs.simulate import Simulation, simulate
+
+__all__ = [
+    "STRATA",
+    "CollisionPlan",
+    "Episode",
+    "Gains",
+    "Motion",
+    "PayloadPick",
+    "Recording",
+    "Simulation",
+    "SimulationDiverged",
+    "SimulationLoop",
+    "Workspace",
+    "point_to_point",
+    "random_motion",
+    "simulate",
+]

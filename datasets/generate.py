@@ -1,0 +1,68 @@
+"""Generation of labelled episodes: parallel, in order, resumable."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from tqdm import tqdm
+
+from tauguard.envs import Episode, simulate
+from tauguard.traces import Trace, read_mcap, write_mcap
+
+
+def simulate_all(
+    episodes: Sequence[Episode], workers: int | None = None, label: str = "simulate"
+) -> Iterator[Trace]:
+    """The traces of ``episodes`` in their order, whatever the number of workers.
+
+    Args:
+        episodes: what to simulate.
+        workers: processes (default: the processors there are); 1 stays in this process.
+        label: of the progress bar.
+    """
+    workers = min(workers or os.cpu_count() or 1, max(len(episodes), 1))
+    bar = tqdm(total=len(episodes), desc=label, unit="episode", disable=None, leave=False)
+    with bar:
+        if workers == 1:
+            for episode in episodes:
+                yield simulate(episode)
+                bar.update()
+            return
+        with multiprocessing.get_context("spawn").Pool(workers) as pool:
+            for trace in pool.imap(simulate, episodes):
+                yield trace
+                bar.update()
+
+
+def write_dataset(
+    episodes: Sequence[Episode], folder: Path, workers: int | None = None
+) -> list[Path]:
+    """Write one MCAP an episode into ``folder``; whole files of the same episodes are kept.
+
+    Raises:
+        OSError: the folder cannot be made or written.
+        ValueError: a file of that name holds another episode (nothing is overwritten).
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    width = max(5, len(str(len(episodes))))
+    paths = [folder / f"episode-{i:0{width}d}.mcap" for i in range(len(episodes))]
+    missing = [i for i, path in enumerate(paths) if not _holds(path, episodes[i])]
+    traces = simulate_all([episodes[i] for i in missing], workers)
+    for i, trace in zip(missing, traces, strict=True):
+        write_mcap(paths[i], trace)
+    return paths
+
+
+def _holds(path: Path, episode: Episode) -> bool:
+    if not path.exists():
+        return False
+    trace, _ = read_mcap(path)
+    if trace.meta.get("config_sha256") != episode.config_hash:
+        raise ValueError(
+            f"{path}: holds another episode than this seed and these settings give; "
+            "choose another folder or remove it"
+        )
+    return True

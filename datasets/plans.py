@@ -1,0 +1,115 @@
+"""What to simulate: training slices, judged collisions and collision-free pools, from one seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tauguard.envs import STRATA, CollisionPlan, Episode, PayloadPick
+from tauguard.models import Mismatch
+
+#: Payloads of the dissertation's 15 training slices [g]: 3 without, 2 of each of six.
+TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757, 2757, 4039, 4039)
+#: Half strikes, a quarter pulses, a quarter clamps.
+KIND_CYCLE = ("strike", "pulse", "strike", "clamp")
+#: Seconds that one collision gets, and where in them it begins.
+SLOT, OFFSET = 3.0, 0.9
+
+
+def collision_plans(
+    rng: np.random.Generator,
+    count: int,
+    begin: float = 1.0,
+    strata: Sequence[tuple[float, float]] = STRATA,
+) -> tuple[CollisionPlan, ...]:
+    """``count`` collisions of all kinds on links 2-6, one a slot, spread over the strata.
+
+    Args:
+        rng: shuffles which kind meets which link and stratum.
+        count: how many.
+        begin: start of the first slot [s].
+        strata: severities to go through in turn [N m].
+    """
+    kinds = rng.permutation([KIND_CYCLE[i % len(KIND_CYCLE)] for i in range(count)])
+    links = rng.permutation([2 + i % 5 for i in range(count)])
+    levels = rng.permutation([i % len(strata) for i in range(count)])
+    plans = []
+    for i in range(count):
+        kind = str(kinds[i])
+        plans.append(
+            CollisionPlan(
+                kind=kind,
+                time=begin + SLOT * i + OFFSET + float(rng.uniform(0, 0.2)),
+                link=int(links[i]),
+                severity=strata[int(levels[i])],
+                duration=float(
+                    rng.uniform(0.4, 0.8) if kind == "clamp" else rng.uniform(0.03, 0.2)
+                ),
+                at_rest=kind != "clamp" and bool(rng.random() < 0.15),
+            )
+        )
+    return tuple(plans)
+
+
+def episode_seconds(collisions: int, begin: float = 1.0) -> float:
+    """Length of an episode that holds ``collisions`` slots [s]."""
+    return begin + SLOT * collisions + 0.5
+
+
+def struck_episodes(
+    seed: int,
+    count: int,
+    collisions: int,
+    speeds: Sequence[float],
+    payloads: Sequence[float] = (0.0,),
+    mismatch: Mismatch | None = None,
+) -> list[Episode]:
+    """Episodes with ``collisions`` each; speeds [%] and payloads [g] are gone through in turn."""
+    children = np.random.SeedSequence([seed, 1]).spawn(count)
+    episodes = []
+    for i, child in enumerate(children):
+        rng = np.random.default_rng(child)
+        episodes.append(
+            Episode(
+                seed=int(rng.integers(2**62)),
+                seconds=episode_seconds(collisions),
+                speed=float(speeds[i % len(speeds)]),
+                payload_g=float(payloads[i % len(payloads)]),
+                collisions=collision_plans(rng, collisions),
+                mismatch=mismatch,
+                temperature=float(rng.uniform(25, 45)),
+            )
+        )
+    return episodes
+
+
+def free_episodes(
+    seed: int,
+    count: int,
+    seconds: float,
+    speeds: Sequence[float],
+    payloads: Sequence[float] = (0.0,),
+    mismatch: Mismatch | None = None,
+    picks: bool = False,
+) -> list[Episode]:
+    """Collision-free episodes; with ``picks`` a payload is taken up half-way through each."""
+    children = np.random.SeedSequence([seed, 2]).spawn(count)
+    episodes = []
+    for i, child in enumerate(children):
+        rng = np.random.default_rng(child)
+        payload = float(payloads[i % len(payloads)])
+        episode = Episode(
+            seed=int(rng.integers(2**62)),
+            seconds=seconds,
+            speed=float(speeds[i % len(speeds)]),
+            payload_g=payload,
+            mismatch=mismatch,
+            temperature=float(rng.uniform(25, 45)),
+        )
+        if picks and payload:
+            change = PayloadPick(seconds / 2, payload)
+            episode = replace(episode, payload_g=0.0, picks=(change,))
+        episodes.append(episode)
+    return episodes

@@ -1,0 +1,118 @@
+"""What an episode is: one run of the arm, described completely by plain values and a seed."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from tauguard.models import Mismatch
+from tauguard.traces import KINDS
+
+#: Severity strata of the achieved peak |tau_ext| over joints 1-4 [N m].
+STRATA = ((4.0, 8.0), (8.0, 16.0), (16.0, 32.0), (32.0, 64.0), (64.0, 128.0))
+
+
+@dataclass(frozen=True)
+class CollisionPlan:
+    """A collision to inject; point and direction are drawn from the episode's seed.
+
+    Attributes:
+        kind: "strike" (a moving obstacle), "clamp" (a fixed one) or "pulse" (a wrench pulse).
+        time: when it should begin [s].
+        link: 1-based link to strike.
+        severity: wanted peak |tau_ext| over joints 1-4 (low, high) [N m]; the strength is searched
+            until the achieved peak lies there.
+        strength: first guess: strike speed [m/s], clamp depth [m, from 0.03 m], pulse force [N].
+        duration: of a pulse or of a clamp [s]; a strike lasts as long as it lasts.
+        at_rest: a pulse or strike while the arm dwells, where one is near ``time``.
+    """
+
+    kind: str
+    time: float
+    link: int
+    severity: tuple[float, float] | None = None
+    strength: float | None = None
+    duration: float = 0.1
+    at_rest: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names what is wrong and what would work."""
+        if self.kind not in KINDS:
+            raise ValueError(f"kind {self.kind!r}: expected one of {', '.join(KINDS)}")
+        if self.link < 1:
+            raise ValueError(f"link {self.link}: links are counted from 1")
+        if self.duration <= 0:
+            raise ValueError(f"duration {self.duration}: expected seconds above 0")
+        if self.severity is not None and not 0 < self.severity[0] < self.severity[1]:
+            raise ValueError(f"severity {self.severity}: expected 0 < low < high [N m]")
+
+
+@dataclass(frozen=True)
+class PayloadPick:
+    """A payload taken up (or put down: 0 g) at a time, without telling the observer."""
+
+    time: float  #: [s]
+    payload_g: float  #: mass from then on [g]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One run of the arm at work."""
+
+    seed: int
+    seconds: float = 20.0  #: length [s]
+    speed: float = 30.0  #: percent of the joints' maximum speed
+    payload_g: float = 0.0  #: carried from the start, not told to the observer [g]
+    collisions: tuple[CollisionPlan, ...] = ()
+    picks: tuple[PayloadPick, ...] = ()
+    mismatch: Mismatch | None = None  #: how the simulated arm differs from the nominal one
+    temperature: float | None = None  #: of the gears [degC]; None is the drive's own
+    ideal_drive: bool = False  #: no friction, ripple, lag or sensor errors
+    timestep: float = 1e-3  #: [s]
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names what is wrong and what would work."""
+        if not self.seconds > 0:
+            raise ValueError(f"seconds {self.seconds}: expected more than 0")
+        if not 0 < self.speed <= 100:
+            raise ValueError(f"speed {self.speed}: expected a percentage above 0 and at most 100")
+        if self.payload_g < 0 or any(pick.payload_g < 0 for pick in self.picks):
+            raise ValueError("payload_g: expected 0 or more grams")
+        for item in (*self.collisions, *self.picks):
+            if not 0 <= item.time < self.seconds:
+                raise ValueError(f"time {item.time}: outside the episode (0 to {self.seconds} s)")
+
+    def to_json(self) -> str:
+        """The episode as JSON text, from which :meth:`from_json` makes an equal one."""
+        return json.dumps(dataclasses.asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Episode:
+        """The episode that :meth:`to_json` wrote.
+
+        Raises:
+            ValueError: not JSON, or a key that an episode does not have.
+        """
+        try:
+            values: dict[str, Any] = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise ValueError(f"episode: not JSON ({error})") from None
+        known = {f.name for f in dataclasses.fields(cls)}
+        if unknown := sorted(values.keys() - known):
+            raise ValueError(f"episode: unknown keys {unknown}; known: {sorted(known)}")
+        values["collisions"] = tuple(
+            CollisionPlan(**{**c, "severity": c["severity"] and tuple(c["severity"])})
+            for c in values.get("collisions", ())
+        )
+        values["picks"] = tuple(PayloadPick(**p) for p in values.get("picks", ()))
+        if values.get("mismatch") is not None:
+            values["mismatch"] = Mismatch(**values["mismatch"])
+        return cls(**values)
+
+    @property
+    def config_hash(self) -> str:
+        """SHA-256 of the JSON form."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()

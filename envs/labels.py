@@ -1,0 +1,99 @@
+"""Truth from the contact forces and applied wrenches themselves, free of limits and friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.models import Scene
+from tauguard.traces import Collision
+
+Array = NDArray[np.float64]
+
+#: Contacts closer in time than this are one collision [s].
+MERGE_GAP = 0.5
+
+
+@dataclass(frozen=True)
+class Wrenches:
+    """External wrenches on the links, a row per sample (world frame, about ``point``)."""
+
+    force: Array  #: [N], shape (T, links, 3)
+    torque: Array  #: [N m], shape (T, links, 3)
+    point: Array  #: [m], shape (T, links, 3)
+
+    @classmethod
+    def empty(cls, rows: int, links: int) -> Wrenches:
+        """No wrench at all."""
+        return cls(*(np.zeros((rows, links, 3)) for _ in range(3)))
+
+    @classmethod
+    def from_contacts(cls, contact: Array) -> Wrenches:
+        """From the scene's contact sensors: found, force by the link, torque, position."""
+        return cls(-contact[:, :, 1:4], -contact[:, :, 4:7], contact[:, :, 7:10].copy())
+
+
+def external_torque(scene: Scene, q: Array, wrenches: Wrenches) -> Array:
+    """``tau_ext``: the sum of J^T w over the links [N m], shape (T, n).
+
+    Args:
+        scene: whose kinematics to use.
+        q: true joint positions [rad], shape (T, n).
+        wrenches: what pushes the links; rows without any cost nothing.
+    """
+    tau = np.zeros_like(q)
+    pushed = (wrenches.force != 0).any(axis=2) | (wrenches.torque != 0).any(axis=2)
+    model, data = scene.model, mujoco.MjData(scene.model)
+    jac_p, jac_r = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    for row in np.flatnonzero(pushed.any(axis=1)):
+        data.qpos[scene.qpos_adr] = q[row]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        for link in np.flatnonzero(pushed[row]):
+            body = int(scene.link_bodies[link])
+            mujoco.mj_jac(model, data, jac_p, jac_r, wrenches.point[row, link], body)
+            tau[row] += (
+                jac_p.T @ wrenches.force[row, link] + jac_r.T @ wrenches.torque[row, link]
+            )[scene.dof_adr]
+    return tau
+
+
+def collisions(
+    t: Array, wrenches: Wrenches, tau_ext: Array, kinds: list[tuple[float, str]]
+) -> tuple[Collision, ...]:
+    """Runs of contact, gaps below 0.5 s closed, in order of onset.
+
+    An obstacle that touches two links at once is one collision; its link, point and force are those
+    of the largest force.
+
+    Args:
+        t: sample times [s], shape (T,).
+        wrenches: what pushed the links.
+        tau_ext: shape (T, n) [N m].
+        kinds: (time, kind) of what was injected; a collision takes the kind of the latest one that
+            began before it.
+    """
+    strength = np.linalg.norm(wrenches.force, axis=2)
+    touched = np.flatnonzero((strength > 0).any(axis=1))
+    if not touched.size:
+        return ()
+    found: list[Collision] = []
+    for run in np.split(touched, np.flatnonzero(np.diff(t[touched]) >= MERGE_GAP) + 1):
+        row, link = np.unravel_index(int(strength[run].argmax()), strength[run].shape)
+        peak = run[row]
+        before = [kind for time, kind in kinds if time <= t[run[0]]]
+        found.append(
+            Collision(
+                kind=before[-1] if before else "strike",
+                onset=float(t[run[0]]),
+                end=float(t[run[-1]]),
+                link=int(link) + 1,
+                point=wrenches.point[peak, link].copy(),
+                force=wrenches.force[peak, link].copy(),
+                peak_tau=float(np.abs(tau_ext[run, :4]).max()),
+            )
+        )
+    return tuple(found)

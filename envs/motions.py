@@ -1,0 +1,157 @@
+"""Smooth joint motions with speed as a percentage of the maximum."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+#: Peak velocity and acceleration of the quintic 10 s^3 - 15 s^4 + 6 s^5 per unit path and time.
+_PEAK_VELOCITY = 1.875
+_PEAK_ACCELERATION = 5.7735026918962575
+
+
+@dataclass(frozen=True)
+class Motion:
+    """References of a joint motion, a row per sample."""
+
+    t: Array  #: [s], shape (T,)
+    q: Array  #: [rad], shape (T, n)
+    qd: Array  #: [rad/s], shape (T, n)
+    qdd: Array  #: [rad/s^2], shape (T, n)
+
+
+def point_to_point(
+    waypoints: ArrayLike, durations: ArrayLike, dwells: ArrayLike, dt: float
+) -> Motion:
+    """Quintic rest-to-rest segments (Flash & Hogan 1985) with a dwell before each and at the end.
+
+    Args:
+        waypoints: Shape (W, n) [rad].
+        durations: of the W - 1 segments [s].
+        dwells: before each segment and after the last, shape (W,) [s].
+        dt: sample interval [s].
+
+    Raises:
+        ValueError: lengths that do not fit, or a duration that is not positive.
+    """
+    points = np.asarray(waypoints, dtype=float)
+    spans, pauses = np.asarray(durations, dtype=float), np.asarray(dwells, dtype=float)
+    if len(spans) != len(points) - 1 or len(pauses) != len(points):
+        raise ValueError(
+            f"{len(points)} waypoints need {len(points) - 1} durations and {len(points)} dwells, "
+            f"not {len(spans)} and {len(pauses)}"
+        )
+    if (spans <= 0).any() or (pauses < 0).any():
+        raise ValueError("durations must be positive and dwells not negative")
+    blocks: list[tuple[Array, Array, Array]] = []
+    for i in range(len(points)):
+        rest = np.repeat(points[i : i + 1], round(pauses[i] / dt), axis=0)
+        blocks.append((rest, np.zeros_like(rest), np.zeros_like(rest)))
+        if i < len(spans):
+            blocks.append(_segment(points[i], points[i + 1], spans[i], dt))
+    q, qd, qdd = (np.concatenate([block[k] for block in blocks]) for k in range(3))
+    return Motion(np.arange(len(q)) * dt, q, qd, qdd)
+
+
+def _segment(start: Array, stop: Array, span: float, dt: float) -> tuple[Array, Array, Array]:
+    rows = max(int(np.ceil(span / dt)), 1)
+    s = (np.arange(rows) / rows)[:, None]
+    scale, path = 1 / (rows * dt), stop - start
+    return (
+        start + path * (10 * s**3 - 15 * s**4 + 6 * s**5),
+        path * (30 * s**2 - 60 * s**3 + 30 * s**4) * scale,
+        path * (60 * s - 180 * s**2 + 120 * s**3) * scale**2,
+    )
+
+
+def segment_time(path: Array, speed: float, max_speed: Array, max_acceleration: Array) -> float:
+    """Shortest time [s] in which a quintic covers ``path`` [rad] within ``speed`` percent.
+
+    The percentage scales the velocity limit of every joint; the acceleration limit stays.
+    """
+    by_speed = np.abs(path) * _PEAK_VELOCITY / (max_speed * speed / 100)
+    by_acceleration = np.sqrt(np.abs(path) * _PEAK_ACCELERATION / max_acceleration)
+    return float(max(by_speed.max(), by_acceleration.max(), 0.2))
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Where random motions go."""
+
+    low: Array  #: [rad], shape (n,)
+    high: Array  #: [rad], shape (n,)
+    max_speed: Array  #: [rad/s], shape (n,)
+    max_acceleration: Array  #: [rad/s^2], shape (n,)
+    allowed: Callable[[Array], bool] = lambda q: True
+    """Whether the arm may stand at ``q`` (free of itself and of the floor)."""
+
+
+def random_motion(
+    rng: np.random.Generator,
+    space: Workspace,
+    seconds: float,
+    speed: float,
+    dt: float = 1e-3,
+    single_joint: float = 0.2,
+    dwell: tuple[float, float] = (0.1, 0.8),
+) -> Motion:
+    """A motion at work: from point to point with dwells, now and then a single joint.
+
+    Args:
+        rng: source of the waypoints.
+        space: joint box, limits, and which poses are allowed.
+        seconds: exact length of the motion [s].
+        speed: percent of ``space.max_speed``, above 0 to 100.
+        dt: sample interval [s].
+        single_joint: share of the segments that move one joint only.
+        dwell: shortest and longest pause [s].
+
+    Raises:
+        ValueError: a speed outside (0, 100].
+    """
+    if not 0 < speed <= 100:
+        raise ValueError(f"speed {speed}: expected a percentage above 0 and at most 100")
+    points = [_free_point(rng, space)]
+    spans: list[float] = []
+    dwells = [float(rng.uniform(*dwell))]
+    total = dwells[0]
+    while total < seconds:
+        target = _next_point(rng, space, points[-1], single_joint)
+        spans.append(
+            segment_time(target - points[-1], speed, space.max_speed, space.max_acceleration)
+        )
+        dwells.append(float(rng.uniform(*dwell)))
+        total += spans[-1] + dwells[-1]
+        points.append(target)
+    motion = point_to_point(points, spans, dwells, dt)
+    rows = round(seconds / dt)
+    return Motion(motion.t[:rows], motion.q[:rows], motion.qd[:rows], motion.qdd[:rows])
+
+
+def _free_point(rng: np.random.Generator, space: Workspace) -> Array:
+    for _ in range(1000):
+        q = rng.uniform(space.low, space.high)
+        if space.allowed(q):
+            return q
+    raise ValueError("no allowed pose found in 1000 draws: widen the workspace")
+
+
+def _next_point(
+    rng: np.random.Generator, space: Workspace, start: Array, single_joint: float
+) -> Array:
+    """A target whose straight joint path is allowed at eight points along it."""
+    for _ in range(1000):
+        target = rng.uniform(space.low, space.high)
+        if rng.random() < single_joint:
+            joint = int(rng.integers(len(start)))
+            target = np.where(np.arange(len(start)) == joint, target, start)
+        if np.abs(target - start).max() < 0.15:
+            continue
+        if all(space.allowed(start + (target - start) * s) for s in np.linspace(0.125, 1, 8)):
+            return target
+    raise ValueError("no allowed path found in 1000 draws: widen the workspace")

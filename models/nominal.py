@@ -1,0 +1,173 @@
+"""The nominal rigid-body model of an arm in Pinocchio, from the numbers that MuJoCo compiles.
+
+``pin.buildModelFromMJCF`` ignores base rotations, ``<option gravity>`` and everything below the
+first top-level body, without a word. Here MuJoCo compiles the file, and the Pinocchio model is
+built from the compiled numbers, so that both describe the same arm, for MJCF and URDF alike.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
+    """The MuJoCo model of MJCF or URDF text, of a file, or of a spec.
+
+    Meshes that a URDF names and that are not there are left out: dynamics do not need them.
+
+    Raises:
+        ValueError: the text or file is no model that MuJoCo can compile.
+        FileNotFoundError: no such file.
+    """
+    if isinstance(source, mujoco.MjModel):
+        return source
+    try:
+        if isinstance(source, mujoco.MjSpec):
+            return source.compile()
+        text = str(source)
+        if text.lstrip().startswith("<"):
+            return mujoco.MjModel.from_xml_string(text)
+        path = Path(text)
+        if not path.is_file():
+            raise FileNotFoundError(f"{path}: no such robot file")
+        if path.suffix.lower() == ".urdf" or "<robot" in path.read_text(errors="replace")[:4000]:
+            return mujoco.MjModel.from_xml_string(_without_shapes(path.read_text()))
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise ValueError(f"robot: {' '.join(str(error).split())}") from None
+
+
+def _without_shapes(urdf: str) -> str:
+    """A URDF without visual and collision elements, fixed joints kept."""
+    import xml.etree.ElementTree as ElementTree
+
+    try:
+        root = ElementTree.fromstring(urdf)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"not well-formed XML ({error})") from None
+    for link in root.findall("link"):
+        for kind in ("visual", "collision"):
+            for element in link.findall(kind):
+                link.remove(element)
+    extension = ElementTree.SubElement(root, "mujoco")
+    ElementTree.SubElement(
+        extension,
+        "compiler",
+        {"fusestatic": "false", "discardvisual": "false", "strippath": "true"},
+    )
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def pin_model(
+    source: str | Path | mujoco.MjSpec | mujoco.MjModel,
+    base_pose: ArrayLike | None = None,
+    gravity: ArrayLike | None = None,
+) -> pin.Model:
+    """The Pinocchio model of an arm: hinge and slide joints, armature included.
+
+    Args:
+        source: MJCF or URDF (text or file), a spec or a compiled model, holding the arm only.
+        base_pose: pose of the arm's world in the world, (4, 4); the default is the file's own.
+        gravity: [m/s^2], (3,); the default is the file's own.
+
+    Raises:
+        ValueError: not a model, no joints, ball or free joints, several joints on one body, or a
+            base pose that is no rigid motion.
+    """
+    m = compiled(source)
+    if m.njnt == 0:
+        raise ValueError("robot: no joints; expected an arm of hinge and slide joints")
+    data = mujoco.MjData(m)
+    data.qpos[:] = 0
+    mujoco.mj_kinematics(m, data)
+    model = pin.Model()
+    model.name = "arm"
+    model.gravity.linear = np.array(m.opt.gravity if gravity is None else gravity, dtype=float)
+    base = pin.SE3(_rigid(base_pose)) if base_pose is not None else pin.SE3.Identity()
+    joint_of = {0: 0}
+    offset = {0: base}
+    for body in range(1, m.nbody):
+        placed = pin.SE3(_quat(m.body_quat[body]), m.body_pos[body])
+        parent = int(m.body_parentid[body])
+        joint, here = joint_of[parent], offset[parent] * placed
+        if m.body_jntnum[body] > 1:
+            raise ValueError(f"robot: body {m.body(body).name!r} has several joints; expected one")
+        if m.body_jntnum[body] == 1:
+            joint, here = _add_joint(model, m, int(m.body_jntadr[body]), joint, here)
+        joint_of[body], offset[body] = joint, here
+        if joint and m.body_mass[body] > 0:
+            inertia = pin.Inertia(
+                float(m.body_mass[body]),
+                m.body_ipos[body],
+                _quat(m.body_iquat[body])
+                @ np.diag(m.body_inertia[body])
+                @ _quat(m.body_iquat[body]).T,
+            )
+            model.appendBodyToJoint(joint, inertia, here)
+    return model
+
+
+def _add_joint(
+    model: pin.Model, m: mujoco.MjModel, j: int, parent: int, body: pin.SE3
+) -> tuple[int, pin.SE3]:
+    """Adds joint ``j``; returns its index and where the body's frame is in the joint's frame."""
+    name = m.joint(j).name or f"joint{j + 1}"
+    axis, anchor = m.jnt_axis[j], m.jnt_pos[j]
+    placement = body * pin.SE3(np.eye(3), anchor)
+    kinds = {
+        int(mujoco.mjtJoint.mjJNT_HINGE): pin.JointModelRevoluteUnaligned,
+        int(mujoco.mjtJoint.mjJNT_SLIDE): pin.JointModelPrismaticUnaligned,
+    }
+    kind = kinds.get(int(m.jnt_type[j]))
+    if kind is None:
+        raise ValueError(f"robot: joint {name!r} is neither hinge nor slide")
+    at = model.addJoint(parent, kind(*axis), placement, name)
+    model.armature[model.idx_vs[at]] = m.dof_armature[m.jnt_dofadr[j]]
+    limited = bool(m.jnt_limited[j])
+    low, high = m.jnt_range[j] if limited else (-np.inf, np.inf)
+    model.lowerPositionLimit[model.idx_qs[at]] = low
+    model.upperPositionLimit[model.idx_qs[at]] = high
+    return at, pin.SE3(np.eye(3), -anchor)
+
+
+def _quat(wxyz: Array) -> Array:
+    frame = np.zeros(9)
+    mujoco.mju_quat2Mat(frame, np.asarray(wxyz, dtype=float))
+    return frame.reshape(3, 3)
+
+
+def _rigid(pose: ArrayLike) -> Array:
+    matrix = np.asarray(pose, dtype=float)
+    if matrix.shape != (4, 4) or not np.allclose(
+        matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-6
+    ):
+        raise ValueError("base_pose: expected a homogeneous (4, 4) matrix with a rotation in it")
+    return matrix
+
+
+def add_payload(
+    model: pin.Model, mass: float, com: ArrayLike, inertia: ArrayLike = 0.0
+) -> pin.Model:
+    """A copy of ``model`` that carries a payload on its last joint.
+
+    Args:
+        model: of an arm.
+        mass: [kg].
+        com: in the last joint's frame [m], (3,).
+        inertia: about the payload's centre of mass [kg m^2], a number or (3, 3).
+    """
+    tensor = np.asarray(inertia, dtype=float)
+    tensor = np.eye(3) * tensor if tensor.ndim == 0 else tensor
+    loaded = model.copy()
+    last = loaded.njoints - 1
+    loaded.appendBodyToJoint(
+        last, pin.Inertia(mass, np.asarray(com, dtype=float), tensor), pin.SE3.Identity()
+    )
+    return loaded

@@ -1,0 +1,157 @@
+"""Episodes: the same bytes from the same seed, and truth that agrees with MuJoCo's own forces."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from tauguard.envs import STRATA, CollisionPlan, Episode, PayloadPick, Simulation, labels, simulate
+from tauguard.models import Mismatch
+
+KINDS = ("strike", "pulse", "clamp")
+
+
+def plans(links=(3, 4, 5), severity=(16.0, 32.0)):
+    return tuple(
+        CollisionPlan(kind, 1.5 + 2.5 * i, links[i % len(links)], severity, duration=0.3)
+        for i, kind in enumerate(KINDS)
+    )
+
+
+@pytest.fixture(scope="module")
+def episode():
+    return Episode(seed=11, seconds=9.0, speed=30.0, collisions=plans(), mismatch=Mismatch(seed=3))
+
+
+@pytest.fixture(scope="module")
+def trace(episode):
+    return simulate(episode)
+
+
+def test_same_seed_same_bytes(episode, trace):
+    again = simulate(Episode.from_json(episode.to_json()))
+    for name in ("t", "q", "qd", "current"):
+        np.testing.assert_array_equal(getattr(trace, name), getattr(again, name))
+    np.testing.assert_array_equal(trace.truth.tau_ext, again.truth.tau_ext)
+    assert trace.meta == again.meta
+    other = simulate(replace(episode, seed=12))
+    assert not np.array_equal(trace.q, other.q)
+
+
+def test_every_kind_is_carried_out_in_its_stratum(trace):
+    assert [c.kind for c in trace.truth.collisions] == list(KINDS)
+    for c in trace.truth.collisions:
+        assert 16 <= c.peak_tau < 32
+        assert c.end > c.onset
+        rows = (trace.t >= c.onset) & (trace.t <= c.end)
+        peak = np.abs(trace.truth.tau_ext[rows, :4]).max()
+        assert peak == pytest.approx(c.peak_tau)
+
+
+def test_truth_is_zero_away_from_collisions(trace):
+    free = np.ones(len(trace.t), dtype=bool)
+    for c in trace.truth.collisions:
+        free &= (trace.t < c.onset) | (trace.t > c.end)
+    assert (trace.truth.tau_ext[free] == 0).all()
+    assert (trace.truth.contact_force[free] == 0).all()
+
+
+def test_contact_truth_equals_mujocos_constraint_torque():
+    """With nothing but one obstacle touching, J^T F is qfrc_constraint at the arm's joints."""
+    episode = Episode(seed=2, seconds=4.0, collisions=(CollisionPlan("strike", 1.5, 4),))
+    run = Simulation(episode)
+    steps = []
+    original = run._attempt
+
+    def spy(plan, target, strength, begin, end):
+        saved = run.loop.save()
+        window = original(plan, target, strength, begin, end)
+        if window is not None and not steps:
+            after = run.loop.save()
+            run.loop.restore(saved)
+            run._launch(target, strength)
+            for k in range(begin, end):
+                run._follow(k, k + 1)
+                steps.append(run.loop.data.qfrc_constraint[run.scene.dof_adr].copy())
+            run.loop.restore(after)
+        return window
+
+    run._attempt = spy
+    trace = run.run()
+    window = run._windows[0]
+    rows = slice(window.begin, window.begin + len(window.recording.q))
+    constraint = np.array(steps)
+    assert np.abs(constraint).max() > 1.0
+    np.testing.assert_allclose(trace.truth.tau_ext[rows], constraint, atol=1e-9)
+
+
+def test_pulse_truth_is_the_applied_generalised_force():
+    episode = Episode(seed=5, seconds=4.0, collisions=(CollisionPlan("pulse", 1.5, 5),))
+    run = Simulation(episode)
+    trace = run.run()
+    window = run._windows[0]
+    model, data = run.scene.model, mujoco.MjData(run.scene.model)
+    body = int(run.scene.link_bodies[4])
+    k = int(np.argmax(np.linalg.norm(window.wrenches.force[:, 4], axis=1)))
+    data.qpos[run.scene.qpos_adr] = window.recording.q[k]
+    mujoco.mj_forward(model, data)
+    force, torque = window.wrenches.force[k, 4], window.wrenches.torque[k, 4]
+    expected = np.zeros(model.nv)
+    mujoco.mj_applyFT(model, data, force, torque, window.wrenches.point[k, 4], body, expected)
+    got = trace.truth.tau_ext[window.begin + k]
+    np.testing.assert_allclose(got, expected[run.scene.dof_adr], atol=1e-12)
+
+
+def test_a_payload_is_not_a_collision():
+    episode = Episode(seed=6, seconds=4.0, picks=(PayloadPick(2.0, 4039.0),))
+    trace = simulate(episode)
+    assert trace.truth.collisions == ()
+    assert (trace.truth.payload[:2000] == 0).all()
+    assert (trace.truth.payload[2000:] == 4.039).all()
+    without = simulate(replace(episode, picks=()))
+    np.testing.assert_allclose(trace.q[:2000], without.q[:2000], atol=1e-5)
+    shift = np.abs(trace.current[2500:] - without.current[2500:]).mean(axis=0)
+    assert shift[1] > 0.5
+
+
+def test_what_is_left_out_is_not_compiled():
+    run = Simulation(Episode(seed=1, seconds=1.0))
+    names = {run.scene.model.body(i).name for i in range(run.scene.model.nbody)}
+    assert not names & {"striker", "clamp", "payload"}
+    assert run.scene.model.nsensor == 0
+
+
+def test_labels_merge_gaps_below_half_a_second():
+    t = np.arange(3000) * 1e-3
+    wrenches = labels.Wrenches.empty(3000, 6)
+    wrenches.force[100:150, 2] = [10, 0, 0]
+    wrenches.force[600:650, 2] = [20, 0, 0]
+    wrenches.force[1200:1210, 4] = [5, 0, 0]
+    found = labels.collisions(t, wrenches, np.zeros((3000, 6)), [(0.05, "pulse"), (1.1, "clamp")])
+    assert [(c.onset, c.link, c.kind) for c in found] == [(0.1, 3, "pulse"), (1.2, 5, "clamp")]
+    assert found[0].end == pytest.approx(0.649)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"speed": 0}, "percentage above 0"),
+        ({"seconds": -1}, "more than 0"),
+        ({"payload_g": -5}, "0 or more grams"),
+        ({"picks": (PayloadPick(99.0, 1.0),)}, "outside the episode"),
+    ],
+)
+def test_bad_episodes_are_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        Episode(seed=0, **change)
+
+
+def test_bad_plans_and_keys_are_named():
+    with pytest.raises(ValueError, match="strike, clamp, pulse"):
+        CollisionPlan("shove", 1.0, 2)
+    with pytest.raises(ValueError, match="counted from 1"):
+        CollisionPlan("pulse", 1.0, 0)
+    with pytest.raises(ValueError, match=r"unknown keys \['sped'\]"):
+        Episode.from_json('{"seed": 1, "sped": 3}')
+    assert STRATA[0] == (4.0, 8.0)
