@@ -110,7 +110,7 @@ def _rows(name: str, value: ArrayLike, joints: int) -> Array:
 def _gains(gain: ArrayLike, joints: int) -> Array:
     gains = np.ascontiguousarray(np.broadcast_to(np.asarray(gain, dtype=np.float64), (joints,)))
     if not (np.isfinite(gains).all() and (gains > 0).all()):
-        raise ValueError(f"gain {gain}: expected numbers above 0 [1/s]")
+        raise ValueError(f"gain {gains}: expected numbers above 0 [1/s]")
     return gains
 
 

@@ -81,9 +81,10 @@ class Episode:
             raise ValueError(f"speed {self.speed}: expected a percentage above 0 and at most 100")
         if self.payload_g < 0 or any(pick.payload_g < 0 for pick in self.picks):
             raise ValueError("payload_g: expected 0 or more grams")
-        for item in (*self.collisions, *self.picks):
-            if not 0 <= item.time < self.seconds:
-                raise ValueError(f"time {item.time}: outside the episode (0 to {self.seconds} s)")
+        times = [plan.time for plan in self.collisions] + [pick.time for pick in self.picks]
+        for time in times:
+            if not 0 <= time < self.seconds:
+                raise ValueError(f"time {time}: outside the episode (0 to {self.seconds} s)")
 
     def to_json(self) -> str:
         """The episode as JSON text, from which :meth:`from_json` makes an equal one."""

@@ -112,8 +112,8 @@ class Aim:
         geom = geoms[int(rng.integers(len(geoms)))]
         axis = self._data.geom_xmat[geom].reshape(3, 3)[:, 2]
         reach = float(model.geom_size[geom, 1]) * 0.8
-        centre: Array = self._data.geom_xpos[geom].copy()
-        return centre + axis * rng.uniform(-reach, reach)
+        inside: Array = self._data.geom_xpos[geom] + axis * rng.uniform(-reach, reach)
+        return inside
 
     def _velocity(self, body: int, point: Array) -> Array:
         model, data = self._scene.model, self._data

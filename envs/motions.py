@@ -55,7 +55,7 @@ def point_to_point(
         if i < len(spans):
             blocks.append(_segment(points[i], points[i + 1], spans[i], dt))
     q, qd, qdd = (np.concatenate([block[k] for block in blocks]) for k in range(3))
-    return Motion(np.arange(len(q)) * dt, q, qd, qdd)
+    return Motion(np.arange(len(q), dtype=np.float64) * dt, q, qd, qdd)
 
 
 def _segment(start: Array, stop: Array, span: float, dt: float) -> tuple[Array, Array, Array]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import labels
-from tauguard.envs.episode import CollisionPlan, Episode
+from tauguard.envs.episode import CollisionPlan, Episode, PayloadPick
 from tauguard.envs.injection import (
     CLAMP_HOLD,
     LEAD,
@@ -152,7 +152,8 @@ class Simulation:
         parts: list[Recording] = []
         payload = np.full(len(self.motion.t), self.episode.payload_g / 1000)
         row, injected = 0, []
-        jobs = sorted([*self.episode.collisions, *self.episode.picks], key=lambda item: item.time)
+        jobs: list[CollisionPlan | PayloadPick] = [*self.episode.collisions, *self.episode.picks]
+        jobs.sort(key=lambda item: item.time)
         self._carry(self.episode.payload_g)
         for index, job in enumerate(jobs):
             stop = len(payload) if index + 1 == len(jobs) else self._row(jobs[index + 1].time)

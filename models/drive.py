@@ -130,7 +130,7 @@ def cura6_drive() -> Drive:
     return Drive(
         gain=gain,
         gear=np.full(6, 101.0),
-        current_limit=np.array([33.0, 33.0, 20.0, 7.0, 7.0, 7.0]),
+        current_limit=np.array([33.0, 30.8, 17.6, 6.2, 5.9, 5.5]),
         electrical_time_constant=5e-4,
         friction=Friction(
             coulomb=coulomb,

@@ -87,9 +87,9 @@ def _inertia_matrix(body: mujoco.MjsBody) -> np.ndarray:
     if np.isfinite(full).all() and full.any():
         xx, yy, zz, xy, xz, yz = full
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    frame = np.zeros(9)
-    mujoco.mju_quat2Mat(frame, np.asarray(body.iquat, dtype=float))
-    frame = frame.reshape(3, 3)
+    flat = np.zeros(9)
+    mujoco.mju_quat2Mat(flat, np.asarray(body.iquat, dtype=float))
+    frame = flat.reshape(3, 3)
     return frame @ np.diag(np.asarray(body.inertia, dtype=float)) @ frame.T
 
 

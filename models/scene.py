@@ -52,7 +52,7 @@ class SceneSpec:
     striker: Striker | None = None
     clamp: Clamp | None = None
     labels: bool = True  #: a contact sensor on every link
-    floor: bool = False  #: a plane at height 0 that touches obstacles, not the arm
+    floor: bool = False  #: a plane at height 0
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the one that is out of range."""
@@ -99,14 +99,16 @@ def compose(spec: SceneSpec) -> Scene:
             type=mujoco.mjtGeom.mjGEOM_PLANE,
             size=[0, 0, 0.05],
             contype=2,
-            conaffinity=2,
+            conaffinity=1,
             rgba=[0.75, 0.77, 0.8, 1],
         )
     if spec.labels:
         for name in links:
             _add_label(arm, name)
+    if obstacles:
+        _add_pairs(arm, links, obstacles)
+        _tune_pairs(arm, spec)
     model = arm.compile()
-    _tune_contacts(model, spec)
     joints = [model.joint(name) for name in cura6.JOINTS]
     return Scene(
         model=model,
@@ -148,15 +150,14 @@ def _add_payload(arm: mujoco.MjSpec) -> None:
 
 
 def _ball(body: mujoco.MjsBody, radius: float, mass: float, rgba: list[float]) -> None:
+    """An obstacle's geom; it meets the arm by contact pairs alone."""
     body.add_geom(
+        name=body.name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
         size=[radius, 0, 0],
         mass=mass,
-        contype=2,
-        conaffinity=1,
-        condim=1,
-        priority=1,
-        solimp=[0.001, 0.001, 0.001, 0.5, 2],
+        contype=0,
+        conaffinity=0,
         rgba=rgba,
     )
 
@@ -165,13 +166,13 @@ def _add_striker(arm: mujoco.MjSpec, striker: Striker) -> str:
     body = arm.worldbody.add_body(name="striker", pos=PARKED, gravcomp=1)
     body.add_freejoint()
     _ball(body, striker.radius, striker.mass, [0.85, 0.25, 0.2, 1])
-    return body.name
+    return "striker"
 
 
 def _add_clamp(arm: mujoco.MjSpec, clamp: Clamp) -> str:
     body = arm.worldbody.add_body(name="clamp", pos=[0, 0, -PARKED[2]], mocap=True)
     _ball(body, clamp.radius, 1.0, [0.75, 0.3, 0.55, 1])
-    return body.name
+    return "clamp"
 
 
 def _add_label(arm: mujoco.MjSpec, link: str) -> None:
@@ -195,21 +196,37 @@ def _add_label(arm: mujoco.MjSpec, link: str) -> None:
     sensor.intprm = [sum(1 << int(field) for field in fields), 3, 1]
 
 
-def _tune_contacts(model: mujoco.MjModel, spec: SceneSpec) -> None:
-    """Write the obstacles' contact stiffness so that it holds whatever the arm's pose.
+def _add_pairs(arm: mujoco.MjSpec, links: list[str], obstacles: list[str]) -> None:
+    """One contact pair for every collision geom of a link and every obstacle."""
+    for link in links:
+        shapes = [g for g in arm.body(link).geoms if g.group == 3]
+        for i, geom in enumerate(shapes):
+            geom.name = geom.name or f"{link}_collision{i}"
+            for obstacle in obstacles:
+                arm.add_pair(
+                    name=f"{geom.name}_{obstacle}",
+                    geomname1=geom.name,
+                    geomname2=obstacle,
+                    condim=1,
+                    solimp=[0.001, 0.001, 0.001, 0.5, 2],
+                )
 
-    With d = solimp's dmin small, the direct solref format gives f = (K pen + B v) / A for a
-    ``solref`` of (-K, -B), A being the sum of both bodies' ``body_invweight0`` (translational).
+
+def _tune_pairs(arm: mujoco.MjSpec, spec: SceneSpec) -> None:
+    """Write the pairs' contact stiffness so that it holds whatever the arm's pose.
+
+    With d = solimp's dmin small, MuJoCo's direct solref format gives f = (K pen + B v) / A for a
+    ``solref`` of (-K, -B), A being the sum of both bodies' translational ``body_invweight0``,
+    which only a compiled model tells.
     """
-    links = [b for b in range(model.nbody) if model.body(b).name.startswith("link")]
-    inverse = float(np.median([model.body_invweight0[b, 0] for b in links]))
-    for name, obstacle in (("striker", spec.striker), ("clamp", spec.clamp)):
-        if obstacle is None:
-            continue
-        body = model.body(name)
-        weight = inverse + float(model.body_invweight0[body.id, 0])
-        geom = int(body.geomadr[0])
-        model.geom_solref[geom] = [-obstacle.stiffness * weight, -obstacle.damping * weight]
+    model = arm.compile()
+    for pair in arm.pairs:
+        body = model.geom_bodyid[model.geom(pair.geomname1).id]
+        obstacle = model.geom_bodyid[model.geom(pair.geomname2).id]
+        weight = float(model.body_invweight0[body, 0] + model.body_invweight0[obstacle, 0])
+        part = spec.striker if pair.geomname2 == "striker" else spec.clamp
+        assert part is not None
+        pair.solref = [-part.stiffness * weight, -part.damping * weight]
 
 
 def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: float) -> None:

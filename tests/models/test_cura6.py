@@ -50,7 +50,7 @@ def test_carries_4039_g_at_full_stretch(model):
     needed = np.abs(data.qfrc_bias + jac.T @ [0, 0, 9.81 * 4.039])
     limit = cura6_drive().torque_limit
     assert (needed < 0.75 * limit).all()
-    np.testing.assert_allclose(limit, [link.torque for link in design.LINKS], rel=0.15)
+    np.testing.assert_allclose(limit, [link.torque for link in design.LINKS], rtol=0.15)
 
 
 def test_simulates_a_second_without_control(model):

@@ -71,7 +71,7 @@ def test_a_clamp_pushes_with_its_stiffness(stiffness):
     data.mocap_pos[0] = data.geom_xpos[geom] + [reach - depth, 0, 0]
     mujoco.mj_forward(model, data)
     force = -data.sensordata.reshape(6, 10)[1, 1:4]
-    assert force[0] == pytest.approx(-stiffness * depth, rel=0.35)
+    assert force[0] == pytest.approx(-stiffness * depth, rel=0.02)
 
 
 def test_payload_changes_gravity_torque_and_nothing_else():
@@ -100,18 +100,19 @@ def test_bad_input_is_named():
     scene = compose(SceneSpec())
     with pytest.raises(ValueError, match="payload=True"):
         set_payload(scene.model, mujoco.MjData(scene.model), -1, 1.0)
-    with pytest.raises(ValueError, match="at most 0.02"):
+    with pytest.raises(ValueError, match=r"at most 0\.02"):
         SceneSpec(timestep=0.5)
     with pytest.raises(ValueError, match=r"Mismatch.gain 2: expected 0 to 0.9"):
         Mismatch(seed=0, gain=2)
+    six = np.ones(6)
     with pytest.raises(ValueError, match=r"Friction.viscous: shape \(2,\)"):
-        six = np.ones(6)
         Friction(six, six, six, np.ones(2), six, six)
 
 
 def test_sensors_quantise_after_noise():
+    rng = np.random.default_rng(0)
     sensors = Sensors(np.full(6, 0.02), np.full(6, 0.01), position_quantum=1e-3)
-    q, qd, current = sensors.measure(np.random.default_rng(0), *np.random.rand(3, 5000, 6))
+    q, qd, current = sensors.measure(rng, *rng.uniform(size=(3, 5000, 6)))
     np.testing.assert_allclose(current / 0.01, np.round(current / 0.01), atol=1e-9)
     np.testing.assert_allclose(q / 1e-3, np.round(q / 1e-3), atol=1e-9)
     assert np.isfinite(qd).all()
