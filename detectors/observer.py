@@ -1,179 +1,77 @@
-"""The generalised-momentum observer: an estimate of ``tau_ext`` from positions, speeds, torques."""
+"""The generalised-momentum observer: an estimate of ``tau_ext`` without accelerations.
+
+With the momentum p = M(q) qd and beta = C(q, qd)^T qd - g(q), dp/dt = tau + beta + tau_ext. The
+residual r follows tau_ext as a first-order filter of rate K (De Luca & Mattone 2003)::
+
+    r += (1 - exp(-K dt)) ((p_k - p_{k-1}) / dt - (tau_{k-1} + (beta_k + beta_{k-1}) / 2) - r)
+
+which is the exact discretisation for a tau that is held over the step: stable at any K dt.
+"""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.detectors import _observer
-
-if TYPE_CHECKING:
-    import pinocchio as pin
+from tauguard.detectors.numbers import RobotNumbers, momentum_terms, rows, same_rows
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class RobotNumbers:
-    """The numbers of a rigid-body model: plain arrays that a file can hold.
+def per_joint(name: str, value: ArrayLike, joints: int) -> Array:
+    """``value`` as one positive number a joint, shape (joints,).
 
-    A tree of one-degree-of-freedom joints, each after its parent.
+    Raises:
+        ValueError: another shape, or a number that is not finite and above 0.
     """
-
-    parents: tuple[int, ...]  #: index of the joint before, -1 for the world
-    prismatic: tuple[bool, ...]  #: else revolute
-    placements: Array  #: of each joint in its parent at position 0, shape (n, 4, 4)
-    axes: Array  #: unit vectors in the joint's frame, shape (n, 3)
-    masses: Array  #: [kg], shape (n,)
-    coms: Array  #: in the joint's frame [m], shape (n, 3)
-    inertias: Array  #: about the centre of mass [kg m^2], shape (n, 3, 3)
-    armature: Array  #: [kg m^2], shape (n,)
-    gravity: Array  #: in the world [m/s^2], shape (3,)
-
-    @classmethod
-    def from_pin(cls, model: pin.Model) -> RobotNumbers:
-        """From a Pinocchio model.
-
-        Raises:
-            ValueError: a joint with other than one degree of freedom (named), or one whose
-                position is not an angle or a length.
-        """
-        axes, prismatic = [], []
-        for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
-            if joint.nv != 1 or joint.nq != 1:
-                raise ValueError(f"joint {name!r}: {joint.nq} positions; expected hinge or slide")
-            axis, slides = _axis(joint)
-            axes.append(axis)
-            prismatic.append(slides)
-        inertias = list(model.inertias)[1:]
-        return cls(
-            parents=tuple(int(p) - 1 for p in list(model.parents)[1:]),
-            prismatic=tuple(prismatic),
-            placements=np.array([p.homogeneous for p in list(model.jointPlacements)[1:]]),
-            axes=np.array(axes),
-            masses=np.array([i.mass for i in inertias]),
-            coms=np.array([i.lever for i in inertias]),
-            inertias=np.array([i.inertia for i in inertias]),
-            armature=np.array(model.armature),
-            gravity=np.array(model.gravity.linear),
-        )
-
-    @property
-    def joints(self) -> int:
-        """How many joints."""
-        return len(self.parents)
-
-    def native(self) -> _observer.Robot:
-        """The compiled form."""
-        return _observer.make_robot(
-            list(self.parents),
-            list(self.prismatic),
-            *(
-                np.ascontiguousarray(values, dtype=np.float64)
-                for values in (
-                    self.placements,
-                    self.axes,
-                    self.masses,
-                    self.coms,
-                    self.inertias,
-                    self.armature,
-                    self.gravity,
-                )
-            ),
-        )
+    array = np.asarray(value, dtype=np.float64)
+    if array.ndim == 0:
+        array = np.full(joints, float(array))
+    if array.shape != (joints,):
+        raise ValueError(f"{name}: shape {array.shape}, expected one number or ({joints},)")
+    if not (np.isfinite(array).all() and (array > 0).all()):
+        raise ValueError(f"{name}: {array.tolist()}, every entry must be finite and above 0")
+    return np.ascontiguousarray(array)
 
 
-def _axis(joint: pin.JointModel) -> tuple[Array, bool]:
-    """Axis and whether it slides, from the joint's motion subspace at position 0."""
-    data = joint.createData()
-    joint.calc(data, np.zeros(1), np.zeros(1)) if joint.idx_q == 0 else joint.calc(
-        data, np.zeros(joint.idx_q + 1), np.zeros(joint.idx_v + 1)
-    )
-    subspace = np.asarray(data.S).reshape(6)
-    slides = bool(np.abs(subspace[:3]).max() > 0.5)
-    return subspace[:3] if slides else subspace[3:], slides
-
-
-def _rows(name: str, value: ArrayLike, joints: int) -> Array:
-    array = np.ascontiguousarray(value, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != joints:
-        raise ValueError(f"{name}: shape {array.shape}, expected (T, {joints}) for this robot")
-    if not np.isfinite(array).all():
-        row = int(np.argwhere(~np.isfinite(array))[0][0])
-        raise ValueError(f"{name}: not finite in row {row}")
-    return array
-
-
-def _gains(gain: ArrayLike, joints: int) -> Array:
-    gains = np.ascontiguousarray(np.broadcast_to(np.asarray(gain, dtype=np.float64), (joints,)))
-    if not (np.isfinite(gains).all() and (gains > 0).all()):
-        raise ValueError(f"gain {gains}: expected numbers above 0 [1/s]")
-    return gains
-
-
-def momentum_terms(
-    robot: RobotNumbers, q: ArrayLike, qd: ArrayLike, threads: int = 1
-) -> tuple[Array, Array]:
-    """Generalised momentum and ``beta = C^T qd - g`` at every row.
+def intervals(t: ArrayLike, samples: int) -> Array:
+    """Sample intervals [s], shape (samples - 1,), from times or from one constant interval.
 
     Args:
-        robot: the nominal model.
-        q: [rad], shape (T, n).
-        qd: [rad/s], shape (T, n).
-        threads: 0 means all processors; the result does not depend on it.
+        t: times [s], shape (samples,), or the interval itself, a number.
+        samples: how many rows the signals have.
 
-    Returns:
-        p [N m s] and beta [N m], each (T, n).
+    Raises:
+        ValueError: times that do not fit or do not increase; names the row.
     """
-    positions, speeds = _rows("q", q, robot.joints), _rows("qd", qd, robot.joints)
-    p, beta = np.empty_like(positions), np.empty_like(positions)
-    _observer.momentum(robot.native(), positions, speeds, p, beta, threads)
-    return p, beta
+    times = np.asarray(t, dtype=np.float64)
+    if times.ndim == 0:
+        if not (np.isfinite(times) and times > 0):
+            raise ValueError(f"t: interval {times}, expected a number above 0")
+        return np.full(max(samples - 1, 0), float(times))
+    if times.shape != (samples,):
+        raise ValueError(f"t: shape {times.shape}, expected ({samples},)")
+    dt = np.diff(times)
+    if not (dt > 0).all():
+        raise ValueError(f"t: not increasing at row {int(np.flatnonzero(~(dt > 0))[0]) + 1}")
+    return dt
 
 
-def inverse_dynamics(
-    robot: RobotNumbers, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, threads: int = 1
-) -> Array:
-    """Joint torques of a motion without contact and friction, armature included [N m], (T, n)."""
-    positions, speeds = _rows("q", q, robot.joints), _rows("qd", qd, robot.joints)
-    accelerations = _rows("qdd", qdd, robot.joints)
-    tau = np.empty_like(positions)
-    _observer.inverse(robot.native(), positions, speeds, accelerations, tau, threads)
-    return tau
+def low_pass(gain: ArrayLike, dt: Array, p: Array, beta: Array, tau: Array | None = None) -> Array:
+    """The observer's filter on given columns: r of dp/dt - tau - beta, shape (T, c).
 
-
-class MomentumObserver:
-    """The observer sample by sample (De Luca & Mattone 2003; exact discretisation).
-
-    The residual follows ``tau_ext`` with the first-order lag 1/gain and is stable at any gain x dt.
-    It is 0 at the first sample.
+    Args:
+        gain: rate of each column [1/s], shape (c,).
+        dt: intervals [s], shape (T - 1,).
+        p: shape (T, c).
+        beta: shape (T, c).
+        tau: held over each step, shape (T, c); ``None``: zero.
     """
-
-    def __init__(self, robot: RobotNumbers, gain: ArrayLike = 100.0) -> None:
-        """For the nominal model ``robot`` with ``gain`` [1/s], a number or one a joint."""
-        self._gain = _gains(gain, robot.joints)
-        self._native = robot.native()
-        self._observer = _observer.Observer(self._native, self._gain)
-        self._out = np.zeros(robot.joints)
-
-    def reset(self) -> None:
-        """Forget the past."""
-        self._observer.reset()
-
-    def step(self, dt: float, q: Array, qd: Array, tau: Array) -> Array:
-        """The residual [N m] at this sample, shape (n,); the array is reused by the next call.
-
-        Args:
-            dt: time since the previous sample [s].
-            q: [rad], shape (n,).
-            qd: [rad/s], shape (n,).
-            tau: what the drives apply from this sample on, friction taken off [N m], shape (n,).
-        """
-        self._observer.step(dt, q, qd, tau, self._out)
-        return self._out
+    out = np.empty_like(p)
+    driven = np.empty((0, p.shape[1])) if tau is None else tau
+    _observer.filter(per_joint("gain", gain, p.shape[1]), dt, p, beta, driven, out)
+    return out
 
 
 def observe(
@@ -183,32 +81,95 @@ def observe(
     qd: ArrayLike,
     tau: ArrayLike,
     gain: ArrayLike = 100.0,
+    *,
+    threads: int = 0,
 ) -> Array:
-    """The residual of a whole recording, the same numbers as :class:`MomentumObserver` gives.
+    """The residual of every sample; equal to :class:`MomentumObserver` fed sample by sample.
 
     Args:
-        robot: the nominal model.
-        t: increasing sample times, jitter allowed [s], shape (T,).
-        q: [rad], shape (T, n).
-        qd: [rad/s], shape (T, n).
-        tau: what the drives apply from each sample on, friction taken off [N m], shape (T, n).
-        gain: [1/s], a number or one a joint.
+        robot: the arm.
+        t: times [s], shape (T,), or a constant interval [s].
+        q: positions [rad], shape (T, n).
+        qd: velocities [rad/s], shape (T, n).
+        tau: drive torques at the joints less what friction takes, as far as known [N m], (T, n).
+        gain: observer rate [1/s], a number or one a joint.
+        threads: 0 takes all processors; the result does not depend on it.
 
     Returns:
-        Estimate of ``tau_ext`` [N m], shape (T, n).
+        Residual [N m], the estimate of ``tau_ext``, shape (T, n); the first row is zero.
 
     Raises:
-        ValueError: shapes that do not fit the robot, values that are not finite, time not
-            increasing, a gain that is not positive.
+        ValueError: shapes that differ, values that are not finite, times that do not increase.
     """
-    positions, speeds = _rows("q", q, robot.joints), _rows("qd", qd, robot.joints)
-    torques = _rows("tau", tau, robot.joints)
-    times = np.ascontiguousarray(t, dtype=np.float64)
-    if times.shape != (len(positions),) or (np.diff(times) <= 0).any():
-        raise ValueError(f"t: expected {len(positions)} increasing times")
-    out = np.empty_like(positions)
-    native = robot.native()
-    _observer.Observer(native, _gains(gain, robot.joints)).run(
-        times, positions, speeds, torques, out
-    )
-    return out
+    q, qd, tau = same_rows(robot.joints, q=q, qd=qd, tau=tau)
+    dt = intervals(t, len(q))
+    p, beta = momentum_terms(robot, q, qd, threads=threads)
+    return low_pass(per_joint("gain", gain, robot.joints), dt, p, beta, tau)
+
+
+class MomentumObserver:
+    """The observer online: a few microseconds a sample."""
+
+    def __init__(self, robot: RobotNumbers, gain: ArrayLike = 100.0, dt: float = 1e-3) -> None:
+        """Bind the numbers.
+
+        Args:
+            robot: the arm.
+            gain: observer rate [1/s], a number or one a joint.
+            dt: sample interval for steps that do not say theirs [s].
+        """
+        self.robot = robot
+        self.gain = per_joint("gain", gain, robot.joints)
+        self.dt = float(intervals(dt, 2)[0])
+        self._native = _observer.Observer(robot.chain, self.gain)
+
+    def reset(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike | None = None) -> None:
+        """Forget; the sample ``(q, qd, tau)`` comes before the next step's. The residual is zero.
+
+        Args:
+            q: positions [rad], shape (n,).
+            qd: velocities [rad/s], shape (n,).
+            tau: drive torques held until the next sample [N m], shape (n,) (default: those that
+                leave the momentum as it is, gravity compensation at rest).
+        """
+        n = self.robot.joints
+        at, speed = rows("q", np.atleast_2d(q), n), rows("qd", np.atleast_2d(qd), n)
+        if tau is None:
+            tau = -momentum_terms(self.robot, at, speed, threads=1)[1]
+        self._native.reset(at[0], speed[0], rows("tau", np.atleast_2d(tau), n)[0])
+
+    def step(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array,
+        dt: float | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """The residual at this sample; the first call after construction resets and returns zero.
+
+        Args:
+            q: positions [rad], float64, shape (n,).
+            qd: velocities [rad/s], shape (n,).
+            tau: drive torques [N m], shape (n,); they count for the next step.
+            dt: time since the last sample [s] (default: the constructor's).
+            out: where to write the residual, shape (n,) (default: a new array).
+
+        Returns:
+            Residual [N m], shape (n,).
+
+        Raises:
+            ValueError: wrong shapes or numbers that are not finite; the state is as before.
+        """
+        if out is None:
+            out = np.empty_like(self.gain)
+        try:
+            if self._native.started:
+                self._native.step(q, qd, tau, self.dt if dt is None else dt, out)
+            else:
+                self._native.reset(q, qd, tau)
+                out[:] = 0.0
+        except TypeError:
+            n = self.robot.joints
+            raise ValueError(f"q, qd, tau: expected float64 arrays of shape ({n},)") from None
+        return out

@@ -1,0 +1,156 @@
+"""From a boolean series to alarms, and from alarms to detected collisions and false alarms.
+
+An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm that starts
+between onset and onset + 0.5 s (clamping: its end) detects that collision, and the first one
+counts. Any other alarm is false, one during a payload change too; an alarm already up at onset is
+false and detects nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tauguard.traces.trace import Alarm, Collision, Detection, Trace
+
+#: Alarms closer than this are one [s]; the false-alarm rate changes up to fourfold with it.
+MERGE_GAP = 0.5
+#: An alarm this long after the onset still detects the collision [s].
+WINDOW = 0.5
+#: Length of a non-collision case [s].
+CASE_SECONDS = 2.0
+
+Interval = tuple[float, float]
+
+
+def find_alarms(t: ArrayLike, alarm: ArrayLike, merge_gap: float = MERGE_GAP) -> tuple[Alarm, ...]:
+    """Maximal runs of True, those less than ``merge_gap`` [s] apart as one.
+
+    Args:
+        t: times [s], shape (T,).
+        alarm: the filtered series, shape (T,).
+        merge_gap: [s].
+
+    Returns:
+        Alarms in order; start and end are the times of the first and last True.
+    """
+    times, up = np.asarray(t, dtype=np.float64), np.asarray(alarm, dtype=np.bool_)
+    if times.shape != up.shape or times.ndim != 1:
+        raise ValueError(f"t and alarm: shapes {times.shape} and {up.shape}, expected (T,) twice")
+    edges = np.diff(np.concatenate(([0], up.astype(np.int8), [0])))
+    starts, ends = times[edges[:-1] == 1], times[edges[1:] == -1]
+    if not len(starts):
+        return ()
+    apart = starts[1:] - ends[:-1] >= merge_gap
+    first = np.concatenate(([True], apart))
+    last = np.concatenate((apart, [True]))
+    pairs = zip(starts[first], ends[last], strict=True)
+    return tuple(Alarm(float(start), float(end)) for start, end in pairs)
+
+
+def detection_window(collision: Collision) -> Interval:
+    """When an alarm must start to detect ``collision``: [s], [s]."""
+    end = collision.end if collision.kind == "clamp" else collision.onset + WINDOW
+    return collision.onset, end
+
+
+def occupied(collision: Collision) -> Interval:
+    """The time that is not collision-free: contact and detection window [s], [s]."""
+    return collision.onset, max(collision.end, detection_window(collision)[1])
+
+
+@dataclass(frozen=True)
+class Matching:
+    """What the alarms of one trace were worth."""
+
+    collisions: tuple[Collision, ...]
+    delays: tuple[float | None, ...]  #: alarm start less onset [s], None for a missed collision
+    false_alarms: tuple[Alarm, ...]
+    free_seconds: float  #: collision-free time [s]
+    cases: int  #: non-collision cases
+    false_cases: int  #: of them, those that a false alarm touches
+
+
+def match(
+    alarms: Sequence[Alarm],
+    collisions: Sequence[Collision],
+    span: Interval,
+    case_seconds: float = CASE_SECONDS,
+) -> Matching:
+    """Judge the alarms of one trace.
+
+    A non-collision case is a piece of ``case_seconds`` of collision-free time: every collision-free
+    stretch is cut into such pieces from its beginning, and the rest at its end is in no case.
+
+    Args:
+        alarms: merged alarms, in order.
+        collisions: the truth.
+        span: first and last time that is judged [s]; alarms and collisions that start before or
+            after it are left out (a detector settles in the beginning).
+        case_seconds: length of a non-collision case [s].
+    """
+    begin, end = span
+    if not (begin <= end and case_seconds > 0):
+        raise ValueError(
+            f"span {span} s, case_seconds {case_seconds} s: expected begin <= end, > 0"
+        )
+    inside = [c for c in collisions if begin <= c.onset <= end]
+    judged = [a for a in alarms if begin <= a.start <= end]
+    delays: list[float | None] = []
+    useful: set[int] = set()
+    for collision in inside:
+        low, high = detection_window(collision)
+        hits = [k for k, a in enumerate(judged) if low <= a.start <= high]
+        useful.update(hits)
+        up_before = any(a.start < low <= a.end for a in alarms)
+        delays.append(None if up_before or not hits else judged[hits[0]].start - low)
+    false_alarms = tuple(a for k, a in enumerate(judged) if k not in useful)
+    free = collision_free([occupied(c) for c in collisions], span)
+    cases = [
+        (low + k * case_seconds, low + (k + 1) * case_seconds)
+        for low, high in free
+        for k in range(int((high - low) / case_seconds + 1e-9))
+    ]
+    touched = sum(any(a.start < high and a.end >= low for a in false_alarms) for low, high in cases)
+    return Matching(
+        tuple(inside),
+        tuple(delays),
+        false_alarms,
+        float(sum(high - low for low, high in free)),
+        len(cases),
+        touched,
+    )
+
+
+def collision_free(busy: Sequence[Interval], span: Interval) -> list[Interval]:
+    """The stretches of ``span`` outside all of ``busy`` [s]."""
+    free, now = [], span[0]
+    for low, high in sorted(busy):
+        if low > now and now < span[1]:
+            free.append((now, min(low, span[1])))
+        now = max(now, high)
+    if now < span[1]:
+        free.append((now, span[1]))
+    return free
+
+
+def judge(detection: Detection, trace: Trace, skip: float = 0.0) -> Matching:
+    """Match a detection with its trace's truth.
+
+    Args:
+        detection: of this trace.
+        trace: with truth.
+        skip: seconds at the beginning that are not judged.
+
+    Raises:
+        ValueError: the trace has no truth, or the detection belongs to another trace.
+    """
+    if trace.truth is None:
+        raise ValueError("trace has no truth to judge a detection by")
+    if detection.t.shape != trace.t.shape:
+        raise ValueError(f"detection has {len(detection.t)} samples, the trace {len(trace.t)}")
+    span = float(min(trace.t[0] + skip, trace.t[-1])), float(trace.t[-1])
+    return match(detection.alarms, trace.truth.collisions, span)

@@ -1,0 +1,187 @@
+#include "chain.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tauguard::detectors {
+
+using Link = Workspace::Link;
+
+// The frame of link i in its parent's.
+void Chain::place(int i, double q, Workspace& work) const {
+  const Joint& joint = joints[i];
+  Link& link = work.links[i];
+  if (joint.prismatic) {
+    link.rotation = joint.fixed;
+    link.origin = joint.offset + q * joint.slide;
+    return;
+  }
+  const double c = std::cos(q), s = std::sin(q);
+  for (int e = 0; e < 9; ++e)
+    link.rotation.m[e] = joint.fixed.m[e] + (c * joint.cosine.m[e] + s * joint.sine.m[e]);
+  link.origin = joint.offset;
+}
+
+// Frames, velocities and gravity of every link, outwards.
+void Chain::velocities(const double* q, const double* qd, Workspace& work) const {
+  for (int i = 0; i < size(); ++i) {
+    place(i, q[i], work);
+    const Joint& joint = joints[i];
+    Link& link = work.links[i];
+    Vec3 w, v, g = gravity;
+    if (joint.parent >= 0) {
+      const Link& parent = work.links[joint.parent];
+      w = parent.w;
+      v = parent.v + cross(parent.w, link.origin);
+      g = parent.gravity;
+    }
+    link.w = transposed(link.rotation, w);
+    link.v = transposed(link.rotation, v);
+    link.gravity = transposed(link.rotation, g);
+    (joint.prismatic ? link.v : link.w) += qd[i] * joint.axis;
+  }
+}
+
+namespace {
+
+// What link i's subtree has gathered, added to its parent's.
+void hand_over(const Link& link, Link& parent) {
+  const Vec3 k = link.rotation * link.k;
+  parent.h += link.rotation * link.h + cross(link.origin, k);
+  parent.k += k;
+}
+
+void hand_over_mass(const Link& link, Link& parent) {
+  parent.mass += link.mass;
+  parent.moment += link.rotation * link.moment + link.mass * link.origin;
+}
+
+// (S . H, H . (V x S) + S . gravity wrench) of joint i from what its subtree has gathered.
+struct Projection {
+  double p, beta;
+};
+
+Projection project(const Joint& joint, const Link& link) {
+  const Vec3 a = joint.axis;
+  if (joint.prismatic) {
+    return {dot(a, link.k), dot(link.k, cross(link.w, a)) + link.mass * dot(a, link.gravity)};
+  }
+  return {dot(a, link.h), dot(link.h, cross(link.w, a)) + dot(link.k, cross(link.v, a)) +
+                              dot(a, cross(link.moment, link.gravity))};
+}
+
+Inertial unit(int parameter) {
+  Inertial one;
+  double* slots[kInertial] = {&one.mass, &one.moment.x, &one.moment.y, &one.moment.z, &one.xx,
+                              &one.xy,   &one.yy,       &one.xz,       &one.yz,       &one.zz};
+  *slots[parameter] = 1.0;
+  return one;
+}
+
+}  // namespace
+
+void Chain::momentum(const double* q, const double* qd, double* p, double* beta, Workspace& work) const {
+  velocities(q, qd, work);
+  for (int i = 0; i < size(); ++i) {
+    const Inertial& body = joints[i].inertial;
+    Link& link = work.links[i];
+    link.h = body.angular_momentum(link.w, link.v);
+    link.k = body.linear_momentum(link.w, link.v);
+    link.mass = body.mass;
+    link.moment = body.moment;
+  }
+  for (int i = size() - 1; i >= 0; --i) {
+    const Joint& joint = joints[i];
+    const Link& link = work.links[i];
+    const Projection onto = project(joint, link);
+    p[i] = onto.p + joint.armature * qd[i];
+    beta[i] = onto.beta;
+    if (joint.parent >= 0) {
+      hand_over(link, work.links[joint.parent]);
+      hand_over_mass(link, work.links[joint.parent]);
+    }
+  }
+}
+
+// One column of the regressor: what a unit of one parameter of `body` does at the joints that carry it.
+void Chain::column(int body, int parameter, double* p, double* beta, std::size_t stride,
+                   Workspace& work) const {
+  for (int i = 0; i < size(); ++i) p[i * stride] = beta[i * stride] = 0.0;
+  const Inertial one = unit(parameter);
+  Link carried = work.links[body];
+  carried.h = one.angular_momentum(carried.w, carried.v);
+  carried.k = one.linear_momentum(carried.w, carried.v);
+  carried.mass = one.mass;
+  carried.moment = one.moment;
+  for (int i = body; i >= 0; i = joints[i].parent) {
+    const Projection onto = project(joints[i], carried);
+    p[i * stride] = onto.p;
+    beta[i * stride] = onto.beta;
+    if (joints[i].parent < 0) break;
+    Link next = work.links[joints[i].parent];
+    next.h = next.k = next.moment = Vec3{};
+    next.mass = 0;
+    hand_over(carried, next);
+    hand_over_mass(carried, next);
+    carried = next;
+  }
+}
+
+void Chain::link_regressor(int body, int count, const double* q, const double* qd, double* p,
+                           double* beta, Workspace& work) const {
+  velocities(q, qd, work);
+  for (int c = 0; c < count; ++c) column(body, c, p + c, beta + c, count, work);
+}
+
+void Chain::regressor(const double* q, const double* qd, double* p, double* beta, Workspace& work) const {
+  velocities(q, qd, work);
+  const std::size_t stride = static_cast<std::size_t>(kInertial) * joints.size();
+  for (int body = 0; body < size(); ++body)
+    for (int c = 0; c < kInertial; ++c)
+      column(body, c, p + kInertial * body + c, beta + kInertial * body + c, stride, work);
+}
+
+void Chain::rnea(const double* q, const double* qd, const double* qdd, double* tau, Workspace& work) const {
+  velocities(q, qd, work);
+  for (int i = 0; i < size(); ++i) {
+    const Joint& joint = joints[i];
+    Link& link = work.links[i];
+    Vec3 aw, av = -1.0 * gravity;  // the base accelerates upwards instead of gravity pulling down
+    if (joint.parent >= 0) {
+      const Link& parent = work.links[joint.parent];
+      aw = parent.aw;
+      av = parent.av + cross(parent.aw, link.origin);
+    }
+    link.aw = transposed(link.rotation, aw);
+    link.av = transposed(link.rotation, av);
+    if (joint.prismatic) {
+      link.av += qdd[i] * joint.axis + qd[i] * cross(link.w, joint.axis);
+    } else {
+      link.aw += qdd[i] * joint.axis + qd[i] * cross(link.w, joint.axis);
+      link.av += qd[i] * cross(link.v, joint.axis);
+    }
+    const Inertial& body = joint.inertial;
+    const Vec3 h = body.angular_momentum(link.w, link.v), k = body.linear_momentum(link.w, link.v);
+    link.h = body.angular_momentum(link.aw, link.av) + cross(link.w, h) + cross(link.v, k);
+    link.k = body.linear_momentum(link.aw, link.av) + cross(link.w, k);
+  }
+  for (int i = size() - 1; i >= 0; --i) {
+    const Joint& joint = joints[i];
+    const Link& link = work.links[i];
+    tau[i] = dot(joint.axis, joint.prismatic ? link.k : link.h) + joint.armature * qdd[i];
+    if (joint.parent >= 0) hand_over(link, work.links[joint.parent]);
+  }
+}
+
+void Chain::mass_matrix(const double* q, double* m, Workspace& work) const {
+  const int n = size();
+  std::vector<double> one(n, 0.0), beta(n), column_of(n);
+  for (int j = 0; j < n; ++j) {
+    one[j] = 1.0;
+    momentum(q, one.data(), column_of.data(), beta.data(), work);
+    for (int i = 0; i < n; ++i) m[i * n + j] = column_of[i];
+    one[j] = 0.0;
+  }
+}
+
+}  // namespace tauguard::detectors

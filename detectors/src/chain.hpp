@@ -1,0 +1,92 @@
+// The rigid-body terms that an observer needs, by O(n) recursions over a tree of one-degree joints.
+//
+// Notation: link i moves with joint i and carries its frame; all quantities of a link are in its own
+// frame, about its origin. w, v: angular and linear velocity; h, k: angular and linear momentum.
+// With S_i the joint's motion axis and H_i = (h, k) the momentum of the whole subtree of joint i,
+//
+//   p_i      = S_i . H_i + armature_i qd_i                    (generalised momentum M(q) qd)
+//   dT/dq_i  = H_i . (V_i x S_i)                              (= (C(q, qd)^T qd)_i)
+//   g_i      = dU/dq_i = -S_i . (first moment x gravity, mass gravity)  of the subtree
+//
+// The second line: turning joint i by d changes its link's velocity by V_i x S_i d (x: motion cross
+// product), which the whole subtree then carries along, and the kinetic energy by H_i times that.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "vec3.hpp"
+
+namespace tauguard::detectors {
+
+constexpr int kInertial = 10;  // m, m c (3), Ixx Ixy Iyy Ixz Iyz Izz about the link's origin
+
+struct Inertial {
+  double mass = 0;
+  Vec3 moment;                           // mass times centre of mass
+  double xx = 0, xy = 0, yy = 0, xz = 0, yz = 0, zz = 0;
+
+  Vec3 angular_momentum(Vec3 w, Vec3 v) const {
+    const Vec3 iw = {xx * w.x + xy * w.y + xz * w.z, xy * w.x + yy * w.y + yz * w.z,
+                     xz * w.x + yz * w.y + zz * w.z};
+    return iw + cross(moment, v);
+  }
+  Vec3 linear_momentum(Vec3 w, Vec3 v) const { return mass * v + cross(w, moment); }
+};
+
+struct Joint {
+  int parent = -1;         // -1: the base
+  bool prismatic = false;  // else revolute
+  Vec3 axis;               // unit, in the link's frame
+  Vec3 offset;             // origin of the joint in the parent's frame
+  Vec3 slide;              // prismatic: the axis in the parent's frame
+  Mat3 fixed, cosine, sine;  // rotation to the parent = fixed + cos(q) cosine + sin(q) sine
+  Inertial inertial;
+  double armature = 0;
+};
+
+// What one evaluation writes to; one per thread.
+struct Workspace {
+  struct Link {
+    Mat3 rotation;  // link axes to parent axes
+    Vec3 origin;    // of the link in the parent's frame
+    Vec3 w, v, gravity;
+    Vec3 aw, av;      // acceleration (spatial)
+    Vec3 h, k;        // momentum or force of the subtree
+    double mass = 0;  // of the subtree
+    Vec3 moment;      // first mass moment of the subtree
+  };
+  std::vector<Link> links;
+  explicit Workspace(std::size_t n = 0) : links(n) {}
+};
+
+class Chain {
+ public:
+  std::vector<Joint> joints;
+  Vec3 gravity;
+
+  int size() const { return static_cast<int>(joints.size()); }
+
+  // p = M(q) qd and beta = C(q, qd)^T qd - g(q), so that dp/dt = tau + beta + tau_ext; n doubles each.
+  void momentum(const double* q, const double* qd, double* p, double* beta, Workspace& work) const;
+
+  // The same, per unit of every inertial parameter of every link: p and beta are n x (10 n), row-major.
+  void regressor(const double* q, const double* qd, double* p, double* beta, Workspace& work) const;
+
+  // The same for the inertial parameters of link `link` alone, the first `count` of them: n x count.
+  void link_regressor(int link, int count, const double* q, const double* qd, double* p, double* beta,
+                      Workspace& work) const;
+
+  // Inverse dynamics: tau = M qdd + C qd + g.
+  void rnea(const double* q, const double* qd, const double* qdd, double* tau, Workspace& work) const;
+
+  // M(q), n x n, armature on its diagonal.
+  void mass_matrix(const double* q, double* m, Workspace& work) const;
+
+ private:
+  void place(int i, double q, Workspace& work) const;
+  void velocities(const double* q, const double* qd, Workspace& work) const;
+  void column(int link, int parameter, double* p, double* beta, std::size_t stride, Workspace& work) const;
+};
+
+}  // namespace tauguard::detectors

@@ -1,0 +1,228 @@
+// tauguard.detectors._observer: chains of one-degree joints and the momentum observer on arrays.
+// Rows are samples and independent of each other in all batch functions; shapes are checked in Python.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+
+#include "chain.hpp"
+#include "observer.hpp"
+#include "tauguard/geometry/thread_pool.hpp"
+
+namespace nb = nanobind;
+using namespace tauguard::detectors;
+using tauguard::geometry::ThreadPool;
+
+using In1 = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using In2 = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using In3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using Ids = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Out1 = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Out2 = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Out3 = nb::ndarray<double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+
+constexpr std::size_t kGrain = 512;  // samples a chunk
+
+namespace {
+
+Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
+
+// Rotation about `axis` by q, in the parent's axes: R (a a^T) + cos q R (1 - a a^T) + sin q R [a].
+void fill_rotation(Joint& joint, const double* placement) {
+  const double a[3] = {joint.axis.x, joint.axis.y, joint.axis.z};
+  const double skew[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0};
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) {
+      double along = 0, turned = 0;
+      for (int k = 0; k < 3; ++k) {
+        along += placement[3 * r + k] * a[k] * a[c];
+        turned += placement[3 * r + k] * skew[3 * k + c];
+      }
+      const double whole = placement[3 * r + c];
+      joint.fixed.m[3 * r + c] = joint.prismatic ? whole : along;
+      joint.cosine.m[3 * r + c] = joint.prismatic ? 0.0 : whole - along;
+      joint.sine.m[3 * r + c] = joint.prismatic ? 0.0 : turned;
+    }
+  Mat3 rotation;
+  std::copy(placement, placement + 9, rotation.m);
+  joint.slide = rotation * joint.axis;
+}
+
+Chain make_chain(Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 axis, In2 inertial,
+                 In1 armature, In1 gravity) {
+  const std::size_t n = parent.shape(0);
+  const bool fits = prismatic.shape(0) == n && rotation.shape(0) == n && rotation.shape(1) == 3 &&
+                    rotation.shape(2) == 3 && translation.shape(0) == n && translation.shape(1) == 3 &&
+                    axis.shape(0) == n && axis.shape(1) == 3 && inertial.shape(0) == n &&
+                    inertial.shape(1) == kInertial && armature.shape(0) == n && gravity.shape(0) == 3;
+  if (!fits) throw std::invalid_argument("Chain: array lengths differ");
+  Chain chain;
+  chain.gravity = vec(gravity.data());
+  chain.joints.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (parent.data()[i] < -1 || parent.data()[i] >= static_cast<std::int64_t>(i))
+      throw std::invalid_argument("Chain: a joint's parent must come before it");
+    Joint& joint = chain.joints[i];
+    joint.parent = static_cast<int>(parent.data()[i]);
+    joint.prismatic = prismatic.data()[i] != 0;
+    joint.axis = vec(axis.data() + 3 * i);
+    joint.offset = vec(translation.data() + 3 * i);
+    fill_rotation(joint, rotation.data() + 9 * i);
+    const double* b = inertial.data() + kInertial * i;
+    joint.inertial = {b[0], vec(b + 1), b[4], b[5], b[6], b[7], b[8], b[9]};
+    joint.armature = armature.data()[i];
+  }
+  return chain;
+}
+
+template <class Row>
+void each_row(std::size_t rows, int joints, int threads, const Row& row) {
+  nb::gil_scoped_release release;
+  ThreadPool::shared().parallel_for(rows, threads, kGrain, [&](auto begin, auto end, auto) {
+    Workspace work(joints);
+    for (auto t = begin; t < end; ++t) row(t, work);
+  });
+}
+
+void require(bool fits, const char* message) {
+  if (!fits) throw std::invalid_argument(message);
+}
+
+template <class... Arrays>
+void same_rows(const Chain& chain, const Arrays&... arrays) {
+  const std::size_t rows = std::get<0>(std::tie(arrays...)).shape(0);
+  const std::size_t n = chain.joints.size();
+  require(((arrays.shape(0) == rows && arrays.shape(1) == n) && ...), "arrays differ in shape");
+}
+
+// Column-wise filter of given p, beta, tau (tau may have no rows: zero): r of shape (T, c).
+void filter(In1 gain, In1 dt, In2 p, In2 beta, In2 tau, Out2 out) {
+  const std::size_t rows = p.shape(0), columns = p.shape(1);
+  const bool driven = tau.shape(0) > 0;
+  require(beta.shape(0) == rows && beta.shape(1) == columns && out.shape(0) == rows &&
+              out.shape(1) == columns && gain.shape(0) == columns && dt.shape(0) + 1 >= rows &&
+              (!driven || (tau.shape(0) == rows && tau.shape(1) == columns)),
+          "filter: arrays differ in shape");
+  nb::gil_scoped_release release;
+  std::vector<double> decay(columns);
+  double decay_dt = -1.0;
+  for (std::size_t c = 0; c < columns && rows > 0; ++c) out.data()[c] = 0.0;
+  for (std::size_t t = 1; t < rows; ++t) {
+    const double step = dt.data()[t - 1];
+    if (step != decay_dt) {
+      for (std::size_t c = 0; c < columns; ++c) decay[c] = observer_decay(gain.data()[c], step);
+      decay_dt = step;
+    }
+    const std::size_t now = t * columns, before = now - columns;
+    for (std::size_t c = 0; c < columns; ++c)
+      out.data()[now + c] = observer_step(
+          out.data()[before + c], decay[c], step, p.data()[now + c], p.data()[before + c],
+          beta.data()[now + c], beta.data()[before + c], driven ? tau.data()[before + c] : 0.0);
+  }
+}
+
+void bind_chain(nb::module_& m) {
+  nb::class_<Chain>(m, "Chain")
+      .def("__init__",
+           [](Chain* self, Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 axis, In2 inertial,
+              In1 armature, In1 gravity) {
+             new (self) Chain(make_chain(parent, prismatic, rotation, translation, axis, inertial, armature,
+                                         gravity));
+           })
+      .def("momentum",
+           [](const Chain& chain, In2 q, In2 qd, Out2 p, Out2 beta, int threads) {
+             same_rows(chain, q, qd, p, beta);
+             const std::size_t n = chain.joints.size();
+             each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+               chain.momentum(q.data() + n * t, qd.data() + n * t, p.data() + n * t, beta.data() + n * t, work);
+             });
+           })
+      .def("rnea",
+           [](const Chain& chain, In2 q, In2 qd, In2 qdd, Out2 tau, int threads) {
+             same_rows(chain, q, qd, qdd, tau);
+             const std::size_t n = chain.joints.size();
+             each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+               chain.rnea(q.data() + n * t, qd.data() + n * t, qdd.data() + n * t, tau.data() + n * t, work);
+             });
+           })
+      .def("mass_matrix",
+           [](const Chain& chain, In2 q, Out3 m, int threads) {
+             const std::size_t n = chain.joints.size();
+             require(q.shape(1) == n && m.shape(0) == q.shape(0) && m.shape(1) == n && m.shape(2) == n,
+                     "mass_matrix: arrays differ in shape");
+             each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+               chain.mass_matrix(q.data() + n * t, m.data() + n * n * t, work);
+             });
+           })
+      .def("regressor",
+           [](const Chain& chain, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
+             const std::size_t n = chain.joints.size(), c = kInertial * n;
+             same_rows(chain, q, qd);
+             require(p.shape(0) == q.shape(0) && p.shape(1) == n && p.shape(2) == c &&
+                         beta.shape(0) == q.shape(0) && beta.shape(1) == n && beta.shape(2) == c,
+                     "regressor: arrays differ in shape");
+             each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+               chain.regressor(q.data() + n * t, qd.data() + n * t, p.data() + n * c * t,
+                               beta.data() + n * c * t, work);
+             });
+           })
+      .def("link_regressor", [](const Chain& chain, int link, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
+        const std::size_t n = chain.joints.size(), c = p.shape(2);
+        same_rows(chain, q, qd);
+        require(link >= 0 && link < chain.size() && c <= kInertial && p.shape(0) == q.shape(0) &&
+                    p.shape(1) == n && beta.shape(0) == q.shape(0) && beta.shape(1) == n &&
+                    beta.shape(2) == c,
+                "link_regressor: arrays differ in shape");
+        each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+          chain.link_regressor(link, static_cast<int>(c), q.data() + n * t, qd.data() + n * t,
+                               p.data() + n * c * t, beta.data() + n * c * t, work);
+        });
+      });
+}
+
+bool finite(const double* v, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i)
+    if (!std::isfinite(v[i])) return false;
+  return true;
+}
+
+void check_sample(const Observer& observer, const In1& q, const In1& qd, const In1& tau) {
+  const std::size_t n = observer.chain().joints.size();
+  require(q.shape(0) == n && qd.shape(0) == n && tau.shape(0) == n, "q, qd and tau: one entry a joint");
+  require(finite(q.data(), n), "q: every entry must be finite");
+  require(finite(qd.data(), n), "qd: every entry must be finite");
+  require(finite(tau.data(), n), "tau: every entry must be finite");
+}
+
+void bind_observer(nb::module_& m) {
+  nb::class_<Observer>(m, "Observer")
+      .def("__init__",
+           [](Observer* self, const Chain& chain, In1 gain) {
+             require(gain.shape(0) == chain.joints.size(), "gain: one entry a joint");
+             new (self) Observer(chain, std::vector<double>(gain.data(), gain.data() + gain.shape(0)));
+           })
+      .def_prop_ro("started", &Observer::started)
+      .def("reset",
+           [](Observer& observer, In1 q, In1 qd, In1 tau) {
+             check_sample(observer, q, qd, tau);
+             observer.reset(q.data(), qd.data(), tau.data());
+           })
+      .def("step", [](Observer& observer, In1 q, In1 qd, In1 tau, double dt, Out1 out) {
+        check_sample(observer, q, qd, tau);
+        require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
+        require(observer.started(), "step before reset");
+        require(out.shape(0) == q.shape(0), "out: one entry a joint");
+        const double* r = observer.step(q.data(), qd.data(), tau.data(), dt);
+        std::copy(r, r + q.shape(0), out.data());
+      });
+}
+
+}  // namespace
+
+NB_MODULE(_observer, m) {
+  bind_chain(m);
+  bind_observer(m);
+  m.def("filter", &filter);
+}
