@@ -1,0 +1,325 @@
+"""A trace as a rerun recording (``.rrd``). The only module that knows rerun's interface."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from tauguard.replay.robot import Body, Motion, Shape, bodies, load_model, motion, quats_wxyz
+from tauguard.replay.story import cut, first_moment, page
+from tauguard.traces.trace import Array, Detection, Trace
+
+TIMELINE = "time"
+FRAME_RATE = 60.0  # [Hz] of the moving bodies
+SERIES_RATE = 200.0  # [Hz] of the charts
+MOST_FRAMES = 30_000  # a long recording is thinned to this, so that the file stays below 30 MB
+MOST_POINTS = 60_000
+ARROW = 2e-3  # [m/N]: 100 N is drawn 0.2 m long
+LONGEST_ARROW = 0.5  # [m]
+COLOURS = np.array(
+    [
+        [66, 135, 245],
+        [245, 166, 35],
+        [80, 190, 120],
+        [200, 90, 220],
+        [120, 200, 220],
+        [190, 190, 110],
+        [240, 130, 150],
+    ],
+    np.uint8,
+)
+RED, GREEN, GREY = (230, 60, 50), (70, 190, 90), (140, 140, 150)
+
+
+def write_rrd(
+    path: str | Path,
+    trace: Trace,
+    detection: Detection | None = None,
+    model: Any = None,
+    *,
+    whole: bool = False,
+) -> None:
+    """Write a recording that ``rerun FILE`` opens with its own layout.
+
+    A viewer puts its time cursor at a recording's beginning and nothing in the file can say
+    otherwise, so the recording begins at the first detected collision, if there is one.
+
+    Args:
+        path: the ``.rrd`` file; it appears whole or not at all.
+        trace: what to show.
+        detection: what a detector said about it.
+        model: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by
+            default the trace's first attachment that ends in ``.xml``.
+        whole: keep what comes before the first detected collision.
+
+    Raises:
+        ValueError: no model, a model without the trace's joints, an empty trace.
+        OSError: the folder cannot be written.
+    """
+    path = Path(path)
+    if len(trace.t) == 0:
+        raise ValueError("the trace is empty: nothing to show")
+    if model is None:
+        attached = [text for name, text in trace.attachments.items() if name.endswith(".xml")]
+        if not attached:
+            raise ValueError("the trace has no attached MJCF: give the robot's model")
+        model = attached[0]
+    scene = load_model(model)
+    with TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        draft = Path(folder) / "draft.rrd"
+        recording = rr.RecordingStream("tauguard", recording_id=path.stem)
+        recording.save(draft)
+        text = page(trace, detection)
+        if not whole:
+            trace, detection = cut(trace, detection, first_moment(trace, detection))
+        center = log_scene(recording, trace, scene)
+        log_series(recording, trace, detection)
+        log_states(recording, trace, detection)
+        page_text = rr.TextDocument(text, media_type="text/markdown")
+        recording.log("about", page_text, static=True)
+        recording.send_blueprint(blueprint(trace, detection, *center))
+        recording.flush()
+        recording.disconnect()
+        os.replace(draft, path)
+
+
+def thin(t: Array, rate: float, most: int) -> NDArray[np.int64]:
+    """First rows of bins that are 1/``rate`` s long, longer if there would be over ``most``."""
+    span = max(t[-1] - t[0], 1e-9)
+    rate = min(rate, most / span)
+    bins = np.floor((t - t[0]) * rate + 1e-6).astype(np.int64)
+    return np.flatnonzero(np.diff(bins, prepend=-1))
+
+
+def extremes(values: Array, starts: NDArray[np.int64]) -> Array:
+    """The value of largest magnitude of each bin, so that no peak is lost; shape (bins, ...)."""
+    high = np.maximum.reduceat(values, starts, axis=0)
+    low = np.minimum.reduceat(values, starts, axis=0)
+    return np.where(np.abs(low) > np.abs(high), low, high)
+
+
+def times(t: Array) -> list[Any]:
+    """The one timeline: seconds of the trace."""
+    return [rr.TimeColumn(TIMELINE, duration=t)]
+
+
+def entity(*parts: str) -> str:
+    """An entity path of parts that may hold any character."""
+    return "/".join(rr.escape_entity_path_part(part) for part in parts)
+
+
+def log_scene(recording: Any, trace: Trace, model: Any) -> tuple[Array, float]:
+    """The bodies, obstacles, contacts; the center [m] and radius [m] of what moves."""
+    recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    starts = thin(trace.t, FRAME_RATE, MOST_FRAMES)
+    t = trace.t[starts]
+    shown = bodies(model)
+    moved = motion(model, trace.joint_names, trace.q[starts])
+    truth = trace.truth
+    names = truth.obstacle_names if truth is not None else ()
+    arm = [i for i, body in enumerate(shown) if body.moves and body.name not in names] or [0]
+    corners = moved.positions[:, arm].reshape(-1, 3)
+    center = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    view = center, float(np.linalg.norm(corners - center, axis=1).max()) + 0.1
+    for index, body in enumerate(shown):
+        place = entity("scene", body.name)
+        for number, piece in enumerate(body.shapes):
+            recording.log(f"{place}/shape_{number}", drawn(piece), static=True)
+        if body.shapes and body.name not in names:
+            log_pose(recording, place, body, index, t, moved)
+    if truth is None:
+        return view
+    for number, name in enumerate(names):
+        place = entity("scene", name)
+        if not any(body.name == name and body.shapes for body in shown):
+            ball = rr.Ellipsoids3D(radii=[0.05], colors=[GREY], fill_mode="solid")
+            recording.log(f"{place}/shape_0", ball, static=True)
+        poses = truth.obstacle_poses[starts, number]
+        columns = rr.Transform3D.columns(
+            translation=poses[:, :3, 3],
+            quaternion=np.roll(quats_wxyz(poses[:, :3, :3]), -1, axis=1),
+        )
+        rr.send_columns(place, times(t), columns, recording=recording)
+    log_contacts(recording, trace, starts)
+    return view
+
+
+def log_pose(recording: Any, place: str, body: Body, index: int, t: Array, moved: Motion) -> None:
+    """A body's pose: once if it is fixed, else at every frame."""
+    positions, quats = moved.positions[:, index], np.roll(moved.quats_wxyz[:, index], -1, axis=1)
+    if not body.moves or (np.ptp(positions, axis=0) + np.ptp(quats, axis=0)[:3] == 0).all():
+        pose = rr.Transform3D(translation=positions[0], quaternion=quats[0])
+        recording.log(place, pose, static=True)
+        return
+    columns = rr.Transform3D.columns(translation=positions, quaternion=quats)
+    rr.send_columns(place, times(t), columns, recording=recording)
+
+
+def drawn(piece: Shape) -> Any:
+    """A shape in rerun's terms."""
+    quat = [np.roll(piece.quat_wxyz, -1)]
+    colour = [np.round(255 * np.clip(piece.rgba, 0, 1)).astype(np.uint8)]
+    common = {"quaternions": quat, "colors": colour, "fill_mode": "solid"}
+    radius, half = float(piece.size[0]), float(piece.size[1])
+    if piece.kind == "mesh":
+        assert piece.vertices is not None
+        assert piece.normals is not None
+        rotation = matrix(piece.quat_wxyz)
+        return rr.Mesh3D(
+            vertex_positions=piece.vertices @ rotation.T + piece.position,
+            vertex_normals=piece.normals @ rotation.T,
+            triangle_indices=piece.triangles,
+            albedo_factor=colour[0],
+        )
+    if piece.kind == "capsule":  # rerun's begins at its origin and goes along z
+        start = piece.position - matrix(piece.quat_wxyz) @ np.array([0.0, 0.0, half])
+        return rr.Capsules3D(lengths=[2 * half], radii=[radius], translations=[start], **common)
+    centres = [piece.position]
+    if piece.kind == "cylinder":
+        return rr.Cylinders3D(lengths=[2 * half], radii=[radius], centers=centres, **common)
+    if piece.kind == "box":
+        return rr.Boxes3D(half_sizes=[piece.size], centers=centres, **common)
+    sizes = [radius] * 3 if piece.kind == "sphere" else piece.size
+    return rr.Ellipsoids3D(half_sizes=[sizes], centers=centres, **common)
+
+
+def matrix(quat_wxyz: Array) -> Array:
+    """Rotation matrix of a unit quaternion, shape (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_quat(quat_wxyz, scalar_first=True).as_matrix(), np.float64)
+
+
+def log_contacts(recording: Any, trace: Trace, starts: NDArray[np.int64]) -> None:
+    """At every frame the strongest contact of its bin, as a point and an arrow; none if none."""
+    truth = trace.truth
+    assert truth is not None
+    size = np.linalg.norm(truth.contact_vector, axis=1)
+    ends = np.append(starts[1:], len(trace.t))
+    rows = np.array([a + np.argmax(size[a:b]) for a, b in zip(starts, ends, strict=True)])
+    there = (size[rows] > 0) & np.isfinite(truth.contact_point[rows]).all(axis=1)
+    points, forces = truth.contact_point[rows][there], truth.contact_vector[rows][there]
+    length = np.minimum(ARROW * size[rows][there], LONGEST_ARROW)
+    arrows = forces / size[rows][there][:, None] * length[:, None]
+    labels = [f"{value:.0f} N" for value in size[rows][there]]
+    when, lengths = times(trace.t[starts]), there.astype(int)
+    columns = [
+        *rr.Arrows3D.columns(vectors=arrows, origins=points - arrows, labels=labels),
+    ]
+    styles = rr.Arrows3D.from_fields(radii=0.012, colors=RED, show_labels=True)
+    recording.log("scene/contact_force", styles, static=True)
+    parted = [column.partition(lengths) for column in columns]
+    rr.send_columns("scene/contact_force", when, parted, recording=recording)
+    recording.log(
+        "scene/contact_point", rr.Points3D.from_fields(radii=0.02, colors=RED), static=True
+    )
+    parted = [c.partition(lengths) for c in rr.Points3D.columns(positions=points)]
+    rr.send_columns("scene/contact_point", when, parted, recording=recording)
+
+
+def log_series(recording: Any, trace: Trace, detection: Detection | None) -> None:
+    """The charts: currents, residuals beside the true torque, score and threshold, force."""
+    starts = thin(trace.t, SERIES_RATE, MOST_POINTS)
+    when = times(trace.t[starts])
+
+    def series(place: str, values: Array, names: list[str], colours: Any, width: float) -> None:
+        lines = rr.SeriesLines(names=names, colors=colours, widths=[width] * len(names))
+        recording.log(place, lines, static=True)
+        values = extremes(values, starts).reshape(len(starts), -1)
+        rr.send_columns(place, when, rr.Scalars.columns(scalars=values), recording=recording)
+
+    names = list(trace.joint_names)
+    colours = [COLOURS[i % len(COLOURS)] for i in range(len(names))]
+    series("current", trace.current, names, colours, 1.0)
+    if detection is not None:
+        series("residual", detection.residual, names, colours, 1.2)
+        series("score/score", detection.score, [detection.detector], [COLOURS[0]], 1.5)
+        edge = np.full(len(trace.t), detection.threshold)
+        series("score/threshold", edge, ["threshold"], [RED], 1.0)
+    if trace.truth is not None:
+        series("force", trace.truth.contact_force, ["contact force"], [RED], 1.5)
+
+
+def log_states(recording: Any, trace: Trace, detection: Detection | None) -> None:
+    """Two lanes: what was true, and when the alarm was up."""
+    if trace.truth is not None:
+        spans = [(c.onset, c.end, c.kind) for c in trace.truth.collisions]
+        log_lane(recording, "states/truth", "free", spans, trace.t)
+    if detection is not None:
+        spans = [(a.start, a.end, "alarm") for a in detection.alarms]
+        log_lane(recording, "states/alarm", "quiet", spans, trace.t)
+
+
+def log_lane(
+    recording: Any, place: str, rest: str, spans: list[tuple[float, float, str]], t: Array
+) -> None:
+    """One lane of a state timeline: ``rest`` between the spans."""
+    first = float(t[0])
+    changes = {first: rest}
+    for start, end, name in sorted(spans):
+        changes[max(start, first)] = name
+        changes[max(end, start + 1e-3)] = rest
+    when, what = np.array(sorted(changes)), [changes[key] for key in sorted(changes)]
+    columns = rr.StateChange.columns(state=what)
+    values = [rest, *sorted({name for _, _, name in spans})]
+    colours = [GREY if v == rest else GREEN if place.endswith("truth") else RED for v in values]
+    recording.log(place, rr.StateConfiguration(values=values, colors=colours), static=True)
+    rr.send_columns(place, times(when), columns, recording=recording)
+
+
+def blueprint(trace: Trace, detection: Detection | None, center: Array, radius: float) -> Any:
+    """3D left, text below it, charts right."""
+    eye = rrb.EyeControls3D(
+        position=center + 2.4 * radius * np.array([0.62, -0.68, 0.4]),
+        look_target=center,
+        eye_up=(0, 0, 1),
+    )
+    left = rrb.Vertical(
+        rrb.Spatial3DView(origin="scene", name="The arm", eye_controls=eye),
+        rrb.TextDocumentView(origin="about", name="What you see"),
+        row_shares=[2, 1],
+    )
+    around = rr.VisibleTimeRange(
+        TIMELINE,
+        start=rr.TimeRangeBoundary.cursor_relative(seconds=-1.0),
+        end=rr.TimeRangeBoundary.cursor_relative(seconds=2.0),
+    )
+
+    def chart(origin: str, name: str, *values: Array) -> Any:
+        low = min(float(np.min(value)) for value in values)
+        high = max(float(np.max(value)) for value in values)
+        margin = 0.05 * (high - low) or 1.0
+        return rrb.TimeSeriesView(
+            origin=origin,
+            name=name,
+            time_ranges=around,
+            axis_y=rrb.ScalarAxis(range=(low - margin, high + margin), zoom_lock=True),
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        )
+
+    charts = []
+    if detection is not None:
+        edge = np.array(detection.threshold)
+        charts += [
+            chart("residual", "Residual [N m]", detection.residual),
+            chart("score", "Score of the detector", detection.score, edge),
+        ]
+    if detection is not None or trace.truth is not None:
+        charts.append(rrb.StateTimelineView(origin="states", name="Alarm and truth"))
+    if trace.truth is not None:
+        charts.append(chart("force", "Contact force, truth [N]", trace.truth.contact_force))
+    charts.append(chart("current", "Motor current [A]", trace.current))
+    return rrb.Blueprint(
+        rrb.Horizontal(left, rrb.Vertical(*charts), column_shares=[1, 1]),
+        rrb.TimePanel(
+            state="collapsed", timeline=TIMELINE, play_state="paused", playback_speed=0.5
+        ),
+        collapse_panels=True,
+    )

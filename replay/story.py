@@ -1,0 +1,114 @@
+"""What a viewer of a recording should look at: the first detected collision, and a page of text."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tauguard.traces import Alarm, Collision, Detection, Trace
+
+ALARM_WINDOW = 0.5  # [s] after onset in which an alarm detects a collision (a clamp: until its end)
+LISTED = 20  # collisions in the table of the page
+
+
+def alarm_of(collision: Collision, alarms: tuple[Alarm, ...]) -> Alarm | None:
+    """The first alarm that starts between the collision's onset and the end of its window."""
+    last = collision.onset + ALARM_WINDOW
+    if collision.kind == "clamp":
+        last = max(last, collision.end)
+    return next((a for a in alarms if collision.onset <= a.start <= last), None)
+
+
+def first_moment(trace: Trace, detection: Detection | None) -> float:
+    """Where to begin [s]: the onset of the first detected collision, else the first sample."""
+    if trace.truth is None or detection is None:
+        return float(trace.t[0])
+    found = [c.onset for c in trace.truth.collisions if alarm_of(c, detection.alarms)]
+    return min(found, default=float(trace.t[0]))
+
+
+def cut(trace: Trace, detection: Detection | None, start: float) -> tuple[Trace, Detection | None]:
+    """What is left from time ``start`` [s] on; events that end before it are dropped."""
+    rows = slice(int(np.searchsorted(trace.t, start - 1e-9)), None)
+
+    def rest(value: Any, *names: str) -> dict[str, Any]:
+        arrays = {name: getattr(value, name) for name in names}
+        return {name: array[rows] for name, array in arrays.items() if array is not None}
+
+    truth = trace.truth
+    if truth is not None:
+        arrays = rest(truth, "tau_ext", "contact_force", "payload", "contact_link")
+        arrays |= rest(truth, "contact_point", "contact_vector", "obstacle_poses")
+        kept = tuple(c for c in truth.collisions if c.end >= start)
+        truth = replace(truth, collisions=kept, **arrays)
+    commands = rest(trace, "q_des", "qd_des", "qdd_des")
+    signals = rest(trace, "t", "q", "qd", "current")
+    trace = replace(trace, truth=truth, **signals, **commands)
+    if detection is not None:
+        alarms = tuple(a for a in detection.alarms if a.end >= start)
+        said = rest(detection, "t", "residual", "score", "alarm")
+        detection = replace(detection, alarms=alarms, **said)
+    return trace, detection
+
+
+def page(trace: Trace, detection: Detection | None) -> str:
+    """The text beside the pictures, in Markdown."""
+    lines: list[str] = []
+    span = trace.t[-1] - trace.t[0]
+    lines += [f"An arm with {len(trace.joint_names)} joints, {span:.1f} s.", ""]
+    if trace.truth is not None:
+        lines += [
+            "- **3D**: the arm in its real geometry. A red arrow is the contact force on the arm, "
+            "at the point of contact.",
+        ]
+    if detection is not None:
+        lines += [
+            "- **Residual**: what the observer believes acts on each joint from outside.",
+            f"- **Score**: the output of the {detection.detector} detector; above the red line "
+            "is a raw alarm.",
+            "- **Alarm and truth**: when the alarm was up, and when there really was a contact.",
+        ]
+    lines += ["- **Current**: the measured motor currents, the only input.", ""]
+    lines += collision_table(trace, detection) if trace.truth is not None else alarms(detection)
+    lines += [
+        "",
+        "Press the space bar to play (at half speed); click into a chart to go to a time.",
+        "",
+        "*A research tool, not a certified safety function.*",
+    ]
+    return "\n".join(lines)
+
+
+def collision_table(trace: Trace, detection: Detection | None) -> list[str]:
+    """Markdown rows of the collisions and when each was noticed."""
+    assert trace.truth is not None
+    found = detection.alarms if detection is not None else ()
+    rows = sorted(trace.truth.collisions, key=lambda c: c.onset)
+    seen = sum(alarm_of(c, found) is not None for c in rows)
+    lines = [f"## {len(rows)} collisions" + (f", {seen} noticed" if detection else ""), ""]
+    if not rows:
+        return lines
+    lines += ["| onset [s] | kind | link | peak torque [N m] | noticed after |", "|-|-|-|-|-|"]
+    for collision in rows[:LISTED]:
+        alarm = alarm_of(collision, found)
+        after = f"{1e3 * (alarm.start - collision.onset):.0f} ms" if alarm else "-"
+        lines.append(
+            f"| {collision.onset:.3f} | {collision.kind} | {collision.link} "
+            f"| {collision.peak_tau:.1f} | {after} |"
+        )
+    if len(rows) > LISTED:
+        lines += ["", f"and {len(rows) - LISTED} more."]
+    return lines
+
+
+def alarms(detection: Detection | None) -> list[str]:
+    """Markdown list of the alarms of a recording without truth."""
+    if detection is None:
+        return []
+    lines = [f"## {len(detection.alarms)} alarms", ""]
+    lines += [f"- {a.start:.3f} s to {a.end:.3f} s" for a in detection.alarms[:LISTED]]
+    if len(detection.alarms) > LISTED:
+        lines.append(f"- and {len(detection.alarms) - LISTED} more")
+    return lines
