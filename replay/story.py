@@ -15,10 +15,11 @@ LISTED = 20  # collisions in the table of the page
 
 def alarm_of(collision: Collision, alarms: tuple[Alarm, ...]) -> Alarm | None:
     """The first alarm that starts between the collision's onset and the end of its window."""
-    last = collision.onset + ALARM_WINDOW
-    if collision.kind == "clamp":
-        last = max(last, collision.end)
-    return next((a for a in alarms if collision.onset <= a.start <= last), None)
+    onset = collision.onset
+    last = collision.end if collision.kind == "clamp" else onset + ALARM_WINDOW
+    if any(a.start < onset <= a.end for a in alarms):
+        return None  # it was up before: that is no detection
+    return next((a for a in alarms if onset <= a.start <= last), None)
 
 
 def first_moment(trace: Trace, detection: Detection | None) -> float:

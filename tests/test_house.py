@@ -55,9 +55,7 @@ def test_light_rooms_leave_heavy_libraries_unloaded(room):
     assert out.stdout.strip() == "[]"
 
 
-def test_nothing_generic_is_importable_by_itself():
+def test_nothing_generic_is_importable_by_itself(tmp_path):
     code = "import datasets"
-    out = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT / "tests"
-    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
     assert "ModuleNotFoundError" in out.stderr

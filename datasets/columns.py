@@ -1,0 +1,95 @@
+"""Which column of a log holds what: maps from the columns of a CSV file to a trace's signals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+Column = str | int
+Unit = str
+
+UR_JOINTS = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """Columns by name (of the header line) or by 0-based index; one column a joint, in order.
+
+    A map with indices only reads files without a header line as well as those with one.
+    """
+
+    t: Column  #: time
+    q: tuple[Column, ...]  #: joint positions
+    qd: tuple[Column, ...]  #: joint velocities
+    current: tuple[Column, ...]  #: motor currents [A]
+    q_des: tuple[Column, ...] = ()  #: commanded positions
+    qd_des: tuple[Column, ...] = ()  #: commanded velocities
+    qdd_des: tuple[Column, ...] = ()  #: commanded accelerations
+    degrees: bool = False  #: angles, their speeds and accelerations are in degrees
+    time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
+    current_scale: float | tuple[float, ...] = 1.0  #: amperes in one unit, a number or one a joint
+    separator: str = ","
+    joint_names: tuple[str, ...] = ()  #: what the joints are called, if the map knows
+    width: int | None = None  #: how many columns every row has, if the map knows
+    repair: frozenset[str] = field(default_factory=frozenset)
+    """Faults whose rows may be dropped, of "repeat" (a row with the time of the one before), "tail"
+    (a last row that is cut off) and "nan" (a row with a number that is missing or not finite)."""
+
+    def __post_init__(self) -> None:
+        """Check that all joints have their columns.
+
+        Raises:
+            ValueError: different numbers of columns, an unknown kind of repair.
+        """
+        joints = len(self.q)
+        if joints == 0:
+            raise ValueError("columns.q: name at least one joint's column")
+        for name, group in self.groups().items():
+            if len(group) != joints:
+                raise ValueError(f"columns.{name}: {len(group)} columns for {joints} joints")
+        if not isinstance(self.current_scale, float | int) and len(self.current_scale) != joints:
+            raise ValueError(f"columns.current_scale: one number or {joints}")
+        unknown = self.repair - {"repeat", "tail", "nan"}
+        if unknown:
+            raise ValueError(f"columns.repair: {sorted(unknown)}; known: repeat, tail, nan")
+
+    def groups(self) -> dict[str, tuple[Column, ...]]:
+        """The columns of the signals that have any, by the trace's field."""
+        names = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
+        optional = ("q_des", "qd_des", "qdd_des")
+        return {n: getattr(self, n) for n in names if n not in optional or getattr(self, n)}
+
+
+def numbered(prefix: str, joints: int = 6) -> tuple[str, ...]:
+    """``prefix0``, ``prefix1``, ..."""
+    return tuple(f"{prefix}{i}" for i in range(joints))
+
+
+PRESETS = {
+    # The headerless files of the UR10e identification data of Mamedov et al. 2020: t, q, qd, i,
+    # i_des, tau_des, six of each.
+    "ur10e": ColumnMap(
+        t=0,
+        q=tuple(range(1, 7)),
+        qd=tuple(range(7, 13)),
+        current=tuple(range(13, 19)),
+        joint_names=UR_JOINTS,
+        width=31,
+        repair=frozenset({"repeat", "tail"}),
+    ),
+    # What the recorder of Universal Robots' real-time data exchange (RTDE) writes.
+    "ur_rtde": ColumnMap(
+        t="timestamp",
+        q=numbered("actual_q_"),
+        qd=numbered("actual_qd_"),
+        current=numbered("actual_current_"),
+        joint_names=UR_JOINTS,
+        repair=frozenset({"repeat", "tail"}),
+    ),
+}

@@ -1,0 +1,204 @@
+"""Logs of real arms as traces: CSV with a column map, MCAP with ``sensor_msgs/JointState``."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.datasets.columns import PRESETS, Column, ColumnMap
+from tauguard.traces.trace import Array, Trace
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log as a trace, and what had to be done to read it."""
+
+    trace: Trace
+    notes: tuple[str, ...]  #: one line for each repair, empty if there was none
+
+
+def read_log(
+    path: str | Path,
+    columns: ColumnMap | str | None = None,
+    joint_names: Sequence[str] | None = None,
+) -> Log:
+    """Read a recording of a real arm.
+
+    Args:
+        path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
+            system whose ``JointState`` messages hold the motor currents in ``effort``.
+        columns: for CSV, a map or the name of a preset (see ``PRESETS``); without one the header
+            line must be that of a preset.
+        joint_names: what the joints are called, in the order of the columns (default: the map's
+            names, the messages' names, or joint_1, joint_2, ...); for MCAP also which joints.
+
+    Returns:
+        The trace, without truth, its times as they are in the log, and notes on repairs.
+
+    Raises:
+        ValueError: a missing column, a bad number, a cut-off row, time that does not increase: one
+            line with the file, the row or line, and what would work. Only what a map's ``repair``
+            names is repaired, and a note says so.
+        OSError: the file is missing or cannot be read.
+    """
+    path = Path(path)
+    try:
+        if path.suffix == ".mcap":
+            from tauguard.datasets.logs_mcap import read_joint_states
+
+            return read_joint_states(path, joint_names)
+        return read_csv(path, chosen(columns, path), joint_names)
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: not a text file; expected CSV or MCAP") from error
+    except ValueError as error:
+        message = str(error)
+        if message.startswith(str(path)):
+            raise
+        raise ValueError(f"{path}: {message}") from error
+
+
+def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
+    """The map itself, the preset of that name, or the preset that fits the header line."""
+    if isinstance(columns, ColumnMap):
+        return columns
+    if columns is not None:
+        if columns not in PRESETS:
+            raise ValueError(f"columns {columns!r}: presets are {', '.join(PRESETS)}")
+        return PRESETS[columns]
+    with open(path, newline="") as stream:
+        first = next(csv.reader(stream), [])
+    names = {cell.strip() for cell in first}
+    for preset in PRESETS.values():
+        wanted = [preset.t, *(c for group in preset.groups().values() for c in group)]
+        if all(isinstance(c, str) and c in names for c in wanted):
+            return preset
+    raise ValueError(f"no column map: give one, or a preset: {', '.join(PRESETS)}")
+
+
+def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) -> Log:
+    """A CSV file as a trace; see :func:`read_log`."""
+    with open(path, newline="", encoding="utf-8-sig") as stream:
+        rows = [
+            (n, r) for n, r in enumerate(csv.reader(stream, delimiter=columns.separator), 1) if r
+        ]
+    if not rows:
+        raise ValueError("empty file")
+    header = [cell.strip() for cell in rows[0][1]]
+    if any(number(cell) is None and cell for cell in header):
+        rows = rows[1:]
+    else:
+        header = []
+    where = {
+        name: [position(column, header, columns) for column in group]
+        for name, group in {"t": (columns.t,), **columns.groups()}.items()
+    }
+    width = columns.width or (len(header) or len(rows[0][1]) if rows else 0)
+    table, lines, notes = parse(
+        rows, [i for group in where.values() for i in group], width, columns
+    )
+    if len(table) < 2:
+        raise ValueError(f"{len(table)} rows of numbers, expected at least 2")
+    ends = np.cumsum([len(group) for group in where.values()])[:-1]
+    parts = dict(zip(where, np.split(table, ends, axis=1), strict=True))
+    t = parts.pop("t")[:, 0] * columns.time_scale
+    keep = increasing(t, lines, columns, notes)
+    signals: dict[str, Any] = {
+        name: np.ascontiguousarray(value[keep]) for name, value in parts.items()
+    }
+    signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
+    if columns.degrees:
+        signals |= {n: np.deg2rad(v) for n, v in signals.items() if n != "current"}
+    names = named(joint_names or columns.joint_names, len(columns.q))
+    trace = Trace(joint_names=names, t=t[keep], meta={"log": path.name}, **signals)
+    return Log(trace, tuple(notes))
+
+
+def named(names: Sequence[str], joints: int) -> tuple[str, ...]:
+    """Joint names, or ``joint_1``, ... where there are none."""
+    if names and len(names) != joints:
+        raise ValueError(f"{len(names)} joint names for {joints} joints in the log")
+    return tuple(names) or tuple(f"joint_{i}" for i in range(1, joints + 1))
+
+
+def number(cell: str) -> float | None:
+    """A cell as a number, None if it is none."""
+    try:
+        return float(cell)
+    except ValueError:
+        return None
+
+
+def position(column: Column, header: Sequence[str], columns: ColumnMap) -> int:
+    """Index of a column."""
+    if isinstance(column, int):
+        if column < 0:
+            raise ValueError(f"column {column}: indices begin at 0")
+        return column
+    if column not in header:
+        have = ", ".join(header) if header else "no header line"
+        raise ValueError(f"no column {column!r}; the file has: {have[:200]}")
+    return header.index(column)
+
+
+def parse(
+    rows: Sequence[tuple[int, list[str]]], wanted: Sequence[int], width: int, columns: ColumnMap
+) -> tuple[Array, NDArray[np.int64], list[str]]:
+    """The wanted columns of all good rows, shape (R, columns), their line numbers, and notes."""
+    if max(wanted) >= width:
+        raise ValueError(f"no column {max(wanted)}: rows have {width} columns, counted from 0")
+    values: list[list[float]] = []
+    lines: list[int] = []
+    dropped: list[int] = []
+    notes: list[str] = []
+    for index, (line, row) in enumerate(rows):
+        if len(row) != width:
+            if index == len(rows) - 1 and len(row) < width and "tail" in columns.repair:
+                notes.append(f"line {line}: cut off ({len(row)} of {width} columns), left out")
+                continue
+            raise ValueError(f"line {line}: {len(row)} columns, expected {width}")
+        found = [number(row[i]) for i in wanted]
+        bad = next((i for i, v in zip(wanted, found, strict=True) if v is None), None)
+        if bad is not None and (row[bad].strip() or "nan" not in columns.repair):
+            raise ValueError(f"line {line}, column {bad}: {row[bad]!r} is not a number")
+        cells = [np.nan if v is None else v for v in found]
+        if not np.isfinite(cells).all():
+            if "nan" in columns.repair:
+                dropped.append(line)
+                continue
+            bad = wanted[int(np.flatnonzero(~np.isfinite(cells))[0])]
+            raise ValueError(
+                f"line {line}, column {bad}: {row[bad].strip() or 'empty'}, not finite"
+            )
+        values.append(cells)
+        lines.append(line)
+    if dropped:
+        notes.append(
+            f"{len(dropped)} rows without finite numbers left out, first: line {dropped[0]}"
+        )
+    table = np.array(values, np.float64).reshape(len(values), len(wanted))
+    return table, np.array(lines, np.int64), notes
+
+
+def increasing(
+    t: Array, lines: NDArray[np.int64], columns: ColumnMap, notes: list[str]
+) -> NDArray[np.bool_]:
+    """Rows to keep so that time increases strictly; repeated times only if the map says so."""
+    step = np.diff(t)
+    back = np.flatnonzero(step < 0)
+    if back.size:
+        row = back[0] + 1
+        raise ValueError(f"line {lines[row]}: time goes back from {t[row - 1]} to {t[row]} s")
+    same = np.flatnonzero(step == 0)
+    if same.size and "repeat" not in columns.repair:
+        raise ValueError(f"line {lines[same[0] + 1]}: time {t[same[0]]} s repeats")
+    if same.size:
+        notes.append(
+            f"{same.size} rows with a repeated time left out, first: line {lines[same[0] + 1]}"
+        )
+    return np.concatenate([[True], step > 0])

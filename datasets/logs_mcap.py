@@ -1,0 +1,134 @@
+"""MCAP logs: a tauguard recording, or anybody's ``sensor_msgs/msg/JointState`` messages."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tauguard.traces.mcap import read_mcap
+from tauguard.traces.trace import Trace
+
+if TYPE_CHECKING:
+    from tauguard.datasets.logs import Log
+
+TYPE = "sensor_msgs/msg/JointState"
+
+
+def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
+    """A trace from the first topic of type JointState; its ``effort`` is taken as current.
+
+    Raises:
+        ValueError: no such topic, messages without velocity or effort, other joints on the way.
+    """
+    from mcap.exceptions import McapError
+    from mcap.reader import make_reader
+
+    from tauguard.datasets.logs import Log
+
+    with open(path, "rb") as stream:
+        try:
+            reader = make_reader(stream, validate_crcs=True)
+            if any(record.name == "tauguard.trace" for record in reader.iter_metadata()):
+                return Log(read_mcap(path)[0], ())
+            summary = reader.get_summary()
+            channels = summary.channels.values() if summary is not None else ()
+            schemas = summary.schemas if summary is not None else {}
+            types = {c.topic: getattr(schemas.get(c.schema_id), "name", "?") for c in channels}
+            topic = next((name for name, kind in types.items() if kind == TYPE), None)
+            if topic is None:
+                have = ", ".join(f"{name} ({kind})" for name, kind in types.items())
+                raise ValueError(f"no topic of type {TYPE}; topics: {have or 'none'}")
+            messages = [(m.log_time, m.data) for _, _, m in reader.iter_messages(topics=[topic])]
+        except (McapError, struct.error) as error:
+            raise ValueError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
+    return Log(
+        assemble(topic, messages, joint_names), (f"{topic}: effort is taken as current [A]",)
+    )
+
+
+def assemble(
+    topic: str, messages: Sequence[tuple[int, bytes]], joint_names: Sequence[str] | None
+) -> Trace:
+    """One trace of the messages; times are their stamps, or the log times if there are none."""
+    if len(messages) < 2:
+        raise ValueError(f"{topic}: {len(messages)} messages, expected at least 2")
+    rows = [joint_state(f"{topic}, message {k}", data) for k, (_, data) in enumerate(messages)]
+    names = list(joint_names or rows[0]["name"])
+    signals: dict[str, list[Any]] = {"position": [], "velocity": [], "effort": []}
+    times = np.empty(len(rows))
+    for k, ((log_time, _), row) in enumerate(zip(messages, rows, strict=True)):
+        missing = [name for name in names if name not in row["name"]]
+        if missing:
+            raise ValueError(
+                f"{topic}, message {k}: no joint {missing[0]!r}; it has {', '.join(row['name'])}"
+            )
+        order = [row["name"].index(name) for name in names]
+        for key, values in signals.items():
+            if len(row[key]) != len(row["name"]):
+                raise ValueError(f"{topic}, message {k}: {key} holds {len(row[key])} numbers")
+            values.append(row[key][order])
+        times[k] = 1e-9 * (row["stamp"] or log_time)
+    return Trace(
+        joint_names=tuple(names),
+        t=times,
+        q=np.array(signals["position"]),
+        qd=np.array(signals["velocity"]),
+        current=np.array(signals["effort"]),
+        meta={"topic": topic},
+    )
+
+
+def joint_state(where: str, data: bytes) -> dict[str, Any]:
+    """The fields of one CDR-encoded JointState.
+
+    Raises:
+        ValueError: a message that ends too early or is not CDR version 1.
+    """
+    if len(data) < 4 or data[:2] not in (b"\0\1", b"\0\0"):
+        raise ValueError(f"{where}: not plain CDR")
+    order = "<" if data[1] == 1 else ">"
+    body, at = data[4:], 0
+
+    def scalar() -> int:
+        nonlocal at
+        at += -at % 4
+        (value,) = struct.unpack_from(f"{order}I", body, at)
+        at += 4
+        return int(value)
+
+    def text() -> str:
+        nonlocal at
+        size = scalar()
+        value = body[at : at + size]
+        if len(value) != size:
+            raise struct.error("string")
+        at += size
+        return value[:-1].decode()
+
+    def doubles() -> Any:
+        nonlocal at
+        count = scalar()
+        if count:
+            at += -at % 8
+        value = np.frombuffer(body, f"{order}f8", count, at).astype(np.float64)
+        at += 8 * count
+        return value
+
+    try:
+        stamp = scalar() * 10**9 + scalar()
+        text()
+        names = [text() for _ in range(scalar())]
+        position, velocity, effort = doubles(), doubles(), doubles()
+    except (struct.error, ValueError) as error:
+        raise ValueError(f"{where}: cut off ({len(data)} bytes)") from error
+    return {
+        "stamp": stamp,
+        "name": names,
+        "position": position,
+        "velocity": velocity,
+        "effort": effort,
+    }

@@ -1,0 +1,201 @@
+"""Logs of real arms: the numbers that are in the file, and one line for every fault."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from mcap_ros2.writer import Writer
+
+from tauguard.datasets import PRESETS, ColumnMap, read_log
+from tauguard.datasets.columns import UR_JOINTS
+from tauguard.traces import Trace, write_mcap
+
+JOINT_STATE = """\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+TWO = ColumnMap(t="t", q=("a", "b"), qd=("va", "vb"), current=("ia", "ib"))
+TEXT = "t,a,b,va,vb,ia,ib\n0,1,2,3,4,5,6\n0.1,7,8,9,10,11,12\n0.3,1,1,1,1,1,1\n"
+
+
+def write(tmp_path, text, name="log.csv"):
+    (tmp_path / name).write_text(text)
+    return tmp_path / name
+
+
+def test_numbers_by_name(tmp_path):
+    log = read_log(write(tmp_path, TEXT), TWO)
+    assert log.notes == ()
+    assert log.trace.joint_names == ("joint_1", "joint_2")
+    np.testing.assert_array_equal(log.trace.t, [0, 0.1, 0.3])
+    np.testing.assert_array_equal(log.trace.q, [[1, 2], [7, 8], [1, 1]])
+    np.testing.assert_array_equal(log.trace.qd, [[3, 4], [9, 10], [1, 1]])
+    np.testing.assert_array_equal(log.trace.current, [[5, 6], [11, 12], [1, 1]])
+    assert log.trace.truth is None
+
+
+def test_indices_units_and_names(tmp_path):
+    text = TEXT.split("\n", 1)[1].replace(",", ";")
+    columns = ColumnMap(
+        t=0,
+        q=(1, 2),
+        qd=(3, 4),
+        current=(5, 6),
+        q_des=(2, 1),
+        degrees=True,
+        time_scale=1e-3,
+        current_scale=(2.0, -1.0),
+        separator=";",
+    )
+    trace = read_log(write(tmp_path, text), columns, joint_names=("elbow", "wrist")).trace
+    assert trace.joint_names == ("elbow", "wrist")
+    np.testing.assert_allclose(trace.t, [0, 1e-4, 3e-4])
+    np.testing.assert_allclose(trace.q[0], np.pi / 180 * np.array([1, 2]))
+    np.testing.assert_allclose(trace.q_des[0], np.pi / 180 * np.array([2, 1]))
+    np.testing.assert_array_equal(trace.current, [[10, -6], [22, -12], [2, -1]])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "empty file"),
+        (TEXT.replace("va", "speed"), "no column 'va'; the file has: t, a, b, speed"),
+        (TEXT.replace("0.3", "0.05"), r"line 4: time goes back from 0\.1 to 0\.05 s"),
+        (TEXT.replace("0.3", "0.1"), r"line 4: time 0\.1 s repeats"),
+        (TEXT.replace("8", "nan"), "line 3, column 2: nan, not finite"),
+        (TEXT.replace("8", ""), "line 3, column 2: '' is not a number"),
+        (TEXT.replace("8", "off"), "line 3, column 2: 'off' is not a number"),
+        (TEXT.replace("12", "1e999"), "line 3, column 6: 1e999, not finite"),
+        (TEXT.replace("10,11,12", "10"), "line 3: 5 columns, expected 7"),
+        (TEXT[:-6], "line 4: 5 columns, expected 7"),
+        (TEXT.split("\n")[0] + "\n0,1,2,3,4,5,6\n", "1 rows of numbers, expected at least 2"),
+    ],
+)
+def test_faults_are_named_with_file_and_line(tmp_path, text, message):
+    path = write(tmp_path, text)
+    with pytest.raises(ValueError, match=rf"log\.csv: {message}"):
+        read_log(path, TWO)
+
+
+def test_repairs_only_where_the_map_says_so_and_tells(tmp_path):
+    text = TEXT.replace("0.3", "0.1") + "0.4,2,2,2,2,2,nan\n0.5,3,3,3,3,3,3\n0.6,4,4"
+    columns = dataclasses.replace(TWO, repair=frozenset({"repeat", "tail", "nan"}))
+    log = read_log(write(tmp_path, text), columns)
+    np.testing.assert_array_equal(log.trace.t, [0, 0.1, 0.5])
+    assert len(log.notes) == 3
+    assert any("line 7: cut off (3 of 7 columns)" in note for note in log.notes)
+    assert any("first: line 4" in note for note in log.notes)
+    assert any("first: line 5" in note for note in log.notes)
+    back = text.replace("0.5,", "0.05,")
+    with pytest.raises(ValueError, match="goes back"):
+        read_log(write(tmp_path, back), columns)
+
+
+def test_maps_that_make_no_sense():
+    with pytest.raises(ValueError, match=r"columns\.qd: 1 columns for 2 joints"):
+        ColumnMap(t=0, q=(1, 2), qd=(3,), current=(4, 5))
+    with pytest.raises(ValueError, match="repair"):
+        ColumnMap(t=0, q=(1,), qd=(3,), current=(4,), repair=frozenset({"magic"}))
+    with pytest.raises(ValueError, match="current_scale"):
+        ColumnMap(t=0, q=(1,), qd=(3,), current=(4,), current_scale=(1.0, 2.0))
+
+
+def test_presets(tmp_path):
+    rows = np.arange(3 * 31).reshape(3, 31) / 8
+    text = "\n".join(",".join(map(str, row)) for row in rows)
+    trace = read_log(write(tmp_path, text), "ur10e").trace
+    np.testing.assert_array_equal(trace.t, rows[:, 0])
+    np.testing.assert_array_equal(trace.current, rows[:, 13:19])
+    assert trace.joint_names == UR_JOINTS
+    preset = PRESETS["ur_rtde"]
+    header = ["timestamp", *preset.q, *preset.qd, "other", *preset.current]
+    text = "\n".join([",".join(header), *(",".join(map(str, r[:20])) for r in rows)])
+    trace = read_log(write(tmp_path, text, "rtde.csv")).trace  # found by its header
+    np.testing.assert_array_equal(trace.qd, rows[:, 7:13])
+    np.testing.assert_array_equal(trace.current, rows[:, 14:20])
+    with pytest.raises(ValueError, match="presets are ur10e, ur_rtde"):
+        read_log(tmp_path / "rtde.csv", "kuka")
+    with pytest.raises(ValueError, match="no column map"):
+        read_log(write(tmp_path, TEXT))
+    with pytest.raises(ValueError, match="line 1: 7 columns, expected 31"):
+        read_log(write(tmp_path, TEXT.split("\n", 1)[1]), "ur10e")
+
+
+@pytest.mark.data
+def test_every_real_file_reads(data_dir):
+    files = sorted((data_dir / "ur10e").glob("*/*.csv"))
+    assert files
+    for file in files:
+        trace = read_log(file, "ur10e").trace
+        raw = np.loadtxt(file, delimiter=",")
+        np.testing.assert_array_equal(trace.t, raw[:, 0])
+        np.testing.assert_array_equal(trace.q, raw[:, 1:7])
+        assert 0.009 < trace.dt < 0.011
+
+
+def rosbag(path, rows, effort=True, names=("b", "a"), stamped=True):
+    """A bag as another program writes it: mcap-ros2-support's own encoder."""
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
+        for k in range(rows):
+            ns = (10**9 + 8 * 10**6 * k) if stamped else 0
+            message = {
+                "header": {"stamp": {"sec": ns // 10**9, "nanosec": ns % 10**9}, "frame_id": "x"},
+                "name": list(names),
+                "position": [k + 0.25, k + 0.5],
+                "velocity": [k + 1.25, k + 1.5],
+                "effort": [k + 2.25, k + 2.5] if effort else [],
+            }
+            writer.write_message("/joint_states", schema, message, log_time=5 * 10**9 + k)
+        writer.finish()
+
+
+def test_a_bag_of_joint_states(tmp_path):
+    rosbag(tmp_path / "a.mcap", 5)
+    log = read_log(tmp_path / "a.mcap", joint_names=("a", "b"))
+    np.testing.assert_allclose(log.trace.t, 1 + 0.008 * np.arange(5), rtol=1e-15)
+    np.testing.assert_array_equal(log.trace.q[2], [2.5, 2.25])
+    np.testing.assert_array_equal(log.trace.current[3], [5.5, 5.25])
+    assert "effort is taken as current" in log.notes[0]
+    assert read_log(tmp_path / "a.mcap").trace.joint_names == ("b", "a")
+    rosbag(tmp_path / "b.mcap", 3, stamped=False)
+    np.testing.assert_allclose(read_log(tmp_path / "b.mcap").trace.t[0], 5.0)
+
+
+def test_bags_with_faults(tmp_path):
+    rosbag(tmp_path / "a.mcap", 3, effort=False)
+    with pytest.raises(ValueError, match=r"a\.mcap: /joint_states, message 0: effort holds 0"):
+        read_log(tmp_path / "a.mcap")
+    rosbag(tmp_path / "b.mcap", 3)
+    with pytest.raises(ValueError, match="no joint 'elbow'; it has b, a"):
+        read_log(tmp_path / "b.mcap", joint_names=("elbow",))
+    data = (tmp_path / "b.mcap").read_bytes()
+    for cut in (3, 100, len(data) - 5):
+        (tmp_path / "c.mcap").write_bytes(data[:cut])
+        with pytest.raises(ValueError, match=r"c\.mcap: not a whole MCAP file"):
+            read_log(tmp_path / "c.mcap")
+    with open(tmp_path / "d.mcap", "wb") as stream:
+        Writer(stream).finish()
+    with pytest.raises(ValueError, match="no topic of type"):
+        read_log(tmp_path / "d.mcap")
+
+
+def test_a_recording_of_our_own(tmp_path):
+    t = np.arange(4) / 4
+    trace = Trace(("a",), t, t[:, None] + 1, t[:, None] + 2, t[:, None] + 3)
+    write_mcap(tmp_path / "a.mcap", trace)
+    again = read_log(tmp_path / "a.mcap").trace
+    np.testing.assert_array_equal(again.current, trace.current)
+    assert again.joint_names == ("a",)
