@@ -4,6 +4,8 @@
 
 #include "convex_abfme.hpp"
 #include "convex_resolve.hpp"
+#include "convex_sat.hpp"
+#include "convex_sat_textbook.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
 
 namespace tauguard::rigid {
@@ -19,24 +21,30 @@ struct Chunk {
   std::uint8_t* hit;
 };
 
-struct AbfmeTetrahedra {
-  TAUGUARD_INLINE static Verdict decide(const Chunk& c, std::size_t i) {
-    return abfme_tetrahedra(c.a.row(i), c.b.row(i));
+// A kernel gives the verdict of one row; what it leaves undecided goes to `resolve_exactly`.
+#define TAUGUARD_KERNEL(Name, expression)                              \
+  struct Name {                                                        \
+    TAUGUARD_INLINE static Verdict decide(const Chunk& c, std::size_t i) { \
+      const double *pa = c.a.row(i), *pb = c.b.row(i);                 \
+      const Kind ka = c.a.kind, kb = c.b.kind;                         \
+      (void)ka, (void)kb;                                              \
+      return expression;                                               \
+    }                                                                  \
   }
-};
-struct AbfmeZonotopes {
+TAUGUARD_KERNEL(AbfmeTT, abfme_tetrahedra(pa, pb));
+TAUGUARD_KERNEL(AbfmeZZ, abfme_zonotopes(zonotope_of(ka, pa), zonotope_of(kb, pb)));
+TAUGUARD_KERNEL(AbfmeZT, abfme_zonotope_tetrahedron(zonotope_of(ka, pa), pb));
+TAUGUARD_KERNEL(AbfmeTZ, abfme_zonotope_tetrahedron(zonotope_of(kb, pb), pa));
+TAUGUARD_KERNEL(SatTT, sat_tetrahedra(pa, pb));
+TAUGUARD_KERNEL(SatZZ, sat_zonotopes(zonotope_of(ka, pa), zonotope_of(kb, pb)));
+TAUGUARD_KERNEL(SatZT, sat_zonotope_tetrahedron(zonotope_of(ka, pa), pb));
+TAUGUARD_KERNEL(SatTZ, sat_zonotope_tetrahedron(zonotope_of(kb, pb), pa));
+#undef TAUGUARD_KERNEL
+
+template <class A, class B>
+struct Textbook {
   TAUGUARD_INLINE static Verdict decide(const Chunk& c, std::size_t i) {
-    return abfme_zonotopes(zonotope_of(c.a.kind, c.a.row(i)), zonotope_of(c.b.kind, c.b.row(i)));
-  }
-};
-struct AbfmeZonotopeTetrahedron {
-  TAUGUARD_INLINE static Verdict decide(const Chunk& c, std::size_t i) {
-    return abfme_zonotope_tetrahedron(zonotope_of(c.a.kind, c.a.row(i)), c.b.row(i));
-  }
-};
-struct AbfmeTetrahedronZonotope {
-  TAUGUARD_INLINE static Verdict decide(const Chunk& c, std::size_t i) {
-    return abfme_zonotope_tetrahedron(zonotope_of(c.b.kind, c.b.row(i)), c.a.row(i));
+    return textbook_overlap<A, B>(c.a.kind, c.a.row(i), c.b.kind, c.b.row(i)) ? common : separated;
   }
 };
 struct AlwaysUndecided {
@@ -80,12 +88,21 @@ Runner runner() {
 }
 #endif
 
+template <class TT, class TZ, class ZT, class ZZ>
+Runner by_kinds(bool tetrahedra_a, bool tetrahedra_b) {
+  if (tetrahedra_a) return tetrahedra_b ? runner<TT>() : runner<TZ>();
+  return tetrahedra_b ? runner<ZT>() : runner<ZZ>();
+}
+
 Runner choose(Kind a, Kind b, Method method) {
   if (a == Kind::hulls || b == Kind::hulls || method == Method::exact) return run_portable<AlwaysUndecided>;
   const bool ta = a == Kind::tetrahedra, tb = b == Kind::tetrahedra;
-  if (ta && tb) return runner<AbfmeTetrahedra>();
-  if (!ta && !tb) return runner<AbfmeZonotopes>();
-  return ta ? runner<AbfmeTetrahedronZonotope>() : runner<AbfmeZonotopeTetrahedron>();
+  using T = TextbookTetrahedron;
+  using Z = TextbookBlock;
+  if (method == Method::textbook_sat)
+    return by_kinds<Textbook<T, T>, Textbook<T, Z>, Textbook<Z, T>, Textbook<Z, Z>>(ta, tb);
+  if (method == Method::sat) return by_kinds<SatTT, SatTZ, SatZT, SatZZ>(ta, tb);
+  return by_kinds<AbfmeTT, AbfmeTZ, AbfmeZT, AbfmeZZ>(ta, tb);
 }
 
 }  // namespace
