@@ -41,6 +41,20 @@ TAUGUARD_INLINE void cross(const double* x, const double* y, double* out) {
 }
 TAUGUARD_INLINE double dot(const double* x, const double* y) { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; }
 
+// Components of four points from `origin`, one point a lane.
+TAUGUARD_INLINE void load_points(const double* v, const double* origin, Double4* x) {
+  for (int k = 0; k < 3; ++k) x[k] = Double4{v[k], v[3 + k], v[6 + k], v[9 + k]} - origin[k];
+}
+// The same as rows; returns their largest 1-norm.
+TAUGUARD_INLINE double offsets_from(const double* v, const double* origin, double (*p)[3]) {
+  double reach = 0.0;
+  for (int j = 0; j < 4; ++j) {
+    for (int k = 0; k < 3; ++k) p[j][k] = v[3 * j + k] - origin[k];
+    reach = std::max(reach, norm1(p[j]));
+  }
+  return reach;
+}
+
 // Lanes whose columns x, y (four rows each) leave an interval of ratios r > 0 with x_j + r y_j < 0.
 // A rounding of r moves a row by u |y| r, which the callers' E covers with its slack.
 TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
@@ -55,43 +69,46 @@ TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
   return low < high;
 }
 
-// The facet functions of a tetrahedron, lane i the one that vanishes opposite vertex i, at points of
-// which `apex` is the offset from vertex 0: F = n . (p - a0) + c, positive inside.
+// The facet functions of a tetrahedron, lane i the one that vanishes on the facet opposite vertex i and is
+// positive at it: F = n . p - c, with points p taken from vertex 0.
 struct TetrahedronFacets {
-  Double4 n[3], c;
-  double determinant, size;
+  Double4 n[3], c, determinant;
+  double size;
   TAUGUARD_INLINE explicit TetrahedronFacets(const double* v) {
-    double e[3][3], m[4][3];
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) e[i][k] = v[3 * (i + 1) + k] - v[k];
-    cross(e[1], e[2], m[1]), cross(e[2], e[0], m[2]), cross(e[0], e[1], m[3]);
-    determinant = dot(e[0], m[1]);
-    const double side = determinant < 0 ? -1.0 : 1.0;
+    Double4 x[3], e[3], f[3];
+    load_points(v, v, x);
+    size = largest(abs(x[0]) + abs(x[1]) + abs(x[2]));
+    Double4 base[3];  // facet i has the vertices i + 1, i + 2, i + 3
     for (int k = 0; k < 3; ++k) {
-      m[0][k] = -(m[1][k] + m[2][k] + m[3][k]);
-      n[k] = Double4{m[0][k], m[1][k], m[2][k], m[3][k]} * side;
+      base[k] = turn1(x[k]);
+      e[k] = turn2(x[k]) - base[k];
+      f[k] = turn1(turn2(x[k])) - base[k];
     }
-    determinant *= side;
-    c = Double4{determinant, 0.0, 0.0, 0.0};
-    size = std::max({norm1(e[0]), norm1(e[1]), norm1(e[2])});
+    for (int k = 0; k < 3; ++k) {
+      const int l = k == 2 ? 0 : k + 1, m = 3 - k - l;
+      n[k] = e[l] * f[m] - e[m] * f[l];
+    }
+    c = n[0] * base[0] + n[1] * base[1] + n[2] * base[2];
+    determinant = n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - c;
+    const Mask4 turned = (Mask4)determinant & INT64_MIN;  // lanes whose normal points outwards
+    for (auto& component : n) component = (Double4)((Mask4)component ^ turned);
+    c = (Double4)((Mask4)c ^ turned);
+    determinant = (Double4)((Mask4)determinant ^ turned);
   }
-  TAUGUARD_INLINE Double4 at(const double* p) const { return n[0] * p[0] + n[1] * p[1] + n[2] * p[2] + c; }
+  TAUGUARD_INLINE Double4 at(const double* p) const { return n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - c; }
 };
 
-// E of a tetrahedron's table at points p - a0 of 1-norm at most `reach`, a = the size of A: a component
-// of a normal is off by 4 u a^2 (that of facet 0 by 16 u a^2: a sum of three), the product with a point
-// (itself off by u) by (16 + 3 * 1 + 3 * 3) u a^2 reach and the sum of four by 3 u (a^3 + 3 a^2 reach);
-// the determinant by 8 u a^3, twice, since its sign may be wrong. 19 u a^3 + 37 u a^2 reach, and slack
-// of 8 u of every entry for the ratio of an interval: 64 u a^2 (a + reach).
-TAUGUARD_INLINE double tetrahedron_error(double a, double reach) { return 64 * unit * a * a * (a + reach); }
+// E of a tetrahedron's table at points p - a0 of 1-norm at most `reach`, a = the largest 1-norm of a
+// vertex from a0. An edge (at most 2 a) is off by 4 u a, a component of a normal (at most 4 a^2) by
+// 24 u a^2, n . p by (24 + 4 + 12) u a^2 reach and c by as much with a for reach, their difference by
+// 4 u a^2 (a + reach) more; the determinant, whose sign may be wrong, by 88 u a^3. With the slack of 8 u
+// of an entry for the ratio of an interval that is at most 164 u a^2 (a + reach).
+TAUGUARD_INLINE double tetrahedron_error(double a, double reach) { return 256 * unit * a * a * (a + reach); }
 
 TAUGUARD_INLINE Verdict abfme_tetrahedra(const double* a, const double* b) {
   const TetrahedronFacets fa(a);
-  double p[4][3], reach = 0.0;
-  for (int j = 0; j < 4; ++j) {
-    for (int k = 0; k < 3; ++k) p[j][k] = b[3 * j + k] - a[k];
-    reach = std::max(reach, norm1(p[j]));
-  }
+  double p[4][3];
+  const double reach = offsets_from(b, a, p);
   if (!in_range(fa.size) || !in_range(reach)) return undecided;
   const double ea = tetrahedron_error(fa.size, reach);
   Double4 row[4];
@@ -100,23 +117,15 @@ TAUGUARD_INLINE Verdict abfme_tetrahedra(const double* a, const double* b) {
   if (any(top_a < -ea)) return separated;
 
   const TetrahedronFacets fb(b);
-  if (!in_range(fb.size)) return undecided;
-  double far = 0.0;
-  Double4 top_b;
-  for (int j = 0; j < 4; ++j) {
-    double q[3];
-    for (int k = 0; k < 3; ++k) q[k] = a[3 * j + k] - b[k];
-    far = std::max(far, norm1(q));
-    const Double4 column = fb.at(q);
-    top_b = j == 0 ? column : max(top_b, column);
-  }
+  double q[4][3];
+  const double far = offsets_from(a, b, q);
+  if (!in_range(fb.size) || !in_range(far)) return undecided;
+  const Double4 top_b = max(max(fb.at(q[0]), fb.at(q[1])), max(fb.at(q[2]), fb.at(q[3])));
   const double eb = tetrahedron_error(fb.size, far);
   if (any(top_b < -eb)) return separated;
-  for (int j = 0; j < 4; ++j)
-    if (all(row[j] > ea)) return common;
 
-
-  bool certain = fa.determinant > ea && fb.determinant > eb && all(top_a > ea) && all(top_b > eb);
+  bool certain =
+      all((fa.determinant > ea) & (fb.determinant > eb) & (top_a > ea) & (top_b > eb));
   Double4 x[4], y[4];
   for (int pass = 0; pass < 2; ++pass) {
     const auto open = [&](double shift) __attribute__((always_inline)) {
@@ -189,7 +198,7 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
   for (int j = 0; j < 4; ++j)
     if (all(abs(row[j]) < wall - ea)) return common;
 
-  bool certain = wall > ea && fb.determinant > eb && all(column > eb) && all(bottom < wall - ea) &&
+  bool certain = wall > ea && all(fb.determinant > eb) && all(column > eb) && all(bottom < wall - ea) &&
                  all(top > ea - wall);
   const Double4 side_x{1.0, 1.0, -1.0, -1.0}, side_y{1.0, -1.0, 1.0, -1.0};
   Double4 x[4], y[4];

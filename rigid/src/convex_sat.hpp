@@ -78,7 +78,8 @@ TAUGUARD_INLINE Verdict sat_tetrahedra(const double* a, const double* b) {
   if (!in_range(fa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(far)) return undecided;
   const double ea = tetrahedron_error(fa.size, reach), eb = tetrahedron_error(fb.size, far);
   if (any((top_a < -ea) | (top_b < -eb))) return separated;
-  bool certain = fa.determinant > ea && fb.determinant > eb && all(top_a > ea) && all(top_b > eb);
+  bool certain =
+      all((fa.determinant > ea) & (fb.determinant > eb) & (top_a > ea) & (top_b > eb));
 
   constexpr int edges[6][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 0, 2}, {2, 3, 0, 1}};
   const TetrahedronEdges f(b);
@@ -140,7 +141,7 @@ TAUGUARD_INLINE Verdict sat_zonotope_tetrahedron(const Zonotope& a, const double
   for (const auto& g : a.g) column += abs(fb.n[0] * g[0] + fb.n[1] * g[1] + fb.n[2] * g[2]);
   const double eb = tetrahedron_error(fb.size, far + 6 * sa.size);
   if (any(column < -eb)) return separated;
-  bool certain = wall > ea && fb.determinant > eb && all(column > eb) && all(bottom < wall - ea) &&
+  bool certain = wall > ea && all(fb.determinant > eb) && all(column > eb) && all(bottom < wall - ea) &&
                  all(top > ea - wall);
 
   const TetrahedronEdges f(b);
