@@ -14,6 +14,16 @@ def overlap(
     threads: int,
     hit: NDArray[np.uint8],
 ) -> int: ...
+def overlap_boxes(
+    a: NDArray[np.float64],
+    blocks_a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    blocks_b: NDArray[np.float64],
+    skew: float,
+    vectors: bool,
+    threads: int,
+    hit: NDArray[np.uint8],
+) -> int: ...
 def witnesses(
     kind_a: int,
     a: NDArray[np.float64],

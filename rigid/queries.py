@@ -65,8 +65,17 @@ def native_overlap(
     if method.startswith("sat") and (isinstance(a, Hulls) or isinstance(b, Hulls)):
         raise ValueError("method: sat needs facets, which Hulls do not have; use abfme or auto")
     hit = np.empty(rows(a, b), dtype=np.uint8)
+    if method == "auto" and isinstance(a, Boxes) and isinstance(b, Boxes):
+        return hit.view(np.bool_), _overlap_boxes(a, b, thread_count(threads), hit)
     left = _rigid.overlap(*native(a), *native(b), _METHODS[method], thread_count(threads), hit)
     return hit.view(np.bool_), left
+
+
+def _overlap_boxes(
+    a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8], vectors: bool = True
+) -> int:
+    skew = max(a.skew, b.skew)
+    return _rigid.overlap_boxes(a.packed, a.blocks, b.packed, b.blocks, skew, vectors, threads, hit)
 
 
 def find_witness(a: Bodies, b: Bodies, threads: int = 1) -> Witness:

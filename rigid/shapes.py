@@ -95,6 +95,29 @@ class Boxes:
         flat = self.rotation.reshape(len(self), 9)
         return np.concatenate([self.center, self.half_extents, flat], axis=1)
 
+    @cached_property
+    def blocks(self) -> NDArray[np.float64]:
+        """Eight boxes a row for the batch path: centres in double, the rest in single precision.
+
+        The last block is filled up with copies of the last box. Shape (ceil(N / 8), 72).
+        """
+        count = -(-len(self) // 8)
+        chosen = np.minimum(np.arange(8 * count), len(self) - 1)
+        by_lane = self.packed[chosen].reshape(count, 8, 15).transpose(0, 2, 1)
+        out = np.empty((count, 72))
+        out[:, :24] = by_lane[:, :3].reshape(count, 24)
+        with np.errstate(over="ignore", under="ignore"):
+            out[:, 24:].view(np.float32)[:] = by_lane[:, 3:].reshape(count, 96)
+        return out
+
+    @cached_property
+    def skew(self) -> float:
+        """The largest entry of ``|R^T R - I|`` over the batch, rounded up."""
+        if len(self) == 0:
+            return 0.0
+        product = self.rotation.transpose(0, 2, 1) @ self.rotation
+        return float(np.abs(product - np.eye(3)).max()) + 2.0**-50
+
 
 @dataclass(frozen=True, eq=False)
 class Parallelepipeds:

@@ -35,6 +35,14 @@ void bind_convex(nb::module_& m) {
     return overlap(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
                    static_cast<Method>(method), threads, hit.data());
   });
+  m.def("overlap_boxes", [](Data a, Data blocks_a, Data b, Data blocks_b, double skew, bool vectors, int threads,
+                            Hits hit) {
+    nb::gil_scoped_release release;
+    const Bodies rows_a{Kind::boxes, a.data(), nullptr, a.shape(0)};
+    const Bodies rows_b{Kind::boxes, b.data(), nullptr, b.shape(0)};
+    return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0), vectors, threads,
+                         hit.data());
+  });
   m.def("witnesses", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
                         int threads, Rows out) {
     nb::gil_scoped_release release;

@@ -15,6 +15,11 @@ enum class Method : int { abfme = 0, sat = 1, automatic = 2, textbook_sat = 3, e
 std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method method, int threads,
                     std::uint8_t* hit);
 
+// The batch path of boxes, from blocks of eight (see BoxBlock; the last one padded) beside the rows.
+// `skew` bounds |R^T R - I| over both batches; `vectors` = false keeps to the portable path.
+std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b, const void* blocks_b,
+                          double skew, std::size_t n, bool vectors, int threads, std::uint8_t* hit);
+
 void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads, double* out);
 
 }  // namespace tauguard::rigid

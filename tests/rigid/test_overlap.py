@@ -9,7 +9,7 @@ from tauguard.benchmarks.rigid_cases import HARD, KINDS
 from tauguard.benchmarks.rigid_truth import exact_hit, float_bodies, truth
 from tauguard.geometry import _geometry
 from tauguard.rigid import Boxes, Hulls, Parallelepipeds, Tetrahedra, overlap
-from tauguard.rigid.queries import native_overlap
+from tauguard.rigid.queries import _overlap_boxes, native_overlap
 
 EXACT_METHODS = ["abfme", "auto", "exact"]
 PAIRS = [(a, b) for a in KINDS for b in KINDS]
@@ -135,6 +135,21 @@ def test_threads_change_nothing(method):
     one = overlap(a, b, method)
     for threads in (2, 5):
         np.testing.assert_array_equal(overlap(a, b, method, threads=threads).hit, one.hit)
+
+
+@pytest.mark.parametrize("name", ["grid boxes", "touching boxes"])
+def test_portable_batch_path_gives_the_same_answers(name):
+    a, b = HARD[name](np.random.default_rng(21), 1001)
+    random_a, random_b = (KINDS["boxes"](np.random.default_rng(seed), 5003) for seed in (1, 2))
+    for x, y in ((a, b), (random_a, random_b)):
+        answers = [np.empty(len(x), dtype=np.uint8) for _ in range(2)]
+        left = [
+            _overlap_boxes(x, y, 1, hit, vectors=vectors)
+            for hit, vectors in zip(answers, (True, False), strict=True)
+        ]
+        np.testing.assert_array_equal(*answers)
+        assert left[0] == left[1]
+    assert left[0] == 0
 
 
 @pytest.mark.parametrize("mode", [1, 2, 3])

@@ -1,0 +1,143 @@
+// Box against box with unit axes (Gottschalk, Lin, Manocha 1996), for scalars and for lanes: the batch
+// path of eight floats, and the double-precision look at boxes with parallel edges.
+//
+// C_ik = r_Ai . r_Bk, t_i = r_Ai . (c_B - c_A); 15 gaps, negative where the axis does not separate.
+// Error, u the unit roundoff of the lanes, w = |d|_1 + sum h_A + sum h_B: rounding inputs costs u each,
+// C is off by 5 u, t by 5 u |d|; an edge's gap by 24 u |d| and 2 * 12 u of the half extents, that of a
+// facet of B by 36 u |d| + 12 u: 64 u w covers all. The boxes are the sets of the given rotations R;
+// using R^T R = I where entries are off by `skew` moves a gap by at most 16 skew w.
+//
+// Overlap needs every facet of the zonotope A - B on the right side. The axis of nearly parallel edges
+// has no certain sign, but may be left out: tilting the shorter edge by the angle makes the facet vanish
+// and moves the body by at most tau h, so a margin of that size at all other axes is enough (a ball of
+// that radius about the offset is inside the tilted body). Edges count as parallel where
+// 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 - C^2 and at most three pairs can be parallel,
+// each edge in one of them, so 2 tau min(sum h_A, sum h_B) is more than they all move.
+#pragma once
+
+#include "convex_abfme.hpp"
+
+namespace tauguard::rigid {
+
+TAUGUARD_INLINE double abs(double x) { return std::fabs(x); }
+TAUGUARD_INLINE double max(double x, double y) { return x > y ? x : y; }
+
+template <class V>
+struct BoxLanes {
+  V h[3], r[3][3];  // half extents; r[k][axis], body to world
+};
+
+template <class V>
+struct BoxBounds {
+  double unit, tau_squared, tau, low, high;  // w outside [low, high] is left undecided
+};
+template <>
+struct BoxBounds<Float8> {
+  static constexpr float unit = 0x1p-24f, tau_squared = 0x1p-16f, tau = 0x1p-8f, low = 1e-30f, high = 1e30f;
+};
+template <>
+struct BoxBounds<double> {
+  static constexpr double unit = 0x1p-53, tau_squared = 0x1p-44, tau = 0x1p-22, low = 1e-250, high = 1e250;
+};
+
+// out: masks (bool for scalars) of lanes that are certainly separated and certainly common.
+template <class V, class Mask, class Scalar>
+TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const V* d, Scalar skew, Mask& apart,
+                              Mask& together) {
+  using Bounds = BoxBounds<V>;
+  V t[3], c[3][3], ac[3][3];
+  for (int i = 0; i < 3; ++i) {
+    t[i] = a.r[0][i] * d[0] + a.r[1][i] * d[1] + a.r[2][i] * d[2];
+    for (int k = 0; k < 3; ++k) {
+      c[i][k] = a.r[0][i] * b.r[0][k] + a.r[1][i] * b.r[1][k] + a.r[2][i] * b.r[2][k];
+      ac[i][k] = abs(c[i][k]);
+    }
+  }
+  const V sum_a = a.h[0] + a.h[1] + a.h[2], sum_b = b.h[0] + b.h[1] + b.h[2];
+  const V w = abs(d[0]) + abs(d[1]) + abs(d[2]) + sum_a + sum_b;
+  const V error = (Scalar(64) * Bounds::unit + Scalar(16) * skew) * w;
+
+  V worst = abs(t[0]) - a.h[0] - (b.h[0] * ac[0][0] + b.h[1] * ac[0][1] + b.h[2] * ac[0][2]);
+  for (int i = 1; i < 3; ++i)
+    worst = max(worst, abs(t[i]) - a.h[i] - (b.h[0] * ac[i][0] + b.h[1] * ac[i][1] + b.h[2] * ac[i][2]));
+  for (int k = 0; k < 3; ++k)
+    worst = max(worst, abs(t[0] * c[0][k] + t[1] * c[1][k] + t[2] * c[2][k]) - b.h[k] -
+                           (a.h[0] * ac[0][k] + a.h[1] * ac[1][k] + a.h[2] * ac[2][k]));
+
+  V straight = worst;  // the worst over the axes that overlap needs
+  Mask any_parallel = worst != worst;
+  for (int i = 0; i < 3; ++i) {
+    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+    for (int k = 0; k < 3; ++k) {
+      const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+      const V gap = abs(t[i2] * c[i1][k] - t[i1] * c[i2][k]) - (a.h[i1] * ac[i2][k] + a.h[i2] * ac[i1][k]) -
+                    (b.h[k1] * ac[i][k2] + b.h[k2] * ac[i][k1]);
+      const Mask parallel = Scalar(1) - c[i][k] * c[i][k] < Bounds::tau_squared;
+      worst = max(worst, gap);
+      straight = parallel ? straight : max(straight, gap);
+      any_parallel = any_parallel | parallel;
+    }
+  }
+  const Mask fits = (w >= Bounds::low) & (w <= Bounds::high);
+  const V smaller = sum_a < sum_b ? sum_a : sum_b;
+  const V tilt = any_parallel ? Scalar(2) * Bounds::tau * smaller : V{};
+  apart = fits & (worst > error);
+  together = fits & (straight < -(error + tilt));
+}
+
+// One pair in double precision; p as packed rows (centre, half extents, rotation).
+TAUGUARD_INLINE Verdict box_pair(const double* pa, const double* pb, double skew) {
+  BoxLanes<double> a, b;
+  double d[3];
+  for (int k = 0; k < 3; ++k) {
+    d[k] = pb[k] - pa[k];
+    a.h[k] = pa[3 + k];
+    b.h[k] = pb[3 + k];
+    for (int axis = 0; axis < 3; ++axis) {
+      a.r[k][axis] = pa[6 + 3 * k + axis];
+      b.r[k][axis] = pb[6 + 3 * k + axis];
+    }
+  }
+  bool apart, together;
+  box_axes<double, bool, double>(a, b, d, skew, apart, together);
+  return apart ? separated : together ? common : undecided;
+}
+
+// Eight boxes as the batch path reads them: centres in double, so that far pairs of near boxes lose
+// nothing, the rest in single precision, coordinate by coordinate.
+struct BoxBlock {
+  double center[3][8];
+  float half_extents[3][8];
+  float rotation[9][8];
+};
+static_assert(sizeof(BoxBlock) == 72 * sizeof(double));
+
+TAUGUARD_INLINE Float8 load8(const float* p) {
+  Float8 x;
+  __builtin_memcpy(&x, p, sizeof x);
+  return x;
+}
+
+TAUGUARD_INLINE void load_lanes(const BoxBlock& block, BoxLanes<Float8>& lanes) {
+  for (int k = 0; k < 3; ++k) {
+    lanes.h[k] = load8(block.half_extents[k]);
+    for (int axis = 0; axis < 3; ++axis) lanes.r[k][axis] = load8(block.rotation[3 * k + axis]);
+  }
+}
+
+TAUGUARD_INLINE void box_blocks(const BoxBlock& pa, const BoxBlock& pb, float skew, Mask8& apart,
+                                Mask8& together) {
+  using Double8 = double __attribute__((vector_size(64)));
+  BoxLanes<Float8> a, b;
+  load_lanes(pa, a), load_lanes(pb, b);
+  Float8 d[3];
+  for (int k = 0; k < 3; ++k) {
+    Double8 x, y;
+    __builtin_memcpy(&x, pa.center[k], sizeof x);
+    __builtin_memcpy(&y, pb.center[k], sizeof y);
+    d[k] = __builtin_convertvector(y - x, Float8);
+  }
+  box_axes<Float8, Mask8, float>(a, b, d, skew, apart, together);
+}
+
+}  // namespace tauguard::rigid
