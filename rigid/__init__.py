@@ -1,6 +1,6 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
-from tauguard.rigid.queries import overlap
+from tauguard.rigid.queries import overlap, sweep
 from tauguard.rigid.results import Impacts, Overlap, Witness
 from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Tetrahedra
 
@@ -13,4 +13,5 @@ __all__ = [
     "Tetrahedra",
     "Witness",
     "overlap",
+    "sweep",
 ]

@@ -24,6 +24,20 @@ def overlap_boxes(
     threads: int,
     hit: NDArray[np.uint8],
 ) -> int: ...
+def sweep(
+    kind_a: int,
+    a: NDArray[np.float64],
+    offsets_a: NDArray[np.int64],
+    kind_b: int,
+    b: NDArray[np.float64],
+    offsets_b: NDArray[np.int64],
+    displacement: NDArray[np.float64],
+    method: int,
+    threads: int,
+    points: bool,
+    hit: NDArray[np.uint8],
+    out: NDArray[np.float64],
+) -> int: ...
 def witnesses(
     kind_a: int,
     a: NDArray[np.float64],
@@ -32,5 +46,6 @@ def witnesses(
     b: NDArray[np.float64],
     offsets_b: NDArray[np.int64],
     threads: int,
+    hit: NDArray[np.uint8],
     out: NDArray[np.float64],
 ) -> None: ...

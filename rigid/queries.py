@@ -1,4 +1,4 @@
-"""Overlap of convex bodies, row by row.
+"""Overlap and sweeps of convex bodies, row by row.
 
 ``abfme`` eliminates the unknowns of a separating plane (Fourier-Motzkin elimination with facet
 functions scaled by determinants, redundant combinations left out); ``sat`` tests separating axes
@@ -12,13 +12,15 @@ import os
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from tauguard.geometry import finite
 from tauguard.rigid import _rigid
-from tauguard.rigid.results import Overlap, Witness
+from tauguard.rigid.results import Impacts, Overlap, Witness
 from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Tetrahedra
 
 OverlapMethod = Literal["abfme", "sat", "gjk", "auto"]
+SweepMethod = Literal["abfme", "sat", "auto"]
 
 #: Number of a method in the native module; ``sat_textbook`` and ``exact`` serve studies and tests.
 _METHODS = {"abfme": 0, "sat": 1, "auto": 2, "sat_textbook": 3, "exact": 4}
@@ -55,7 +57,7 @@ def overlap(a: Bodies, b: Bodies, method: OverlapMethod = "auto", threads: int =
         hit = collide(a, b, count)
     else:
         hit = native_overlap(a, b, method, threads)[0]
-    return Overlap(hit, lambda: find_witness(a, b, threads))
+    return Overlap(hit, lambda: find_witness(a, b, hit, threads))
 
 
 def native_overlap(
@@ -78,10 +80,64 @@ def _overlap_boxes(
     return _rigid.overlap_boxes(a.packed, a.blocks, b.packed, b.blocks, skew, vectors, threads, hit)
 
 
-def find_witness(a: Bodies, b: Bodies, threads: int = 1) -> Witness:
-    """A common point or a separating plane of each row, rounded from exact values."""
+def sweep(
+    a: Bodies,
+    b: Bodies,
+    displacement: ArrayLike,
+    method: SweepMethod = "auto",
+    threads: int = 1,
+) -> Impacts:
+    """When does ``b[i]``, moving straight by ``t * displacement[i]``, first touch ``a[i]``?
+
+    Args:
+        a: N bodies of one kind at rest, or one.
+        b: N bodies, or one.
+        displacement: Over the step t in [0, 1]. Shape (N, 3) or (3,).
+        method: ``abfme`` eliminates the separating plane with t as one more unknown and casts
+            separating axes for the time of hits only; ``sat`` casts them in any case; ``auto`` is
+            the faster of both. ``hit`` is exact for each, ``toi`` never late.
+        threads: 0 means all processors; the answer does not depend on it.
+
+    Returns:
+        ``hit``, ``toi``, ``point`` and ``normal`` (from a to b; NaN where they overlap at t = 0).
+
+    Raises:
+        ValueError: lengths or shapes that do not match, an entry that is not finite, an unknown
+            method.
+    """
+    count = rows(a, b)
+    if method not in get_args(SweepMethod):
+        raise ValueError(f"method: {method!r}, expected one of {', '.join(get_args(SweepMethod))}")
+    given = np.asarray(displacement)
+    moves = finite("displacement", given[None] if given.ndim == 1 else given, (None, 3))
+    if len(moves) not in (1, count):
+        raise ValueError(f"displacement: {len(moves)} rows, expected {count} or 1")
+    hit, out, _ = native_sweep(a, b, moves, method, threads)
+    return Impacts(hit, out[:, 0], out[:, 1:4], out[:, 4:7])
+
+
+def native_sweep(
+    a: Bodies,
+    b: Bodies,
+    displacement: NDArray[np.float64],
+    method: str,
+    threads: int = 1,
+    points: bool = True,
+) -> tuple[NDArray[np.bool_], NDArray[np.float64], int]:
+    """``hit`` (N,), rows of toi, point, normal (N, 7), how many rows needed exact arithmetic."""
+    count = rows(a, b)
+    moves = np.ascontiguousarray(np.broadcast_to(displacement, (count, 3)))
+    hit, out = np.empty(count, dtype=np.uint8), np.empty((count, 7))
+    left = _rigid.sweep(
+        *native(a), *native(b), moves, _METHODS[method], thread_count(threads), points, hit, out
+    )
+    return hit.view(np.bool_), out, left
+
+
+def find_witness(a: Bodies, b: Bodies, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
+    """A common point or a separating plane of each row, to rounding."""
     out = np.empty((rows(a, b), 7))
-    _rigid.witnesses(*native(a), *native(b), thread_count(threads), out)
+    _rigid.witnesses(*native(a), *native(b), thread_count(threads), hit.view(np.uint8), out)
     return Witness(out[:, :3], out[:, 3:6], out[:, 6])
 
 

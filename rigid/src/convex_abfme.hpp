@@ -55,11 +55,12 @@ TAUGUARD_INLINE double offsets_from(const double* v, const double* origin, doubl
   return reach;
 }
 
-// Lanes whose columns x, y (four rows each) leave an interval of ratios r > 0 with x_j + r y_j < 0.
+// Lanes whose columns x, y leave an interval of ratios r > 0 with x_j + r y_j < 0.
 // A rounding of r moves a row by u |y| r, which the callers' E covers with its slack.
+template <int Rows = 4>
 TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
   Double4 low = splat(0.0), high = splat(HUGE_VAL);
-  for (int j = 0; j < 4; ++j) {
+  for (int j = 0; j < Rows; ++j) {
     const Double4 ratio = -x[j] / y[j];
     const Mask4 upper = y[j] >= 0.0;
     const Double4 h = upper ? ratio : splat(HUGE_VAL), l = upper ? splat(0.0) : ratio;

@@ -43,9 +43,15 @@ void bind_convex(nb::module_& m) {
     return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0), vectors, threads,
                          hit.data());
   });
-  m.def("witnesses", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
-                        int threads, Rows out) {
+  m.def("sweep", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b, Data displacement,
+                    int method, int threads, bool points, Hits hit, Rows out) {
     nb::gil_scoped_release release;
-    witnesses(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), out.shape(0), threads, out.data());
+    return sweep(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), displacement.data(), hit.shape(0),
+                 static_cast<Method>(method), threads, points, hit.data(), out.data());
+  });
+  m.def("witnesses", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
+                        int threads, Hits hit, Rows out) {
+    nb::gil_scoped_release release;
+    witnesses(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), out.shape(0), threads, hit.data(), out.data());
   });
 }

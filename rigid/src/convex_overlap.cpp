@@ -47,6 +47,9 @@ struct Textbook {
     return textbook_overlap<A, B>(c.a.kind, c.a.row(i), c.b.kind, c.b.row(i)) ? common : separated;
   }
 };
+struct HullSimplexMethod {
+  static Verdict decide(const Chunk& c, std::size_t i) { return resolve_hulls(c.a, c.b, i); }
+};
 struct AlwaysUndecided {
   static Verdict decide(const Chunk&, std::size_t) { return undecided; }
 };
@@ -95,7 +98,9 @@ Runner by_kinds(bool tetrahedra_a, bool tetrahedra_b) {
 }
 
 Runner choose(Kind a, Kind b, Method method) {
-  if (a == Kind::hulls || b == Kind::hulls || method == Method::exact) return run_portable<AlwaysUndecided>;
+  if (method == Method::exact) return run_portable<AlwaysUndecided>;
+  if (a == Kind::hulls && b == Kind::hulls) return run_portable<HullSimplexMethod>;
+  if (a == Kind::hulls || b == Kind::hulls) return run_portable<AlwaysUndecided>;
   const bool ta = a == Kind::tetrahedra, tb = b == Kind::tetrahedra;
   using T = TextbookTetrahedron;
   using Z = TextbookBlock;
@@ -117,9 +122,10 @@ std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method meth
   return left;
 }
 
-void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads, double* out) {
+void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads, const std::uint8_t* hit,
+               double* out) {
   geometry::ThreadPool::shared().parallel_for(n, threads, 64, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) find_witness(a, b, i, out + 7 * i);
+    for (auto i = begin; i < end; ++i) find_witness(a, b, i, hit[i] ? common : separated, out + 7 * i);
   });
 }
 

@@ -20,6 +20,11 @@ std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method meth
 std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b, const void* blocks_b,
                           double skew, std::size_t n, bool vectors, int threads, std::uint8_t* hit);
 
-void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads, double* out);
+// Sweeps: b moves by t d[i], 0 <= t <= 1. Row i of `out`: toi (inf without a hit), point, normal; `hit` as
+// above. `d` holds n rows of 3. Without `points` that column stays NaN.
+std::size_t sweep(const Bodies& a, const Bodies& b, const double* d, std::size_t n, Method method, int threads,
+                  bool points, std::uint8_t* hit, double* out);
+
+void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads, const std::uint8_t* hit, double* out);
 
 }  // namespace tauguard::rigid

@@ -22,6 +22,25 @@ Dyadic projection(const double* n, const std::array<Dyadic, 3>& p) {
   return Dyadic(n[0]) * p[0] + Dyadic(n[1]) * p[1] + Dyadic(n[2]) * p[2];
 }
 
+// The largest projection of a and the smallest of b.
+std::array<Dyadic, 2> extent(const Points<Dyadic>& a, const Points<Dyadic>& b, const double* normal) {
+  Dyadic high = projection(normal, a[0]), low = projection(normal, b[0]);
+  for (const auto& p : a) {
+    const Dyadic x = projection(normal, p);
+    if (high < x) high = x;
+  }
+  for (const auto& p : b) {
+    const Dyadic x = projection(normal, p);
+    if (x < low) low = x;
+  }
+  return {high, low};
+}
+
+std::array<Dyadic, 3> shifted(const std::array<Dyadic, 3>& p, const double* d, double time) {
+  const Dyadic t(time);
+  return {p[0] + Dyadic(d[0]) * t, p[1] + Dyadic(d[1]) * t, p[2] + Dyadic(d[2]) * t};
+}
+
 void write_plane(const HullSimplex<Dyadic>& lp, const Points<Dyadic>& a, const Points<Dyadic>& b,
                  double* normal, double* offset) {
   std::int64_t top = std::numeric_limits<std::int64_t>::min();
@@ -33,15 +52,7 @@ void write_plane(const HullSimplex<Dyadic>& lp, const Points<Dyadic>& a, const P
     length += normal[k] * normal[k];
   }
   for (int k = 0; k < 3; ++k) normal[k] /= std::sqrt(length);
-  Dyadic high = projection(normal, a[0]), low = projection(normal, b[0]);
-  for (const auto& p : a) {
-    const Dyadic x = projection(normal, p);
-    if (high < x) high = x;
-  }
-  for (const auto& p : b) {
-    const Dyadic x = projection(normal, p);
-    if (x < low) low = x;
-  }
+  const auto [high, low] = extent(a, b, normal);
   *offset = (high + low).scaled(-1).to_double();
 }
 
@@ -54,7 +65,89 @@ void write_point(const HullSimplex<Dyadic>& lp, const Points<Dyadic>& a, double*
   }
 }
 
+using Lp = HullSimplex<double>;
+
+// Coordinates from the first vertex of a; returns the largest 1-norm.
+double localize(Points<double>& a, Points<double>& b, std::array<double, 3>& base) {
+  base = a[0];
+  double reach = 0.0;
+  for (auto* points : {&a, &b})
+    for (auto& p : *points) {
+      for (int k = 0; k < 3; ++k) p[k] -= base[k];
+      reach = std::max(reach, norm1(p.data()));
+    }
+  return reach;
+}
+
+// Gap between the projections on the plane's normal, less its error: each product sum is off by 4 u |n|
+// reach, coordinates by u reach.
+double certain_gap(const Points<double>& a, const Points<double>& b, const double* n, double reach,
+                   double& high, double& low) {
+  high = -HUGE_VAL, low = HUGE_VAL;
+  for (const auto& p : a) high = std::max(high, dot(n, p.data()));
+  for (const auto& p : b) low = std::min(low, dot(n, p.data()));
+  return low - high - 16 * unit * norm1(n) * reach;
+}
+
+// Witness in double precision; false where it is not good to a few roundings.
+bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, Verdict known,
+                          double* out) {
+  auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
+  std::array<double, 3> base;
+  const double reach = localize(a, b, base);
+  if (!in_range(reach)) return false;
+  Lp lp(a, b);
+  const auto answer = lp.solve(64);
+  if (known != (answer == Lp::Answer::separated ? separated : common)) return false;
+  if (answer == Lp::Answer::separated) {
+    double n[3], high, low;
+    const double length = std::sqrt(dot(lp.plane().data(), lp.plane().data()));
+    for (int k = 0; k < 3; ++k) n[k] = lp.plane()[k] / length;
+    if (!(certain_gap(a, b, n, reach + norm1(base.data()), high, low) > 0)) return false;
+    std::copy(n, n + 3, out + 3);
+    out[6] = 0.5 * (high + low) + dot(n, base.data());
+    return true;
+  }
+  if (answer != Lp::Answer::common) return false;
+  double point[3] = {0, 0, 0}, other[3] = {0, 0, 0};
+  for (int c = 0; c < 4; ++c) {
+    const double weight = lp.weight(c) / lp.determinant();
+    if (lp.is_artificial(c)) continue;
+    if (!(weight >= 0)) return false;
+    const auto [i, j] = lp.basis_pair(c);
+    for (int k = 0; k < 3; ++k) {
+      point[k] += weight * a[i][k];
+      other[k] += weight * b[j][k];
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (!(std::fabs(point[k] - other[k]) <= 8 * unit * reach)) return false;
+    out[k] = point[k] + base[k];
+  }
+  return true;
+}
+
 }  // namespace
+
+// A basis of four real columns with positive weights encloses the origin. A weight is a determinant of
+// three columns (1-norm at most 2 reach, off by 4 u reach): six products of three, off by
+// 6 * (3 * 4 + 4 * 2 * 3) u reach^3 and less than 512 u reach^3 with their sum.
+Verdict resolve_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
+  auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
+  std::array<double, 3> base;
+  const double reach = localize(a, b, base);
+  if (!in_range(reach)) return undecided;
+  Lp lp(a, b);
+  const auto answer = lp.solve(64);
+  if (answer == Lp::Answer::separated) {
+    double high, low;
+    return certain_gap(a, b, lp.plane().data(), reach, high, low) > 0 ? separated : undecided;
+  }
+  if (answer != Lp::Answer::common) return undecided;
+  for (int c = 0; c < 4; ++c)
+    if (lp.is_artificial(c) || !(lp.weight(c) > 512 * unit * reach * reach * reach)) return undecided;
+  return common;
+}
 
 Verdict resolve_exactly(const Bodies& a, const Bodies& b, std::size_t row) {
   const auto pa = vertices_of<Dyadic>(a, row), pb = vertices_of<Dyadic>(b, row);
@@ -62,7 +155,40 @@ Verdict resolve_exactly(const Bodies& a, const Bodies& b, std::size_t row) {
   return lp.solve() == HullSimplex<Dyadic>::Answer::separated ? separated : common;
 }
 
-void find_witness(const Bodies& a, const Bodies& b, std::size_t row, double* out) {
+Verdict resolve_sweep_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row) {
+  const auto pa = vertices_of<Dyadic>(a, row);
+  auto pb = vertices_of<Dyadic>(b, row);
+  const std::size_t n = pb.size();
+  for (std::size_t j = 0; j < n; ++j) pb.push_back(shifted(pb[j], d, 1.0));
+  HullSimplex<Dyadic> lp(pa, pb);
+  return lp.solve() == HullSimplex<Dyadic>::Answer::separated ? separated : common;
+}
+
+double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row, double* normal) {
+  std::fill(normal, normal + 3, std::numeric_limits<double>::quiet_NaN());
+  const auto pa = vertices_of<Dyadic>(a, row), start = vertices_of<Dyadic>(b, row);
+  double time = 0.0;
+  for (int step = 0; step < 200; ++step) {
+    auto pb = start;
+    for (auto& p : pb) p = shifted(p, d, time);
+    HullSimplex<Dyadic> lp(pa, pb);
+    if (lp.solve() != HullSimplex<Dyadic>::Answer::separated) return time;
+    double offset;
+    write_plane(lp, pa, pb, normal, &offset);
+    const auto [high, low] = extent(pa, pb, normal);
+    const Dyadic gap = low - high;
+    const Dyadic closing = -projection(normal, {Dyadic(d[0]), Dyadic(d[1]), Dyadic(d[2])});
+    if (gap.sign() <= 0 || closing.sign() <= 0) return time;  // the plane's rounding ate the rest
+    const double next = std::nextafter(time + quotient(gap, closing) * (1 - 0x1p-46), 0.0);
+    if (!(next > time) || next > 1.0) return std::min(1.0, std::max(time, next));
+    time = next;
+  }
+  return time;
+}
+
+void find_witness(const Bodies& a, const Bodies& b, std::size_t row, Verdict known, double* out) {
+  std::fill(out, out + 7, std::numeric_limits<double>::quiet_NaN());
+  if (find_witness_quickly(a, b, row, known, out)) return;
   std::fill(out, out + 7, std::numeric_limits<double>::quiet_NaN());
   const auto pa = vertices_of<Dyadic>(a, row), pb = vertices_of<Dyadic>(b, row);
   HullSimplex<Dyadic> lp(pa, pb);

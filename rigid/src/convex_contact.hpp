@@ -1,0 +1,118 @@
+// A common point of two bodies that touch along a known normal: the features of both that lie in the
+// contact plane (vertices within `tolerance` of it), cut with each other in that plane.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "convex_bodies.hpp"
+
+namespace tauguard::rigid {
+
+class ContactFeature {
+ public:
+  using Point2 = std::array<double, 2>;
+
+  // The vertices of `body` extreme along sign * normal, as a convex polygon in the plane basis u, v.
+  ContactFeature(const Points<double>& body, const double* normal, double sign, double tolerance,
+                 const double* u, const double* v) {
+    const auto along = [](const double* n, const std::array<double, 3>& p) {
+      return n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
+    };
+    double top = sign * along(normal, body[0]);
+    for (const auto& p : body) top = std::max(top, sign * along(normal, p));
+    std::vector<Point2> points;
+    for (const auto& p : body)
+      if (sign * along(normal, p) >= top - tolerance) points.push_back({along(u, p), along(v, p)});
+    level = sign * top;
+    polygon = hull(points);
+  }
+
+  // The mean of the corners of the intersection, or of both means where rounding leaves none.
+  static Point2 meet(const ContactFeature& a, const ContactFeature& b, double tolerance) {
+    if (a.polygon.size() == 1) return a.polygon[0];
+    if (b.polygon.size() == 1) return b.polygon[0];
+    const bool a_cuts = a.polygon.size() >= b.polygon.size();
+    const auto& cutter = a_cuts ? a.polygon : b.polygon;
+    std::vector<Point2> rest = a_cuts ? b.polygon : a.polygon;
+    for (std::size_t i = 0; i < cutter.size() && !rest.empty(); ++i)
+      rest = cut(rest, cutter[i], cutter[(i + 1) % cutter.size()], tolerance);
+    if (!rest.empty()) return mean(rest);
+    const Point2 x = mean(a.polygon), y = mean(b.polygon);
+    return {0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1])};
+  }
+
+  double level = 0.0;
+  std::vector<Point2> polygon;
+
+ private:
+  static double turn(const Point2& o, const Point2& p, const Point2& q) {
+    return (p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0]);
+  }
+
+  // Counter-clockwise convex hull (Andrew's monotone chain).
+  static std::vector<Point2> hull(std::vector<Point2> p) {
+    std::sort(p.begin(), p.end());
+    p.erase(std::unique(p.begin(), p.end()), p.end());
+    if (p.size() < 3) return p;
+    std::vector<Point2> out;
+    for (int side = 0; side < 2; ++side) {
+      const std::size_t start = out.size();
+      for (const auto& x : p) {
+        while (out.size() >= start + 2 && turn(out[out.size() - 2], out.back(), x) <= 0) out.pop_back();
+        out.push_back(x);
+      }
+      out.pop_back();
+      std::reverse(p.begin(), p.end());
+    }
+    return out;
+  }
+
+  // What lies left of the line o -> e, or within `tolerance` of it.
+  static std::vector<Point2> cut(const std::vector<Point2>& p, const Point2& o, const Point2& e, double tolerance) {
+    const double length = std::hypot(e[0] - o[0], e[1] - o[1]);
+    const auto inside = [&](const Point2& x) { return turn(o, e, x) + tolerance * length; };
+    std::vector<Point2> out;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      const Point2 &x = p[i], &y = p[(i + 1) % p.size()];
+      const double fx = inside(x), fy = inside(y);
+      if (fx >= 0) out.push_back(x);
+      if ((fx > 0 && fy < 0) || (fx < 0 && fy > 0)) {
+        const double s = fx / (fx - fy);
+        out.push_back({x[0] + s * (y[0] - x[0]), x[1] + s * (y[1] - x[1])});
+      }
+    }
+    return out;
+  }
+
+  static Point2 mean(const std::vector<Point2>& p) {
+    Point2 sum{};
+    for (const auto& x : p) sum = {sum[0] + x[0], sum[1] + x[1]};
+    const auto n = static_cast<double>(p.size());
+    return {sum[0] / n, sum[1] / n};
+  }
+};
+
+// `a` and `b` touch along the unit `normal` (from a to b). Writes a common point to `point`.
+inline void contact_point(const Points<double>& a, const Points<double>& b, const double* normal, double tolerance,
+                          double* point) {
+  const int least = std::fabs(normal[0]) < std::fabs(normal[1])
+                        ? (std::fabs(normal[0]) < std::fabs(normal[2]) ? 0 : 2)
+                        : (std::fabs(normal[1]) < std::fabs(normal[2]) ? 1 : 2);
+  double u[3], v[3];
+  double length = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    u[k] = (k == least ? 1.0 : 0.0) - normal[least] * normal[k];
+    length += u[k] * u[k];
+  }
+  for (double& x : u) x /= std::sqrt(length);
+  for (int k = 0; k < 3; ++k) v[k] = normal[(k + 1) % 3] * u[(k + 2) % 3] - normal[(k + 2) % 3] * u[(k + 1) % 3];
+  const ContactFeature fa(a, normal, 1.0, tolerance, u, v), fb(b, normal, -1.0, tolerance, u, v);
+  const auto at = ContactFeature::meet(fa, fb, tolerance);
+  const double level = 0.5 * (fa.level + fb.level);
+  for (int k = 0; k < 3; ++k) point[k] = at[0] * u[k] + at[1] * v[k] + level * normal[k];
+}
+
+}  // namespace tauguard::rigid
