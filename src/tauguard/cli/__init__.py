@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
+    "detect": "look for collisions in the log of a real arm",
     "replay": "turn an MCAP recording into an .rrd for the rerun viewer",
     "bench": "run one study of speed against error: a table, a figure, --json",
 }

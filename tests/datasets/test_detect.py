@@ -1,0 +1,132 @@
+"""Collisions in logs: a push that is added to the currents is found, what is not there is not."""
+
+import json
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from tauguard.cli import main
+from tauguard.models import pin_model
+
+ARM = """
+<mujoco><worldbody>
+  <body name="a" pos="0 0 .3"><joint name="j1" axis="0 0 1"/>
+    <geom type="capsule" size=".05" fromto="0 0 0 .4 0 0" mass="4"/>
+    <body name="b" pos=".4 0 0"><joint name="j2" axis="0 1 0"/>
+      <geom type="capsule" size=".04" fromto="0 0 0 .3 0 0" mass="2"/></body></body>
+</worldbody></mujoco>
+"""
+COLUMNS = {"t": 0, "q": [1, 2], "qd": [3, 4], "current": [5, 6]}
+GAINS = np.array([8.0, 5.0])
+
+
+@pytest.fixture
+def log(tmp_path):
+    """20 s at 250 Hz whose torques are Pinocchio's, with a push of 8 N m on joint 2 at 14 s."""
+    rng = np.random.default_rng(0)
+    (tmp_path / "arm.xml").write_text(ARM)
+    (tmp_path / "columns.json").write_text(json.dumps(COLUMNS))
+    model = pin_model(tmp_path / "arm.xml")
+    data = model.createData()
+    t = np.arange(5000) / 250
+    w, phase = np.array([0.7, 1.1]), np.array([0.0, 0.5])
+    q = 0.8 * np.sin(w * t[:, None] + phase)
+    qd = 0.8 * w * np.cos(w * t[:, None] + phase)
+    qdd = -w * w * q
+    tau = np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd, strict=True)])
+    tau[(t >= 14) & (t < 14.4), 1] -= 8.0
+    current = tau / GAINS + 0.01 * rng.standard_normal(tau.shape)
+    table = np.column_stack([t, q, qd, current])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", fmt="%.9g")
+    return tmp_path
+
+
+def run(folder, *flags):
+    main(
+        [
+            "detect",
+            str(folder / "log.csv"),
+            "--robot",
+            str(folder / "arm.xml"),
+            "--columns",
+            str(folder / "columns.json"),
+            *flags,
+        ]
+    )
+
+
+def test_the_push_is_found_and_nothing_else(log, capsys):
+    out = log / "found"
+    run(log, "--gains", "8", "5", "--out", str(out), "--json", str(log / "figures.json"))
+    figures = json.loads((log / "figures.json").read_text())
+    assert figures["alarms"] == 1
+    event = figures["events"][0]
+    assert 14.0 < event["start"] < 14.2
+    assert event["joint"] == "j2"
+    assert sorted(p.name for p in out.iterdir()) == ["detect.mcap", "detect.rrd", "events.json"]
+    assert json.loads((out / "events.json").read_text()) == figures
+    text = capsys.readouterr().out
+    assert "1 alarms in 10.0 s watched" in text
+    assert "250 Hz" in text
+
+
+def test_a_coarse_rate_is_said_aloud(log, capsys):
+    run(log, "--gains", "8", "5", "--confirmation", "0.003")
+    assert "a confirmation of 3 ms is counted as 1 samples (4 ms)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        ((), "--gains: give 2 numbers"),
+        (("--gains", "8"), "--gains: 1 numbers for 2 joints"),
+        (("--gains", "8", "0"), "every number must be finite and not 0"),
+        (("--gains", "8", "5", "--viscous", "1"), "viscous: 1 numbers for 2 gains"),
+        (("--gains", "8", "5", "--quiet", "50"), "the log is 20.0 s long"),
+        (("--gains", "8", "5", "--quiet", "0.1"), "quiet: 0.1 s leave 0 samples"),
+        (("--gains", "8", "5", "--factor", "0"), "factor: 0.0, expected above 0"),
+        (("--gains", "8", "5", "--columns", "ur10e"), "line 1: 7 columns, expected 31"),
+        (("--gains", "8", "5", "--robot", "no.urdf"), "no.urdf: no such robot file"),
+    ],
+)
+def test_bad_input_is_one_line_and_code_2(log, capsys, flags, message):
+    with pytest.raises(SystemExit) as stop:
+        run(log, *flags)
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert message in error
+
+
+def test_joints_that_do_not_match(log, capsys):
+    one = ARM.replace('<joint name="j2" axis="0 1 0"/>', "")
+    (log / "one.xml").write_text(one)
+    with pytest.raises(SystemExit):
+        run(log, "--gains", "8", "5", "--robot", str(log / "one.xml"))
+    assert "the log has 2 joints (joint_1, joint_2), the robot 1 (j1)" in capsys.readouterr().err
+
+
+@pytest.mark.data
+def test_a_real_collision_free_file_raises_few_alarms(data_dir, tmp_path, capsys):
+    folder = data_dir / "ur10e"
+    main(
+        [
+            "detect",
+            str(folder / "free" / "ur-20_02_12-40sec_12harm.csv"),
+            "--robot",
+            str(folder / "ur10e.urdf"),
+            "--columns",
+            "ur10e",
+            "--quiet",
+            "20",
+            "--out",
+            str(tmp_path / "out"),
+            "--json",
+            str(tmp_path / "figures.json"),
+        ]
+    )
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert figures["alarms"] <= 1
+    assert 29 < figures["watched_seconds"] < 30
+    assert (tmp_path / "out" / "detect.rrd").exists()
