@@ -175,7 +175,9 @@ def sample_topics(trace: Trace, detection: Detection | None) -> list[Topic]:
                 raise ValueError(
                     f"truth.obstacle_poses: shape {truth.obstacle_poses.shape}, expected {shape}"
                 )
-            values["obstacle_poses"] = truth.obstacle_poses.reshape(len(trace.t), -1)
+            values["obstacle_poses"] = truth.obstacle_poses.reshape(
+                len(trace.t), 16 * len(truth.obstacle_names)
+            )
     if detection is not None:
         if not np.array_equal(detection.t, trace.t):
             raise ValueError("detection.t: differs from trace.t: its rows must be the samples")
@@ -314,7 +316,7 @@ def decode_truth(form: Mapping[str, Any], values: Mapping[str, Any], table: Any)
     names = tuple(form["obstacle_names"])
     poses = {}
     if names:
-        poses = {"obstacle_poses": values["obstacle_poses"].reshape(-1, len(names), 4, 4)}
+        poses = {"obstacle_poses": values["obstacle_poses"].reshape(form["rows"], len(names), 4, 4)}
     fields = "tau_ext", "contact_force", "payload", "contact_link", "contact_point"
     return Truth(
         collisions=collisions,

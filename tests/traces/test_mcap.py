@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -95,7 +95,7 @@ def same(a, b):
         assert type(a) is type(b)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     rows=st.integers(0, 40),
     joints=st.integers(1, 9),
@@ -105,6 +105,7 @@ def same(a, b):
     detected=st.booleans(),
     seed=st.integers(0, 99),
 )
+@example(rows=0, joints=1, obstacles=1, commanded=(True,) * 3, truth=True, detected=True, seed=0)
 def test_read_back_equal(
     tmp_path_factory, rows, joints, obstacles, commanded, truth, detected, seed
 ):
