@@ -1,5 +1,7 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
+from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
+from tauguard.rigid.motion import Motion
 from tauguard.rigid.queries import overlap, sweep
 from tauguard.rigid.results import Impacts, Overlap, Witness
 from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Tetrahedra
@@ -8,6 +10,10 @@ __all__ = [
     "Boxes",
     "Hulls",
     "Impacts",
+    "MeshContacts",
+    "MeshOverlap",
+    "MeshTree",
+    "Motion",
     "Overlap",
     "Parallelepipeds",
     "Tetrahedra",

@@ -1,0 +1,81 @@
+"""Rigid poses and motions, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.geometry import finite
+from tauguard.rigid.shapes import ORTHONORMAL_TOLERANCE
+
+
+def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """``value`` as a batch of homogeneous matrices, shape (N, 4, 4); one (4, 4) is a batch of one.
+
+    Raises:
+        ValueError: another shape, an entry that is not finite, a bottom row other than 0 0 0 1, or
+            a rotation further than 1e-6 from a proper orthonormal one; the message names the row.
+    """
+    raw = np.asarray(value, dtype=np.float64)
+    batch = finite(name, raw[None] if raw.ndim == 2 else raw, (None, 4, 4))
+    bottom = (batch[:, 3] != (0.0, 0.0, 0.0, 1.0)).any(axis=1)
+    if bottom.any():
+        row = int(np.argmax(bottom))
+        raise ValueError(f"{name}: bottom row {batch[row, 3]} in row {row}, expected 0 0 0 1")
+    rotation = batch[:, :3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(rotation.transpose(0, 2, 1) @ rotation - np.eye(3)).max(axis=(1, 2), initial=0)
+        bad = ~(off <= ORTHONORMAL_TOLERANCE) | (np.linalg.det(rotation) < 0)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise ValueError(
+            f"{name}: the rotation in row {row} is not proper orthonormal "
+            f"(R^T R is off by {off[row]:.3g}, at most {ORTHONORMAL_TOLERANCE:g} is accepted)"
+        )
+    return batch
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Constant linear and angular velocity over a step, t in [0, 1].
+
+    A body's point y moves as ``x(t) = x0 + t linear + exp(t [angular]x) R0 y`` with ``R0, x0`` the
+    pose at t = 0: world frame, rotation about the pose's origin.
+
+    Args:
+        pose_t0: Shape (N, 4, 4), or (4, 4) for a batch of one.
+        linear: Displacement of the origin over the step. Shape (N, 3) or (3,), m.
+        angular: Rotation vector over the step. Shape (N, 3) or (3,), rad.
+
+    Raises:
+        ValueError: wrong shapes or lengths, an entry that is not finite, a rotation further than
+            1e-6 from orthonormal (named with its row).
+    """
+
+    pose_t0: NDArray[np.float64]
+    linear: NDArray[np.float64]
+    angular: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        pose = poses("pose_t0", self.pose_t0)
+        object.__setattr__(self, "pose_t0", pose)
+        for name in ("linear", "angular"):
+            value = np.asarray(getattr(self, name), dtype=np.float64)
+            value = np.broadcast_to(value, (len(pose), 3)) if value.ndim == 1 else value
+            object.__setattr__(self, name, finite(name, value, (len(pose), 3)))
+
+    def __len__(self) -> int:
+        return len(self.pose_t0)
+
+    def at(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Poses at time ``t`` (a number, or one a row). Shape (N, 4, 4)."""
+        from scipy.spatial.transform import Rotation
+
+        time = np.broadcast_to(np.asarray(t, dtype=np.float64), (len(self),))[:, None]
+        out = self.pose_t0.copy()
+        turn = Rotation.from_rotvec(time * self.angular).as_matrix()
+        out[:, :3, :3] = turn @ self.pose_t0[:, :3, :3]
+        out[:, :3, 3] += time * self.linear
+        return out

@@ -1,0 +1,127 @@
+#include "mesh_query.hpp"
+
+#include <algorithm>
+
+namespace tauguard::rigid {
+
+Mesh::Mesh(const double* vertices, const std::int32_t* faces, std::size_t n_faces, VolumeKind k)
+    : tree(vertices, faces, n_faces), kind(k) {
+  if (kind == VolumeKind::obb) obbs = fit_all<Obb>(tree);
+  if (kind == VolumeKind::k_dop) k_dops = fit_all<KDop>(tree);
+  if (kind == VolumeKind::sphere) balls = fit_all<Ball>(tree);
+}
+
+FacePair first_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch) {
+  FacePair found = {-1, -1};
+  each_overlap(a, b, pose, scratch, [&](int i, int j, const Triangle&) {
+    found = {a.tree.id[i], b.tree.id[j]};
+    return true;
+  });
+  return found;
+}
+
+namespace {
+
+double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+void cross(const double* a, const double* b, double* out) {
+  out[0] = a[1] * b[2] - a[2] * b[1];
+  out[1] = a[2] * b[0] - a[0] * b[2];
+  out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+void edge(const Triangle& t, int i, double* out) {
+  for (int k = 0; k < 3; ++k) out[k] = t.v[(i + 1) % 3][k] - t.v[i][k];
+}
+
+// The cheaper of moving b along +axis or -axis until its interval leaves a's; keeps the least depth.
+void separate(const Triangle& a, const Triangle& b, const double* axis, double size, Contact& c) {
+  const double length = std::sqrt(dot(axis, axis));
+  if (!(length > size)) return;
+  double lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
+  for (int i = 0; i < 3; ++i) {
+    // Relative to one corner of a, so that a far-away origin costs no digits.
+    const double x[3] = {a.v[i][0] - a.v[0][0], a.v[i][1] - a.v[0][1], a.v[i][2] - a.v[0][2]};
+    const double y[3] = {b.v[i][0] - a.v[0][0], b.v[i][1] - a.v[0][1], b.v[i][2] - a.v[0][2]};
+    const double p = dot(axis, x) / length, q = dot(axis, y) / length;
+    lo[0] = std::min(lo[0], p), hi[0] = std::max(hi[0], p);
+    lo[1] = std::min(lo[1], q), hi[1] = std::max(hi[1], q);
+  }
+  const double forward = hi[0] - lo[1], backward = hi[1] - lo[0];
+  const double depth = std::max(0.0, std::min(forward, backward));
+  if (depth >= c.depth) return;
+  c.depth = depth;
+  const double sign = forward <= backward ? 1.0 : -1.0;
+  for (int k = 0; k < 3; ++k) c.normal[k] = sign * axis[k] / length;
+}
+
+// The mean of the points where edges of one triangle pierce the other: the middle of the common segment in
+// general position; where nothing is pierced (coplanar or degenerate) the corners nearest to the middle of
+// both triangles stand in.
+void common_point(const Triangle& a, const Triangle& b, double* point) {
+  double sum[3] = {}, lo[3] = {}, n = 0;
+  for (int side = 0; side < 2; ++side) {
+    const Triangle &t = side ? b : a, &s = side ? a : b;
+    double u[3], v[3], normal[3];
+    edge(s, 0, u), edge(s, 1, v), cross(u, v, normal);
+    for (int i = 0; i < 3; ++i) {
+      const double *p = t.v[i], *q = t.v[(i + 1) % 3];
+      const double dp[3] = {p[0] - s.v[0][0], p[1] - s.v[0][1], p[2] - s.v[0][2]};
+      const double dq[3] = {q[0] - s.v[0][0], q[1] - s.v[0][1], q[2] - s.v[0][2]};
+      const double hp = dot(normal, dp), hq = dot(normal, dq);
+      if (hp == hq || (hp > 0) == (hq > 0) || !exact::segment_meets(p, q, s)) continue;
+      const double w = hp / (hp - hq);
+      for (int k = 0; k < 3; ++k) sum[k] += p[k] + w * (q[k] - p[k]);
+      ++n;
+    }
+  }
+  if (n > 0) {
+    for (int k = 0; k < 3; ++k) point[k] = sum[k] / n;
+    return;
+  }
+  // Coplanar or touching at the rim: the middle of the overlap of both boxes.
+  for (int k = 0; k < 3; ++k) {
+    lo[k] = std::max(std::min({a.v[0][k], a.v[1][k], a.v[2][k]}), std::min({b.v[0][k], b.v[1][k], b.v[2][k]}));
+    const double hi = std::min(std::max({a.v[0][k], a.v[1][k], a.v[2][k]}), std::max({b.v[0][k], b.v[1][k], b.v[2][k]}));
+    point[k] = 0.5 * (lo[k] + hi);
+  }
+}
+
+Contact describe(const Triangle& a, const Triangle& b) {
+  Contact c;
+  c.depth = INFINITY;
+  double ea[3][3], eb[3][3], na[3], nb[3], axis[3], longest = 0;
+  for (int i = 0; i < 3; ++i) {
+    edge(a, i, ea[i]), edge(b, i, eb[i]);
+    longest = std::max({longest, dot(ea[i], ea[i]), dot(eb[i], eb[i])});
+  }
+  // Cross products this small carry no direction: their rounding error is about 2^-52 of the edges' product.
+  const double size = 0x1p-40 * longest;
+  cross(ea[0], ea[1], na), cross(eb[0], eb[1], nb);
+  separate(a, b, na, size, c);
+  separate(a, b, nb, size, c);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) cross(ea[i], eb[j], axis), separate(a, b, axis, size, c);
+  if (!(c.depth < INFINITY)) {  // two segments on a line, or points: no axis separates them better
+    c.depth = 0;
+    c.normal[0] = c.normal[1] = 0, c.normal[2] = 1;
+  }
+  common_point(a, b, c.point);
+  return c;
+}
+
+}  // namespace
+
+void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, std::vector<Contact>& out) {
+  const auto first = static_cast<std::ptrdiff_t>(out.size());
+  each_overlap(a, b, pose, scratch, [&](int i, int j, const Triangle& moved) {
+    Contact c = describe(a.tree.triangles[i], moved);
+    c.a = a.tree.id[i], c.b = b.tree.id[j];
+    out.push_back(c);
+    return false;
+  });
+  std::sort(out.begin() + first, out.end(),
+            [](const Contact& x, const Contact& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
+}
+
+}  // namespace tauguard::rigid

@@ -1,0 +1,70 @@
+// A mesh with its tree and bounding volumes, and the queries on two of them.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "mesh_volumes.hpp"
+
+namespace tauguard::rigid {
+
+enum class VolumeKind { aabb, obb, k_dop, sphere };
+
+struct Mesh {
+  Mesh(const double* vertices, const std::int32_t* faces, std::size_t n_faces, VolumeKind kind);
+  Tree tree;
+  VolumeKind kind;
+  std::vector<Obb> obbs;
+  std::vector<KDop> k_dops;
+  std::vector<Ball> balls;
+};
+
+// Scratch space of one thread.
+using Scratch = std::vector<SlotPair>;
+
+// leaf(index of a triangle of a, index of a triangle of b (both in leaf order), b's triangle posed) for every
+// pair of triangles that share a point, until it returns true.
+template <class Visit>
+bool each_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, Visit visit) {
+  const Placement at(a.tree, b.tree, pose);
+  if (at.apart) return false;
+  const auto leaf = [&](Child ca, Child cb) {
+    for (int j = leaf_first(cb); j < leaf_first(cb) + leaf_count(cb); ++j) {
+      const Triangle moved = pose.apply(b.tree.triangles[j]);
+      for (int i = leaf_first(ca); i < leaf_first(ca) + leaf_count(ca); ++i)
+        if (triangles_overlap(a.tree.triangles[i], moved) && visit(i, j, moved)) return true;
+    }
+    return false;
+  };
+  switch (a.kind) {
+    case VolumeKind::obb: {
+      const VolumeBounds<Obb> bounds{a.tree, b.tree, a.obbs, b.obbs, {a.tree, b.tree, pose}};
+      return traverse(a.tree, b.tree, bounds, scratch, leaf);
+    }
+    case VolumeKind::k_dop: {
+      const VolumeBounds<KDop> bounds{a.tree, b.tree, a.k_dops, b.k_dops, {a.tree, b.tree, pose}};
+      return traverse(a.tree, b.tree, bounds, scratch, leaf);
+    }
+    case VolumeKind::sphere: {
+      const VolumeBounds<Ball> bounds{a.tree, b.tree, a.balls, b.balls, {a.tree, b.tree, pose}};
+      return traverse(a.tree, b.tree, bounds, scratch, leaf);
+    }
+    default: return traverse(a.tree, b.tree, BoxBounds{a.tree, b.tree, at}, scratch, leaf);
+  }
+}
+
+// The first colliding pair found, as rows of the faces; {-1, -1} where the meshes are apart.
+struct FacePair {
+  std::int32_t a, b;
+};
+FacePair first_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch);
+
+// Where and how two overlapping triangles touch: point on both, unit normal from a to b, and how far b must
+// move along the normal to come free of a.
+struct Contact {
+  std::int32_t a, b;  // rows of the faces
+  double point[3], normal[3], depth;
+};
+void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, std::vector<Contact>& out);
+
+}  // namespace tauguard::rigid
