@@ -1,6 +1,7 @@
 """Generation of labelled episodes, and loaders of real logs."""
 
 from tauguard.datasets.columns import PRESETS, ColumnMap
+from tauguard.datasets.demo import SPEEDS, DemoPlan, demo_plan
 from tauguard.datasets.generate import simulate_all, write_dataset
 from tauguard.datasets.logs import Log, read_log
 from tauguard.datasets.plans import (
@@ -12,10 +13,13 @@ from tauguard.datasets.plans import (
 
 __all__ = [
     "PRESETS",
+    "SPEEDS",
     "TRAINING_PAYLOADS",
     "ColumnMap",
+    "DemoPlan",
     "Log",
     "collision_plans",
+    "demo_plan",
     "free_episodes",
     "read_log",
     "simulate_all",

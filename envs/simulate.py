@@ -45,6 +45,8 @@ Array = NDArray[np.float64]
 PARKED = np.array([0.0, 0.0, 50.0])
 #: Targets to try for one collision, and strengths to try on each.
 TARGETS, TRIES = 16, 10
+#: A person is not pushed harder in a collision worth detecting: such a target is given up [N].
+FORCE_LIMIT = 400.0
 #: An obstacle that touches the arm sooner than this after it was put there stood in its way [s].
 CLEAR = 0.01
 #: A clamp's strength counts from this far in front of the arm's deepest reach [m]: its depth is
@@ -65,7 +67,8 @@ class Window:
     begin: int  #: first row
     recording: Recording
     wrenches: labels.Wrenches
-    peak_tau: float
+    peak_tau: float  #: [N m]
+    peak_force: float  #: [N]
 
 
 def workspace(scene: Scene) -> Workspace:
@@ -243,7 +246,7 @@ class Simulation:
         for _ in range(TRIES):
             self.loop.restore(saved)
             window = self._attempt(plan, target, strength, begin, end)
-            if window is None:
+            if window is None or window.peak_force > FORCE_LIMIT:
                 return None
             if plan.severity is None or plan.severity[0] <= window.peak_tau < plan.severity[1]:
                 return window
@@ -286,7 +289,9 @@ class Simulation:
         if plan.kind != "pulse" and (wrenches.force[: self._row(CLEAR)] != 0).any():
             return None
         tau = labels.external_torque(scene, recording.q, wrenches)
-        return Window(begin, recording, wrenches, float(np.abs(tau[:, :4]).max(initial=0.0)))
+        peak_tau = float(np.abs(tau[:, :4]).max(initial=0.0))
+        peak_force = float(np.linalg.norm(wrenches.force, axis=2).max(initial=0.0))
+        return Window(begin, recording, wrenches, peak_tau, peak_force)
 
     def _launch(self, target: Target, speed: float) -> None:
         model, data = self.scene.model, self.loop.data

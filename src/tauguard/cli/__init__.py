@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 COMMANDS = {
     "detect": "look for collisions in the log of a real arm",
+    "simulate": "labelled episodes of the arm at work, as many as asked",
     "replay": "turn an MCAP recording into an .rrd for the rerun viewer",
     "bench": "run one study of speed against error: a table, a figure, --json",
 }
