@@ -7,4 +7,6 @@ A study is a module ``tauguard.benchmarks.<name>`` with two functions::
 """
 
 #: Every study and its one-line description, in the order of ``tauguard bench list``.
-STUDIES: dict[str, str] = {}
+STUDIES: dict[str, str] = {
+    "rigid": "convex overlap and sweeps by elimination (ABFME) against separating axes and coal",
+}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -33,16 +34,25 @@ def coal_module() -> Any:
 
 def collide(a: Bodies, b: Bodies, count: int) -> NDArray[np.bool_]:
     """coal's boolean answer of ``count`` rows. Its tolerance is coal's own (1e-6 and the like)."""
-    coal = coal_module()
     left, right = geometries(a), geometries(b)
+    left, right = (side * count if len(side) == 1 else side for side in (left, right))
+    return np.array(collide_all(left, right)[0], dtype=np.bool_)
+
+
+def collide_all(
+    left: list[tuple[Any, Any]], right: list[tuple[Any, Any]]
+) -> tuple[list[bool], float]:
+    """Boolean answers of prepared pairs, and the seconds of the bare loop."""
+    coal = coal_module()
     request, result = coal.CollisionRequest(), coal.CollisionResult()
-    hit = np.zeros(count, dtype=np.bool_)
-    for i in range(count):
-        result.clear()
-        ga, ta = left[i if len(left) > 1 else 0]
-        gb, tb = right[i if len(right) > 1 else 0]
-        hit[i] = coal.collide(ga, ta, gb, tb, request, result) > 0
-    return hit
+    request.enable_contact = False
+    collide, clear = coal.collide, result.clear
+    hit = []
+    start = time.perf_counter()
+    for (ga, ta), (gb, tb) in zip(left, right, strict=True):
+        clear()
+        hit.append(collide(ga, ta, gb, tb, request, result) > 0)
+    return hit, time.perf_counter() - start
 
 
 def geometries(bodies: Bodies) -> list[tuple[Any, Any]]:

@@ -68,14 +68,15 @@ def native_overlap(
         raise ValueError("method: sat needs facets, which Hulls do not have; use abfme or auto")
     hit = np.empty(rows(a, b), dtype=np.uint8)
     if method == "auto" and isinstance(a, Boxes) and isinstance(b, Boxes):
-        return hit.view(np.bool_), _overlap_boxes(a, b, thread_count(threads), hit)
+        return hit.view(np.bool_), overlap_boxes(a, b, thread_count(threads), hit)
     left = _rigid.overlap(*native(a), *native(b), _METHODS[method], thread_count(threads), hit)
     return hit.view(np.bool_), left
 
 
-def _overlap_boxes(
+def overlap_boxes(
     a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8], vectors: bool = True
 ) -> int:
+    """The batch path of boxes into ``hit``: how many rows needed exact arithmetic."""
     skew = max(a.skew, b.skew)
     return _rigid.overlap_boxes(a.packed, a.blocks, b.packed, b.blocks, skew, vectors, threads, hit)
 

@@ -9,7 +9,7 @@ from tauguard.benchmarks.rigid_cases import HARD, KINDS
 from tauguard.benchmarks.rigid_truth import exact_hit, float_bodies, truth
 from tauguard.geometry import _geometry
 from tauguard.rigid import Boxes, Hulls, Parallelepipeds, Tetrahedra, overlap
-from tauguard.rigid.queries import _overlap_boxes, native_overlap
+from tauguard.rigid.queries import native_overlap, overlap_boxes
 
 EXACT_METHODS = ["abfme", "auto", "exact"]
 PAIRS = [(a, b) for a in KINDS for b in KINDS]
@@ -144,7 +144,7 @@ def test_portable_batch_path_gives_the_same_answers(name):
     for x, y in ((a, b), (random_a, random_b)):
         answers = [np.empty(len(x), dtype=np.uint8) for _ in range(2)]
         left = [
-            _overlap_boxes(x, y, 1, hit, vectors=vectors)
+            overlap_boxes(x, y, 1, hit, vectors=vectors)
             for hit, vectors in zip(answers, (True, False), strict=True)
         ]
         np.testing.assert_array_equal(*answers)
