@@ -1,7 +1,5 @@
 #include "candidates.hpp"
 
-#include <utility>
-
 #include "overlap.hpp"
 
 namespace tauguard::cloth {
@@ -12,33 +10,32 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
           const std::int32_t* vb, Mask hits, const Groups& groups, CandidateBlock& out) {
   std::int32_t a[ArityA];
   for (int j = 0; j < ArityA; ++j) a[j] = va[j * lanes + i];
+  std::int32_t *row = out.rows.data() + 4 * out.size, *pair = out.pairs.data() + 2 * out.size;
+  // Every hit is written; the place is taken only by those that count (no branch to mispredict).
   for (; hits; hits &= hits - 1) {
     const int lane = __builtin_ctz(hits);
-    std::int32_t row[ArityA + ArityB];
+    // A vertex goes by its own number, not by its place among the vertices in use.
+    const std::int32_t id_a = ArityA == 1 ? a[0] : ids_a[i], id_b = ids_b[lane];
+    const bool swap = ArityA == ArityB && id_a > id_b;
+    const int at_a = swap ? ArityB : 0, at_b = swap ? 0 : ArityA;
     bool shared = false;
     for (int k = 0; k < ArityB; ++k) {
-      row[ArityA + k] = vb[k * lanes + lane];
-      for (int j = 0; j < ArityA; ++j) shared |= a[j] == row[ArityA + k];
+      const std::int32_t v = vb[k * lanes + lane];
+      row[at_b + k] = v;
+      for (int j = 0; j < ArityA; ++j) shared |= a[j] == v;
     }
-    if (shared) {
-      ++out.adjacent;
-      continue;
-    }
-    if (groups.any() && !groups.meet(groups.of_vertex[a[0]], groups.of_vertex[row[ArityA]])) {
-      ++out.kept_apart;
-      continue;
-    }
-    for (int j = 0; j < ArityA; ++j) row[j] = a[j];
-    // A vertex goes by its own number, not by its place among the vertices in use.
-    std::int32_t first = ArityA == 1 ? a[0] : ids_a[i], second = ids_b[lane];
-    if (ArityA == ArityB && first > second) {
-      std::swap(first, second);
-      for (int j = 0; j < ArityA; ++j) std::swap(row[j], row[ArityA + j]);
-    }
-    out.rows.insert(out.rows.end(), row, row + ArityA + ArityB);
-    out.pairs.push_back(first);
-    out.pairs.push_back(second);
+    for (int j = 0; j < ArityA; ++j) row[at_a + j] = a[j];
+    pair[0] = swap ? id_b : id_a;
+    pair[1] = swap ? id_a : id_b;
+    const bool meet =
+        !groups.any() || groups.meet(groups.of_vertex[a[0]], groups.of_vertex[vb[lane]]);
+    const bool counts = !shared & meet;
+    out.adjacent += shared;
+    out.kept_apart += !shared & !meet;
+    row += 4 * counts;
+    pair += 2 * counts;
   }
+  out.size = (pair - out.pairs.data()) / 2;
 }
 
 }  // namespace
@@ -51,8 +48,8 @@ void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves
   Mask rows = a.occupied(leaves.a), columns = b.occupied(leaves.b);
   const bool same = edges && leaves.a == leaves.b;
   if (!same) {
-    rows = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), block_a, a.axes(), a.times(), rows);
-    columns = kernels.lanes_of_node(a.node(a.leaves() + leaves.a), block_b, a.axes(), a.times(), columns);
+    rows = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), block_a, a.axes(), a.times(), rows);
+    columns = kernels.lanes_of_node(a.node(a.leaves() + leaves.a), a.slots(), block_b, a.axes(), a.times(), columns);
     if (rows == 0 || columns == 0) return;
   }
   std::uint16_t masks[lanes];

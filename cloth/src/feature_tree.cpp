@@ -123,71 +123,77 @@ void FeatureTree::fill_groups(const Features& features, const Groups& groups) {
   }
 }
 
+template <int slots>
 void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
+  constexpr int both = 2 * slots;  // [end of the step][axis slot]
   float* block = blocks_.data() + leaf * block_stride();
-  float* node = nodes_.data() + (leaves_ + std::size_t(leaf)) * node_stride();
   const std::int32_t* v = vertices(leaf);
-  const int sweep = times_ == 1 ? 2 : 1;  // ends of the step that one interval covers
+  float node_low[both], node_high[both];
+  std::fill(node_low, node_low + both, infinity);
+  std::fill(node_high, node_high + both, -infinity);
   for (int lane = 0; lane < lanes; ++lane) {
     if (!(occupied_[leaf] >> lane & 1)) {
       for (int r = 0; r < 2 * times_ * axes_; ++r) block[r * lanes + lane] = r % 2 == 0 ? infinity : -infinity;
       continue;
     }
-    float low[2 * axis_slots], high[2 * axis_slots];
+    float low[both], high[both];
     const float* first = points.of(v[lane]);
-    std::copy(first, first + 2 * axes_, low);
-    std::copy(first, first + 2 * axes_, high);
+    std::copy(first, first + both, low);
+    std::copy(first, first + both, high);
     for (int j = 1; j < arity_; ++j) {
       const float* p = points.of(v[j * lanes + lane]);
-      for (int r = 0; r < 2 * axes_; ++r) {
+      for (int r = 0; r < both; ++r) {
         low[r] = std::min(low[r], p[r]);
         high[r] = std::max(high[r], p[r]);
       }
     }
-    if (sweep == 2)
-      for (int k = 0; k < axes_; ++k) {
-        low[k] = std::min(low[k], low[axes_ + k]);
-        high[k] = std::max(high[k], high[axes_ + k]);
+    if (times_ == 1)
+      for (int k = 0; k < slots; ++k) {
+        low[k] = std::min(low[k], low[slots + k]);
+        high[k] = std::max(high[k], high[slots + k]);
       }
+    for (int r = 0; r < both; ++r) {
+      low[r] -= points.pad()[r % slots];
+      high[r] += points.pad()[r % slots];
+      node_low[r] = std::min(node_low[r], low[r]);
+      node_high[r] = std::max(node_high[r], high[r]);
+    }
+    float* out = block + lane;
     for (int k = 0; k < axes_; ++k)
-      for (int t = 0; t < times_; ++t) {
-        float* out = block + (k * times_ + t) * 2 * lanes + lane;
-        out[0] = low[t * axes_ + k] - points.pad(k);
-        out[lanes] = high[t * axes_ + k] + points.pad(k);
+      for (int t = 0; t < times_; ++t, out += 2 * lanes) {
+        out[0] = low[t * slots + k];
+        out[lanes] = high[t * slots + k];
       }
   }
-  for (int t = 0; t < times_; ++t)
-    for (int k = 0; k < axis_slots; ++k) {
-      float lo = k < axes_ ? infinity : -infinity, hi = -lo;
-      const float* in = block + (k * times_ + t) * 2 * lanes;
-      for (int lane = 0; lane < lanes && k < axes_; ++lane) {
-        lo = std::min(lo, in[lane]);
-        hi = std::max(hi, in[lanes + lane]);
-      }
-      node[2 * t * axis_slots + k] = lo;
-      node[(2 * t + 1) * axis_slots + k] = hi;
-    }
+  float* node = nodes_.data() + (leaves_ + std::size_t(leaf)) * node_stride();
+  for (int t = 0; t < times_; ++t) {
+    std::copy(node_low + t * slots, node_low + (t + 1) * slots, node + 2 * t * slots);
+    std::copy(node_high + t * slots, node_high + (t + 1) * slots, node + (2 * t + 1) * slots);
+  }
 }
 
 void FeatureTree::fit_inner(std::int32_t i) {
   float* out = nodes_.data() + i * node_stride();
   const float *a = node(2 * i), *b = node(2 * i + 1);
-  for (int t = 0; t < times_; ++t, out += 2 * axis_slots, a += 2 * axis_slots, b += 2 * axis_slots)
-    for (int k = 0; k < axis_slots; ++k) {
+  for (int t = 0; t < times_; ++t, out += 2 * slots_, a += 2 * slots_, b += 2 * slots_)
+    for (int k = 0; k < slots_; ++k) {
       out[k] = std::min(a[k], b[k]);
-      out[axis_slots + k] = std::max(a[axis_slots + k], b[axis_slots + k]);
+      out[slots_ + k] = std::max(a[slots_ + k], b[slots_ + k]);
     }
 }
 
 void FeatureTree::refit(const Projection& points, int threads) {
   axes_ = points.kind().axes();
+  slots_ = points.kind().slots();
   times_ = points.kind().times();
   const std::size_t n = leaves_;
   blocks_.resize(n * block_stride());
   nodes_.resize(2 * n * node_stride());
+  const auto fit = slots_ == 4 ? &FeatureTree::fit_leaf<4>
+                   : slots_ == 8 ? &FeatureTree::fit_leaf<8> : &FeatureTree::fit_leaf<16>;
   auto& pool = ThreadPool::shared();
   pool.parallel_for(n, threads, 128, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) fit_leaf(static_cast<std::int32_t>(i), points);
+    for (auto i = begin; i < end; ++i) (this->*fit)(static_cast<std::int32_t>(i), points);
   });
   std::size_t level = 1;
   while (2 * level < n) level *= 2;
@@ -198,7 +204,7 @@ void FeatureTree::refit(const Projection& points, int threads) {
   spread_ = 0;
   for (std::size_t i = n; i < 2 * n; ++i) {
     const float* v = node(static_cast<std::int32_t>(i));
-    for (int k = 0; k < 3 && occupied_[i - n]; ++k) spread_ += double(v[axis_slots + k]) - v[k];
+    for (int k = 0; k < 3 && occupied_[i - n]; ++k) spread_ += double(v[slots_ + k]) - v[k];
   }
 }
 

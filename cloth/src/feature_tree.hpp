@@ -44,6 +44,7 @@ class FeatureTree {
   std::int32_t leaves() const { return leaves_; }
   int times() const { return times_; }
   int axes() const { return axes_; }
+  int slots() const { return slots_; }
   bool is_leaf(std::int32_t node) const { return node >= leaves_; }
   const float* node(std::int32_t i) const { return nodes_.data() + std::size_t(i) * node_stride(); }
   const float* block(std::int32_t leaf) const { return blocks_.data() + std::size_t(leaf) * block_stride(); }
@@ -61,15 +62,16 @@ class FeatureTree {
   std::size_t bytes() const;
 
  private:
-  std::size_t node_stride() const { return 2 * axis_slots * times_; }
+  std::size_t node_stride() const { return 2 * std::size_t(slots_) * times_; }
   std::size_t block_stride() const { return 2 * std::size_t(lanes) * times_ * axes_; }
+  template <int slots>
   void fit_leaf(std::int32_t leaf, const Projection& points);
   void fit_inner(std::int32_t node);
   void put(std::int32_t leaf, int lane, std::int32_t id, const Features& features);
   std::int32_t free_leaf_near(std::int32_t leaf) const;
   void fill_groups(const Features& features, const Groups& groups);
 
-  int arity_ = 1, axes_ = 0, times_ = 0;
+  int arity_ = 1, axes_ = 0, slots_ = 0, times_ = 0;
   std::int32_t leaves_ = 0;
   double spread_ = 0;
   std::vector<float> nodes_, blocks_;

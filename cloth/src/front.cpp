@@ -14,11 +14,11 @@ int depth(std::int32_t node) { return 31 - __builtin_clz(static_cast<unsigned>(n
 class Walk {
  public:
   Walk(const FeatureTree& a, const FeatureTree& b)
-      : a_(a), b_(b), self_(&a == &b), times_(a.times()) {}
+      : a_(a), b_(b), self_(&a == &b), test_(node_test(a.slots(), a.times())) {}
 
   bool overlap(NodePair p) {
     ++tests;
-    return a_.may_meet(p.a, b_, p.b) && nodes_overlap(a_.node(p.a), b_.node(p.b), times_);
+    return a_.may_meet(p.a, b_, p.b) && test_(a_.node(p.a), b_.node(p.b));
   }
 
   void descend(NodePair p) {
@@ -85,7 +85,7 @@ class Walk {
 
   const FeatureTree &a_, &b_;
   bool self_;
-  int times_;
+  NodeTest test_;
 };
 
 void append(std::vector<NodePair>& to, const std::vector<NodePair>& from) {

@@ -60,7 +60,9 @@ void Projection::set(const double* x_t0, const double* x_t1, std::size_t n, Volu
   kind_ = kind;
   const int axes = kind.axes();
   const auto* axis = axes_of(kind.k);
-  values_.resize(2 * axes * n);
+  const int slots = kind.slots();
+  values_.resize(2 * slots * n);
+  std::fill(pad_, pad_ + most_slots, 0.0f);
   double largest = 0;
   const Aabb raw = bounds(x_t0, x_t1, n, threads);
   for (int k = 0; k < 3 && n > 0; ++k) largest = std::max({largest, -raw.lo[k], raw.hi[k]});
@@ -83,7 +85,7 @@ void Projection::set(const double* x_t0, const double* x_t1, std::size_t n, Volu
   }
   ThreadPool::shared().parallel_for(n, threads, grain, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i) {
-      float* out = values_.data() + 2 * axes * i;
+      float* out = values_.data() + 2 * slots * i;
       for (const double* x : {x_t0 + 3 * i, x_t1 + 3 * i}) {
         double z[3];
         for (int k = 0; k < 3; ++k) z[k] = (x[k] * first - centre[k]) * second;
@@ -93,6 +95,7 @@ void Projection::set(const double* x_t0, const double* x_t1, std::size_t n, Volu
           const double sum = s[0] * z[0] + s[1] * z[1] + s[2] * z[2];
           *out++ = static_cast<float>(sum * (s[0] != 0 && s[1] != 0 && s[2] != 0 ? 0.25 : 0.5));
         }
+        for (int a = axes; a < slots; ++a) *out++ = 0;
       }
     }
   });

@@ -10,14 +10,17 @@
 
 namespace tauguard::cloth {
 
-// Slots of a node for axes: 13 is the largest number in use, 16 the vector width.
-inline constexpr int axis_slots = 16;
+// The largest number of axes, rounded up to a vector.
+inline constexpr int most_slots = 16;
 
 struct VolumeKind {
   int k = 18;          // 6 (axis-aligned box), 14, 16, 18 or 26
   bool moving = true;  // an interval at each end of the step, not one over both
   int axes() const { return k / 2; }
   int times() const { return moving ? 2 : 1; }
+  // Axes rounded up to 4, 8 or 16: the room that points and nodes give them. Spare slots hold zeros, on
+  // which nothing is ever apart.
+  int slots() const { return axes() <= 4 ? 4 : axes() <= 8 ? 8 : 16; }
 };
 
 // Rows of {-1, 0, 1} of the k / 2 axes: x, y, z first. Throws std::invalid_argument for another k.
@@ -39,14 +42,14 @@ class Projection {
            int threads);
 
   VolumeKind kind() const { return kind_; }
-  // [end of the step][axis], axes() values each.
-  const float* of(std::int32_t vertex) const { return values_.data() + 2 * kind_.axes() * std::size_t(vertex); }
-  float pad(int axis) const { return pad_[axis]; }
+  // [end of the step][axis slot]
+  const float* of(std::int32_t vertex) const { return values_.data() + 2 * kind_.slots() * std::size_t(vertex); }
+  const float* pad() const { return pad_; }  // [axis slot]
   std::size_t bytes() const { return values_.capacity() * sizeof(float); }
 
  private:
   VolumeKind kind_;
-  float pad_[axis_slots] = {};
+  float pad_[most_slots] = {};
   std::vector<float> values_;
 };
 

@@ -54,7 +54,7 @@ struct Mesh {
 std::vector<std::int32_t> sorted_candidates(MeshCcd& ccd, MeshCcd::Kind kind) {
   std::vector<std::vector<std::uint64_t>> parts(ccd.chunks(kind));
   ccd.for_each_block(kind, [&](const CandidateBlock& block, std::size_t chunk) {
-    for (std::size_t i = 0; i < block.size(); ++i) parts[chunk].push_back(key_of(&block.pairs[2 * i]));
+    for (std::size_t i = 0; i < block.size; ++i) parts[chunk].push_back(key_of(&block.pairs[2 * i]));
   });
   std::vector<std::uint64_t> keys;
   for (const auto& part : parts) keys.insert(keys.end(), part.begin(), part.end());

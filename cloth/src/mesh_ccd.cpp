@@ -9,7 +9,6 @@ namespace tauguard::cloth {
 namespace {
 
 constexpr std::size_t chunk_pairs = 512;   // leaf pairs of a chunk
-constexpr std::size_t block_rows = 2048;   // candidates handed over at a time, at least
 // Trees are built anew where the leaves have spread this much wider than when they were built.
 constexpr double worn = 2;
 
@@ -90,20 +89,16 @@ void MeshCcd::for_each_block(Kind kind, const Take& take) {
   geometry::ThreadPool::shared().parallel_for(
       pairs.size(), threads_, chunk_pairs, [&](auto begin, auto end, auto chunk) {
         static thread_local CandidateBlock block;
-        block.clear();
-        block.adjacent = block.kept_apart = 0;
+        block.size = block.adjacent = block.kept_apart = 0;
         std::uint64_t candidates = 0;
-        const auto flush = [&] {
-          if (block.size() == 0) return;
-          candidates += block.size();
-          take(block, chunk);
-          block.clear();
-        };
         for (auto i = begin; i < end; ++i) {
           leaf_candidates(a, b, pairs[i], groups_, block);
-          if (block.size() >= block_rows) flush();
+          if (block.size >= CandidateBlock::full || (i + 1 == end && block.size > 0)) {
+            candidates += block.size;
+            take(block, chunk);
+            block.size = 0;
+          }
         }
-        flush();
         const std::lock_guard<std::mutex> lock(mutex);
         counts.candidates += candidates;
         counts.adjacent += block.adjacent;

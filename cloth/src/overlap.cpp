@@ -16,7 +16,7 @@ struct RowStride {
   int axis, end, side;
 };
 RowStride in_block(int times) { return {2 * lanes * times, 2 * lanes, lanes}; }
-constexpr RowStride in_node{1, 32, 16};
+RowStride in_node(int slots) { return {1, 2 * slots, slots}; }
 
 #define TAUGUARD_INLINE inline __attribute__((always_inline))
 
@@ -39,8 +39,9 @@ TAUGUARD_INLINE Mask apart_portable(const float* row, RowStride s, const float* 
   return wanted & ~mask;
 }
 
-Mask node_portable(const float* node, const float* block, int axes, int times, Mask wanted) {
-  return apart_portable(node, in_node, block, axes, times, wanted);
+Mask node_portable(const float* node, int slots, const float* block, int axes, int times,
+                         Mask wanted) {
+  return apart_portable(node, in_node(slots), block, axes, times, wanted);
 }
 void rows_portable(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
                    std::uint16_t* out) {
@@ -75,8 +76,9 @@ TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, c
   return wanted;
 }
 
-TAUGUARD_AVX2 Mask node_avx2(const float* node, const float* block, int axes, int times, Mask wanted) {
-  return overlap_avx2(node, in_node, block, axes, times, wanted);
+TAUGUARD_AVX2 Mask node_avx2(const float* node, int slots, const float* block, int axes, int times,
+                         Mask wanted) {
+  return overlap_avx2(node, in_node(slots), block, axes, times, wanted);
 }
 TAUGUARD_AVX2 void rows_avx2(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
                              std::uint16_t* out) {
@@ -107,8 +109,9 @@ TAUGUARD_AVX512 TAUGUARD_INLINE Mask overlap_avx512(const float* row, RowStride 
   return wanted;
 }
 
-TAUGUARD_AVX512 Mask node_avx512(const float* node, const float* block, int axes, int times, Mask wanted) {
-  return overlap_avx512(node, in_node, block, axes, times, wanted);
+TAUGUARD_AVX512 Mask node_avx512(const float* node, int slots, const float* block, int axes, int times,
+                         Mask wanted) {
+  return overlap_avx512(node, in_node(slots), block, axes, times, wanted);
 }
 TAUGUARD_AVX512 void rows_avx512(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
                                  std::uint16_t* out) {
