@@ -1,6 +1,17 @@
 """Continuous collision detection for deforming triangle meshes, on plain arrays."""
 
+from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
+from tauguard.cloth.impacts import Impacts, edge_edge, vertex_face
 from tauguard.cloth.mesh import VOLUMES, MeshCCD
 
-__all__ = ["VOLUMES", "Groups", "MeshCCD"]
+__all__ = [
+    "VOLUMES",
+    "Frame",
+    "FrameStats",
+    "Groups",
+    "Impacts",
+    "MeshCCD",
+    "edge_edge",
+    "vertex_face",
+]

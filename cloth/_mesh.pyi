@@ -21,6 +21,14 @@ class Mesh:
         min_distance: float,
         fresh: bool,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], dict[str, Any]]: ...
+    def find(
+        self,
+        x_t0: NDArray[np.float64],
+        x_t1: NDArray[np.float64],
+        method: int,
+        min_distance: float,
+        fresh: bool,
+    ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]: ...
     def update_topology(
         self, faces: NDArray[np.int32], ids: NDArray[np.int32], meets: NDArray[np.uint8]
     ) -> dict[str, Any]: ...
@@ -28,3 +36,16 @@ class Mesh:
 def overlap_rows(
     variant: str, a: NDArray[np.float32], b: NDArray[np.float32]
 ) -> NDArray[np.int32]: ...
+def solve(
+    vf: bool,
+    x_t0: NDArray[np.float64],
+    x_t1: NDArray[np.float64],
+    rows: NDArray[np.int32],
+    method: int,
+    min_distance: float,
+    hit: NDArray[np.uint8],
+    toi: NDArray[np.float64],
+    point: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    weights: NDArray[np.float64],
+) -> None: ...

@@ -10,13 +10,16 @@ come and go (``update_topology``) without a rebuild.
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.cloth import _mesh
+from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
+from tauguard.cloth.impacts import Impacts, checked_distance, method_number
 from tauguard.geometry import finite, indices
 
 #: Bounding volumes by name: k, and whether they move with the step or sweep it.
@@ -35,6 +38,7 @@ class MeshCCD:
     Args:
         faces: Shape (F, 3), three different vertices each. Only vertices that a face uses take
             part.
+        method: How the narrow phase decides, as for :func:`tauguard.cloth.vertex_face`.
         threads: 0 means all processors. Results do not depend on it.
         groups: Which parts meet; ``None``: everything meets everything, itself included.
         volume: One of :data:`VOLUMES`. Any of them finds the same collisions; they differ in cost.
@@ -51,14 +55,17 @@ class MeshCCD:
     def __init__(
         self,
         faces: ArrayLike,
+        method: str = "ab2pf",
         threads: int = 1,
         groups: Groups | None = None,
         volume: str = "moving_k_dop14",
     ) -> None:
         """Check the faces and number the edges; the hierarchy waits for positions."""
+        method_number(method)  # raises where there is none
         if volume not in VOLUMES:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
         k, moving = VOLUMES[volume]
+        self.method = method
         self.threads = threads
         self.volume = volume
         self.groups = groups
@@ -68,6 +75,40 @@ class MeshCCD:
         self._vertices: int | None = None
         self._mesh = _mesh.Mesh(self.faces, *_group_arrays(groups), k, moving, threads)
         self.edges: NDArray[np.int32] = self._mesh.edges()
+
+    def find(
+        self, x_t0: ArrayLike, x_t1: ArrayLike, min_distance: float = 0.0, fresh: bool = False
+    ) -> Frame:
+        """Every collision of one step.
+
+        Args:
+            x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
+            x_t1: Positions at its end. Shape (V, 3).
+            min_distance: Pairs that come this close count, in the unit of the positions:
+                conservative there, exact at 0 (with an exact method).
+            fresh: Descend from the root instead of the last frame's front. The answer is the same.
+
+        Raises:
+            ValueError: as :meth:`candidates`.
+        """
+        start = time.perf_counter()
+        vf, ee, stats = self._mesh.find(
+            *self._checked_step(x_t0, x_t1),
+            method_number(self.method),
+            checked_distance(min_distance),
+            fresh,
+        )
+        answer = Frame(
+            vf["pairs"],
+            ee["pairs"],
+            _impacts(vf),
+            _impacts(ee),
+            FrameStats(
+                vf["counts"], ee["counts"], stats["seconds"], stats["builds"], stats["bytes"]
+            ),
+        )
+        answer.stats.seconds["total"] = time.perf_counter() - start
+        return answer
 
     def candidates(
         self, x_t0: ArrayLike, x_t1: ArrayLike, min_distance: float = 0.0, fresh: bool = False
@@ -89,7 +130,7 @@ class MeshCCD:
                 ends, of a size that the faces or earlier frames do not have; a negative distance.
         """
         vf, ee, self.broad_stats = self._mesh.candidates(
-            *self._checked(x_t0, x_t1, min_distance), fresh
+            *self._checked_step(x_t0, x_t1), checked_distance(min_distance), fresh
         )
         return vf, ee
 
@@ -119,9 +160,9 @@ class MeshCCD:
         self.edges = self._mesh.edges()
         return change
 
-    def _checked(
-        self, x_t0: ArrayLike, x_t1: ArrayLike, min_distance: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    def _checked_step(
+        self, x_t0: ArrayLike, x_t1: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         start = finite("x_t0", x_t0, (None, 3))
         end = finite("x_t1", x_t1, (None, 3))
         if len(start) != len(end):
@@ -139,10 +180,13 @@ class MeshCCD:
                 f"faces: row {row} is {self.faces[row].tolist()}, "
                 f"but x_t0 has {len(start)} vertices"
             )
-        if not (np.isfinite(min_distance) and min_distance >= 0):
-            raise ValueError(f"min_distance: {min_distance}, expected a finite number >= 0")
         self._vertices = len(start)
-        return start, end, float(min_distance)
+        return start, end
+
+
+def _impacts(found: dict[str, Any]) -> Impacts:
+    hit = np.ones(len(found["toi"]), dtype=bool)
+    return Impacts(hit, found["toi"], found["point"], found["normal"], found["weights"])
 
 
 def _group_arrays(groups: Groups | None) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:

@@ -5,8 +5,9 @@
 namespace tauguard::cloth {
 namespace {
 
-constexpr std::size_t grain = 2048;  // front entries of a chunk
-constexpr int first_depth = 5;       // the cut to start from: all pairs at this depth
+// Front entries of a chunk: a kept entry is about one test, one near the root a whole descent.
+constexpr std::size_t kept_grain = 1024, root_grain = 16;
+constexpr int first_depth = 5;  // the cut to start from: all pairs at this depth
 
 int depth(std::int32_t node) { return 31 - __builtin_clz(static_cast<unsigned>(node)); }
 
@@ -22,10 +23,19 @@ class Walk {
   }
 
   void descend(NodePair p) {
-    if (!overlap(p)) return cut.push_back(p);
+    if (overlap(p)) {
+      enter(p);
+    } else {
+      cut.push_back(p);
+    }
+  }
+
+  // Below a pair that overlaps.
+  void enter(NodePair p) {
     if (a_.is_leaf(p.a) && b_.is_leaf(p.b)) {
       cut.push_back(p);
-      return leaf_pairs.push_back({p.a - a_.leaves(), p.b - b_.leaves()});
+      leaf_pairs.push_back({p.a - a_.leaves(), p.b - b_.leaves()});
+      return;
     }
     NodePair child[4];
     const int n = children(p, child);
@@ -58,18 +68,18 @@ class Walk {
       NodePair child[4];
       const NodePair up = parent(*begin);
       const int n = up.a > 0 && up.b > 0 ? children(up, child) : 0;
-      if (n > 0 && end - begin >= n && same(begin, child, n)) {
-        bool any = false;
-        for (int i = 0; i < n && !any; ++i) any = overlap(begin[i]);
-        if (!any && !overlap(up)) {
-          cut.push_back(up);
-        } else {
-          for (int i = 0; i < n; ++i) descend(begin[i]);
-        }
-        begin += n;
-      } else {
+      if (n == 0 || end - begin < n || !same(begin, child, n)) {
         descend(*begin++);
+        continue;
       }
+      bool overlaps[4], any = false;
+      for (int i = 0; i < n; ++i) any |= overlaps[i] = overlap(begin[i]);
+      if (!any && !overlap(up)) {
+        cut.push_back(up);
+      } else {
+        for (int i = 0; i < n; ++i) overlaps[i] ? enter(begin[i]) : cut.push_back(begin[i]);
+      }
+      begin += n;
     }
   }
 
@@ -95,6 +105,7 @@ void append(std::vector<NodePair>& to, const std::vector<NodePair>& from) {
 }  // namespace
 
 const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTree& b, int threads) {
+  const std::size_t step = cut_.empty() ? root_grain : kept_grain;
   if (cut_.empty()) {
     // Split every entry, without looking at the volumes, until it is `first_depth` deep or two leaves.
     const Walk walk(a, b);
@@ -113,7 +124,6 @@ const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTr
       cut_.swap(next);
     }
   }
-  const std::size_t step = cut_.size() > 16 * grain ? grain : 16;
   std::vector<Walk> walks((cut_.size() + step - 1) / step, Walk(a, b));
   geometry::ThreadPool::shared().parallel_for(cut_.size(), threads, step, [&](auto begin, auto end, auto c) {
     walks[c].move(cut_.data() + begin, cut_.data() + end);

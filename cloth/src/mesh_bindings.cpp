@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <mutex>
 
+#include "frame.hpp"
 #include "mesh_ccd.hpp"
+#include "tauguard/geometry/rounding.hpp"
 
 namespace nb = nanobind;
 using namespace tauguard::cloth;
@@ -79,8 +81,7 @@ nb::dict counts_of(const BroadCounts& c) {
   return d;
 }
 
-nb::dict stats_of(const MeshCcd& ccd) {
-  const BroadStats& s = ccd.stats();
+nb::dict stats_of(const BroadStats& s, std::size_t bytes) {
   nb::dict seconds, d;
   seconds["project"] = s.project_s;
   seconds["build"] = s.build_s;
@@ -90,22 +91,71 @@ nb::dict stats_of(const MeshCcd& ccd) {
   d["ee"] = counts_of(s.ee);
   d["seconds"] = seconds;
   d["builds"] = s.builds;
-  d["bytes"] = ccd.bytes();
+  d["bytes"] = bytes;
   return d;
 }
 
 nb::tuple candidates(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, bool fresh) {
   std::vector<std::int32_t> vf, ee;
+  BroadStats broad;
+  std::size_t bytes = 0;
   {
     const nb::gil_scoped_release release;
     const std::lock_guard<std::mutex> lock(mesh.mutex);
     mesh.ccd.prepare(x_t0.data(), x_t1.data(), x_t0.shape(0), min_distance, fresh);
     vf = sorted_candidates(mesh.ccd, MeshCcd::Kind::vf);
     ee = sorted_candidates(mesh.ccd, MeshCcd::Kind::ee);
+    broad = mesh.ccd.stats();
+    bytes = mesh.ccd.bytes();
   }
   const std::size_t n_vf = vf.size() / 2, n_ee = ee.size() / 2;
   return nb::make_tuple(array_of<Pairs>(std::move(vf), {n_vf, 2}), array_of<Pairs>(std::move(ee), {n_ee, 2}),
-                        stats_of(mesh.ccd));
+                        stats_of(broad, bytes));
+}
+
+void add_counts(nb::dict& d, const Stats& s) {
+  d["cubic_sign"] = s.cubic_sign;
+  d["directions"] = s.directions;
+  d["intervals"] = s.intervals;
+}
+
+// {"pairs", "toi", "point", "normal", "weights"} and, under "counts", what led to them.
+nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
+  using Scalars = nb::ndarray<nb::numpy, double, nb::shape<-1>, nb::c_contig>;
+  using Rows = nb::ndarray<nb::numpy, double, nb::shape<-1, -1>, nb::c_contig>;
+  const std::size_t n = c.size();
+  nb::dict counts = counts_of(broad), d;
+  add_counts(counts, c.stats);
+  counts["hits"] = n;
+  d["counts"] = counts;
+  d["pairs"] = array_of<Pairs>(std::move(c.pairs), {n, 2});
+  d["toi"] = array_of<Scalars>(std::move(c.toi), {n});
+  d["point"] = array_of<Rows>(std::move(c.point), {n, 3});
+  d["normal"] = array_of<Rows>(std::move(c.normal), {n, 3});
+  d["weights"] = array_of<Rows>(std::move(c.weights), {n, 4});
+  return d;
+}
+
+nb::tuple find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double min_distance, bool fresh) {
+  Collisions vf, ee;
+  BroadStats broad;
+  std::size_t bytes = 0;
+  const double *start = x_t0.data(), *end = x_t1.data();
+  {
+    const nb::gil_scoped_release release;
+    const std::lock_guard<std::mutex> lock(mesh.mutex);
+    mesh.ccd.prepare(start, end, x_t0.shape(0), min_distance, fresh);
+    vf = find_collisions(mesh.ccd, MeshCcd::Kind::vf, start, end, Method(method), min_distance);
+    ee = find_collisions(mesh.ccd, MeshCcd::Kind::ee, start, end, Method(method), min_distance);
+    broad = mesh.ccd.stats();
+    bytes = mesh.ccd.bytes();
+  }
+  nb::dict stats = stats_of(broad, bytes), seconds = nb::cast<nb::dict>(stats["seconds"]);
+  seconds["vf"] = vf.total_s;
+  seconds["ee"] = ee.total_s;
+  seconds["vf_narrow"] = vf.narrow_s;
+  seconds["ee_narrow"] = ee.narrow_s;
+  return nb::make_tuple(arrays_of(std::move(vf), broad.vf), arrays_of(std::move(ee), broad.ee), stats);
 }
 
 nb::dict update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
@@ -138,7 +188,22 @@ NB_MODULE(_mesh, m) {
            })
       .def("candidates", &candidates, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("min_distance"),
            nb::arg("fresh"))
+      .def("find", &find, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("method"), nb::arg("min_distance"),
+           nb::arg("fresh"))
       .def("update_topology", &update_topology, nb::arg("faces"), nb::arg("ids"), nb::arg("meets"));
+  m.def("solve", [](bool vf, Positions x_t0, Positions x_t1,
+                    nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu> rows, int method, double min_distance,
+                      nb::ndarray<std::uint8_t, nb::shape<-1>, nb::c_contig> hit,
+                      nb::ndarray<double, nb::shape<-1>, nb::c_contig> toi,
+                      nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> point,
+                      nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> normal,
+                      nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig> weights) {
+    const nb::gil_scoped_release release;
+    const tauguard::geometry::RoundToNearest guard;
+    Stats stats;
+    (vf ? solve_vf : solve_ee)(x_t0.data(), x_t1.data(), rows.data(), hit.shape(0), Method(method), min_distance,
+                               hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats);
+  });
   // For tests: the lanes of each row that overlap, by the named variant; empty where it cannot run here.
   m.def("overlap_rows", [](const std::string& variant,
                            nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,

@@ -1,0 +1,54 @@
+"""What a step of a mesh leads to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.cloth.impacts import Impacts
+
+
+@dataclass(frozen=True)
+class FrameStats:
+    """How a frame was answered.
+
+    Attributes:
+        vf: Counts of the vertex-face side, in the order in which work is left out: ``node_tests``,
+            ``front`` (entries kept for the next frame), ``leaf_pairs``; pairs of features left out
+            as ``adjacent`` or ``kept_apart`` (by groups); ``candidates``; how many of them each
+            filter of the narrow phase removed; ``hits``.
+        ee: The same of the edge-edge side.
+        seconds: Wall time of each phase: ``project`` (positions onto the axes), ``build``,
+            ``refit``, ``traverse``, ``vf`` and ``ee`` (candidates and narrow phase of each side),
+            ``total``; and ``vf_narrow``, ``ee_narrow``: the narrow phase alone, summed over
+            threads [s].
+        builds: Trees built from nothing in this frame.
+        bytes: Memory that the mesh keeps between frames.
+    """
+
+    vf: dict[str, int]
+    ee: dict[str, int]
+    seconds: dict[str, float]
+    builds: int
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Every collision of one step.
+
+    Attributes:
+        vf: Colliding vertices and faces, shape (M, 2), sorted.
+        ee: Colliding edges (rows of ``MeshCCD.edges``), smaller first, shape (K, 2), sorted.
+        vf_impacts: Of ``vf``, row by row; all are hits.
+        ee_impacts: Of ``ee``, row by row.
+        stats: How the answer was reached.
+    """
+
+    vf: NDArray[np.int32]
+    ee: NDArray[np.int32]
+    vf_impacts: Impacts
+    ee_impacts: Impacts
+    stats: FrameStats

@@ -1,0 +1,100 @@
+"""Single queries: does a moving vertex meet a moving face, do two moving edges meet?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.cloth import _mesh
+from tauguard.geometry import finite
+
+#: Methods of the narrow phase by name.
+METHODS: dict[str, int] = {"ab2pf": 0}
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """First contacts, one a row.
+
+    Attributes:
+        hit: Shape (N,).
+        toi: Time of impact in [0, 1] of the step, never late; inf without a hit. Shape (N,).
+        point: Where, at that time; NaN where there is no hit. Shape (N, 3).
+        normal: Unit normal of the face, or of both edges; zeros where they have none (a face
+            without area, parallel edges), NaN where there is no hit. Shape (N, 3).
+        weights: Of the four vertices of a row: (1, w, w, w) of the vertex and the face's vertices,
+            or (1 - s, s, 1 - t, t) of the two edges' ends. Shape (N, 4).
+    """
+
+    hit: NDArray[np.bool_]
+    toi: NDArray[np.float64]
+    point: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+
+def vertex_face(
+    x_t0: ArrayLike, x_t1: ArrayLike, method: str = "ab2pf", min_distance: float = 0.0
+) -> Impacts:
+    """First contact of a vertex with a face, all four vertices moving linearly.
+
+    Args:
+        x_t0: Positions at the start of the step [any unit]: vertex, three of the face. (N, 4, 3).
+        x_t1: At its end. Shape (N, 4, 3).
+        method: One of ``METHODS``.
+        min_distance: Counts as contact, in the unit of the positions; conservative there.
+
+    Raises:
+        ValueError: wrong shapes, entries that are not finite, no such method, a negative distance.
+    """
+    return _solve(True, x_t0, x_t1, method, min_distance)
+
+
+def edge_edge(
+    x_t0: ArrayLike, x_t1: ArrayLike, method: str = "ab2pf", min_distance: float = 0.0
+) -> Impacts:
+    """First contact of two edges (two ends each, four rows a query); see :func:`vertex_face`."""
+    return _solve(False, x_t0, x_t1, method, min_distance)
+
+
+def method_number(method: str) -> int:
+    """The number of a method, or a ``ValueError`` that lists the names there are."""
+    if method not in METHODS:
+        raise ValueError(f"method {method!r}: there are {', '.join(METHODS)}")
+    return METHODS[method]
+
+
+def checked_distance(min_distance: float) -> float:
+    """A finite distance of at least 0, or a ``ValueError``."""
+    if not (np.isfinite(min_distance) and min_distance >= 0):
+        raise ValueError(f"min_distance: {min_distance}, expected a finite number >= 0")
+    return float(min_distance)
+
+
+def _solve(
+    vertex: bool, x_t0: ArrayLike, x_t1: ArrayLike, method: str, min_distance: float
+) -> Impacts:
+    start = finite("x_t0", x_t0, (None, 4, 3))
+    end = finite("x_t1", x_t1, (None, 4, 3))
+    if len(start) != len(end):
+        raise ValueError(f"x_t1: {len(end)} queries, but x_t0 has {len(start)}")
+    n = len(start)
+    hit = np.zeros(n, dtype=np.uint8)
+    toi = np.full(n, np.inf)
+    point, normal, weights = (np.full((n, k), np.nan) for k in (3, 3, 4))
+    _mesh.solve(
+        vertex,
+        start.reshape(-1, 3),
+        end.reshape(-1, 3),
+        np.arange(4 * n, dtype=np.int32).reshape(-1, 4),
+        method_number(method),
+        checked_distance(min_distance),
+        hit,
+        toi,
+        point,
+        normal,
+        weights,
+    )
+    return Impacts(hit.astype(bool), toi, point, normal, weights)

@@ -1,0 +1,26 @@
+// Every collision of one step: the candidates of a MeshCcd through the narrow phase.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mesh_ccd.hpp"
+#include "narrow_phase.hpp"
+
+namespace tauguard::cloth {
+
+// The collisions of one kind, in the order of their pairs.
+struct Collisions {
+  std::vector<std::int32_t> pairs;                  // (n, 2)
+  std::vector<double> toi, point, normal, weights;  // (n), (n, 3), (n, 3), (n, 4)
+  Stats stats;
+  double narrow_s = 0;  // in the narrow phase, summed over threads
+  double total_s = 0;   // candidates, narrow phase and sorting, by the clock
+  std::size_t size() const { return toi.size(); }
+};
+
+// After ccd.prepare with the same positions.
+Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const double* x_t0, const double* x_t1,
+                           Method method, double min_distance);
+
+}  // namespace tauguard::cloth

@@ -1,0 +1,250 @@
+// A query is answered by cutting [0, 1] into intervals of time and clearing them, earliest first. An interval
+// is clear where the coplanarity cubic has Bernstein coefficients of one sign on it, or where one direction
+// separates the features at both of its ends (and so in between: the differences are linear in time). Where
+// the cubic changes sign its root is cut out into an interval too small to matter. What cannot be cleared
+// down to a width of 2^-34 is a hit, at the interval's start: never late, never missed.
+#include "narrow_phase.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tauguard::cloth {
+namespace {
+
+constexpr double u = 0x1p-53;
+
+struct Vec { double x, y, z; };
+Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+Vec operator*(double s, Vec a) { return {s * a.x, s * a.y, s * a.z}; }
+double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+double size(Vec a) { return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}); }
+Vec load(const double* x, std::int32_t i) { return {x[3 * i], x[3 * i + 1], x[3 * i + 2]}; }
+Vec mix(Vec a, Vec b, double t) { return a + t * (b - a); }
+
+// Differences of positions at both ends: the cubic is p . (q x r); `gap` holds those that a separating
+// direction must see on one side. `big` is the largest magnitude among them.
+struct Query {
+  Vec p[2], q[2], r[2];
+  Vec gap[2][4];
+  int gaps;
+  double big, distance;
+  // Of a Bernstein coefficient, with M = big^3: each of up to three triple products of 6 terms carries 3
+  // differences, 2 products and 3 sums, 8 u of 6 M each, 144 u M and 40 for their own sum; every cut adds
+  // 3 interpolations of 3 roundings on values up to 6 M, 54 u M, and there are at most 70 in a row:
+  // (184 + 70 * 54) u M < 2^12 u M. The scale keeps underflow far below that.
+  double cubic_error() const { return 0x1p-41 * big * big * big; }
+};
+
+template <bool vf>
+Query make(const double* x0, const double* x1, const std::int32_t* row, double distance) {
+  Query k;
+  k.distance = distance;
+  k.gaps = vf ? 3 : 4;
+  k.big = 0;
+  for (int e = 0; e < 2; ++e) {
+    const double* x = e ? x1 : x0;
+    const Vec a = load(x, row[0]), b = load(x, row[1]), c = load(x, row[2]), d = load(x, row[3]);
+    if (vf) {
+      k.p[e] = a - b; k.q[e] = c - b; k.r[e] = d - b;
+      k.gap[e][0] = a - b; k.gap[e][1] = a - c; k.gap[e][2] = a - d;
+    } else {
+      k.p[e] = c - a; k.q[e] = b - a; k.r[e] = d - c;
+      k.gap[e][0] = c - a; k.gap[e][1] = d - a; k.gap[e][2] = c - b; k.gap[e][3] = d - b;
+    }
+    for (int i = 0; i < k.gaps; ++i) k.big = std::max(k.big, size(k.gap[e][i]));
+    k.big = std::max({k.big, size(k.q[e]), size(k.r[e])});
+  }
+  // By a power of two to about 1, so that no product over- or underflows.
+  if (k.big > 0x1p-20 && k.big < 0x1p20) return k;
+  const double s = k.big > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(k.big), -1000, 1000)) : 1;
+  for (int e = 0; e < 2; ++e) {
+    k.p[e] = s * k.p[e]; k.q[e] = s * k.q[e]; k.r[e] = s * k.r[e];
+    for (int i = 0; i < k.gaps; ++i) k.gap[e][i] = s * k.gap[e][i];
+  }
+  k.big *= s;
+  k.distance *= s;
+  return k;
+}
+
+// Does m see every gap on one side by more than the distance, at times a and b? Rounding, against |m|_1 big:
+// u of the difference, 3 u of the dot product, 6 u of the interpolation: 10 u, below the 16 u in use.
+bool separated(const Query& k, Vec m, double a, double b) {
+  const double m1 = std::fabs(m.x) + std::fabs(m.y) + std::fabs(m.z);
+  const double margin = 16 * u * m1 * k.big + k.distance * std::sqrt(dot(m, m)) * (1 + 16 * u);
+  bool above = true, below = true;
+  for (int i = 0; i < k.gaps; ++i) {
+    const double g0 = dot(m, k.gap[0][i]), g1 = dot(m, k.gap[1][i]);
+    const double ga = g0 + a * (g1 - g0), gb = g0 + b * (g1 - g0);
+    above = above && ga > margin && gb > margin;
+    below = below && ga < -margin && gb < -margin;
+  }
+  return above || below;
+}
+
+// The directions that separate nearly everything that is apart: the normal and those in the plane.
+bool plane_direction(const Query& k, double t, double a, double b, bool vf) {
+  const Vec q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t), n = cross(q, r);
+  return separated(k, cross(n, q), a, b) || separated(k, cross(n, r), a, b) ||
+         (vf && separated(k, cross(n, r - q), a, b)) || separated(k, n, a, b);
+}
+// The rest: between vertices, and between a vertex and an edge.
+bool edge_direction(const Query& k, double t, double a, double b) {
+  const Vec q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
+  for (int i = 0; i < k.gaps; ++i) {
+    const Vec d = mix(k.gap[0][i], k.gap[1][i], t);
+    if (separated(k, d, a, b)) return true;
+    for (Vec e : {q, r}) {
+      const double ee = dot(e, e);
+      if (ee > 0 && separated(k, d - (dot(d, e) / ee) * e, a, b)) return true;
+    }
+  }
+  return false;
+}
+
+struct Cubic { double b[4]; };
+Cubic cubic(const Query& k) {
+  const Vec c00 = cross(k.q[0], k.r[0]), c11 = cross(k.q[1], k.r[1]);
+  const Vec mixed = cross(k.q[0], k.r[1]) + cross(k.q[1], k.r[0]);
+  return {{dot(k.p[0], c00), (dot(k.p[1], c00) + dot(k.p[0], mixed)) / 3,
+           (dot(k.p[0], c11) + dot(k.p[1], mixed)) / 3, dot(k.p[1], c11)}};
+}
+int one_sign(const Cubic& c, double error) {
+  if (c.b[0] > error && c.b[1] > error && c.b[2] > error && c.b[3] > error) return 1;
+  if (c.b[0] < -error && c.b[1] < -error && c.b[2] < -error && c.b[3] < -error) return -1;
+  return 0;
+}
+void halve(const Cubic& c, double s, Cubic& left, Cubic& right) {
+  const auto l = [s](double a, double b) { return a + s * (b - a); };
+  const double d0 = l(c.b[0], c.b[1]), d1 = l(c.b[1], c.b[2]), d2 = l(c.b[2], c.b[3]);
+  const double e0 = l(d0, d1), e1 = l(d1, d2), f = l(e0, e1);
+  left = {{c.b[0], d0, e0, f}};
+  right = {{f, e1, d2, c.b[3]}};
+}
+
+// The root of a cubic with ends of different sign, in (0, 1): Newton's steps kept within the bracket.
+double root(const double* b) {
+  double lo = 0, hi = 1, x = b[0] / (b[0] - b[3]);
+  for (int i = 0; i < 40; ++i) {
+    const double y = 1 - x;
+    const double f = y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
+    ((f > 0) == (b[0] > 0) ? lo : hi) = x;
+    const double df = 3 * ((b[1] - b[0]) * y * y + 2 * (b[2] - b[1]) * y * x + (b[3] - b[2]) * x * x);
+    double next = x - f / df;
+    if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
+    if (std::fabs(next - x) < 1e-14) return next;
+    x = next;
+  }
+  return x;
+}
+
+// The start of the first interval that no filter clears, or infinity. At most 4000 intervals are looked at:
+// what is then left of degenerate input counts as a hit, which is conservative.
+double first_contact(const Query& k, const Cubic& whole, bool vf, Stats& stats) {
+  struct Piece { double a, b; Cubic c; };
+  const double error = k.cubic_error();
+  Piece stack[128];
+  int top = 0;
+  stack[top++] = {0, 1, whole};
+  for (int count = 0; top > 0; ++count) {
+    const Piece piece = stack[--top];
+    ++stats.intervals;
+    if (k.distance == 0 && one_sign(piece.c, error) != 0) continue;
+    const double width = piece.b - piece.a, *b = piece.c.b;
+    const bool crosses = k.distance == 0 && (b[0] > 0) != (b[3] > 0);
+    double s = 0.5;
+    {
+      const double middle = 0.5 * (piece.a + piece.b);
+      if (plane_direction(k, middle, piece.a, piece.b, vf)) continue;
+      if (!(crosses && width > 0x1p-30) && edge_direction(k, middle, piece.a, piece.b)) continue;
+    }
+    if (width < 0x1p-34 || count > 4000 || top > 120) return piece.a;
+    Piece left, right;
+    if (crosses) {
+      const double x = root(b), delta = 0x1p-37 / width;
+      // Around the root: [x - delta, x + delta] is small enough to be the answer at once.
+      const double lo = x - delta, hi = x + delta;
+      if (lo > 0 && hi < 1) {
+        Piece rest, near;
+        halve(piece.c, lo, left.c, rest.c);
+        halve(rest.c, (hi - lo) / (1 - lo), near.c, right.c);
+        left.a = piece.a; left.b = near.a = piece.a + lo * width;
+        near.b = right.a = piece.a + hi * width; right.b = piece.b;
+        stack[top++] = right; stack[top++] = near; stack[top++] = left;
+        continue;
+      }
+    }
+    const double cut = piece.a + s * width;
+    if (!(cut > piece.a && cut < piece.b)) return piece.a;
+    left.a = piece.a; left.b = cut; right.a = cut; right.b = piece.b;
+    halve(piece.c, s, left.c, right.c);
+    stack[top++] = right;
+    stack[top++] = left;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+Vec at(const double* x0, const double* x1, std::int32_t v, double t) { return mix(load(x0, v), load(x1, v), t); }
+
+// Where, along which normal and with which weights the two features meet at time t.
+template <bool vf>
+void describe(const double* x0, const double* x1, const std::int32_t* row, double t, ImpactArrays out,
+              std::size_t i) {
+  const Vec a = at(x0, x1, row[0], t), b = at(x0, x1, row[1], t), c = at(x0, x1, row[2], t),
+            d = at(x0, x1, row[3], t);
+  const Vec q = vf ? c - b : b - a, r = vf ? d - b : d - c, p = vf ? a - b : c - a;
+  Vec n = cross(q, r);
+  const double nn = dot(n, n);
+  double* w = out.weights + 4 * i;
+  Vec point = a;
+  if (vf) {
+    const double v1 = nn > 0 ? dot(cross(p, r), n) / nn : 0, v2 = nn > 0 ? dot(cross(q, p), n) / nn : 0;
+    w[0] = 1;
+    w[2] = std::clamp(v1, 0.0, 1.0);
+    w[3] = std::clamp(v2, 0.0, 1.0 - w[2]);
+    w[1] = 1 - w[2] - w[3];
+  } else {
+    const double s = nn > 0 ? std::clamp(dot(cross(p, r), n) / nn, 0.0, 1.0) : 0;
+    const double e = nn > 0 ? std::clamp(dot(cross(p, q), n) / nn, 0.0, 1.0) : 0;
+    w[0] = 1 - s;
+    w[1] = s;
+    w[2] = 1 - e;
+    w[3] = e;
+    point = a + s * q;
+  }
+  const double length = std::sqrt(nn);
+  n = length > 0 ? (1 / length) * n : Vec{0, 0, 0};
+  const double pt[] = {point.x, point.y, point.z}, nl[] = {n.x, n.y, n.z};
+  std::copy(pt, pt + 3, out.point + 3 * i);
+  std::copy(nl, nl + 3, out.normal + 3 * i);
+}
+
+template <bool vf>
+void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n, double distance,
+           std::uint8_t* hit, ImpactArrays out, Stats& stats) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const Query k = make<vf>(x0, x1, rows + 4 * i, distance);
+    hit[i] = 0;
+    const double error = k.cubic_error();
+    const Cubic whole = cubic(k);
+    if (k.distance == 0 && one_sign(whole, error) != 0) { ++stats.cubic_sign; continue; }
+    const double t = first_contact(k, whole, vf, stats);
+    if (!(t <= 1)) { ++stats.directions; continue; }
+    hit[i] = 1;
+    out.toi[i] = t;
+    describe<vf>(x0, x1, rows + 4 * i, t, out, i);
+  }
+}
+}  // namespace
+
+void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method,
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
+  solve<true>(x_t0, x_t1, rows, n, min_distance, hit, impacts, stats);
+}
+void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method,
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
+  solve<false>(x_t0, x_t1, rows, n, min_distance, hit, impacts, stats);
+}
+}  // namespace tauguard::cloth

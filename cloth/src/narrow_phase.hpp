@@ -1,0 +1,35 @@
+// Vertex-face and edge-edge queries: does a moving vertex meet a moving face, do two moving edges meet?
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace tauguard::cloth {
+
+enum class Method : int { ab2pf = 0 };
+
+// Row i is written where hit[i] is not 0. Weights are those of the four vertices of the row: (1, w of the
+// face's vertices), or (1 - s, s, 1 - t, t) of the two edges.
+struct ImpactArrays {
+  double *toi, *point, *normal, *weights;  // (n), (n, 3), (n, 3), (n, 4)
+};
+
+// How many queries each filter removed, and the intervals of time that the rest were cut into.
+struct Stats {
+  std::uint64_t cubic_sign = 0, directions = 0, intervals = 0;
+  Stats& operator+=(const Stats& o) {
+    cubic_sign += o.cubic_sign;
+    directions += o.directions;
+    intervals += o.intervals;
+    return *this;
+  }
+};
+
+// rows: (n, 4) indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge. Callable from several
+// threads. Needs round-to-nearest.
+void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats);
+void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats);
+
+}  // namespace tauguard::cloth
