@@ -61,14 +61,16 @@ def run(quick: bool, seed: int) -> list[Row]:
 
 def take(bodies: Bodies, index: NDArray[Any]) -> Bodies:
     """The chosen rows of a batch."""
-    fields = [getattr(bodies, field.name)[index] for field in dataclasses.fields(bodies)]
+    fields = [
+        getattr(bodies, field.name)[index] for field in dataclasses.fields(bodies) if field.init
+    ]
     return type(bodies)(*fields)
 
 
 def join(parts: list[Bodies]) -> Bodies:
     """One batch of several of the same kind."""
     kind = type(parts[0])
-    names = [field.name for field in dataclasses.fields(kind)]
+    names = [field.name for field in dataclasses.fields(kind) if field.init]
     return kind(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
@@ -222,7 +224,7 @@ def batch_rows(rng: np.random.Generator, n: int) -> list[Row]:
     assert isinstance(a, Boxes)
     assert isinstance(b, Boxes)
     start = time.perf_counter()
-    _ = (a.packed, a.blocks, a.skew)
+    _ = (a.packed, a.blocks)
     packing = (time.perf_counter() - start) / n * 1e9
     hit = np.empty(n, dtype=np.uint8)
     calls: dict[str, Callable[[], object]] = {

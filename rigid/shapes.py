@@ -6,13 +6,14 @@ thickness, a single point. Lengths are in any one unit, the same for both sides 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.geometry import finite
+from tauguard.rigid import _rigid
 
 #: How far an entry of R^T R may be from the identity; beyond it R is refused as not a rotation.
 ORTHONORMAL_TOLERANCE = 1e-6
@@ -63,6 +64,8 @@ class Boxes:
     center: NDArray[np.float64]
     half_extents: NDArray[np.float64]
     rotation: NDArray[np.float64]
+    #: The largest entry of ``|R^T R - I|`` over the batch, rounded up.
+    skew: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         center = finite("center", self.center, (None, 3))
@@ -73,15 +76,13 @@ class Boxes:
             raise ValueError(
                 f"half_extents: {half_extents[row, axis]} in row {row}; expected 0 or more"
             )
-        with np.errstate(over="ignore", invalid="ignore"):
-            deviation = np.abs(rotation.transpose(0, 2, 1) @ rotation - np.eye(3)).max(axis=(1, 2))
-        bad = ~(deviation <= ORTHONORMAL_TOLERANCE)
-        if bad.any():
-            row = int(np.argmax(bad))
+        skew, row = _rigid.box_skew(rotation.reshape(-1, 9), ORTHONORMAL_TOLERANCE)
+        if row < len(center):
             raise ValueError(
-                f"rotation: row {row} is off orthonormal by {deviation[row]:.3g}; "
-                f"expected at most {ORTHONORMAL_TOLERANCE:g}"
+                f"rotation: row {row} is off orthonormal: R^T R differs from the identity by more "
+                f"than {ORTHONORMAL_TOLERANCE:g}"
             )
+        object.__setattr__(self, "skew", skew)
         object.__setattr__(self, "center", center)
         object.__setattr__(self, "half_extents", half_extents)
         object.__setattr__(self, "rotation", rotation)
@@ -92,8 +93,10 @@ class Boxes:
     @cached_property
     def packed(self) -> NDArray[np.float64]:
         """Centre, half extents and rotation (row-major) of a body in one row. Shape (N, 15)."""
-        flat = self.rotation.reshape(len(self), 9)
-        return np.concatenate([self.center, self.half_extents, flat], axis=1)
+        out = np.empty((len(self), 15))
+        out[:, :3], out[:, 3:6] = self.center, self.half_extents
+        out[:, 6:] = self.rotation.reshape(len(self), 9)
+        return out
 
     @cached_property
     def blocks(self) -> NDArray[np.float64]:
@@ -101,22 +104,9 @@ class Boxes:
 
         The last block is filled up with copies of the last box. Shape (ceil(N / 8), 72).
         """
-        count = -(-len(self) // 8)
-        chosen = np.minimum(np.arange(8 * count), len(self) - 1)
-        by_lane = self.packed[chosen].reshape(count, 8, 15).transpose(0, 2, 1)
-        out = np.empty((count, 72))
-        out[:, :24] = by_lane[:, :3].reshape(count, 24)
-        with np.errstate(over="ignore", under="ignore"):
-            out[:, 24:].view(np.float32)[:] = by_lane[:, 3:].reshape(count, 96)
+        out = np.empty((-(-len(self) // 8), 72))
+        _rigid.pack_boxes(self.packed, out)
         return out
-
-    @cached_property
-    def skew(self) -> float:
-        """The largest entry of ``|R^T R - I|`` over the batch, rounded up."""
-        if len(self) == 0:
-            return 0.0
-        product = self.rotation.transpose(0, 2, 1) @ self.rotation
-        return float(np.abs(product - np.eye(3)).max()) + 2.0**-50
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,6 +58,38 @@ TAUGUARD_AVX2 std::size_t run_avx2(const Batch& batch, std::size_t begin, std::s
 
 }  // namespace
 
+Skew box_skew(const double* rotation, std::size_t n, double tolerance) {
+  const geometry::RoundToNearest guard;
+  Skew out{0.0, n};
+  for (std::size_t i = 0; i < n; ++i) {
+    const double* r = rotation + 9 * i;
+    double worst = 0.0;
+    for (int j = 0; j < 3; ++j)
+      for (int k = j; k < 3; ++k) {
+        const double entry = r[j] * r[k] + r[3 + j] * r[3 + k] + r[6 + j] * r[6 + k] - (j == k ? 1.0 : 0.0);
+        if (!(std::fabs(entry) <= worst)) worst = std::fabs(entry);
+      }
+    if (!(worst <= tolerance) && out.first_beyond == n) out.first_beyond = i;
+    if (!(worst <= out.largest)) out.largest = worst;
+  }
+  out.largest += 0x1p-50;  // the rounding of an entry near 1
+  return out;
+}
+
+void pack_boxes(const double* packed, std::size_t n, double* blocks) {
+  const geometry::RoundToNearest guard;
+  auto* block = reinterpret_cast<BoxBlock*>(blocks);
+  for (std::size_t k = 0; 8 * k < n; ++k, ++block)
+    for (std::size_t lane = 0; lane < 8; ++lane) {
+      const double* p = packed + 15 * std::min(8 * k + lane, n - 1);
+      for (int c = 0; c < 3; ++c) {
+        block->center[c][lane] = p[c];
+        block->half_extents[c][lane] = static_cast<float>(p[3 + c]);
+      }
+      for (int c = 0; c < 9; ++c) block->rotation[c][lane] = static_cast<float>(p[6 + c]);
+    }
+}
+
 std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b, const void* blocks_b,
                           double skew, std::size_t n, bool vectors, int threads, std::uint8_t* hit) {
   const Batch batch{a, b, static_cast<const BoxBlock*>(blocks_a), static_cast<const BoxBlock*>(blocks_b),

@@ -1,6 +1,7 @@
 // The convex half of tauguard.rigid._rigid.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
 
 #include "convex_overlap.hpp"
 
@@ -42,6 +43,15 @@ void bind_convex(nb::module_& m) {
     const Bodies rows_b{Kind::boxes, b.data(), nullptr, b.shape(0)};
     return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0), vectors, threads,
                          hit.data());
+  });
+  m.def("box_skew", [](Data rotation, double tolerance) {
+    nb::gil_scoped_release release;
+    const Skew skew = box_skew(rotation.data(), rotation.shape(0), tolerance);
+    return std::pair(skew.largest, skew.first_beyond);
+  });
+  m.def("pack_boxes", [](Data packed, Rows blocks) {
+    nb::gil_scoped_release release;
+    pack_boxes(packed.data(), packed.shape(0), blocks.data());
   });
   m.def("sweep", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b, Data displacement,
                     int method, int threads, bool points, Hits hit, Rows out) {

@@ -25,6 +25,16 @@ std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b
 std::size_t sweep(const Bodies& a, const Bodies& b, const double* d, std::size_t n, Method method, int threads,
                   bool points, std::uint8_t* hit, double* out);
 
+// The largest |R^T R - I| of n rotations (rounded up), and the first row beyond `tolerance` (n: none).
+struct Skew {
+  double largest;
+  std::size_t first_beyond;
+};
+Skew box_skew(const double* rotation, std::size_t n, double tolerance);
+
+// Blocks of eight from packed rows, the last one filled up with copies of the last box.
+void pack_boxes(const double* packed, std::size_t n, double* blocks);
+
 void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads, const std::uint8_t* hit, double* out);
 
 }  // namespace tauguard::rigid
