@@ -54,6 +54,7 @@ def exact_vertices(bodies: Bodies, i: int) -> tuple[Vectors, Vectors]:
         origin = [f(float(low[k])) - sum(g[a][k] for a in range(3)) for k in range(3)]
         g = [tuple(2 * x for x in e) for e in g]
     else:
+        assert isinstance(bodies, Parallelepipeds)
         g = [tuple(f(float(x)) for x in e) for e in bodies.edges[i]]
         origin = [f(float(x)) for x in bodies.origin[i]]
     points = [

@@ -4,7 +4,7 @@ from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion
 from tauguard.rigid.queries import overlap, sweep
 from tauguard.rigid.results import Impacts, Overlap, Witness
-from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Tetrahedra
+from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
 
 __all__ = [
     "Boxes",
@@ -16,6 +16,7 @@ __all__ = [
     "Motion",
     "Overlap",
     "Parallelepipeds",
+    "Polygons",
     "Tetrahedra",
     "Witness",
     "overlap",

@@ -83,7 +83,7 @@ def _hulls(bodies: Bodies) -> list[tuple[NDArray[np.float64], Any]]:
             (bodies.vertices[i:j], None)
             for i, j in zip(bodies.offsets, bodies.offsets[1:], strict=False)
         ]
-    raise TypeError(type(bodies).__name__)
+    raise ValueError(f"method: gjk knows no {type(bodies).__name__}; use abfme or auto")
 
 
 def _convex(coal: Any, points: NDArray[np.float64], faces: Any) -> Any:

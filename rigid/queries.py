@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.geometry import finite
 from tauguard.rigid import _rigid
 from tauguard.rigid.results import Impacts, Overlap, Witness
-from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Tetrahedra
+from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
 
 OverlapMethod = Literal["abfme", "sat", "gjk", "auto"]
 SweepMethod = Literal["abfme", "sat", "auto"]
 
 #: Number of a method in the native module; ``sat_textbook`` and ``exact`` serve studies and tests.
 _METHODS = {"abfme": 0, "sat": 1, "auto": 2, "sat_textbook": 3, "exact": 4}
-_KINDS: dict[type, int] = {Tetrahedra: 0, Boxes: 1, Parallelepipeds: 2, Hulls: 3}
+_KINDS: dict[type, int] = {Tetrahedra: 0, Boxes: 1, Parallelepipeds: 2, Hulls: 3, Polygons: 4}
 _NO_OFFSETS = np.zeros(1, dtype=np.int64)
 
 
@@ -64,8 +64,8 @@ def native_overlap(
     a: Bodies, b: Bodies, method: str, threads: int = 1
 ) -> tuple[NDArray[np.bool_], int]:
     """``hit`` of shape (N,), and how many rows the filter left to exact arithmetic."""
-    if method.startswith("sat") and (isinstance(a, Hulls) or isinstance(b, Hulls)):
-        raise ValueError("method: sat needs facets, which Hulls do not have; use abfme or auto")
+    if method.startswith("sat") and (isinstance(a, Hulls | Polygons) or isinstance(b, Hulls)):
+        raise ValueError("method: sat needs facets, which hulls do not have; use abfme or auto")
     hit = np.empty(rows(a, b), dtype=np.uint8)
     if method == "auto" and isinstance(a, Boxes) and isinstance(b, Boxes):
         return hit.view(np.bool_), overlap_boxes(a, b, thread_count(threads), hit)
@@ -107,6 +107,8 @@ def sweep(
             method.
     """
     count = rows(a, b)
+    if isinstance(a, Polygons):
+        raise ValueError("a: Polygons, expected bodies in space; give them thickness as Hulls")
     if method not in get_args(SweepMethod):
         raise ValueError(f"method: {method!r}, expected one of {', '.join(get_args(SweepMethod))}")
     given = np.asarray(displacement)
@@ -144,7 +146,7 @@ def find_witness(a: Bodies, b: Bodies, hit: NDArray[np.bool_], threads: int = 1)
 
 def native(bodies: Bodies) -> tuple[int, NDArray[np.float64], NDArray[np.int64]]:
     """A batch as the native module takes it: kind, packed rows, offsets."""
-    offsets = bodies.offsets if isinstance(bodies, Hulls) else _NO_OFFSETS
+    offsets = bodies.offsets if isinstance(bodies, Hulls | Polygons) else _NO_OFFSETS
     return _KINDS[type(bodies)], bodies.packed, offsets
 
 
@@ -158,6 +160,8 @@ def rows(a: Bodies, b: Bodies) -> int:
         if type(bodies) not in _KINDS:
             kinds = ", ".join(kind.__name__ for kind in _KINDS)
             raise ValueError(f"{name}: {type(bodies).__name__}, expected one of {kinds}")
+    if isinstance(a, Polygons) != isinstance(b, Polygons):
+        raise ValueError("b: polygons meet polygons only, for there is no third coordinate")
     if len(a) != len(b) and 1 not in (len(a), len(b)):
         raise ValueError(f"b: {len(b)} bodies against {len(a)}; expected the same number, or 1")
     return max(len(a), len(b)) if len(a) and len(b) else 0

@@ -1,4 +1,4 @@
-"""Batches of convex bodies on plain arrays: tetrahedra, boxes, parallelepipeds and vertex hulls.
+"""Batches of convex bodies on plain arrays: tetrahedra, boxes, parallelepipeds, hulls, polygons.
 
 A batch holds N bodies of one kind. Degenerate bodies are legal: a flat tetrahedron, a box without
 thickness, a single point. Lengths are in any one unit, the same for both sides of a query.
@@ -156,24 +156,8 @@ class Hulls:
     offsets: NDArray[np.int64]
 
     def __post_init__(self) -> None:
-        vertices = finite("vertices", self.vertices, (None, 3))
-        offsets = np.asarray(self.offsets)
-        if offsets.ndim != 1 or len(offsets) == 0 or not np.issubdtype(offsets.dtype, np.integer):
-            raise ValueError(
-                f"offsets: shape {offsets.shape} of {offsets.dtype}, expected (N + 1,) integers"
-            )
-        if offsets[0] != 0 or offsets[-1] != len(vertices):
-            raise ValueError(
-                f"offsets: run from {offsets[0]} to {offsets[-1]}, expected 0 to {len(vertices)}"
-            )
-        if (np.diff(offsets) <= 0).any():
-            row = int(np.argmax(np.diff(offsets) <= 0))
-            raise ValueError(
-                f"offsets: hull {row} is empty (offsets {offsets[row]} and {offsets[row + 1]}); "
-                "expected strictly increasing offsets"
-            )
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "offsets", np.ascontiguousarray(offsets, dtype=np.int64))
+        object.__setattr__(self, "vertices", finite("vertices", self.vertices, (None, 3)))
+        object.__setattr__(self, "offsets", _partition(self.offsets, len(self.vertices)))
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -184,4 +168,45 @@ class Hulls:
         return self.vertices
 
 
-Bodies = Tetrahedra | Boxes | Parallelepipeds | Hulls
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Convex polygons in the plane: the hulls of any number of points each, in any order.
+
+    They meet other polygons only. Arguments and errors as for :class:`Hulls`, vertices of shape
+    (M, 2).
+    """
+
+    vertices: NDArray[np.float64]
+    offsets: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", finite("vertices", self.vertices, (None, 2)))
+        object.__setattr__(self, "offsets", _partition(self.offsets, len(self.vertices)))
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    @property
+    def packed(self) -> NDArray[np.float64]:
+        """The vertices of all bodies. Shape (M, 2)."""
+        return self.vertices
+
+
+def _partition(given: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    offsets = np.asarray(given)
+    if offsets.ndim != 1 or len(offsets) == 0 or not np.issubdtype(offsets.dtype, np.integer):
+        raise ValueError(
+            f"offsets: shape {offsets.shape} of {offsets.dtype}, expected (N + 1,) integers"
+        )
+    if offsets[0] != 0 or offsets[-1] != count:
+        raise ValueError(f"offsets: run from {offsets[0]} to {offsets[-1]}, expected 0 to {count}")
+    if (np.diff(offsets) <= 0).any():
+        row = int(np.argmax(np.diff(offsets) <= 0))
+        raise ValueError(
+            f"offsets: hull {row} is empty (offsets {offsets[row]} and {offsets[row + 1]}); "
+            "expected strictly increasing offsets"
+        )
+    return np.ascontiguousarray(offsets, dtype=np.int64)
+
+
+Bodies = Tetrahedra | Boxes | Parallelepipeds | Hulls | Polygons

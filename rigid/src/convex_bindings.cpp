@@ -16,7 +16,7 @@ using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cp
 using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 Bodies view(int kind, const Data& data, const Offsets& offsets) {
-  const bool hulls = kind == static_cast<int>(Kind::hulls);
+  const bool hulls = is_cloud(static_cast<Kind>(kind));
   return {static_cast<Kind>(kind), data.data(), offsets.data(), hulls ? offsets.shape(0) - 1 : data.shape(0)};
 }
 

@@ -12,26 +12,29 @@ namespace tauguard::rigid {
 
 using geometry::Dyadic;
 
-enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 3 };
+enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 3, polygons = 4 };
+
+// Bodies of any number of vertices.
+inline bool is_cloud(Kind kind) { return kind == Kind::hulls || kind == Kind::polygons; }
 
 // One body a row: tetrahedra 12 doubles (vertices), boxes 15 (centre, half extents, rotation by rows),
-// parallelepipeds 12 (origin, edges); hulls share one vertex array cut by offsets.
+// parallelepipeds 12 (origin, edges); hulls and polygons share one vertex array cut by offsets.
 struct Bodies {
   Kind kind;
   const double* data;
-  const std::int64_t* offsets;  // hulls only
+  const std::int64_t* offsets;  // hulls and polygons only
   std::size_t count;            // 1 broadcasts against the other side
 
-  static constexpr std::size_t strides[] = {12, 15, 12, 3};
+  static constexpr std::size_t strides[] = {12, 15, 12, 3, 2};
 
   std::size_t index(std::size_t row) const { return count == 1 ? 0 : row; }
   const double* row(std::size_t r) const {
     const std::size_t i = index(r);
-    return data + strides[static_cast<int>(kind)] * (kind == Kind::hulls ? offsets[i] : i);
+    return data + strides[static_cast<int>(kind)] * (is_cloud(kind) ? static_cast<std::size_t>(offsets[i]) : i);
   }
   std::size_t vertex_count(std::size_t r) const {
     if (kind == Kind::tetrahedra) return 4;
-    if (kind != Kind::hulls) return 8;
+    if (!is_cloud(kind)) return 8;
     const std::size_t i = index(r);
     return static_cast<std::size_t>(offsets[i + 1] - offsets[i]);
   }
@@ -45,6 +48,10 @@ template <class Number>
 Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
   const double* p = bodies.row(r);
   Points<Number> out(bodies.vertex_count(r));
+  if (bodies.kind == Kind::polygons) {  // in the plane z = 0
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = {Number(p[2 * i]), Number(p[2 * i + 1]), Number(0.0)};
+    return out;
+  }
   if (bodies.kind == Kind::tetrahedra || bodies.kind == Kind::hulls) {
     for (std::size_t i = 0; i < out.size(); ++i)
       for (int k = 0; k < 3; ++k) out[i][k] = Number(p[3 * i + k]);

@@ -50,6 +50,9 @@ struct Textbook {
 struct HullSimplexMethod {
   static Verdict decide(const Chunk& c, std::size_t i) { return resolve_hulls(c.a, c.b, i); }
 };
+struct HullEliminationMethod {
+  static Verdict decide(const Chunk& c, std::size_t i) { return eliminate_hulls(c.a, c.b, i); }
+};
 struct AlwaysUndecided {
   static Verdict decide(const Chunk&, std::size_t) { return undecided; }
 };
@@ -99,6 +102,8 @@ Runner by_kinds(bool tetrahedra_a, bool tetrahedra_b) {
 
 Runner choose(Kind a, Kind b, Method method) {
   if (method == Method::exact) return run_portable<AlwaysUndecided>;
+  if (a == Kind::polygons || (a == Kind::hulls && b == Kind::hulls && method == Method::abfme))
+    return run_portable<HullEliminationMethod>;
   if (a == Kind::hulls && b == Kind::hulls) return run_portable<HullSimplexMethod>;
   if (a == Kind::hulls || b == Kind::hulls) return run_portable<AlwaysUndecided>;
   const bool ta = a == Kind::tetrahedra, tb = b == Kind::tetrahedra;

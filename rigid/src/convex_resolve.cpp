@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "convex_eliminate.hpp"
 #include "convex_simplex.hpp"
 
 namespace tauguard::rigid {
@@ -147,6 +148,15 @@ Verdict resolve_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_
   for (int c = 0; c < 4; ++c)
     if (lp.is_artificial(c) || !(lp.weight(c) > 512 * unit * reach * reach * reach)) return undecided;
   return common;
+}
+
+Verdict eliminate_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
+  auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
+  std::array<double, 3> base;
+  const double reach = localize(a, b, base);
+  if (!in_range(reach)) return undecided;
+  if (bodies_a.kind == Kind::polygons) return HullElimination<2>(a, b, reach).decide();
+  return HullElimination<3>(a, b, reach).decide();
 }
 
 Verdict resolve_exactly(const Bodies& a, const Bodies& b, std::size_t row) {

@@ -11,6 +11,9 @@ namespace tauguard::rigid {
 // Vertex hulls in double precision, with error bounds; `undecided` near contact.
 Verdict resolve_hulls(const Bodies& a, const Bodies& b, std::size_t row);
 
+// Vertex hulls or polygons by elimination in double precision; `undecided` near contact.
+Verdict eliminate_hulls(const Bodies& a, const Bodies& b, std::size_t row);
+
 // Exact: `separated` or `common` for any finite input. Tens of microseconds.
 Verdict resolve_exactly(const Bodies& a, const Bodies& b, std::size_t row);
 

@@ -16,6 +16,13 @@ namespace tauguard::rigid {
 inline int sign_of(const Dyadic& x) { return x.sign(); }
 inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
+// Is x - y positive, for a sum of terms of size `scale`? In doubles a basic column's price is rounding
+// noise about zero, which must not bring it in again.
+inline bool exceeds(const Dyadic& x, const Dyadic& y, const Dyadic&) { return y < x; }
+inline bool exceeds(double x, double y, double scale) { return x - y > 0x1p-46 * scale; }
+inline void grow(Dyadic&, const Dyadic&) {}
+inline void grow(double& scale, double x) { scale = std::fmax(scale, std::fabs(x)); }
+
 template <class Number>
 class HullSimplex {
  public:
@@ -120,10 +127,13 @@ class HullSimplex {
     pa.clear(), pb.clear();
     for (const auto& p : a_) pa.push_back(project(p));
     for (const auto& p : b_) pb.push_back(project(p) - y_[3]);
+    Number scale{};
+    for (const auto& x : pa) grow(scale, x);
+    for (const auto& x : pb) grow(scale, x);
     if (first) {
       for (i = 0; i < pa.size(); ++i)
         for (j = 0; j < pb.size(); ++j)
-          if (sign_of(pa[i] - pb[j]) > 0) return true;
+          if (exceeds(pa[i], pb[j], scale)) return true;
       return false;
     }
     i = j = 0;
@@ -131,7 +141,7 @@ class HullSimplex {
       if (pa[i] < pa[k]) i = k;
     for (std::size_t k = 1; k < pb.size(); ++k)
       if (pb[k] < pb[j]) j = k;
-    return sign_of(pa[i] - pb[j]) > 0;
+    return exceeds(pa[i], pb[j], scale);
   }
 
   bool exchange(std::size_t i, std::size_t j) {

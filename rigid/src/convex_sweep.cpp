@@ -153,7 +153,7 @@ Runner runner(bool eliminate) {
 }
 
 Runner choose(Kind a, Kind b, Method method) {
-  if (a == Kind::hulls || b == Kind::hulls || method == Method::exact) return run_hulls;
+  if (is_cloud(a) || is_cloud(b) || method == Method::exact) return run_hulls;
   const bool eliminate = method != Method::sat;
   if (a == Kind::tetrahedra)
     return b == Kind::tetrahedra ? runner<Tetrahedron, Tetrahedron>(eliminate) : runner<Tetrahedron, Block>(eliminate);

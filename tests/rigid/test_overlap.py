@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tauguard.benchmarks.rigid_cases import HARD, KINDS
 from tauguard.benchmarks.rigid_truth import exact_hit, float_bodies, truth
 from tauguard.geometry import _geometry
-from tauguard.rigid import Boxes, Hulls, Parallelepipeds, Tetrahedra, overlap
+from tauguard.rigid import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra, overlap
 from tauguard.rigid.queries import native_overlap, overlap_boxes
 
 EXACT_METHODS = ["abfme", "auto", "exact"]
@@ -81,6 +81,48 @@ def test_hulls_of_any_size_agree_with_the_truth():
     expected = np.array([exact_hit(a, b, i) for i in range(len(a))])
     assert 0.05 < expected.mean() < 0.95
     check(a, b, expected)
+
+
+def random_hulls(rng, n, low, high, dimension):
+    counts = rng.integers(low, high, n)
+    offsets = np.r_[0, np.cumsum(counts)]
+    shift = np.repeat(rng.uniform(-1, 1, (n, dimension)), counts, axis=0)
+    return rng.uniform(-0.8, 0.8, (offsets[-1], dimension)) + shift, offsets
+
+
+def test_elimination_decides_random_hulls_without_exact_arithmetic():
+    rng = np.random.default_rng(15)
+    a, b = (Hulls(*random_hulls(rng, 400, 4, 9, 3)) for _ in range(2))
+    expected, _ = native_overlap(a, b, "exact")
+    assert 0.1 < expected.mean() < 0.9
+    for method in ("abfme", "auto"):
+        hit, left = native_overlap(a, b, method)
+        np.testing.assert_array_equal(hit, expected)
+        assert left == 0, method
+
+
+def polygon_truth(a, b, i):
+    pa, pb = (Hulls(np.c_[p.vertices, np.zeros(len(p.vertices))], p.offsets) for p in (a, b))
+    return exact_hit(pa, pb, i)
+
+
+def test_polygons_in_the_plane():
+    rng = np.random.default_rng(16)
+    a, b = (Polygons(*random_hulls(rng, 300, 3, 9, 2)) for _ in range(2))
+    expected = np.array([polygon_truth(a, b, i) for i in range(300)])
+    assert 0.1 < expected.mean() < 0.9
+    for method in ("abfme", "auto"):
+        hit, left = native_overlap(a, b, method)
+        np.testing.assert_array_equal(hit, expected)
+        assert left == 0
+    grid_a, grid_b = (
+        Polygons(rng.integers(0, 4, p.vertices.shape).astype(float), p.offsets) for p in (a, b)
+    )
+    expected = np.array([polygon_truth(grid_a, grid_b, i) for i in range(300)])
+    assert 0.1 < expected.mean() < 0.99
+    np.testing.assert_array_equal(overlap(grid_a, grid_b, "abfme").hit, expected)
+    with pytest.raises(ValueError, match="polygons meet polygons only"):
+        overlap(a, Hulls(np.zeros((300, 3)), np.arange(301)))
 
 
 @pytest.mark.parametrize("scale", [2.0**-900, 2.0**-300, 2.0**300, 2.0**900])

@@ -1,0 +1,201 @@
+// Elimination for vertex hulls without facets, in D = 2 or 3 dimensions. The unknowns are the values p_i
+// of the separating function at D + 1 affinely independent vertices of A, p_i >= 0; F_i are the barycentric
+// coordinates of that simplex, scaled by its determinant. A vertex of B asks sum p_i F_i(b) < 0, any other
+// vertex of A asks -sum p_i F_i(a) <= 0. Eliminating p_k keeps the rows with a positive entry (with p_k >= 0
+// that entry drops out) and combines them with the rows of the opposite sign; every row is a point of B
+// less a point of A. After s eliminations a row made of more than s + 1 inequalities is redundant
+// (Chernikov 1960), and so is one whose inequalities include those of another (Kohler 1967).
+//   * A row of positive entries: no plane exists, the bodies share a point.
+//   * No such row: back-substitution gives a plane, which is then checked against all vertices.
+// Combinations leave an entry of 2 E instead of 0 (E bounds every entry's error), so that the entries of a
+// positive row are positive beyond rounding in the eliminated columns too; rows too small for that, and
+// planes that the check rejects, leave the pair undecided.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "convex_abfme.hpp"
+
+namespace tauguard::rigid {
+
+template <int D>
+class HullElimination {
+ public:
+  using Point = std::array<double, 3>;  // two-dimensional points have z = 0
+
+  // Points from a common origin, at most `reach` in 1-norm.
+  HullElimination(const Points<double>& a, const Points<double>& b, double reach)
+      : a_(a), b_(b), reach_(reach) {}
+
+  Verdict decide() {
+    if (a_.size() + b_.size() > 100 || !choose_simplex()) return undecided;
+    std::vector<Row> rows = initial_rows();
+    std::array<std::vector<Row>, D> stages;
+    for (int k = 0; k < D; ++k) {
+      for (const Row& r : rows)
+        if (positive(r)) return common;
+      stages[static_cast<std::size_t>(k)] = rows;
+      rows = eliminate(rows, k);
+      if (rows.size() > 4000) return undecided;
+    }
+    for (const Row& r : rows)
+      if (positive(r)) return common;
+    return plane_separates(stages) ? separated : undecided;
+  }
+
+ private:
+  struct Row {
+    std::array<double, D + 1> entry;
+    std::array<std::uint64_t, 2> support;  // the inequalities it is made of
+  };
+
+  static int count(const std::array<std::uint64_t, 2>& s) {
+    return __builtin_popcountll(s[0]) + __builtin_popcountll(s[1]);
+  }
+  static void add(std::array<std::uint64_t, 2>& s, std::size_t i) { s[i / 64] |= std::uint64_t{1} << (i % 64); }
+
+  bool positive(const Row& r) const {
+    return std::all_of(r.entry.begin(), r.entry.end(), [&](double x) { return x > error_; });
+  }
+
+  static Point minus(const Point& x, const Point& y) { return {x[0] - y[0], x[1] - y[1], x[2] - y[2]}; }
+
+  // Normal of F through the points o, p (and q): F(x) = n . (x - o).
+  static Point normal_of(const Point& o, const Point& p, const Point& q) {
+    const Point u = minus(p, o);
+    if (D == 2) return {-u[1], u[0], 0.0};
+    const Point v = minus(q, o);
+    Point n;
+    cross(u.data(), v.data(), n.data());
+    return n;
+  }
+
+  // Far vertices of A, one after the other the farthest from the span of those before.
+  bool choose_simplex() {
+    chosen_[0] = 0;
+    Point along{}, across{};
+    for (int i = 1; i <= D; ++i) {
+      double best = -1.0;
+      for (std::size_t k = 0; k < a_.size(); ++k) {
+        const Point x = minus(a_[k], a_[0]);
+        double size;
+        if (i == 1) size = dot(x.data(), x.data());
+        else if (i == 2) {
+          Point c;
+          cross(along.data(), x.data(), c.data());
+          size = dot(c.data(), c.data());
+        } else size = std::fabs(dot(across.data(), x.data()));
+        if (size > best) best = size, chosen_[static_cast<std::size_t>(i)] = k;
+      }
+      const Point x = minus(a_[chosen_[static_cast<std::size_t>(i)]], a_[0]);
+      if (i == 1) along = x;
+      if (i == 2) cross(along.data(), x.data(), across.data());
+    }
+    for (std::size_t i = 0; i <= D; ++i) {
+      const auto vertex = [&](std::size_t step) { return a_[chosen_[(i + step) % (D + 1)]]; };
+      base_[i] = vertex(1);
+      normal_[i] = normal_of(base_[i], vertex(2), D == 3 ? vertex(3) : vertex(2));
+      double own = value(i, vertex(0));
+      if (own < 0) {
+        for (double& x : normal_[i]) x = -x;
+        own = -own;
+      }
+      // As for a tetrahedron's facets (convex_abfme.hpp), with all lengths bounded by `reach`.
+      error_ = 512 * unit * (D == 3 ? reach_ * reach_ * reach_ : reach_ * reach_);
+      if (!(own > 8 * error_)) return false;
+    }
+    return true;
+  }
+
+  double value(std::size_t i, const Point& x) const {
+    const Point p = minus(x, base_[i]);
+    return dot(normal_[i].data(), p.data());
+  }
+
+  std::vector<Row> initial_rows() const {
+    std::vector<Row> rows;
+    std::size_t name = D + 1;  // names 0 .. D stand for p_i >= 0
+    const auto push = [&](const Point& x, double sign) {
+      Row r{};
+      for (std::size_t i = 0; i <= D; ++i) r.entry[i] = sign * value(i, x);
+      add(r.support, name++);
+      rows.push_back(r);
+    };
+    for (const auto& x : b_) push(x, 1.0);
+    for (std::size_t k = 0; k < a_.size(); ++k)
+      if (std::find(chosen_.begin(), chosen_.end(), k) == chosen_.end()) push(a_[k], -1.0);
+    return rows;
+  }
+
+  std::vector<Row> eliminate(const std::vector<Row>& rows, int column) const {
+    const auto k = static_cast<std::size_t>(column);
+    std::vector<Row> out;
+    for (const Row& p : rows) {
+      if (!(p.entry[k] > 4 * error_)) continue;
+      Row kept = p;
+      add(kept.support, k);
+      kept.entry[k] = 2 * error_;  // any value up to its own is a valid combination
+      out.push_back(kept);
+      for (const Row& q : rows) {
+        if (!(q.entry[k] < 0)) continue;
+        Row r;
+        for (int w = 0; w < 2; ++w) r.support[w] = p.support[w] | q.support[w];
+        if (count(r.support) > column + 2) continue;
+        const double share = (p.entry[k] - 2 * error_) / (p.entry[k] - q.entry[k]);
+        for (std::size_t i = 0; i <= D; ++i) r.entry[i] = (1 - share) * p.entry[i] + share * q.entry[i];
+        out.push_back(r);
+      }
+    }
+    for (const Row& z : rows)  // entries that count as zero stay as they are
+      if (z.entry[k] >= 0 && z.entry[k] <= 4 * error_) out.push_back(z);
+    return without_supersets(std::move(out));
+  }
+
+  static std::vector<Row> without_supersets(std::vector<Row> rows) {
+    std::stable_sort(rows.begin(), rows.end(),
+                     [](const Row& x, const Row& y) { return count(x.support) < count(y.support); });
+    std::vector<Row> out;
+    for (const Row& r : rows) {
+      const bool redundant = std::any_of(out.begin(), out.end(), [&](const Row& s) {
+        return (s.support[0] & ~r.support[0]) == 0 && (s.support[1] & ~r.support[1]) == 0;
+      });
+      if (!redundant) out.push_back(r);
+    }
+    return out;
+  }
+
+  // Values p_D = 1 and then p_k in the middle of what the rows of its stage leave.
+  bool plane_separates(const std::array<std::vector<Row>, D>& stages) const {
+    std::array<double, D + 1> p{};
+    p[D] = 1.0;
+    for (std::size_t k = D; k-- > 0;) {
+      double low = 0.0, high = HUGE_VAL;
+      for (const Row& r : stages[k]) {
+        double rest = 0.0;
+        for (std::size_t i = k + 1; i <= D; ++i) rest += p[i] * r.entry[i];
+        if (r.entry[k] > 0) high = std::min(high, -rest / r.entry[k]);
+        if (r.entry[k] < 0) low = std::max(low, rest / -r.entry[k]);
+      }
+      p[k] = std::isinf(high) ? 2 * low + 1 : 0.5 * (low + high);
+    }
+    Point n{};
+    for (std::size_t i = 0; i <= D; ++i)
+      for (std::size_t c = 0; c < 3; ++c) n[c] -= p[i] * normal_[i][c];
+    double high = -HUGE_VAL, low = HUGE_VAL;
+    for (const auto& x : a_) high = std::max(high, dot(n.data(), x.data()));
+    for (const auto& x : b_) low = std::min(low, dot(n.data(), x.data()));
+    return low - high > 16 * unit * norm1(n.data()) * reach_;
+  }
+
+  const Points<double>& a_;
+  const Points<double>& b_;
+  double reach_, error_ = 0.0;
+  std::array<std::size_t, D + 1> chosen_{};
+  std::array<Point, D + 1> base_{}, normal_{};
+};
+
+}  // namespace tauguard::rigid
