@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from tauguard.benchmarks.report import Row, measure, rate
 from tauguard.benchmarks.rigid_cases import HARD, KINDS
 from tauguard.benchmarks.rigid_truth import exact_toi, truth
-from tauguard.rigid import coal_peer
+from tauguard.rigid import PlaneCache, coal_peer
 from tauguard.rigid.queries import native_overlap, native_sweep
 from tauguard.rigid.queries import overlap_boxes as overlap_boxes_native
-from tauguard.rigid.shapes import Bodies, Boxes
+from tauguard.rigid.shapes import Bodies, Boxes, Tetrahedra
 
 #: Published static ratios of separating axes to elimination (collision, non-collision).
 PUBLISHED = {
@@ -55,6 +55,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     for pair in PUBLISHED:
         rows += dynamic_rows(rng, pair, per_cell // 5, exact_sample // 2)
     rows += batch_rows(rng, 200_000 if quick else 1_000_000)
+    rows += coherent_rows(rng, 20_000 if quick else 100_000, 6 if quick else 20)
     rows += [hard_row(name, rng, 500 if quick else 20_000) for name in HARD]
     return rows
 
@@ -244,6 +245,55 @@ def batch_rows(rng: np.random.Generator, n: int) -> list[Row]:
             "exact_rows": left,
         }
     ]
+
+
+def coherent_rows(rng: np.random.Generator, n: int, frames: int) -> list[Row]:
+    """Cached planes on slowly moving tetrahedra and boxes, about one pair in eight in contact."""
+    rows: list[Row] = []
+    for kind in ("tetrahedra", "boxes"):
+        a, b = KINDS[kind](rng, n), KINDS[kind](rng, n)
+        velocity = rng.normal(0, 0.01, (n, 3))
+        offset = rng.uniform(-2, 2, (n, 3))
+        cache = PlaneCache(n)
+        seconds: dict[str, list[float]] = {"cached": [], "auto": [], "abfme": []}
+        wrong = answered = clear = 0
+        for frame in range(frames):
+            moved = shifted(b, offset + frame * velocity)
+            _ = (a.packed, moved.packed, getattr(moved, "blocks", None), getattr(a, "blocks", None))
+            start = time.perf_counter()
+            hit = cache.overlap(a, moved).hit
+            seconds["cached"].append((time.perf_counter() - start) / n * 1e9)
+            for method in ("auto", "abfme"):
+                start = time.perf_counter()
+                fresh, _ = native_overlap(a, moved, method)
+                seconds[method].append((time.perf_counter() - start) / n * 1e9)
+            wrong += int((hit != fresh).sum())
+            if frame:
+                answered += cache.answered
+                clear += int((~hit).sum())
+        rows.append(
+            {
+                "study": "coherent frames",
+                "pair": f"{kind}-{kind}",
+                "pairs": n,
+                "hits": float(hit.mean()),
+                **{
+                    f"{name}_ns": {"median": float(np.median(t[1:])), "low": min(t), "high": max(t)}
+                    for name, t in seconds.items()
+                },
+                "answered_by_cache": rate(answered, clear),
+                "differs_from_fresh": rate(wrong, n * frames),
+            }
+        )
+    return rows
+
+
+def shifted(bodies: Bodies, by: NDArray[np.float64]) -> Bodies:
+    """The same bodies moved by ``by``, shape (N, 3)."""
+    if isinstance(bodies, Tetrahedra):
+        return Tetrahedra(bodies.vertices + by[:, None])
+    assert isinstance(bodies, Boxes)
+    return Boxes(bodies.center + by, bodies.half_extents, bodies.rotation)
 
 
 def hard_row(name: str, rng: np.random.Generator, n: int) -> Row:

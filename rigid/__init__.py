@@ -2,6 +2,7 @@
 
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion
+from tauguard.rigid.plane_cache import PlaneCache
 from tauguard.rigid.queries import overlap, sweep
 from tauguard.rigid.results import Impacts, Overlap, Witness
 from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
@@ -16,6 +17,7 @@ __all__ = [
     "Motion",
     "Overlap",
     "Parallelepipeds",
+    "PlaneCache",
     "Polygons",
     "Tetrahedra",
     "Witness",

@@ -40,6 +40,17 @@ def sweep(
     hit: NDArray[np.uint8],
     out: NDArray[np.float64],
 ) -> int: ...
+def overlap_cached(
+    kind_a: int,
+    a: NDArray[np.float64],
+    offsets_a: NDArray[np.int64],
+    kind_b: int,
+    b: NDArray[np.float64],
+    offsets_b: NDArray[np.int64],
+    threads: int,
+    normals: NDArray[np.float64],
+    hit: NDArray[np.uint8],
+) -> int: ...
 def witnesses(
     kind_a: int,
     a: NDArray[np.float64],

@@ -59,6 +59,12 @@ void bind_convex(nb::module_& m) {
     return sweep(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), displacement.data(), hit.shape(0),
                  static_cast<Method>(method), threads, points, hit.data(), out.data());
   });
+  m.def("overlap_cached", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
+                             int threads, Rows normals, Hits hit) {
+    nb::gil_scoped_release release;
+    return overlap_cached(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0), threads,
+                          normals.data(), hit.data());
+  });
   m.def("witnesses", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
                         int threads, Hits hit, Rows out) {
     nb::gil_scoped_release release;

@@ -127,6 +127,13 @@ std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method meth
   return left;
 }
 
+RowMethod row_method(Kind a, Kind b) {
+  const Runner run = choose(a, b, Method::automatic);
+  return [run](const Bodies& x, const Bodies& y, std::size_t row, std::uint8_t* hit) {
+    run(Chunk{x, y, row, row + 1, hit});
+  };
+}
+
 void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads, const std::uint8_t* hit,
                double* out) {
   geometry::ThreadPool::shared().parallel_for(n, threads, 64, [&](auto begin, auto end, auto) {

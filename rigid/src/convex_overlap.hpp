@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 
 #include "convex_bodies.hpp"
 
@@ -24,6 +25,15 @@ std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b
 // above. `d` holds n rows of 3. Without `points` that column stays NaN.
 std::size_t sweep(const Bodies& a, const Bodies& b, const double* d, std::size_t n, Method method, int threads,
                   bool points, std::uint8_t* hit, double* out);
+
+// Decides one row by elimination (or the hulls' method) into hit[row].
+using RowMethod = std::function<void(const Bodies& a, const Bodies& b, std::size_t row, std::uint8_t* hit)>;
+RowMethod row_method(Kind a, Kind b);
+
+// As `overlap`, but tries row i's normal (3 numbers, zeros where there is none) first and renews it where
+// it fails and the pair is apart. Returns how many rows the normals answered.
+std::size_t overlap_cached(const Bodies& a, const Bodies& b, std::size_t n, int threads, double* normals,
+                           std::uint8_t* hit);
 
 // The largest |R^T R - I| of n rotations (rounded up), and the first row beyond `tolerance` (n: none).
 struct Skew {

@@ -31,6 +31,12 @@ def test_dynamic_rows_name_the_un_inverted_entries():
     assert collision["toi_error_max"] < 1e-9
 
 
+def test_cached_planes_give_fresh_answers():
+    for row in rigid_convex.coherent_rows(np.random.default_rng(3), 300, 3):
+        assert row["differs_from_fresh"]["value"] == 0
+        assert row["answered_by_cache"]["value"] > 0.8
+
+
 def test_coal_agrees_away_from_contact():
     pytest.importorskip("coal")
     rng = np.random.default_rng(2)

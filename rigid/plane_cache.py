@@ -1,0 +1,50 @@
+"""Overlap of coherent frames: the separating planes of the last frame are tried first."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.rigid import _rigid
+from tauguard.rigid.queries import find_witness, native, rows, thread_count
+from tauguard.rigid.results import Overlap
+from tauguard.rigid.shapes import Bodies
+
+
+class PlaneCache:
+    """Overlap queries on the same pairs frame after frame.
+
+    A pair that was apart keeps the normal of its separating plane; while that still separates, it
+    is the whole query. Answers are those of :func:`tauguard.rigid.overlap`, whatever is cached.
+
+    Args:
+        count: The number of pairs N, the same in every frame.
+
+    Raises:
+        ValueError: a negative count.
+    """
+
+    def __init__(self, count: int) -> None:
+        """Start without planes; see the class."""
+        if count < 0:
+            raise ValueError(f"count: {count}, expected 0 or more")
+        self._normals: NDArray[np.float64] = np.zeros((count, 3))
+        #: How many rows of the last frame their cached plane answered.
+        self.answered = 0
+
+    def overlap(self, a: Bodies, b: Bodies, threads: int = 1) -> Overlap:
+        """Answers one frame and keeps its separating planes; arguments as for ``overlap``.
+
+        Raises:
+            ValueError: another number of pairs than the cache was made for, and what ``overlap``
+                raises.
+        """
+        count = rows(a, b)
+        if count != len(self._normals):
+            raise ValueError(f"a, b: {count} pairs, expected {len(self._normals)}")
+        hit = np.empty(count, dtype=np.uint8)
+        self.answered = _rigid.overlap_cached(
+            *native(a), *native(b), thread_count(threads), self._normals, hit
+        )
+        found = hit.view(np.bool_)
+        return Overlap(found, lambda: find_witness(a, b, found, threads))
