@@ -51,8 +51,10 @@ struct Entry {
   double reliable = enter;                                  // `enter` plus twice its error
   double normal[3] = {0, 0, 0};                             // of the axis of `enter`, from a to b
 
-  bool miss() const { return enter > leave || enter > 1.0 || leave < 0.0; }
-  bool hit() const { return certain && surely_in < surely_out && surely_in < 1.0 && surely_out > 0.0; }
+  bool usable = true;                                       // sizes are in range
+
+  bool miss() const { return usable && (enter > leave || enter > 1.0 || leave < 0.0); }
+  bool hit() const { return usable && certain && surely_in < surely_out && surely_in < 1.0 && surely_out > 0.0; }
 };
 
 // Errors, with `length` >= |axis|_1 the product of the sizes of its edges: the axis is off by 4 u length
@@ -61,6 +63,10 @@ struct Entry {
 template <class A, class B>
 TAUGUARD_INLINE void cast_axis(const A& a, const B& b, const double* axis, double length, const double* d,
                                Entry& out) {
+  if (!(length > 1e-200)) {  // products that may have lost their accuracy to underflow
+    out.certain = false;
+    return;
+  }
   double low_a = dot(axis, a.v[0]), high_a = low_a, low_b = dot(axis, b.v[0]), high_b = low_b;
   for (const auto& v : a.v) {
     const double x = dot(axis, v);
@@ -97,6 +103,8 @@ template <class A, class B>
 TAUGUARD_INLINE Entry cast(const A& a, const B& b, const double* d) {
   constexpr int faces[4][2] = {{0, 1}, {0, 2}, {1, 2}, {3, 4}};
   Entry out;
+  out.usable = in_range(a.reach + b.reach) && in_range(norm1(d));
+  if (!out.usable) return out;
   double axis[3];
   const auto try_axis = [&](const double* e, const double* f) __attribute__((always_inline)) {
     cross(e, f, axis);

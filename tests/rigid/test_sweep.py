@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from tauguard.benchmarks.rigid_cases import HARD, KINDS
-from tauguard.benchmarks.rigid_truth import exact_toi, float_bodies
+from tauguard.benchmarks.rigid_truth import cross, dot, exact_toi, exact_vertices, float_bodies
 from tauguard.rigid import Boxes, Hulls, Tetrahedra, overlap, sweep
 from tauguard.rigid.queries import native_sweep
 
@@ -44,6 +46,32 @@ def test_random_bodies(kind_a, kind_b):
     truth = check(a, b, d, 1e-9)
     assert 5 < np.isfinite(truth).sum() < n - 5
     assert (truth[np.isfinite(truth)] > 0).sum() > 10
+
+
+numbers = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False, width=64),
+    st.integers(-3, 3).map(float),
+    st.sampled_from([5e-324, 1e-170, 1e-300, 1e300, 1.7976931348623157e308]),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(numbers, min_size=27, max_size=27))
+def test_any_finite_tetrahedra(values):
+    v = np.array(values)
+    a, b, d = (
+        Tetrahedra(v[None, :12].reshape(1, 4, 3)),
+        Tetrahedra(v[None, 12:24].reshape(1, 4, 3)),
+        v[None, 24:],
+    )
+    for body in (a, b):
+        e = exact_vertices(body, 0)[1]
+        assume(dot(e[0], cross(e[1], e[2])) != 0)
+    expected = exact_toi(a, b, d, 0)
+    for method in ("abfme", "sat"):
+        got = sweep(a, b, d, method=method)
+        assert got.hit[0] == (expected is not None), method
+        assert expected is None or got.toi[0] <= expected or expected == 0
 
 
 def test_grid_motions_touch_at_once_or_slide_past():
