@@ -8,7 +8,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <vector>
+
+#include "tauguard/geometry/limbs.hpp"
 
 namespace tauguard::geometry {
 
@@ -141,8 +142,6 @@ class Dyadic {
   }
 
  private:
-  using Limbs = std::vector<std::uint32_t>;
-
   void normalize() {
     while (!limbs_.empty() && limbs_.back() == 0) limbs_.pop_back();
     if (limbs_.empty()) {
@@ -153,7 +152,7 @@ class Dyadic {
     std::size_t zeros = 0;
     while (limbs_[zeros] == 0) ++zeros;
     if (zeros) {
-      limbs_.erase(limbs_.begin(), limbs_.begin() + static_cast<std::ptrdiff_t>(zeros));
+      limbs_.drop_front(zeros);
       exponent_ += 32 * static_cast<std::int64_t>(zeros);
     }
   }
