@@ -1,7 +1,10 @@
 """Momentum observer, features, collision detectors, event matching and metrics."""
 
+from tauguard.detectors.calibrate import Calibration, Priors, calibrate
+from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.events import Matching, find_alarms, judge, match
 from tauguard.detectors.filter import Confirmation, confirmed
+from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.metrics import figures, poisson_rate, wilson
 from tauguard.detectors.numbers import (
     RobotNumbers,
@@ -12,12 +15,28 @@ from tauguard.detectors.numbers import (
     momentum_terms,
 )
 from tauguard.detectors.observer import MomentumObserver, observe
+from tauguard.detectors.pipeline import CollisionDetector, DetectorSettings
+from tauguard.detectors.svr import SrqSVR, srq_kernel
+from tauguard.detectors.thresholds import QuietDetector, QuietThresholds
 
 __all__ = [
+    "ArmModel",
+    "Calibration",
+    "CollisionDetector",
     "Confirmation",
+    "DetectorSettings",
+    "Estimate",
+    "Estimator",
+    "FrictionModel",
     "Matching",
     "MomentumObserver",
+    "Priors",
+    "QuietDetector",
+    "QuietThresholds",
     "RobotNumbers",
+    "SrqSVR",
+    "Unknowns",
+    "calibrate",
     "confirmed",
     "figures",
     "find_alarms",
@@ -30,5 +49,6 @@ __all__ = [
     "momentum_terms",
     "observe",
     "poisson_rate",
+    "srq_kernel",
     "wilson",
 ]

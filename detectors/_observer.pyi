@@ -31,3 +31,58 @@ class Observer:
     def step(self, q: Array, qd: Array, tau: Array, dt: float, out: Array) -> None: ...
 
 def filter(gain: Array, dt: Array, p: Array, beta: Array, tau: Array, out: Array) -> None: ...
+
+class FrictionBasis:
+    def __init__(
+        self,
+        bristles: list[float],
+        stops: list[float],
+        stribeck: list[float],
+        slopes: list[float],
+        cycles: list[float],
+        play: float,
+        joints: int,
+    ) -> None: ...
+    @property
+    def columns(self) -> int: ...
+    def evaluate(self, q: Array, qd: Array, tau: Array, out: Array) -> None: ...
+
+class Estimator:
+    def __init__(
+        self,
+        chain: Chain,
+        basis: FrictionBasis,
+        drive_gain: list[float],
+        gain: list[float],
+        weights: list[float],
+        deviation: list[float],
+        persistence: list[float],
+        noise: list[float],
+        clip: float,
+        every: int,
+    ) -> None: ...
+    @property
+    def started(self) -> bool: ...
+    def theta(self, out: Array) -> None: ...
+    def reset(self) -> None: ...
+    def run(
+        self,
+        dt: Array,
+        q: Array,
+        qd: Array,
+        current: Array,
+        residual: Array,
+        left: Array,
+        acceleration: Array,
+        theta: Array,
+    ) -> None: ...
+    def step(
+        self,
+        q: Array,
+        qd: Array,
+        current: Array,
+        dt: float,
+        residual: Array,
+        left: Array,
+        acceleration: Array,
+    ) -> None: ...

@@ -68,7 +68,7 @@ def low_pass(gain: ArrayLike, dt: Array, p: Array, beta: Array, tau: Array | Non
         beta: shape (T, c).
         tau: held over each step, shape (T, c); ``None``: zero.
     """
-    out = np.empty_like(p)
+    out = np.empty(p.shape)
     driven = np.empty((0, p.shape[1])) if tau is None else tau
     _observer.filter(per_joint("gain", gain, p.shape[1]), dt, p, beta, driven, out)
     return out

@@ -130,6 +130,10 @@ void Chain::column(int body, int parameter, double* p, double* beta, std::size_t
 void Chain::link_regressor(int body, int count, const double* q, const double* qd, double* p,
                            double* beta, Workspace& work) const {
   velocities(q, qd, work);
+  link_regressor_again(body, count, p, beta, work);
+}
+
+void Chain::link_regressor_again(int body, int count, double* p, double* beta, Workspace& work) const {
   for (int c = 0; c < count; ++c) column(body, c, p + c, beta + c, count, work);
 }
 

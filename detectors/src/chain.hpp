@@ -76,6 +76,8 @@ class Chain {
   // The same for the inertial parameters of link `link` alone, the first `count` of them: n x count.
   void link_regressor(int link, int count, const double* q, const double* qd, double* p, double* beta,
                       Workspace& work) const;
+  // The same for the state that `work` holds from the call before.
+  void link_regressor_again(int link, int count, double* p, double* beta, Workspace& work) const;
 
   // Inverse dynamics: tau = M qdd + C qd + g.
   void rnea(const double* q, const double* qd, const double* qdd, double* tau, Workspace& work) const;

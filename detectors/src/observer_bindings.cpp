@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <stdexcept>
 
+#include "bindings.hpp"
 #include "chain.hpp"
 #include "observer.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
@@ -14,14 +15,6 @@
 namespace nb = nanobind;
 using namespace tauguard::detectors;
 using tauguard::geometry::ThreadPool;
-
-using In1 = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using In2 = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using In3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
-using Ids = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Out1 = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Out2 = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Out3 = nb::ndarray<double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 constexpr std::size_t kGrain = 512;  // samples a chunk
 
@@ -86,10 +79,6 @@ void each_row(std::size_t rows, int joints, int threads, const Row& row) {
   });
 }
 
-void require(bool fits, const char* message) {
-  if (!fits) throw std::invalid_argument(message);
-}
-
 template <class... Arrays>
 void same_rows(const Chain& chain, const Arrays&... arrays) {
   const std::size_t rows = std::get<0>(std::tie(arrays...)).shape(0);
@@ -138,7 +127,7 @@ void bind_chain(nb::module_& m) {
              each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
                chain.momentum(q.data() + n * t, qd.data() + n * t, p.data() + n * t, beta.data() + n * t, work);
              });
-           })
+           }, nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg())
       .def("rnea",
            [](const Chain& chain, In2 q, In2 qd, In2 qdd, Out2 tau, int threads) {
              same_rows(chain, q, qd, qdd, tau);
@@ -146,7 +135,7 @@ void bind_chain(nb::module_& m) {
              each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
                chain.rnea(q.data() + n * t, qd.data() + n * t, qdd.data() + n * t, tau.data() + n * t, work);
              });
-           })
+           }, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg())
       .def("mass_matrix",
            [](const Chain& chain, In2 q, Out3 m, int threads) {
              const std::size_t n = chain.joints.size();
@@ -155,7 +144,7 @@ void bind_chain(nb::module_& m) {
              each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
                chain.mass_matrix(q.data() + n * t, m.data() + n * n * t, work);
              });
-           })
+           }, nb::arg(), nb::arg().noconvert(), nb::arg())
       .def("regressor",
            [](const Chain& chain, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
              const std::size_t n = chain.joints.size(), c = kInertial * n;
@@ -167,7 +156,7 @@ void bind_chain(nb::module_& m) {
                chain.regressor(q.data() + n * t, qd.data() + n * t, p.data() + n * c * t,
                                beta.data() + n * c * t, work);
              });
-           })
+           }, nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg())
       .def("link_regressor", [](const Chain& chain, int link, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
         const std::size_t n = chain.joints.size(), c = p.shape(2);
         same_rows(chain, q, qd);
@@ -179,21 +168,7 @@ void bind_chain(nb::module_& m) {
           chain.link_regressor(link, static_cast<int>(c), q.data() + n * t, qd.data() + n * t,
                                p.data() + n * c * t, beta.data() + n * c * t, work);
         });
-      });
-}
-
-bool finite(const double* v, std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i)
-    if (!std::isfinite(v[i])) return false;
-  return true;
-}
-
-void check_sample(const Observer& observer, const In1& q, const In1& qd, const In1& tau) {
-  const std::size_t n = observer.chain().joints.size();
-  require(q.shape(0) == n && qd.shape(0) == n && tau.shape(0) == n, "q, qd and tau: one entry a joint");
-  require(finite(q.data(), n), "q: every entry must be finite");
-  require(finite(qd.data(), n), "qd: every entry must be finite");
-  require(finite(tau.data(), n), "tau: every entry must be finite");
+      }, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg());
 }
 
 void bind_observer(nb::module_& m) {
@@ -206,17 +181,17 @@ void bind_observer(nb::module_& m) {
       .def_prop_ro("started", &Observer::started)
       .def("reset",
            [](Observer& observer, In1 q, In1 qd, In1 tau) {
-             check_sample(observer, q, qd, tau);
+             check_sample(observer.chain().joints.size(), q, qd, tau, "tau");
              observer.reset(q.data(), qd.data(), tau.data());
            })
       .def("step", [](Observer& observer, In1 q, In1 qd, In1 tau, double dt, Out1 out) {
-        check_sample(observer, q, qd, tau);
+        check_sample(observer.chain().joints.size(), q, qd, tau, "tau");
         require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
         require(observer.started(), "step before reset");
         require(out.shape(0) == q.shape(0), "out: one entry a joint");
         const double* r = observer.step(q.data(), qd.data(), tau.data(), dt);
         std::copy(r, r + q.shape(0), out.data());
-      });
+      }, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
 }
 
 }  // namespace
@@ -224,5 +199,6 @@ void bind_observer(nb::module_& m) {
 NB_MODULE(_observer, m) {
   bind_chain(m);
   bind_observer(m);
-  m.def("filter", &filter);
+  m.def("filter", &filter, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+  bind_estimator(m);
 }

@@ -1,0 +1,195 @@
+"""Windows of the scaled residual: what a detector looks at.
+
+The dissertation's window is rows 1-4 of the observer output, t_W = 80 ms long, sampled every
+t_I = 8 ms: 11 samples each, 44 numbers. Scaling decides whether the SVR works: the kernel's length
+is sigma = 3, and raw N m residuals have a median distance near 100, which makes the kernel matrix
+almost diagonal. So each joint's residual is divided by its envelope (what free motion leaves of it
+at this speed and acceleration), compressed by asinh (a hard blow must not leave the region that
+training has seen) and multiplied by one factor that brings the median distance to ``distance``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import nnls
+
+from tauguard.detectors import _kernel
+
+Array = NDArray[np.float64]
+
+#: The dissertation's window [s].
+WINDOW, INTERVAL = 80e-3, 8e-3
+
+
+@dataclass(frozen=True)
+class WindowShape:
+    """Which samples make a window, in whole samples."""
+
+    lag: int  #: samples between two numbers of a window
+    count: int = 11  #: numbers of a window per joint
+    note: str = ""  #: what the sample rate could not carry; empty if nothing
+
+    @classmethod
+    def at(
+        cls, dt: float, window: float = WINDOW, interval: float = INTERVAL, confirmation: float = 0
+    ) -> WindowShape:
+        """The window at sample interval ``dt`` [s].
+
+        Args:
+            dt: [s].
+            window: t_W [s].
+            interval: t_I [s].
+            confirmation: t_c [s], for the note.
+        """
+        if not (dt > 0 and interval > 0 and window >= interval):
+            raise ValueError(
+                f"dt {dt}, t_I {interval}, t_W {window} s: expected 0 < dt, t_I <= t_W"
+            )
+        lag, count = max(1, round(interval / dt)), round(window / interval) + 1
+        notes = []
+        for name, asked, got in (
+            ("t_I", interval, lag * dt),
+            ("t_c", confirmation, max(1, round(confirmation / dt)) * dt),
+        ):
+            if asked and abs(got - asked) > 0.05 * asked:
+                samples = round(got / dt)
+                plural = "" if samples == 1 else "s"
+                notes.append(f"{name} = {1e3 * asked:g} ms is {samples} sample{plural}")
+        if notes:
+            span = 1e3 * lag * dt * (count - 1)
+            text = ", ".join(notes)
+            notes = [f"at {1e3 * dt:g} ms a sample {text}; a window spans {span:g} ms"]
+        return cls(lag, count, "".join(notes))
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope:
+    """What free motion leaves of the residual: per joint a + b |qd_j| + c sum |qd| + d sum |qdd|.
+
+    The sums run over all joints; the acceleration is the estimator's.
+    """
+
+    weights: Array  #: shape (n, 4), not negative [N m per unit]
+
+    @classmethod
+    def fit(cls, left: Array, qd: Array, acceleration: Array) -> Envelope:
+        """Non-negative least squares of ``|left|``, scaled to its standard deviation.
+
+        Args:
+            left: residual of free motion [N m], shape (T, n).
+            qd: [rad/s], shape (T, n).
+            acceleration: [rad/s^2], shape (T, n).
+        """
+        columns = cls._columns(qd, acceleration)
+        weights = np.zeros((left.shape[1], 4))
+        for j in range(left.shape[1]):
+            weights[j] = nnls(columns[:, j], np.abs(left[:, j]))[0]
+            weights[j, 0] = max(weights[j, 0], 1e-3 * float(np.abs(left[:, j]).mean()), 1e-9)
+        return cls(weights * np.sqrt(np.pi / 2))
+
+    @classmethod
+    def constant(cls, scale: ArrayLike) -> Envelope:
+        """The same at every speed, shape (n,) [N m]."""
+        level = np.asarray(scale, dtype=np.float64)
+        return cls(np.column_stack([level, np.zeros((len(level), 3))]))
+
+    @staticmethod
+    def _columns(qd: Array, acceleration: Array) -> Array:
+        speed, total = np.abs(qd), np.abs(acceleration).sum(axis=-1, keepdims=True)
+        return np.stack(
+            [
+                np.ones_like(qd),
+                speed,
+                np.broadcast_to(speed.sum(axis=-1, keepdims=True), qd.shape),
+                np.broadcast_to(total, qd.shape),
+            ],
+            axis=-1,
+        )
+
+    def scale(self, qd: Array, acceleration: Array) -> Array:
+        """The envelope [N m] at every sample, shape (..., n)."""
+        w = self.weights
+        speed = np.abs(qd)
+        total = speed.sum(axis=-1, keepdims=True)
+        shaken = np.abs(acceleration).sum(axis=-1, keepdims=True)
+        value: Array = w[:, 0] + w[:, 1] * speed + w[:, 2] * total + w[:, 3] * shaken
+        return value
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """From residuals to windows."""
+
+    joints: tuple[int, ...]  #: 0-based, those whose residuals feed the windows
+    shape: WindowShape
+    envelope: Envelope | None  #: None: raw N m
+    factor: float = 1.0
+    units: float = 5.0  #: envelopes that count one before the compression
+    compress: bool = True
+    notes: tuple[str, ...] = field(default=())
+
+    def signal(self, left: Array, qd: Array, acceleration: Array) -> Array:
+        """The scaled residual of the chosen joints, shape (..., len(joints))."""
+        chosen = list(self.joints)
+        if self.envelope is None:
+            return np.ascontiguousarray(left[..., chosen] * self.factor)
+        ratio = (left / (self.units * self.envelope.scale(qd, acceleration)))[..., chosen]
+        return np.ascontiguousarray(self.factor * (np.arcsinh(ratio) if self.compress else ratio))
+
+    @property
+    def size(self) -> int:
+        """Numbers of a window."""
+        return len(self.joints) * self.shape.count
+
+    def windows(self, signal: Array, ends: ArrayLike) -> Array:
+        """The windows that end at rows ``ends``, shape (N, size): joint by joint, oldest first.
+
+        Rows before the first count as the first.
+        """
+        at = np.ascontiguousarray(ends, dtype=np.int64)
+        out = np.empty((len(at), self.size))
+        _kernel.windows(signal, at, self.shape.lag, self.shape.count, out)
+        return out
+
+
+def median_distance(windows: Array, rng: np.random.Generator, pairs: int = 4000) -> float:
+    """Median Euclidean distance between random pairs of rows."""
+    a, b = rng.integers(len(windows), size=(2, pairs))
+    apart = a != b
+    gaps = np.linalg.norm(windows[a[apart]] - windows[b[apart]], axis=1)
+    return float(np.median(gaps)) if len(gaps) else 0.0
+
+
+class Ring:
+    """The last rows of a signal, for windows online without allocation."""
+
+    def __init__(self, features: Features) -> None:
+        """For the windows of ``features``."""
+        self._lag, self._count = features.shape.lag, features.shape.count
+        self._length = self._lag * (self._count - 1) + 1
+        self._rows = np.zeros((2 * self._length, len(features.joints)))
+        self._columns: Sequence[int] = range(len(features.joints))
+        self.window = np.zeros((1, features.size))
+        self._view = self.window.reshape(len(features.joints), self._count)
+        self._at = -1
+
+    def reset(self) -> None:
+        """Forget."""
+        self._at = -1
+
+    def push(self, row: Array) -> Array:
+        """The window that ends with ``row``, shape (1, size); overwritten by the next call."""
+        if self._at < 0:
+            self._rows[:] = row
+            self._at = 0
+        else:
+            self._at = (self._at + 1) % self._length
+            self._rows[self._at] = row
+            self._rows[self._at + self._length] = row
+        end = self._at + self._length
+        self._view[:] = self._rows[end - self._length + 1 : end + 1 : self._lag].T
+        return self.window

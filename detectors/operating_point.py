@@ -1,0 +1,63 @@
+"""The threshold for a number of false alarms per hour, from collision-free scores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.events import MERGE_GAP
+
+Array = NDArray[np.float64]
+
+
+def sustained(score: Array, samples: int) -> Array:
+    """The level that the last ``samples`` scores all reach, shape (T,): an alarm needs it."""
+    if samples <= 1:
+        return score
+    padded = np.concatenate((np.full(samples - 1, -np.inf), score))
+    lowest: Array = np.lib.stride_tricks.sliding_window_view(padded, samples).min(axis=-1)
+    return lowest
+
+
+def block_peaks(level: Array, rows: int) -> Array:
+    """The maximum of each block of ``rows`` samples (the last may be shorter)."""
+    return np.maximum.reduceat(level, np.arange(0, len(level), max(1, rows)))
+
+
+def threshold_for_rate(
+    levels: Sequence[Array], dt: float, per_hour: float, tail: float = 0.02
+) -> float:
+    """The threshold at which collision-free motion gives ``per_hour`` false alarms.
+
+    Alarms are counted as blocks of the merge gap that exceed the threshold (an overcount where an
+    alarm spans several). If the rate allows at least one alarm in the time given, the threshold is
+    the peak that is exceeded that often; otherwise an exponential tail is fitted to the largest
+    share ``tail`` of the block peaks and followed down to the rate.
+
+    Args:
+        levels: sustained scores of collision-free stretches, each of shape (T,).
+        dt: sample interval [s].
+        per_hour: the false alarms to accept, above 0.
+        tail: share of the block peaks in the tail.
+
+    Raises:
+        ValueError: no scores, or a rate that is not above 0.
+    """
+    if not per_hour > 0:
+        raise ValueError(f"per_hour: {per_hour}, expected above 0")
+    rows = max(1, round(MERGE_GAP / dt))
+    parts = [block_peaks(level, rows) for level in levels if len(level)]
+    if not parts:
+        raise ValueError("no collision-free scores to choose a threshold by")
+    peaks = np.sort(np.concatenate(parts))[::-1]
+    hours = sum(len(level) for level in levels) * dt / 3600
+    allowed = per_hour * hours
+    if allowed >= 1:
+        return float(peaks[min(int(allowed), len(peaks) - 1)])
+    count = max(2, min(len(peaks) - 1, round(tail * len(peaks))))
+    base = float(peaks[min(count, len(peaks) - 1)])
+    mean_excess = float(np.mean(peaks[:count] - base))
+    followed = base + mean_excess * float(np.log(count / allowed))
+    return max(followed, float(np.nextafter(peaks[0], np.inf)))

@@ -1,0 +1,207 @@
+// The estimator: friction compensation, momentum observer, and a Kalman filter for what the model does
+// not know (payload, friction that has changed), so that the residual that is left is a collision.
+//
+// The residual of a wrong model is linear in what is wrong: r = Phi theta + tau_ext with Phi the columns
+// of the unknowns, passed through the observer's own filter. theta holds the payload at the last link
+// (mass and first moment in that link's frame) and, per joint, a torque offset and the relative errors of
+// viscous and Coulomb friction. Each is an Ornstein-Uhlenbeck process with its own standard deviation and
+// time constant: what no motion excites falls back to zero. A standard deviation of 0 removes an unknown.
+//
+// An innovation of more than `clip` standard deviations counts as one of `clip`: a collision moves the
+// estimate little, a payload within a second or so.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "chain.hpp"
+#include "friction.hpp"
+#include "observer.hpp"
+
+namespace tauguard::detectors {
+
+constexpr int kPayload = 4;    // mass and first moment
+constexpr int kPerJoint = 3;   // offset, viscous, Coulomb
+constexpr double kAccelerationRate = 30.0;  // [1/s]
+
+struct EstimatorSettings {
+  std::vector<double> drive_gain;    // N m/A, n
+  std::vector<double> gain;          // of the observer [1/s], n
+  std::vector<double> weights;       // friction, n x columns
+  std::vector<double> deviation;     // of the unknowns, 4 + 3 n
+  std::vector<double> persistence;   // time constants of the unknowns [s], 4 + 3 n
+  std::vector<double> noise;         // standard deviation of the residual [N m], n
+  double clip = 3.0;
+  int every = 10;                    // samples between two corrections
+};
+
+class Estimator {
+ public:
+  Estimator(Chain chain, FrictionBasis basis, EstimatorSettings settings)
+      : chain_(std::move(chain)),
+        basis_(std::move(basis)),
+        set_(std::move(settings)),
+        n_(chain_.joints.size()),
+        m_(kPayload + kPerJoint * n_),
+        work_(n_),
+        memory_(n_ * basis_.memory()),
+        column_(basis_.columns()),
+        theta_(m_),
+        covariance_(m_ * m_),
+        gathered_(m_),
+        row_(m_) {
+    for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_, &decay_}) v->resize(n_);
+    for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_}) v->resize(kPayload * n_);
+    for (auto* v : {&own_now_, &own_before_, &own_}) v->resize(kPerJoint * n_);
+    adapts_ = false;
+    for (const double d : set_.deviation) adapts_ = adapts_ || d > 0;
+  }
+
+  std::size_t joints() const { return n_; }
+  std::size_t unknowns() const { return m_; }
+  bool started() const { return started_; }
+  const std::vector<double>& theta() const { return theta_; }
+
+  void reset() {
+    started_ = false;
+    decay_dt_ = -1.0;
+  }
+
+  // One sample: residual r of the observer, what is left of it after the unknowns' share, in `left`, and
+  // an acceleration (velocity differentiated at the rate kAccelerationRate).
+  void step(const double* q, const double* qd, const double* current, double dt, double* residual,
+            double* left, double* acceleration) {
+    if (!started_) begin(q, qd);
+    drive(q, qd, current);
+    chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
+    if (adapts_)
+      chain_.link_regressor_again(static_cast<int>(n_) - 1, kPayload, load_p_.data(), load_beta_.data(), work_);
+    if (started_) filter(dt);
+    remember();
+    for (std::size_t j = 0; j < n_; ++j) {
+      residual[j] = left[j] = residual_[j];
+      if (started_) smooth_[j] += smooth_decay_ * (qd[j] - smooth_[j]);
+      acceleration[j] = kAccelerationRate * (qd[j] - smooth_[j]);
+    }
+    if (adapts_) {
+      for (std::size_t j = 0; j < n_; ++j) left[j] -= expected(j);
+      if (started_ && ++since_ >= set_.every) correct(dt * since_);
+    }
+    started_ = true;
+  }
+
+ private:
+  void begin(const double* q, const double* qd) {
+    smooth_.assign(qd, qd + n_);
+    for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
+    for (auto* v : {&residual_, &load_, &own_, &theta_, &covariance_}) std::fill(v->begin(), v->end(), 0.0);
+    for (std::size_t a = 0; a < m_; ++a) covariance_[a * m_ + a] = set_.deviation[a] * set_.deviation[a];
+    since_ = 0;
+  }
+
+  // Drive torques less friction, and what each unknown of a joint's own would add to them.
+  void drive(const double* q, const double* qd, const double* current) {
+    const std::size_t columns = basis_.columns(), smooth = basis_.smooth();
+    for (std::size_t j = 0; j < n_; ++j) {
+      const double tau = set_.drive_gain[j] * current[j];
+      basis_.evaluate(j, q[j], qd[j], tau, &memory_[j * basis_.memory()], column_.data());
+      const double* w = &set_.weights[j * columns];
+      const double viscous = w[FrictionBasis::kViscous] * column_[FrictionBasis::kViscous];
+      double coulomb = 0.0, other = w[FrictionBasis::kOffset];
+      for (std::size_t c = FrictionBasis::kFirst; c < smooth; ++c) coulomb += w[c] * column_[c];
+      for (std::size_t c = smooth; c < columns; ++c) other += w[c] * column_[c];
+      tau_[j] = tau - (viscous + coulomb + other);
+      own_now_[kPerJoint * j] = 1.0;
+      own_now_[kPerJoint * j + 1] = viscous;
+      own_now_[kPerJoint * j + 2] = coulomb;
+    }
+  }
+
+  void filter(double dt) {
+    if (dt != decay_dt_) {
+      for (std::size_t j = 0; j < n_; ++j) decay_[j] = observer_decay(set_.gain[j], dt);
+      smooth_decay_ = observer_decay(kAccelerationRate, dt);
+      decay_dt_ = dt;
+    }
+    for (std::size_t j = 0; j < n_; ++j) {
+      residual_[j] = observer_step(residual_[j], decay_[j], dt, p_[j], p_before_[j], beta_[j], beta_before_[j],
+                                   tau_before_[j]);
+      if (!adapts_) continue;
+      for (std::size_t a = j * kPayload; a < (j + 1) * kPayload; ++a)
+        load_[a] = observer_step(load_[a], decay_[j], dt, load_p_[a], load_p_before_[a], load_beta_[a],
+                                 load_beta_before_[a], 0.0);
+      for (std::size_t a = j * kPerJoint; a < (j + 1) * kPerJoint; ++a)
+        own_[a] += decay_[j] * (-own_before_[a] - own_[a]);
+    }
+  }
+
+  void remember() {
+    p_.swap(p_before_);
+    beta_.swap(beta_before_);
+    load_p_.swap(load_p_before_);
+    load_beta_.swap(load_beta_before_);
+    tau_before_ = tau_;
+    own_before_ = own_now_;
+  }
+
+  double expected(std::size_t j) const {
+    double sum = 0.0;
+    for (int a = 0; a < kPayload; ++a) sum += load_[kPayload * j + a] * theta_[a];
+    for (int a = 0; a < kPerJoint; ++a)
+      sum += own_[kPerJoint * j + a] * theta_[kPayload + kPerJoint * j + a];
+    return sum;
+  }
+
+  // The Kalman filter: time update over `elapsed` seconds, then one scalar update per joint.
+  void correct(double elapsed) {
+    since_ = 0;
+    for (std::size_t a = 0; a < m_; ++a) row_[a] = std::exp(-elapsed / set_.persistence[a]);
+    for (std::size_t a = 0; a < m_; ++a) {
+      theta_[a] *= row_[a];
+      for (std::size_t b = 0; b < m_; ++b) covariance_[a * m_ + b] *= row_[a] * row_[b];
+      covariance_[a * m_ + a] += (1 - row_[a] * row_[a]) * set_.deviation[a] * set_.deviation[a];
+    }
+    for (std::size_t j = 0; j < n_; ++j) update(j);
+  }
+
+  void update(std::size_t j) {
+    const std::size_t first = kPayload + kPerJoint * j;
+    std::fill(row_.begin(), row_.end(), 0.0);
+    for (int a = 0; a < kPayload; ++a) row_[a] = load_[kPayload * j + a];
+    for (int a = 0; a < kPerJoint; ++a) row_[first + a] = own_[kPerJoint * j + a];
+    double variance = set_.noise[j] * set_.noise[j];
+    for (std::size_t b = 0; b < m_; ++b) {
+      double sum = 0.0;
+      for (int a = 0; a < kPayload; ++a) sum += covariance_[b * m_ + a] * row_[a];
+      for (int a = 0; a < kPerJoint; ++a) sum += covariance_[b * m_ + first + a] * row_[first + a];
+      gathered_[b] = sum;
+    }
+    for (std::size_t b = 0; b < m_; ++b) variance += row_[b] * gathered_[b];
+    double innovation = residual_[j] - expected(j);
+    const double limit = set_.clip * std::sqrt(variance);
+    innovation = std::clamp(innovation, -limit, limit);
+    for (std::size_t a = 0; a < m_; ++a) {
+      const double k = gathered_[a] / variance;
+      theta_[a] += k * innovation;
+      for (std::size_t b = 0; b <= a; ++b) {
+        covariance_[a * m_ + b] -= k * gathered_[b];
+        covariance_[b * m_ + a] = covariance_[a * m_ + b];
+      }
+    }
+  }
+
+  Chain chain_;
+  FrictionBasis basis_;
+  EstimatorSettings set_;
+  std::size_t n_, m_;
+  Workspace work_;
+  std::vector<double> memory_, column_, theta_, covariance_, gathered_, row_;
+  std::vector<double> p_, beta_, p_before_, beta_before_, tau_, tau_before_, residual_, decay_;
+  std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_;
+  std::vector<double> own_now_, own_before_, own_, smooth_;
+  double decay_dt_ = -1.0, smooth_decay_ = 0.0;
+  int since_ = 0;
+  bool started_ = false, adapts_ = false;
+};
+
+}  // namespace tauguard::detectors

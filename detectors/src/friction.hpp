@@ -1,0 +1,77 @@
+// A friction model that is linear in its weights: columns of position, velocity and drive torque.
+//
+// Presliding and Coulomb friction come in two forms, both in [-1, 1] and rate-independent:
+//   a Dahl bristle of settling length d:   ds = (dq - s |dq|) / d   (exact over a step: exponential)
+//   a stop operator of width d:            s = (q - rest) / d, rest dragged along beyond d
+// The bristle forgets under jitter, so it follows a position that moves only when the measured one has
+// left a dead zone of `play` around it. With b the first bristle (the first stop where there is none), the
+// columns of one joint are, in this order,
+//   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each width w,
+//   |tau| b, cos(c q), sin(c q) for each ripple frequency c
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+namespace tauguard::detectors {
+
+class FrictionBasis {
+ public:
+  std::vector<double> bristles;  // settling lengths [rad]
+  std::vector<double> stops;     // widths [rad]
+  std::vector<double> stribeck;  // [rad/s]
+  std::vector<double> slopes;    // tanh widths [rad/s]
+  std::vector<double> cycles;    // per joint, `ripples` each [1/rad]
+  std::size_t ripples = 0;
+  double play = 0.0;             // [rad]
+
+  static constexpr std::size_t kOffset = 0, kViscous = 1, kFirst = 2;
+
+  std::size_t columns() const {
+    return kFirst + bristles.size() + stops.size() + stribeck.size() + slopes.size() + 1 + 2 * ripples;
+  }
+  // Columns [kFirst, smooth()) are Coulomb friction in its forms.
+  std::size_t smooth() const { return columns() - 2 * ripples; }
+
+  // Numbers of memory a joint: the followed position, the bristles, the stops' rests.
+  std::size_t memory() const { return 1 + bristles.size() + stops.size(); }
+
+  void reset(double q, double* memory) const {
+    *memory++ = q;
+    for (std::size_t k = 0; k < bristles.size(); ++k) *memory++ = 0.0;
+    for (std::size_t k = 0; k < stops.size(); ++k) *memory++ = q;
+  }
+
+  void evaluate(std::size_t joint, double q, double qd, double tau, double* memory, double* out) const {
+    *out++ = 1.0;
+    *out++ = qd;
+    const double* coulomb = out;
+    const double before = *memory;
+    *memory = std::clamp(before, q - play, q + play);
+    const double moved = *memory++ - before;
+    for (const double length : bristles) {
+      if (moved != 0.0) {
+        const double settled = moved > 0 ? 1.0 : -1.0;
+        *memory = settled + (*memory - settled) * std::exp(-std::fabs(moved) / length);
+      }
+      *out++ = *memory++;
+    }
+    for (const double width : stops) {
+      *memory = std::clamp(*memory, q - width, q + width);
+      *out++ = (q - *memory++) / width;
+    }
+    const double b = *coulomb;
+    for (const double w : stribeck) *out++ = b * std::exp(-(qd / w) * (qd / w));
+    for (const double w : slopes) *out++ = std::tanh(qd / w);
+    *out++ = std::fabs(tau) * b;
+    for (std::size_t h = 0; h < ripples; ++h) {
+      const double phase = cycles[joint * ripples + h] * q;
+      *out++ = std::cos(phase);
+      *out++ = std::sin(phase);
+    }
+  }
+};
+
+}  // namespace tauguard::detectors

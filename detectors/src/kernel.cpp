@@ -1,0 +1,149 @@
+// tauguard.detectors._kernel: the SRQ kernel 1 / (1 + |x - z|^2 / sigma^2)^2 and sums of it.
+//
+// Lanes run over support vectors: every lane does the same arithmetic in the same order whatever the
+// vector width, so that all code paths give the same bits. A result depends on its row alone, so that any
+// number of threads and online evaluation give the same bits too.
+#include <nanobind/nanobind.h>
+
+#include <vector>
+
+#include "bindings.hpp"
+#include "tauguard/geometry/thread_pool.hpp"
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__)
+#define TAUGUARD_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define TAUGUARD_WIDE
+#endif
+
+namespace tauguard::detectors {
+
+using geometry::ThreadPool;
+
+constexpr std::size_t kLanes = 16;
+
+// sum_i coef_i / (1 + |x - z_i|^2 inv)^2 over `blocks` blocks of kLanes vectors of d numbers, lane last.
+TAUGUARD_WIDE double weighted_sum(const double* x, const double* vectors, const double* coef, std::size_t blocks,
+                                  std::size_t d, double inv) {
+  double sum[kLanes] = {};
+  for (std::size_t b = 0; b < blocks; ++b) {
+    double square[kLanes] = {};
+    const double* z = vectors + b * d * kLanes;
+    for (std::size_t k = 0; k < d; ++k)
+      for (std::size_t l = 0; l < kLanes; ++l) {
+        const double gap = x[k] - z[k * kLanes + l];
+        square[l] += gap * gap;
+      }
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      const double one = 1.0 / (1.0 + square[l] * inv);
+      sum[l] += coef[b * kLanes + l] * (one * one);
+    }
+  }
+  double total = 0.0;
+  for (std::size_t l = 0; l < kLanes; ++l) total += sum[l];
+  return total;
+}
+
+// A weighted sum of kernels: support vectors packed for weighted_sum, padded with zero coefficients.
+class KernelSum {
+ public:
+  KernelSum(In2 vectors, In1 coef, double intercept, double sigma)
+      : d_(vectors.shape(1)), blocks_((vectors.shape(0) + kLanes - 1) / kLanes), intercept_(intercept) {
+    require(coef.shape(0) == vectors.shape(0), "KernelSum: one coefficient a vector");
+    require(sigma > 0, "KernelSum: sigma must be above 0");
+    inv_ = 1.0 / (sigma * sigma);
+    vectors_.assign(blocks_ * d_ * kLanes, 0.0);
+    coef_.assign(blocks_ * kLanes, 0.0);
+    for (std::size_t i = 0; i < vectors.shape(0); ++i) {
+      coef_[i] = coef.data()[i];
+      for (std::size_t k = 0; k < d_; ++k)
+        vectors_[((i / kLanes) * d_ + k) * kLanes + i % kLanes] = vectors.data()[i * d_ + k];
+    }
+  }
+
+  std::size_t dimension() const { return d_; }
+  double at(const double* x) const {
+    return weighted_sum(x, vectors_.data(), coef_.data(), blocks_, d_, inv_) + intercept_;
+  }
+
+ private:
+  std::size_t d_, blocks_;
+  double intercept_, inv_;
+  std::vector<double> vectors_, coef_;
+};
+
+namespace {
+
+void rows(const KernelSum& kernel, In2 x, Out1 out, int threads) {
+  require(x.shape(1) == kernel.dimension() && out.shape(0) == x.shape(0), "rows: arrays differ in shape");
+  nb::gil_scoped_release release;
+  ThreadPool::shared().parallel_for(x.shape(0), threads, 256, [&](auto begin, auto end, auto) {
+    for (auto t = begin; t < end; ++t) out.data()[t] = kernel.at(x.data() + t * kernel.dimension());
+  });
+}
+
+// The window that ends with row t of a signal of m columns: `count` rows `lag` apart, oldest first, one
+// column after the other; rows before the first are the first.
+void window(const double* signal, std::size_t m, std::size_t t, std::size_t lag, std::size_t count, double* out) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t back = (count - 1 - i) * lag;
+    const double* row = signal + m * (back > t ? 0 : t - back);
+    for (std::size_t j = 0; j < m; ++j) out[j * count + i] = row[j];
+  }
+}
+
+void windows(In2 signal, Ids ends, std::size_t lag, std::size_t count, Out2 out) {
+  const std::size_t m = signal.shape(1);
+  require(out.shape(0) == ends.shape(0) && out.shape(1) == m * count, "windows: arrays differ in shape");
+  for (std::size_t i = 0; i < ends.shape(0); ++i) {
+    require(ends.data()[i] >= 0 && static_cast<std::size_t>(ends.data()[i]) < signal.shape(0),
+            "windows: an end lies outside the signal");
+    window(signal.data(), m, ends.data()[i], lag, count, out.data() + i * m * count);
+  }
+}
+
+void series(const KernelSum& kernel, In2 signal, std::size_t lag, std::size_t count, Out1 out, int threads) {
+  const std::size_t m = signal.shape(1);
+  require(m * count == kernel.dimension() && out.shape(0) == signal.shape(0) && lag > 0,
+          "series: arrays differ in shape");
+  nb::gil_scoped_release release;
+  ThreadPool::shared().parallel_for(signal.shape(0), threads, 256, [&](auto begin, auto end, auto) {
+    std::vector<double> x(m * count);
+    for (auto t = begin; t < end; ++t) {
+      window(signal.data(), m, t, lag, count, x.data());
+      out.data()[t] = kernel.at(x.data());
+    }
+  });
+}
+
+// K_ij between the rows of a and b.
+void gram(In2 a, In2 b, double sigma, Out2 out, int threads) {
+  const std::size_t d = a.shape(1), columns = b.shape(0);
+  require(b.shape(1) == d && out.shape(0) == a.shape(0) && out.shape(1) == columns && sigma > 0,
+          "gram: arrays differ in shape, or sigma is not above 0");
+  nb::gil_scoped_release release;
+  const double inv = 1.0 / (sigma * sigma);
+  ThreadPool::shared().parallel_for(a.shape(0), threads, 16, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i)
+      for (std::size_t j = 0; j < columns; ++j) {
+        const double *x = a.data() + i * d, *z = b.data() + j * d;
+        double square = 0.0;
+        for (std::size_t k = 0; k < d; ++k) square += (x[k] - z[k]) * (x[k] - z[k]);
+        const double one = 1.0 / (1.0 + square * inv);
+        out.data()[i * columns + j] = one * one;
+      }
+  });
+}
+
+}  // namespace
+}  // namespace tauguard::detectors
+
+NB_MODULE(_kernel, m) {
+  using namespace tauguard::detectors;
+  nb::class_<KernelSum>(m, "KernelSum")
+      .def(nb::init<In2, In1, double, double>())
+      .def("rows", &rows, nb::arg(), nb::arg().noconvert(), nb::arg())
+      .def("series", &series, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
+  m.def("gram", &gram, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
+  m.def("windows", &windows, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+}

@@ -1,0 +1,39 @@
+"""A small arm's worth of simulated traces, and a detector trained on them."""
+
+import numpy as np
+import pytest
+
+from tauguard.datasets.plans import free_episodes, struck_episodes
+from tauguard.detectors import CollisionDetector, DetectorSettings, RobotNumbers
+from tauguard.envs import simulate
+from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
+
+ARM = Mismatch(seed=11)
+
+
+@pytest.fixture(scope="session")
+def robot():
+    return RobotNumbers.from_pin(pin_model(cura6.arm_xml()))
+
+
+@pytest.fixture(scope="session")
+def drive_gain():
+    return np.array(cura6_drive().gain)
+
+
+@pytest.fixture(scope="session")
+def training():
+    episodes = free_episodes(5, 6, 20.0, (10.0, 30.0, 60.0), (0.0, 2000.0, 4000.0), ARM)
+    episodes += struck_episodes(6, 2, 6, (30.0, 60.0), (0.0, 2500.0), ARM)
+    return [simulate(episode) for episode in episodes]
+
+
+@pytest.fixture(scope="session")
+def unseen():
+    return [simulate(e) for e in struck_episodes(77, 2, 8, (20.0, 50.0), (1500.0, 3500.0), ARM)]
+
+
+@pytest.fixture(scope="session")
+def detector(training, robot, drive_gain):
+    settings = DetectorSettings(windows=1000, mined=80, false_alarms_per_hour=60.0)
+    return CollisionDetector(settings).fit(training, robot, drive_gain)

@@ -1,0 +1,88 @@
+"""Windows, envelope, scaling, and what a sample rate cannot carry."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tauguard.detectors.features import (
+    Envelope,
+    Features,
+    Ring,
+    WindowShape,
+    median_distance,
+)
+
+
+def test_the_dissertations_window_is_44_numbers():
+    shape = WindowShape.at(1e-3, confirmation=3e-3)
+    assert (shape.lag, shape.count, shape.note) == (8, 11, "")
+    assert Features((0, 1, 2, 3), shape, None).size == 44
+
+
+@pytest.mark.parametrize(
+    ("dt", "lag", "words"),
+    [
+        (10e-3, 1, ["t_I = 8 ms is 1 sample", "t_c = 3 ms is 1 sample", "spans 100 ms"]),
+        (42e-3, 1, ["at 42 ms", "spans 420 ms"]),
+        (4e-3, 2, ["t_c = 3 ms is 1 sample"]),
+        (2e-3, 4, ["t_c = 3 ms is 2 samples"]),
+    ],
+)
+def test_what_a_rate_cannot_carry_is_counted_in_samples_and_said(dt, lag, words):
+    shape = WindowShape.at(dt, confirmation=3e-3)
+    assert shape.lag == lag
+    assert shape.count == 11
+    for word in words:
+        assert word in shape.note
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**31), lag=st.integers(1, 5), count=st.integers(1, 6))
+def test_windows_are_causal_and_equal_to_a_plain_gather(seed, lag, count):
+    rng = np.random.default_rng(seed)
+    signal = rng.normal(size=(40, 3))
+    features = Features((0, 1, 2), WindowShape(lag, count), None)
+    windows = features.windows(signal, np.arange(40))
+    ring = Ring(features)
+    for t in range(40):
+        rows = [max(0, t - k * lag) for k in reversed(range(count))]
+        expected = signal[rows].T.ravel()
+        np.testing.assert_array_equal(windows[t], expected)
+        np.testing.assert_array_equal(ring.push(signal[t])[0], expected)
+    changed = signal.copy()
+    changed[25:] += 1
+    np.testing.assert_array_equal(features.windows(changed, np.arange(25)), windows[:25])
+
+
+def test_envelope_finds_what_the_noise_grows_with():
+    rng = np.random.default_rng(0)
+    qd, acceleration = rng.normal(size=(2, 20000, 2))
+    truth = np.array([[1.0, 0.5, 0.0, 0.0], [0.2, 0.0, 0.3, 0.1]])
+    scale = Envelope(truth).scale(qd, acceleration)
+    left = scale * rng.normal(size=qd.shape)
+    fitted = Envelope.fit(left, qd, acceleration)
+    np.testing.assert_allclose(fitted.weights, truth, atol=0.06)
+    assert np.std(left / fitted.scale(qd, acceleration), axis=0) == pytest.approx([1, 1], abs=0.03)
+
+
+def test_a_joint_without_any_residual_keeps_a_scale_above_zero():
+    silent = Envelope.fit(np.zeros((100, 1)), np.ones((100, 1)), np.ones((100, 1)))
+    assert (silent.scale(np.zeros(1), np.zeros(1)) > 0).all()
+
+
+def test_scaling_brings_the_median_distance_to_what_was_asked(detector, training):
+    estimate = detector._estimate(training[-1])
+    f = detector.features
+    signal = f.signal(estimate.left, training[-1].qd, estimate.acceleration)
+    rows = np.arange(3000, len(signal), 7)
+    distance = median_distance(f.windows(signal, rows), np.random.default_rng(0))
+    assert 1 < distance < 8  # of the kernel's length 3; raw N m give about 100
+    plain = Features(f.joints, f.shape, None)
+    raw = plain.signal(estimate.residual, training[-1].qd, estimate.acceleration)
+    np.testing.assert_array_equal(raw, estimate.residual[:, :4])
+
+
+def test_bad_window():
+    with pytest.raises(ValueError, match=r"dt 0\.0, t_I"):
+        WindowShape.at(0.0)
