@@ -222,7 +222,9 @@ def calibrate(
         normal = _Normal(robot, model.columns, len(data))
         for k, columns in enumerate(data):
             normal.add(columns, k, 1 / (priors.softness * level))
-        solution: NDArray[Any] = np.linalg.solve(normal.matrix + np.diag(deviations**-2.0), normal.vector)
+        solution: NDArray[Any] = np.linalg.solve(
+            normal.matrix + np.diag(deviations**-2.0), normal.vector
+        )
         level = np.maximum(normal.rms(data, solution), 1e-6)
     inertial = solution[: normal.friction].reshape(-1, INERTIAL)
     weights: Array = solution[normal.friction : normal.gain].reshape(robot.joints, -1)
