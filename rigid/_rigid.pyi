@@ -3,6 +3,7 @@ from numpy.typing import NDArray
 
 # convex bodies
 def has_avx2() -> bool: ...
+def allow_vectors(allowed: bool) -> None: ...
 def overlap(
     kind_a: int,
     a: NDArray[np.float64],
@@ -20,7 +21,6 @@ def overlap_boxes(
     b: NDArray[np.float64],
     blocks_b: NDArray[np.float64],
     skew: float,
-    vectors: bool,
     threads: int,
     hit: NDArray[np.uint8],
 ) -> int: ...

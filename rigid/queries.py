@@ -9,6 +9,8 @@ and hand what they cannot tell to exact arithmetic.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Literal, get_args
 
 import numpy as np
@@ -73,12 +75,10 @@ def native_overlap(
     return hit.view(np.bool_), left
 
 
-def overlap_boxes(
-    a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8], vectors: bool = True
-) -> int:
+def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> int:
     """The batch path of boxes into ``hit``: how many rows needed exact arithmetic."""
     skew = max(a.skew, b.skew)
-    return _rigid.overlap_boxes(a.packed, a.blocks, b.packed, b.blocks, skew, vectors, threads, hit)
+    return _rigid.overlap_boxes(a.packed, a.blocks, b.packed, b.blocks, skew, threads, hit)
 
 
 def sweep(
@@ -135,6 +135,16 @@ def native_sweep(
         *native(a), *native(b), moves, _METHODS[method], thread_count(threads), points, hit, out
     )
     return hit.view(np.bool_), out, left
+
+
+@contextmanager
+def portable() -> Iterator[None]:
+    """Without vector instructions inside the block, for studies and tests; for all threads."""
+    _rigid.allow_vectors(False)
+    try:
+        yield
+    finally:
+        _rigid.allow_vectors(True)
 
 
 def find_witness(a: Bodies, b: Bodies, hit: NDArray[np.bool_], threads: int = 1) -> Witness:

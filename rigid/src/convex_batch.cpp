@@ -91,14 +91,13 @@ void pack_boxes(const double* packed, std::size_t n, double* blocks) {
 }
 
 std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b, const void* blocks_b,
-                          double skew, std::size_t n, bool vectors, int threads, std::uint8_t* hit) {
+                          double skew, std::size_t n, int threads, std::uint8_t* hit) {
   const Batch batch{a, b, static_cast<const BoxBlock*>(blocks_a), static_cast<const BoxBlock*>(blocks_b),
                     skew, n, hit};
   auto run = run_portable;
 #if defined(TAUGUARD_AVX2)
-  if (vectors && __builtin_cpu_supports("avx2")) run = run_avx2;
+  if (use_avx2()) run = run_avx2;
 #endif
-  (void)vectors;
   std::atomic<std::size_t> left{0};
   geometry::ThreadPool::shared().parallel_for((n + 7) / 8, threads, 512, [&](auto begin, auto end, auto) {
     left += run(batch, begin, end);

@@ -3,6 +3,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 
+#include "convex_lanes.hpp"
 #include "convex_overlap.hpp"
 
 namespace nb = nanobind;
@@ -23,25 +24,20 @@ Bodies view(int kind, const Data& data, const Offsets& offsets) {
 }  // namespace
 
 void bind_convex(nb::module_& m) {
-  m.def("has_avx2", [] {
-#if defined(__x86_64__)
-    return static_cast<bool>(__builtin_cpu_supports("avx2"));
-#else
-    return false;
-#endif
-  });
+  m.def("has_avx2", [] { return use_avx2(); });
+  m.def("allow_vectors", [](bool allowed) { vectors_allowed = allowed; });
   m.def("overlap", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b, int method,
                       int threads, Hits hit) {
     nb::gil_scoped_release release;
     return overlap(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
                    static_cast<Method>(method), threads, hit.data());
   });
-  m.def("overlap_boxes", [](Data a, Data blocks_a, Data b, Data blocks_b, double skew, bool vectors, int threads,
+  m.def("overlap_boxes", [](Data a, Data blocks_a, Data b, Data blocks_b, double skew, int threads,
                             Hits hit) {
     nb::gil_scoped_release release;
     const Bodies rows_a{Kind::boxes, a.data(), nullptr, a.shape(0)};
     const Bodies rows_b{Kind::boxes, b.data(), nullptr, b.shape(0)};
-    return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0), vectors, threads,
+    return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0), threads,
                          hit.data());
   });
   m.def("box_skew", [](Data rotation, double tolerance) {

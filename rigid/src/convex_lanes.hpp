@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 
@@ -13,6 +14,17 @@
 #endif
 
 namespace tauguard::rigid {
+
+// Off only where a test or a study compares the vector path with the portable one.
+inline std::atomic<bool> vectors_allowed{true};
+
+inline bool use_avx2() {
+#if defined(TAUGUARD_AVX2)
+  return vectors_allowed && __builtin_cpu_supports("avx2");
+#else
+  return false;
+#endif
+}
 
 using Double4 = double __attribute__((vector_size(32)));
 using Mask4 = std::int64_t __attribute__((vector_size(32)));

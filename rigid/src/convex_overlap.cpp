@@ -90,7 +90,7 @@ TAUGUARD_AVX2 std::size_t run_avx2(const Chunk& c) {
 }
 template <class Kernel>
 Runner runner() {
-  return __builtin_cpu_supports("avx2") ? run_avx2<Kernel> : run_portable<Kernel>;
+  return use_avx2() ? run_avx2<Kernel> : run_portable<Kernel>;
 }
 #else
 template <class Kernel>

@@ -17,9 +17,9 @@ std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method meth
                     std::uint8_t* hit);
 
 // The batch path of boxes, from blocks of eight (see BoxBlock; the last one padded) beside the rows.
-// `skew` bounds |R^T R - I| over both batches; `vectors` = false keeps to the portable path.
+// `skew` bounds |R^T R - I| over both batches.
 std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b, const void* blocks_b,
-                          double skew, std::size_t n, bool vectors, int threads, std::uint8_t* hit);
+                          double skew, std::size_t n, int threads, std::uint8_t* hit);
 
 // Sweeps: b moves by t d[i], 0 <= t <= 1. Row i of `out`: toi (inf without a hit), point, normal; `hit` as
 // above. `d` holds n rows of 3. Without `points` that column stays NaN.

@@ -147,7 +147,7 @@ TAUGUARD_AVX2 std::size_t run_avx2(const Chunk& c) {
 template <class A, class B>
 Runner runner(bool eliminate) {
 #if defined(TAUGUARD_AVX2)
-  if (__builtin_cpu_supports("avx2")) return eliminate ? run_avx2<A, B, true> : run_avx2<A, B, false>;
+  if (use_avx2()) return eliminate ? run_avx2<A, B, true> : run_avx2<A, B, false>;
 #endif
   return eliminate ? run_portable<A, B, true> : run_portable<A, B, false>;
 }

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from tauguard.benchmarks.rigid_cases import HARD, KINDS
 from tauguard.benchmarks.rigid_truth import exact_hit, float_bodies, truth
 from tauguard.geometry import _geometry
-from tauguard.rigid import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra, overlap
-from tauguard.rigid.queries import native_overlap, overlap_boxes
+from tauguard.rigid import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra, _rigid, overlap
+from tauguard.rigid.queries import native_overlap, native_sweep, portable
 
 EXACT_METHODS = ["abfme", "auto", "exact"]
 PAIRS = [(a, b) for a in KINDS for b in KINDS]
@@ -179,19 +179,31 @@ def test_threads_change_nothing(method):
         np.testing.assert_array_equal(overlap(a, b, method, threads=threads).hit, one.hit)
 
 
-@pytest.mark.parametrize("name", ["grid boxes", "touching boxes"])
-def test_portable_batch_path_gives_the_same_answers(name):
-    a, b = HARD[name](np.random.default_rng(21), 1001)
-    random_a, random_b = (KINDS["boxes"](np.random.default_rng(seed), 5003) for seed in (1, 2))
-    for x, y in ((a, b), (random_a, random_b)):
-        answers = [np.empty(len(x), dtype=np.uint8) for _ in range(2)]
-        left = [
-            overlap_boxes(x, y, 1, hit, vectors=vectors)
-            for hit, vectors in zip(answers, (True, False), strict=True)
-        ]
-        np.testing.assert_array_equal(*answers)
-        assert left[0] == left[1]
-    assert left[0] == 0
+@pytest.mark.skipif(not _rigid.has_avx2(), reason="this machine has the portable path only")
+@pytest.mark.parametrize(("kind_a", "kind_b"), PAIRS)
+def test_portable_path_gives_the_same_bits(kind_a, kind_b):
+    rng = np.random.default_rng(21)
+    a, b = KINDS[kind_a](rng, 2003), KINDS[kind_b](rng, 2003)
+    d = rng.uniform(-2, 2, (2003, 3))
+
+    def answers():
+        results = [native_overlap(a, b, m) for m in ("abfme", "sat", "auto", "sat_textbook")]
+        return [*results, native_sweep(a, b, d, "abfme"), native_sweep(a, b, d, "sat")]
+
+    vectors = answers()
+    with portable():
+        assert not _rigid.has_avx2()
+        plain = answers()
+    for x, y in zip(vectors, plain, strict=True):
+        for u, v in zip(x, y, strict=True):
+            np.testing.assert_array_equal(u, v)
+
+
+def test_box_batch_settles_random_pairs_and_gets_contacts_right():
+    a, b = (KINDS["boxes"](np.random.default_rng(seed), 5003) for seed in (1, 2))
+    hit, left = native_overlap(a, b, "auto")
+    assert left == 0
+    np.testing.assert_array_equal(hit, native_overlap(a, b, "abfme")[0])
 
 
 @pytest.mark.parametrize("mode", [1, 2, 3])

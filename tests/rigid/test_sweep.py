@@ -55,7 +55,7 @@ numbers = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(numbers, min_size=27, max_size=27))
 def test_any_finite_tetrahedra(values):
     v = np.array(values)
