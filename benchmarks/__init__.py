@@ -8,6 +8,6 @@ A study is a module ``tauguard.benchmarks.<name>`` with two functions::
 
 #: Every study and its one-line description, in the order of ``tauguard bench list``.
 STUDIES: dict[str, str] = {
-    "simulation": "what each part of a scene costs a step, and what the time step costs in accuracy",
+    "simulation": "what each part of a scene costs, and what the time step costs in accuracy",
     "rigid": "convex overlap and sweeps by elimination (ABFME) against separating axes and coal",
 }

@@ -14,6 +14,8 @@ from tauguard.models import Mismatch
 TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757, 2757, 4039, 4039)
 #: Half strikes, a quarter pulses, a quarter clamps.
 KIND_CYCLE = ("strike", "pulse", "strike", "clamp")
+#: A detector settles in the first seconds of a run: no collision before [s].
+BEGIN = 3.0
 #: Seconds that one collision gets, and where in them it begins.
 SLOT, OFFSET = 3.0, 0.9
 
@@ -21,7 +23,7 @@ SLOT, OFFSET = 3.0, 0.9
 def collision_plans(
     rng: np.random.Generator,
     count: int,
-    begin: float = 1.0,
+    begin: float = BEGIN,
     strata: Sequence[tuple[float, float]] = STRATA,
 ) -> tuple[CollisionPlan, ...]:
     """``count`` collisions of all kinds on links 2-6, one a slot, spread over the strata.
@@ -53,7 +55,7 @@ def collision_plans(
     return tuple(plans)
 
 
-def episode_seconds(collisions: int, begin: float = 1.0) -> float:
+def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
     """Length of an episode that holds ``collisions`` slots [s]."""
     return begin + SLOT * collisions + 0.5
 

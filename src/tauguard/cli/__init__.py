@@ -13,8 +13,11 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
+    "demo": "simulate, strike, train, detect, and leave a recording to look at",
     "detect": "look for collisions in the log of a real arm",
     "simulate": "labelled episodes of the arm at work, as many as asked",
+    "train": "a detector from labelled recordings",
+    "evaluate": "a detector's figures on labelled recordings",
     "replay": "turn an MCAP recording into an .rrd for the rerun viewer",
     "bench": "run one study of speed against error: a table, a figure, --json",
 }

@@ -1,0 +1,5 @@
+"""``python -m tauguard``: the command line."""
+
+from tauguard.cli import main
+
+main()

@@ -1,0 +1,115 @@
+"""``tauguard demo``: the whole way from the arm to the replay."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tauguard.detectors import CollisionDetector
+    from tauguard.traces import Trace
+
+#: False alarms per hour that the threshold is set for on the training motions.
+FALSE_ALARMS_PER_HOUR = 10.0
+
+
+def command(
+    out: Path = Path("demo"), seed: int = 0, workers: int | None = None, json: Path | None = None
+) -> None:
+    """Simulate an arm at work, strike it, detect the collisions, leave a recording.
+
+    Leaves in the folder: demo.mcap (a run with collisions, truth and detection), demo.rrd (the
+    same for rerun), model.skops (the trained detector), summary.json and summary.png (how well it
+    did on collisions and motions that it was not trained on).
+
+    Args:
+        out: folder of the results (made if it does not exist).
+        seed: of the arm and of everything drawn; the same seed gives the same files.
+        workers: processes for the simulation (default: all processors).
+        json: write the summary here as well.
+    """
+    started = time.perf_counter()
+    out.mkdir(parents=True, exist_ok=True)
+
+    from tauguard.benchmarks.report import write_json
+    from tauguard.cli.fitting import trained
+    from tauguard.cli.summary import draw, text
+    from tauguard.datasets import demo_plan, simulate_all
+    from tauguard.detectors import figures, judge
+    from tauguard.envs import simulate
+    from tauguard.replay import write_rrd
+    from tauguard.traces import write_mcap
+
+    plan = demo_plan(seed)
+    training = list(simulate_all(plan.train, workers, "simulate training"))
+    judged = list(simulate_all([*plan.judge_struck, *plan.judge_free], workers, "simulate test"))
+    simulated = time.perf_counter() - started
+    mark = time.perf_counter()
+    detector = trained(training, FALSE_ALARMS_PER_HOUR)
+    training_s = time.perf_counter() - mark
+    mark = time.perf_counter()
+    detections = [detector.detect(trace) for trace in judged]
+    detected = time.perf_counter() - mark
+    matchings = [
+        judge(detection, trace, detector.settings.settle)
+        for detection, trace in zip(detections, judged, strict=True)
+    ]
+    showcase = simulate(plan.showcase)
+    shown = detector.detect(showcase)
+    mark = time.perf_counter()
+    free_run = simulate(plan.judge_free[0])
+    per_sample = (time.perf_counter() - mark) / len(free_run.t)
+
+    samples = sum(len(trace.t) for trace in judged)
+    seconds = sum(e.seconds for e in (*plan.train, *plan.judge_struck, *plan.judge_free))
+    summary: dict[str, Any] = {
+        "seed": seed,
+        "simulated_seconds": seconds,
+        "judged_seconds": sum(m.free_seconds for m in matchings),
+        "not_judged_seconds": detector.settings.settle * len(judged),
+        "collisions_by_kind": count(judged, lambda c: c.kind),
+        "collisions_by_link": count(judged, lambda c: str(c.link)),
+        "threshold": detector.threshold,
+        **figures(matchings),
+        "timing": {
+            "simulate_s": simulated,
+            "train_s": training_s,
+            "detect_s": detected,
+            "real_time_factor": seconds / simulated,
+            "simulation_us_per_sample": 1e6 * per_sample,
+            **detector_timing(detector, judged, 1e6 * detected / samples),
+        },
+    }
+    write_mcap(out / "demo.mcap", showcase, shown)
+    write_rrd(out / "demo.rrd", showcase, shown)
+    detector.save(out / "model.skops")
+    draw(out / "summary.png", summary, matchings)
+    summary["timing"]["total_s"] = time.perf_counter() - started
+    for path in filter(None, (out / "summary.json", json)):
+        write_json(path, summary)
+    print(text(summary))
+    print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
+    print(f"look at the recording with: rerun {out / 'demo.rrd'}")
+
+
+def count(traces: list[Trace], key: Any) -> dict[str, int]:
+    """How many judged collisions there are of each kind (or link)."""
+    found = [key(c) for trace in traces if trace.truth for c in trace.truth.collisions]
+    return {name: found.count(name) for name in sorted(set(found))}
+
+
+def detector_timing(
+    detector: CollisionDetector, traces: list[Trace], total: float
+) -> dict[str, float]:
+    """Microseconds per sample of the momentum observer alone and of all the rest of a detection."""
+    from tauguard.detectors import observe
+
+    assert detector.arm is not None
+    robot, gain = detector.arm.robot, detector.arm.drive_gain
+    started = time.perf_counter()
+    for trace in traces:
+        observe(robot, trace.t, trace.q, trace.qd, gain * trace.current)
+    samples = sum(len(trace.t) for trace in traces)
+    alone = 1e6 * (time.perf_counter() - started) / samples
+    return {"observer_us_per_sample": alone, "detector_us_per_sample": total - alone}

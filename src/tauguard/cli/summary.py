@@ -1,0 +1,122 @@
+"""What a judged detector looks like: a page of text and a page of charts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tauguard.detectors import Matching
+
+
+def rate(figure: Mapping[str, Any]) -> str:
+    """A proportion with its interval as text."""
+    if figure["value"] is None:
+        return "none judged"
+    return f"{figure['value']:.3f}  [{figure['low']:.3f}, {figure['high']:.3f}] of {figure['n']}"
+
+
+def text(summary: Mapping[str, Any]) -> str:
+    """The figures of ``summary`` as aligned lines."""
+    confusion, delay = summary["confusion"], summary["delay_ms"]
+    alarms, head = summary["false_alarms_per_hour"], summary["headline"]
+    lines = [
+        "",
+        f"judged on {confusion['tp'] + confusion['fn']} collisions and "
+        f"{alarms['hours'] * 60:.1f} collision-free minutes that were not trained on",
+        "(values with their 95 % interval)",
+        "",
+        f"  sensitivity from 16 N m up  {rate(head['sensitivity'])}",
+        f"  sensitivity, all            {rate(summary['sensitivity'])}",
+        f"  specificity, cases of 2 s   {rate(summary['specificity'])}",
+        f"  ppv                         {rate(summary['ppv'])}",
+        f"  accuracy                    {rate(summary['accuracy'])}",
+        f"  false alarms per hour       {alarms['value']:.1f}  "
+        f"[{alarms['low']:.1f}, {alarms['high']:.1f}] ({alarms['n']} alarms)",
+    ]
+    if delay["n"]:
+        lines.append(
+            f"  delay                       median {delay['median']:.1f} ms, "
+            f"p95 {delay['p95']:.1f} ms"
+        )
+    lines += [
+        f"  tp {confusion['tp']}  fn {confusion['fn']}  fp {confusion['fp']}  tn {confusion['tn']}",
+        "",
+        "  peak |tau_ext| [N m]   sensitivity",
+    ]
+    for name, figure in summary["strata"].items():
+        lines.append(f"  {name:>8}               {rate(figure['sensitivity'])}")
+    if "timing" in summary:
+        t = summary["timing"]
+        lines += [
+            "",
+            f"  {summary['simulated_seconds']:.0f} s simulated, {t['real_time_factor']:.0f} times "
+            f"real time; per sample: simulation {t['simulation_us_per_sample']:.1f} us, "
+            f"observer {t['observer_us_per_sample']:.1f} us, "
+            f"detector {t['detector_us_per_sample']:.1f} us",
+        ]
+    return "\n".join(lines)
+
+
+def draw(path: Path, summary: Mapping[str, Any], matchings: Sequence[Matching]) -> None:
+    """Sensitivity and delay over severity, the confusion matrix, and delays by kind."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    figure, axes = plt.subplots(1, 3, figsize=(14, 4.6), layout="constrained")
+    strata = {k: v for k, v in summary["strata"].items() if v["sensitivity"]["n"]}
+    values = [v["sensitivity"]["value"] for v in strata.values()]
+    low = [v["sensitivity"]["value"] - v["sensitivity"]["low"] for v in strata.values()]
+    high = [v["sensitivity"]["high"] - v["sensitivity"]["value"] for v in strata.values()]
+    axes[0].bar(range(len(strata)), values, color="#2a788e", yerr=[low, high], capsize=4)
+    labels = [f"{k}\nn = {v['sensitivity']['n']}" for k, v in strata.items()]
+    axes[0].set_xticks(range(len(strata)), labels)
+    axes[0].set(
+        xlabel="achieved peak |tau_ext|, joints 1-4 [N m]",
+        ylabel="sensitivity (95 % interval)",
+        ylim=(0, 1.05),
+        title="Collisions found, by severity",
+    )
+    confusion = summary["confusion"]
+    table = np.array([[confusion["tp"], confusion["fn"]], [confusion["fp"], confusion["tn"]]])
+    axes[1].imshow(table / table.sum(axis=1, keepdims=True), cmap="YlGnBu", vmin=0, vmax=1)
+    for i in range(2):
+        for j in range(2):
+            share = table[i, j] / max(table[i].sum(), 1)
+            axes[1].text(
+                j, i, f"{table[i, j]}", ha="center", va="center", fontsize=15,
+                color="white" if share > 0.6 else "black",
+            )  # fmt: skip
+    axes[1].set_xticks([0, 1], ["alarm", "no alarm"])
+    axes[1].set_yticks([0, 1], ["collision", "no collision\n(2 s cases)"])
+    alarms = summary["false_alarms_per_hour"]
+    axes[1].set_title(
+        f"Confusion matrix\n{alarms['value']:.1f} false alarms per hour "
+        f"[{alarms['low']:.1f}, {alarms['high']:.1f}]"
+    )
+    colours = {"strike": "#d95f02", "clamp": "#7570b3", "pulse": "#1b9e77"}
+    for kind, colour in colours.items():
+        pairs = [
+            (c.peak_tau, 1e3 * d)
+            for m in matchings
+            for c, d in zip(m.collisions, m.delays, strict=True)
+            if c.kind == kind and d is not None
+        ]
+        if pairs:
+            axes[2].scatter(*zip(*pairs, strict=True), s=22, color=colour, label=kind)
+    axes[2].set(
+        xscale="log",
+        yscale="log",
+        xlabel="achieved peak |tau_ext|, joints 1-4 [N m]",
+        ylabel="delay after onset [ms]",
+        title="Detection delay",
+    )
+    axes[2].grid(alpha=0.3)
+    if axes[2].get_legend_handles_labels()[0]:
+        axes[2].legend()
+    figure.savefig(path, dpi=110)
+    plt.close(figure)

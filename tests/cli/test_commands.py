@@ -1,0 +1,81 @@
+"""The command line as a user meets it: help, one-line errors, and the whole way."""
+
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tauguard.cli import COMMANDS, main
+
+
+def run(*args: str) -> None:
+    main(list(args))
+
+
+def fails(capsys, *args: str) -> str:
+    """Runs a command that must end in exit code 2 with one line; returns the line."""
+    with pytest.raises(SystemExit) as stop:
+        run(*args)
+    assert stop.value.code == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    return line
+
+
+def test_help_is_quick_and_names_every_command():
+    started = time.perf_counter()
+    out = subprocess.run(
+        [sys.executable, "-m", "tauguard", "--help"], capture_output=True, text=True, check=True
+    )
+    assert time.perf_counter() - started < 3.0
+    for name in COMMANDS:
+        assert name in out.stdout
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_explains_itself(name, capsys):
+    with pytest.raises(SystemExit) as stop:
+        run(name, "--help")
+    assert stop.value.code == 0
+    assert f"tauguard {name}" in capsys.readouterr().out
+
+
+def test_unknown_commands_and_studies_name_what_there_is(capsys):
+    assert "did you mean demo?" in fails(capsys, "dmeo")
+    assert "no study 'speed': there are" in fails(capsys, "bench", "speed")
+
+
+def test_bad_input_is_one_line(capsys, tmp_path):
+    assert "no such folder" in fails(capsys, "train", "--traces", str(tmp_path / "none"))
+    assert "no .mcap files" in fails(capsys, "train", "--traces", str(tmp_path))
+    (tmp_path / "a.mcap").write_bytes(b"not a recording")
+    assert "a.mcap" in fails(capsys, "train", "--traces", str(tmp_path))
+    missing = str(tmp_path / "m.skops")
+    line = fails(capsys, "evaluate", "--traces", str(tmp_path), "--model", missing)
+    assert "m.skops" in line
+    line = fails(capsys, "simulate", "--out", str(tmp_path / "o"), "--episodes", "0")
+    assert "expected 1 or more" in line
+    (tmp_path / "file").touch()
+    assert "simulate" in fails(capsys, "simulate", "--out", str(tmp_path / "file"))
+
+
+def test_simulate_train_evaluate(tmp_path, capsys):
+    struck, free = tmp_path / "all", tmp_path / "all" / "free"
+    common = ("--workers", "1", "--payloads-g", "0", "1000", "--speeds", "30")
+    run("simulate", "--out", str(struck), "--episodes", "2", "--collisions", "5", *common)
+    free_flags = ("--episodes", "2", "--collisions", "0", "--seconds", "15", *common)
+    run("simulate", "--out", str(free), *free_flags)
+    for path in free.glob("*.mcap"):
+        path.rename(struck / f"free-{path.name}")
+    model, figures = tmp_path / "model.skops", tmp_path / "figures.json"
+    run("train", "--traces", str(struck), "--model", str(model))
+    flags = ("--json", str(figures), "--figure", str(tmp_path / "f.png"))
+    run("evaluate", "--traces", str(struck), "--model", str(model), *flags)
+    row = json.loads(figures.read_text())["rows"][0]
+    assert row["confusion"]["tp"] + row["confusion"]["fn"] == 10
+    # Judged on what it was trained on: blows from 16 N m up are not missed.
+    assert row["headline"]["sensitivity"]["value"] > 0.8
+    assert (tmp_path / "f.png").stat().st_size > 10_000
+    assert "sensitivity from 16 N m up" in capsys.readouterr().out

@@ -1,0 +1,1 @@
+../../../src/tauguard/__main__.py
