@@ -109,8 +109,7 @@ Runner choose(Kind a, Kind b, Method method) {
   if (method == Method::exact) return run_portable<AlwaysUndecided>;
   if (a == Kind::polygons || (a == Kind::hulls && b == Kind::hulls && method == Method::abfme))
     return run_portable<HullEliminationMethod>;
-  if (a == Kind::hulls && b == Kind::hulls) return run_portable<HullSimplexMethod>;
-  if (a == Kind::hulls || b == Kind::hulls) return run_portable<AlwaysUndecided>;
+  if (a == Kind::hulls || b == Kind::hulls) return run_portable<HullSimplexMethod>;
   const bool ta = a == Kind::tetrahedra, tb = b == Kind::tetrahedra;
   using T = TextbookTetrahedron;
   using Z = TextbookBlock;

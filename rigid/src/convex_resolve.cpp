@@ -130,23 +130,27 @@ bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::s
 
 }  // namespace
 
-// A basis of four real columns with positive weights encloses the origin. A weight is a determinant of
-// three columns (1-norm at most 2 reach, off by 4 u reach): six products of three, off by
-// 6 * (3 * 4 + 4 * 2 * 3) u reach^3 and less than 512 u reach^3 with their sum.
+// A basis of four real columns with positive weights encloses the origin. Vertices are off by u reach, and
+// those computed from generators by 8 u of `size`, which counts the distance of the origin too. A weight is
+// a determinant of three columns (1-norm at most 2 size, off by 16 u size): 3 * 16 * 4 u size^3 from the
+// columns and 48 u size^3 from its own rounding, less than 512 u size^3.
 Verdict resolve_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
   std::array<double, 3> base;
   const double reach = localize(a, b, base);
-  if (!in_range(reach)) return undecided;
+  const auto given = [](Kind kind) { return is_cloud(kind) || kind == Kind::tetrahedra; };
+  const double size =
+      given(bodies_a.kind) && given(bodies_b.kind) ? reach : 2 * (reach + norm1(base.data()));
+  if (!in_range(reach) || !in_range(size)) return undecided;
   Lp lp(a, b);
   const auto answer = lp.solve(64);
   if (answer == Lp::Answer::separated) {
     double high, low;
-    return certain_gap(a, b, lp.plane().data(), reach, high, low) > 0 ? separated : undecided;
+    return certain_gap(a, b, lp.plane().data(), size, high, low) > 0 ? separated : undecided;
   }
   if (answer != Lp::Answer::common) return undecided;
   for (int c = 0; c < 4; ++c)
-    if (lp.is_artificial(c) || !(lp.weight(c) > 512 * unit * reach * reach * reach)) return undecided;
+    if (lp.is_artificial(c) || !(lp.weight(c) > 512 * unit * size * size * size)) return undecided;
   return common;
 }
 

@@ -8,7 +8,7 @@
 
 namespace tauguard::rigid {
 
-// Vertex hulls in double precision, with error bounds; `undecided` near contact.
+// Any bodies by the simplex method in double precision, with error bounds; `undecided` near contact.
 Verdict resolve_hulls(const Bodies& a, const Bodies& b, std::size_t row);
 
 // Vertex hulls or polygons by elimination in double precision; `undecided` near contact.

@@ -101,6 +101,27 @@ def test_elimination_decides_random_hulls_without_exact_arithmetic():
         assert left == 0, method
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("offset", [0.0, 1e6])
+def test_hulls_meet_every_other_kind(kind, offset):
+    rng = np.random.default_rng(17)
+    vertices, offsets = random_hulls(rng, 300, 4, 7, 3)
+    shift = np.array([offset, 0.0, -offset])
+    hulls, others = Hulls(vertices + shift, offsets), KINDS[kind](rng, 300)
+    if kind == "tetrahedra":
+        others = Tetrahedra(others.vertices + shift)
+    elif kind == "boxes":
+        others = Boxes(others.center + shift, others.half_extents, others.rotation)
+    else:
+        others = Parallelepipeds(others.origin + shift, others.edges)
+    expected, _ = native_overlap(hulls, others, "exact")
+    assert 0.1 < expected.mean() < 0.9
+    hit, left = native_overlap(hulls, others, "auto")
+    np.testing.assert_array_equal(hit, expected)
+    assert left < 3 or offset  # corners computed far from the origin are rounded
+    np.testing.assert_array_equal(native_overlap(others, hulls, "abfme")[0], expected)
+
+
 def polygon_truth(a, b, i):
     pa, pb = (Hulls(np.c_[p.vertices, np.zeros(len(p.vertices))], p.offsets) for p in (a, b))
     return exact_hit(pa, pb, i)
