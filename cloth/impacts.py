@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.cloth import _mesh
 from tauguard.geometry import finite
 
-#: Methods of the narrow phase by name.
-METHODS: dict[str, int] = {"ab2pf": 0}
+#: Methods of the narrow phase by name. "ab2pf" never misses; the others are earlier work, for
+#: comparison: what was taken over and what was inferred stands in ``comparators.hpp``.
+METHODS: dict[str, int] = {"ab2pf": 0, "naive": 1, "iccd": 2, "dnf": 3, "scd": 4, "vcd": 5}
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,10 @@ def method_number(method: str) -> int:
     return METHODS[method]
 
 
-def checked_distance(min_distance: float) -> float:
-    """A finite distance of at least 0, or a ``ValueError``."""
+def checked_distance(min_distance: float, method: str) -> float:
+    """A finite distance of at least 0 (0 with a comparator), or a ``ValueError``."""
+    if min_distance > 0 and method != "ab2pf":
+        raise ValueError(f"min_distance: {min_distance} with method {method!r}: only ab2pf has one")
     if not (np.isfinite(min_distance) and min_distance >= 0):
         raise ValueError(f"min_distance: {min_distance}, expected a finite number >= 0")
     return float(min_distance)
@@ -90,7 +93,7 @@ def _solve(
         end.reshape(-1, 3),
         np.arange(4 * n, dtype=np.int32).reshape(-1, 4),
         method_number(method),
-        checked_distance(min_distance),
+        checked_distance(min_distance, method),
         hit,
         toi,
         point,

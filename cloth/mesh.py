@@ -95,7 +95,7 @@ class MeshCCD:
         vf, ee, stats = self._mesh.find(
             *self._checked_step(x_t0, x_t1),
             method_number(self.method),
-            checked_distance(min_distance),
+            checked_distance(min_distance, self.method),
             fresh,
         )
         answer = Frame(
@@ -130,7 +130,7 @@ class MeshCCD:
                 ends, of a size that the faces or earlier frames do not have; a negative distance.
         """
         vf, ee, self.broad_stats = self._mesh.candidates(
-            *self._checked_step(x_t0, x_t1), checked_distance(min_distance), fresh
+            *self._checked_step(x_t0, x_t1), checked_distance(min_distance, self.method), fresh
         )
         return vf, ee
 

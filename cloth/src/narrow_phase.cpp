@@ -9,65 +9,11 @@
 #include <cmath>
 #include <limits>
 
+#include "comparators.hpp"
+#include "query.hpp"
+
 namespace tauguard::cloth {
 namespace {
-
-constexpr double u = 0x1p-53;
-
-struct Vec { double x, y, z; };
-Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-Vec operator*(double s, Vec a) { return {s * a.x, s * a.y, s * a.z}; }
-double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-double size(Vec a) { return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}); }
-Vec load(const double* x, std::int32_t i) { return {x[3 * i], x[3 * i + 1], x[3 * i + 2]}; }
-Vec mix(Vec a, Vec b, double t) { return a + t * (b - a); }
-
-// Differences of positions at both ends: the cubic is p . (q x r); `gap` holds those that a separating
-// direction must see on one side. `big` is the largest magnitude among them.
-struct Query {
-  Vec p[2], q[2], r[2];
-  Vec gap[2][4];
-  int gaps;
-  double big, distance;
-  // Of a Bernstein coefficient, with M = big^3: each of up to three triple products of 6 terms carries 3
-  // differences, 2 products and 3 sums, 8 u of 6 M each, 144 u M and 40 for their own sum; every cut adds
-  // 3 interpolations of 3 roundings on values up to 6 M, 54 u M, and there are at most 70 in a row:
-  // (184 + 70 * 54) u M < 2^12 u M. The scale keeps underflow far below that.
-  double cubic_error() const { return 0x1p-41 * big * big * big; }
-};
-
-template <bool vf>
-Query make(const double* x0, const double* x1, const std::int32_t* row, double distance) {
-  Query k;
-  k.distance = distance;
-  k.gaps = vf ? 3 : 4;
-  k.big = 0;
-  for (int e = 0; e < 2; ++e) {
-    const double* x = e ? x1 : x0;
-    const Vec a = load(x, row[0]), b = load(x, row[1]), c = load(x, row[2]), d = load(x, row[3]);
-    if (vf) {
-      k.p[e] = a - b; k.q[e] = c - b; k.r[e] = d - b;
-      k.gap[e][0] = a - b; k.gap[e][1] = a - c; k.gap[e][2] = a - d;
-    } else {
-      k.p[e] = c - a; k.q[e] = b - a; k.r[e] = d - c;
-      k.gap[e][0] = c - a; k.gap[e][1] = d - a; k.gap[e][2] = c - b; k.gap[e][3] = d - b;
-    }
-    for (int i = 0; i < k.gaps; ++i) k.big = std::max(k.big, size(k.gap[e][i]));
-    k.big = std::max({k.big, size(k.q[e]), size(k.r[e])});
-  }
-  // By a power of two to about 1, so that no product over- or underflows.
-  if (k.big > 0x1p-20 && k.big < 0x1p20) return k;
-  const double s = k.big > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(k.big), -1000, 1000)) : 1;
-  for (int e = 0; e < 2; ++e) {
-    k.p[e] = s * k.p[e]; k.q[e] = s * k.q[e]; k.r[e] = s * k.r[e];
-    for (int i = 0; i < k.gaps; ++i) k.gap[e][i] = s * k.gap[e][i];
-  }
-  k.big *= s;
-  k.distance *= s;
-  return k;
-}
 
 // Does m see every gap on one side by more than the distance, at times a and b? Rounding, against |m|_1 big:
 // u of the difference, 3 u of the dot product, 6 u of the interpolation: 10 u, below the 16 u in use.
@@ -102,42 +48,6 @@ bool edge_direction(const Query& k, double t, double a, double b) {
     }
   }
   return false;
-}
-
-struct Cubic { double b[4]; };
-Cubic cubic(const Query& k) {
-  const Vec c00 = cross(k.q[0], k.r[0]), c11 = cross(k.q[1], k.r[1]);
-  const Vec mixed = cross(k.q[0], k.r[1]) + cross(k.q[1], k.r[0]);
-  return {{dot(k.p[0], c00), (dot(k.p[1], c00) + dot(k.p[0], mixed)) / 3,
-           (dot(k.p[0], c11) + dot(k.p[1], mixed)) / 3, dot(k.p[1], c11)}};
-}
-int one_sign(const Cubic& c, double error) {
-  if (c.b[0] > error && c.b[1] > error && c.b[2] > error && c.b[3] > error) return 1;
-  if (c.b[0] < -error && c.b[1] < -error && c.b[2] < -error && c.b[3] < -error) return -1;
-  return 0;
-}
-void halve(const Cubic& c, double s, Cubic& left, Cubic& right) {
-  const auto l = [s](double a, double b) { return a + s * (b - a); };
-  const double d0 = l(c.b[0], c.b[1]), d1 = l(c.b[1], c.b[2]), d2 = l(c.b[2], c.b[3]);
-  const double e0 = l(d0, d1), e1 = l(d1, d2), f = l(e0, e1);
-  left = {{c.b[0], d0, e0, f}};
-  right = {{f, e1, d2, c.b[3]}};
-}
-
-// The root of a cubic with ends of different sign, in (0, 1): Newton's steps kept within the bracket.
-double root(const double* b) {
-  double lo = 0, hi = 1, x = b[0] / (b[0] - b[3]);
-  for (int i = 0; i < 40; ++i) {
-    const double y = 1 - x;
-    const double f = y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
-    ((f > 0) == (b[0] > 0) ? lo : hi) = x;
-    const double df = 3 * ((b[1] - b[0]) * y * y + 2 * (b[2] - b[1]) * y * x + (b[3] - b[2]) * x * x);
-    double next = x - f / df;
-    if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
-    if (std::fabs(next - x) < 1e-14) return next;
-    x = next;
-  }
-  return x;
 }
 
 // The start of the first interval that no filter clears, or infinity. At most 4000 intervals are looked at:
@@ -222,16 +132,30 @@ void describe(const double* x0, const double* x1, const std::int32_t* row, doubl
 }
 
 template <bool vf>
-void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n, double distance,
-           std::uint8_t* hit, ImpactArrays out, Stats& stats) {
+void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n, Method method,
+           double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats) {
   for (std::size_t i = 0; i < n; ++i) {
     const Query k = make<vf>(x0, x1, rows + 4 * i, distance);
     hit[i] = 0;
-    const double error = k.cubic_error();
     const Cubic whole = cubic(k);
-    if (k.distance == 0 && one_sign(whole, error) != 0) { ++stats.cubic_sign; continue; }
-    const double t = first_contact(k, whole, vf, stats);
-    if (!(t <= 1)) { ++stats.directions; continue; }
+    double t;
+    if (method == Method::ab2pf) {
+      if (k.distance == 0 && one_sign(whole, k.cubic_error()) != 0) {
+        ++stats.cubic_sign;
+        continue;
+      }
+      t = first_contact(k, whole, vf, stats);
+    } else {
+      if (filtered_out(whole, method)) {
+        ++stats.cubic_sign;
+        continue;
+      }
+      t = first_root_inside(k, whole, method, vf);
+    }
+    if (!(t <= 1)) {
+      ++stats.directions;
+      continue;
+    }
     hit[i] = 1;
     out.toi[i] = t;
     describe<vf>(x0, x1, rows + 4 * i, t, out, i);
@@ -239,12 +163,12 @@ void solve(const double* x0, const double* x1, const std::int32_t* rows, std::si
 }
 }  // namespace
 
-void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method,
+void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
               double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
-  solve<true>(x_t0, x_t1, rows, n, min_distance, hit, impacts, stats);
+  solve<true>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats);
 }
-void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method,
+void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
               double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
-  solve<false>(x_t0, x_t1, rows, n, min_distance, hit, impacts, stats);
+  solve<false>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats);
 }
 }  // namespace tauguard::cloth

@@ -6,7 +6,8 @@
 
 namespace tauguard::cloth {
 
-enum class Method : int { ab2pf = 0 };
+// ab2pf never misses; the others are comparators (comparators.hpp) and know no minimum distance.
+enum class Method : int { ab2pf = 0, naive, iccd, dnf, scd, vcd };
 
 // Row i is written where hit[i] is not 0. Weights are those of the four vertices of the row: (1, w of the
 // face's vertices), or (1 - s, s, 1 - t, t) of the two edges.
