@@ -1,5 +1,6 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
+from tauguard.rigid.impact import MeshImpacts, time_of_impact
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion
 from tauguard.rigid.plane_cache import PlaneCache
@@ -12,6 +13,7 @@ __all__ = [
     "Hulls",
     "Impacts",
     "MeshContacts",
+    "MeshImpacts",
     "MeshOverlap",
     "MeshTree",
     "Motion",
@@ -23,4 +25,5 @@ __all__ = [
     "Witness",
     "overlap",
     "sweep",
+    "time_of_impact",
 ]

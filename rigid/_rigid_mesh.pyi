@@ -11,5 +11,34 @@ class Mesh:
     def contacts(
         self, other: Mesh, poses: NDArray[np.float64], threads: int
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]: ...
+    def time_of_impact(
+        self,
+        other: Mesh,
+        pose_a: NDArray[np.float64],
+        linear_a: NDArray[np.float64],
+        angular_a: NDArray[np.float64],
+        pose_b: NDArray[np.float64],
+        linear_b: NDArray[np.float64],
+        angular_b: NDArray[np.float64],
+        out: NDArray[np.float64],
+        faces: NDArray[np.int32],
+        threads: int,
+    ) -> None: ...
 
+def time_of_impact(
+    kind_a: int,
+    a: NDArray[np.float64],
+    offsets_a: NDArray[np.int64],
+    kind_b: int,
+    b: NDArray[np.float64],
+    offsets_b: NDArray[np.int64],
+    pose_a: NDArray[np.float64],
+    linear_a: NDArray[np.float64],
+    angular_a: NDArray[np.float64],
+    pose_b: NDArray[np.float64],
+    linear_b: NDArray[np.float64],
+    angular_b: NDArray[np.float64],
+    out: NDArray[np.float64],
+    threads: int,
+) -> None: ...
 def triangles_overlap(pairs: NDArray[np.float64], out: NDArray[np.bool_]) -> None: ...

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import finite, indices
 from tauguard.rigid import _rigid_mesh
-from tauguard.rigid.motion import poses
+from tauguard.rigid.motion import Motion, poses
+
+if TYPE_CHECKING:
+    from tauguard.rigid.impact import MeshImpacts
 
 Volume = Literal["obb", "aabb", "k_dop", "sphere"]
 
@@ -137,3 +140,37 @@ class MeshTree:
             np.ascontiguousarray(values[:, 3:6]),
             np.ascontiguousarray(values[:, 6]),
         )
+
+    def time_of_impact(self, other: MeshTree, motion: Motion, threads: int = 1) -> MeshImpacts:
+        """When does the other mesh, under ``motion`` in this one's frame, first touch this one?
+
+        See :func:`tauguard.rigid.time_of_impact`; this mesh is at rest.
+        """
+        from tauguard.rigid.impact import time_of_impact
+
+        rest = Motion(np.eye(4), np.zeros(3), np.zeros(3))
+        return time_of_impact(self, other, rest, motion, threads)
+
+    def sweep(
+        self, other: MeshTree, pose: ArrayLike, displacement: ArrayLike, threads: int = 1
+    ) -> MeshImpacts:
+        """When does the other mesh, moving straight from ``pose``, first touch this one?
+
+        Args:
+            other: Any mesh.
+            pose: At t = 0. Shape (N, 4, 4) or (4, 4).
+            displacement: Over the step t in [0, 1]. Shape (N, 3) or (3,), m.
+            threads: 0 means all processors; the answer does not depend on it.
+
+        Raises:
+            ValueError: a bad pose or displacement (named with its row), lengths that do not match.
+        """
+        start, move = poses("pose", pose), np.asarray(displacement, dtype=np.float64)
+        if move.ndim == 2 and len(start) == 1:
+            start = np.repeat(start, len(move), axis=0)
+        if move.shape not in ((3,), (len(start), 3)):
+            raise ValueError(
+                f"displacement: shape {move.shape}, expected ({len(start)}, 3) or (3,)"
+            )
+        finite("displacement", np.atleast_2d(move), (None, 3))
+        return self.time_of_impact(other, Motion(start, move, np.zeros(3)), threads)

@@ -3,6 +3,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 
+#include "mesh_impact.hpp"
 #include "mesh_query.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
 
@@ -10,9 +11,13 @@ namespace nb = nanobind;
 using namespace tauguard::rigid;
 using tauguard::geometry::ThreadPool;
 
-using Points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Vertices = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Faces = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Poses = nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::device::cpu>;
+using Vectors = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Packed = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Offsets = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Touches = nb::ndarray<double, nb::shape<-1, 7>, nb::c_contig, nb::device::cpu>;  // toi, point, normal
 using Pairs = nb::ndarray<std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 
 namespace {
@@ -54,12 +59,56 @@ nb::tuple contacts(const Mesh& a, const Mesh& b, Poses poses, int threads) {
                         owned(std::move(values), std::array<std::size_t, 2>{count, 7}));
 }
 
+// A batch of motions, one row or as many as the query has.
+struct Motions {
+  Poses pose;
+  Vectors linear, angular;
+  RigidMotion operator[](std::size_t i) const {
+    const std::size_t r = pose.shape(0) == 1 ? 0 : i;
+    return RigidMotion(pose.data() + 16 * r, linear.data() + 3 * r, angular.data() + 3 * r);
+  }
+};
+
+Bodies view(int kind, const Packed& data, const Offsets& offsets) {
+  const bool hulls = kind == static_cast<int>(Kind::hulls);
+  return {static_cast<Kind>(kind), data.data(), offsets.data(), hulls ? offsets.shape(0) - 1 : data.shape(0)};
+}
+
+void store(const FirstTouch& t, double* out) {
+  out[0] = t.toi;
+  for (int k = 0; k < 3; ++k) out[1 + k] = t.point[k], out[4 + k] = t.normal[k];
+}
+
+void impact_of_bodies(int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b, Poses pose_a,
+                      Vectors linear_a, Vectors angular_a, Poses pose_b, Vectors linear_b, Vectors angular_b,
+                      Touches out, int threads) {
+  nb::gil_scoped_release release;
+  const Bodies x = view(kind_a, a, offsets_a), y = view(kind_b, b, offsets_b);
+  const Motions mx{pose_a, linear_a, angular_a}, my{pose_b, linear_b, angular_b};
+  ThreadPool::shared().parallel_for(out.shape(0), threads, 16, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i) store(bodies_impact(x, y, i, mx[i], my[i]), out.data() + 7 * i);
+  });
+}
+
+void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear_a, Vectors angular_a, Poses pose_b,
+                      Vectors linear_b, Vectors angular_b, Touches out, Pairs faces, int threads) {
+  nb::gil_scoped_release release;
+  const Motions mx{pose_a, linear_a, angular_a}, my{pose_b, linear_b, angular_b};
+  ThreadPool::shared().parallel_for(out.shape(0), threads, 1, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i) {
+      FacePair pair;
+      store(meshes_impact(a, b, mx[i], my[i], &pair), out.data() + 7 * i);
+      faces.data()[2 * i] = pair.a, faces.data()[2 * i + 1] = pair.b;
+    }
+  });
+}
+
 }  // namespace
 
 NB_MODULE(_rigid_mesh, m) {
   nb::class_<Mesh>(m, "Mesh")
       .def("__init__",
-           [](Mesh* self, Points vertices, Faces faces, const std::string& volume) {
+           [](Mesh* self, Vertices vertices, Faces faces, const std::string& volume) {
              nb::gil_scoped_release release;
              new (self) Mesh(vertices.data(), faces.data(), faces.shape(0), kind_of(volume));
            })
@@ -75,7 +124,9 @@ NB_MODULE(_rigid_mesh, m) {
                }
              });
            })
-      .def("contacts", &contacts);
+      .def("contacts", &contacts)
+      .def("time_of_impact", &impact_of_meshes);
+  m.def("time_of_impact", &impact_of_bodies);
   // Row by row, for tests of the exact answer.
   m.def("triangles_overlap", [](nb::ndarray<const double, nb::shape<-1, 2, 3, 3>, nb::c_contig, nb::device::cpu> pairs,
                                 nb::ndarray<bool, nb::shape<-1>, nb::c_contig, nb::device::cpu> out) {

@@ -1,0 +1,113 @@
+// A convex body under constant linear and angular velocity, in closed form: a vertex is
+//   x(t) = fixed + t linear + cos(speed t) swing + sin(speed t) side,
+// with `fixed` the part along the rotation axis and `swing`, `side` across it. No integration, no drift.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "convex_bodies.hpp"
+
+namespace tauguard::rigid {
+
+using Vec = std::array<double, 3>;
+
+inline double dot(const Vec& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+inline Vec cross(const Vec& a, const Vec& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+inline Vec operator-(const Vec& a, const Vec& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+inline Vec operator+(const Vec& a, const Vec& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+inline Vec operator*(double s, const Vec& a) { return {s * a[0], s * a[1], s * a[2]}; }
+inline double norm(const Vec& a) { return std::sqrt(dot(a, a)); }
+
+struct RigidMotion {
+  Vec r0[3];  // rows of the rotation at t = 0
+  Vec x0, linear, axis;
+  double speed;  // rad over the step
+
+  // pose: 16 doubles, homogeneous, by rows.
+  RigidMotion(const double* pose, const double* lin, const double* angular) {
+    for (int i = 0; i < 3; ++i) {
+      r0[i] = {pose[4 * i], pose[4 * i + 1], pose[4 * i + 2]};
+      x0[i] = pose[4 * i + 3];
+      linear[i] = lin[i];
+      axis[i] = angular[i];
+    }
+    const double largest = std::max({std::fabs(axis[0]), std::fabs(axis[1]), std::fabs(axis[2])});
+    speed = largest == 0 ? 0 : largest * norm((1 / largest) * axis);
+    axis = speed == 0 ? Vec{} : (1 / speed) * axis;
+  }
+  Vec turn(const Vec& y) const { return {dot(r0[0], y), dot(r0[1], y), dot(r0[2], y)}; }
+};
+
+// A vector that turns with a body.
+struct Swing {
+  Vec along, swing, side;
+  Swing(const RigidMotion& m, const Vec& w) : along(dot(m.axis, w) * m.axis), swing(w - along), side(cross(m.axis, w)) {}
+  Vec at(double c, double s) const { return along + (c * swing + s * side); }
+};
+
+class MovingBody {
+ public:
+  // `origin` is subtracted from every position: the caller picks one near both bodies.
+  MovingBody(const RigidMotion& motion, const Vec& origin) : motion_(motion), shift_(motion.x0 - origin) {}
+
+  void add_vertex(const Vec& y) {
+    const Vec w = motion_.turn(y);
+    vertices_.emplace_back(motion_, w);
+    radius_ = std::max(radius_, norm(w));
+    sweep_ = std::max(sweep_, norm(vertices_.back().swing));
+  }
+  void add_normal(const Vec& n) { add_direction(normals_, n); }
+  void add_edge(const Vec& e) { add_direction(edges_, e); }
+
+  // Sets `now`, `velocity`, `centre`, `normal` and `edge` for time t.
+  void move_to(double t) {
+    const double c = std::cos(motion_.speed * t), s = std::sin(motion_.speed * t);
+    const double w = motion_.speed;
+    now.resize(vertices_.size()), velocity.resize(vertices_.size());
+    centre = shift_ + t * motion_.linear;
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      now[i] = centre + vertices_[i].at(c, s);
+      velocity[i] = motion_.linear + w * (c * vertices_[i].side - s * vertices_[i].swing);
+    }
+    normal.clear(), edge.clear();
+    for (const Swing& n : normals_) normal.push_back(n.at(c, s));
+    for (const Swing& e : edges_) edge.push_back(e.at(c, s));
+  }
+
+  // Bound on |n . x''| over all vertices and times, for every n within `drift` of the given unit one.
+  double acceleration(const Vec& n, double drift) const {
+    const Vec across = n - dot(n, motion_.axis) * motion_.axis;
+    return motion_.speed * motion_.speed * sweep_ * (norm(across) + drift + 0x1p-40) * (1 + 0x1p-40);
+  }
+  // Bound on the speed of any vertex about the centre.
+  double turning_speed() const { return motion_.speed * sweep_ * (1 + 0x1p-40); }
+  Vec angular() const { return motion_.speed * motion_.axis; }
+  // Largest magnitude that enters a position; the angle counts because its rounding turns the body.
+  double magnitude() const {
+    return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_;
+  }
+  double radius() const { return radius_; }
+  const Vec& linear() const { return motion_.linear; }
+
+  std::vector<Vec> now, velocity, normal, edge;
+  Vec centre{};  // of the rotation
+  bool complete = true;  // normals and crossed edges hold a separating axis of any disjoint pair
+
+ private:
+  void add_direction(std::vector<Swing>& list, const Vec& d) {
+    const Vec w = motion_.turn(d);
+    const double length = norm(w);
+    if (length > 0) list.emplace_back(motion_, (1 / length) * w);
+  }
+
+  const RigidMotion& motion_;
+  Vec shift_;
+  std::vector<Swing> vertices_, normals_, edges_;
+  double radius_ = 0, sweep_ = 0;
+};
+
+}  // namespace tauguard::rigid

@@ -1,0 +1,146 @@
+"""Time of impact against bisection of the exact overlap test, and analytic cases."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tauguard.rigid import (
+    Boxes,
+    Hulls,
+    MeshTree,
+    Motion,
+    Tetrahedra,
+    overlap,
+    time_of_impact,
+)
+
+REST = Motion(np.eye(4), np.zeros(3), np.zeros(3))
+CUBE_FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)]
+CUBE_FACES += [(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
+CUBE = 0.5 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+
+
+def motions(rng, n, reach=2.0):
+    pose = np.tile(np.eye(4), (n, 1, 1))
+    pose[:, :3, :3] = Rotation.random(n, random_state=rng).as_matrix()
+    pose[:, :3, 3] = rng.uniform(-reach, reach, (n, 3))
+    return Motion(pose, *rng.uniform(-2, 2, (2, n, 3)))
+
+
+def placed(bodies, motion, t):
+    pose = motion.at(t)
+    if isinstance(bodies, Boxes):
+        center = pose[:, :3, 3] + np.einsum("nij,nj->ni", pose[:, :3, :3], bodies.center)
+        return Boxes(center, bodies.half_extents, pose[:, :3, :3] @ bodies.rotation)
+    moved = np.einsum("nij,nkj->nki", pose[:, :3, :3], bodies.vertices)
+    return Tetrahedra(moved + pose[:, None, :3, 3])
+
+
+def bisected(a, b, ma, mb, samples=150):
+    """The first time at which the exact test says hit, inf where no sample does."""
+    n = len(a)
+    hits = np.array(
+        [overlap(placed(a, ma, t), placed(b, mb, t)).hit for t in np.linspace(0, 1, samples + 1)]
+    )
+    first = hits.argmax(axis=0)
+    hi = first / samples
+    lo = np.maximum(first - 1, 0) / samples
+    for _ in range(50):
+        middle = 0.5 * (lo + hi)
+        hit = overlap(placed(a, ma, middle), placed(b, mb, middle)).hit
+        lo, hi = np.where(hit, lo, middle), np.where(hit, middle, hi)
+    assert len(hi) == n
+    return np.where(hits.any(axis=0), hi, np.inf)
+
+
+def bodies(kind, rng, n):
+    if kind == "tetrahedra":
+        return Tetrahedra(rng.uniform(-1, 1, (n, 4, 3)))
+    return Boxes(np.zeros((n, 3)), rng.uniform(0.2, 1, (n, 3)), np.tile(np.eye(3), (n, 1, 1)))
+
+
+@pytest.mark.parametrize("kind", ["boxes", "tetrahedra"])
+def test_never_late_never_missed_and_close(kind):
+    rng = np.random.default_rng(1)
+    n = 400
+    a, b, ma, mb = bodies(kind, rng, n), bodies(kind, rng, n), motions(rng, n), motions(rng, n)
+    ours, truth = time_of_impact(a, b, ma, mb), bisected(a, b, ma, mb)
+    found = np.isfinite(truth)
+    assert found.sum() > 40
+    assert ours.hit[found].all()
+    assert (ours.toi[found] <= truth[found] + 1e-13).all()
+    assert (truth[found] - ours.toi[found] <= 1e-7).mean() > 0.99  # a graze between two samples
+    start = ours.toi == 0
+    np.testing.assert_array_equal(start, truth <= 0)
+    later = ours.hit & ~start
+    np.testing.assert_allclose(np.linalg.norm(ours.normal[later], axis=1), 1.0)
+    assert np.isinf(ours.toi[~ours.hit]).all()
+    assert np.isnan(ours.point[~ours.hit]).all()
+
+
+def test_a_cube_falls_on_a_cube():
+    box = Boxes(np.zeros((1, 3)), np.full((1, 3), 0.5), np.eye(3)[None])
+    pose = np.eye(4)
+    pose[2, 3] = 2.0
+    got = time_of_impact(box, box, REST, Motion(pose, [0, 0, -4.0], np.zeros(3)))
+    np.testing.assert_allclose(got.toi, 0.25, atol=1e-12)
+    np.testing.assert_allclose(got.normal, [[0, 0, 1]], atol=1e-12)
+    np.testing.assert_allclose(got.point[0, 2], 0.5, atol=1e-12)
+
+
+def test_a_spinning_rod_hits_at_the_angle_that_geometry_says():
+    # A thin rod about z through the origin reaches the point (cos 1, sin 1) at angle 1.
+    post = Hulls(np.array([[0.5 * np.cos(1), 0.5 * np.sin(1), 0.0]]), np.array([0, 1]))
+    spin = Motion(np.eye(4), np.zeros(3), [0, 0, 2.0])
+    rod = Hulls(np.array([[x, 0.0, z] for x in (0.0, 1.0) for z in (-0.1, 0.1)]), np.array([0, 4]))
+    got = time_of_impact(rod, post, spin, REST)
+    np.testing.assert_allclose(got.toi, 0.5, atol=1e-9)
+    np.testing.assert_allclose(got.point, post.vertices, atol=1e-9)
+
+
+def test_touching_at_the_start_is_a_hit_at_zero():
+    box = Boxes(np.zeros((1, 3)), np.full((1, 3), 0.5), np.eye(3)[None])
+    pose = np.eye(4)
+    pose[0, 3] = 1.0
+    assert time_of_impact(box, box, REST, Motion(pose, [1.0, 0, 0], np.zeros(3))).toi[0] == 0
+
+
+def test_meshes_give_the_time_of_their_hulls_and_of_sweeps():
+    rng = np.random.default_rng(2)
+    tree = MeshTree(CUBE, CUBE_FACES)
+    box = Boxes(np.zeros((1, 3)), np.full((1, 3), 0.5), np.eye(3)[None])
+    ma, mb = motions(rng, 150, 1.3), motions(rng, 150, 1.3)
+    convex, mesh = time_of_impact(box, box, ma, mb), time_of_impact(tree, tree, ma, mb)
+    free = ~(convex.toi == 0)  # a cube inside a cube has no common surface
+    np.testing.assert_array_equal(mesh.hit[free], convex.hit[free])
+    hit = free & convex.hit
+    assert hit.sum() > 5
+    np.testing.assert_allclose(mesh.toi[hit], convex.toi[hit], atol=1e-9)
+    pose = np.eye(4)
+    pose[:3, 3] = [2.0, 0.1, 0.2]
+    swept = tree.sweep(tree, pose, [-4.0, 0, 0])
+    np.testing.assert_allclose(swept.toi, 0.25, atol=1e-12)
+    assert not tree.sweep(tree, pose, [4.0, 0, 0]).hit[0]
+    assert tree.sweep(tree, pose, [4.0, 0, 0]).faces.tolist() == [[-1, -1]]
+
+
+def test_thread_count_changes_nothing():
+    rng = np.random.default_rng(3)
+    a, b = (bodies("boxes", rng, 200) for _ in range(2))
+    ma, mb = motions(rng, 200), motions(rng, 200)
+    first = time_of_impact(a, b, ma, mb)
+    again = time_of_impact(a, b, ma, mb, threads=2)
+    for name in ("toi", "point", "normal"):
+        assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
+
+
+def test_bad_input_is_refused():
+    box = Boxes(np.zeros((3, 3)), np.ones((3, 3)), np.tile(np.eye(3), (3, 1, 1)))
+    two = Motion(np.tile(np.eye(4), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3)))
+    with pytest.raises(ValueError, match="motion_a: 2 rows, expected 3 or 1"):
+        time_of_impact(box, box, two, REST)
+    tree = MeshTree(CUBE, CUBE_FACES)
+    with pytest.raises(ValueError, match="a mesh against convex bodies"):
+        time_of_impact(box, tree, REST, REST)  # type: ignore[call-overload]
+    with pytest.raises(ValueError, match="displacement: shape"):
+        tree.sweep(tree, np.eye(4), [1.0, 2.0])
