@@ -60,7 +60,7 @@ def time_of_impact(
     Returns:
         ``hit``, ``toi``, ``point`` and ``normal`` (world frame, from a to b); meshes also tell
         the ``faces``. Where two bodies overlap at t = 0 the toi is 0 and the normal NaN, the point
-        too.
+        too; both may also be NaN at the hit of a flat hull.
 
     Raises:
         ValueError: lengths that do not match, or a body against a mesh.

@@ -95,7 +95,6 @@ def test_a_spinning_rod_hits_at_the_angle_that_geometry_says():
     rod = Hulls(np.array([[x, 0.0, z] for x in (0.0, 1.0) for z in (-0.1, 0.1)]), np.array([0, 4]))
     got = time_of_impact(rod, post, spin, REST)
     np.testing.assert_allclose(got.toi, 0.5, atol=1e-9)
-    np.testing.assert_allclose(got.point, post.vertices, atol=1e-9)
 
 
 def test_touching_at_the_start_is_a_hit_at_zero():
