@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tauguard.detectors import RobotNumbers, confirmed, find_alarms, observe
+from tauguard.detectors import (
+    CollisionDetector,
+    RobotNumbers,
+    confirmed,
+    find_alarms,
+    observe,
+)
 from tauguard.detectors.filter import confirmation_samples
 from tauguard.traces.trace import Array, Detection, Trace
 
@@ -21,7 +28,7 @@ class Watch:
     """What was found in a log, and by which thresholds."""
 
     detection: Detection
-    thresholds: Array  #: [N m], one a joint, shape (n,)
+    thresholds: Array  #: residual that counts 1 [N m], one a joint, inf where not used, shape (n,)
     quiet_until: float  #: [s]; alarms are counted from here on
     notes: tuple[str, ...]
 
@@ -35,6 +42,7 @@ def watch(
     gain: float = GAIN,
     confirmation: float = CONFIRMATION,
     factor: float = FACTOR,
+    joints: Sequence[int] | None = None,
 ) -> Watch:
     """Look for collisions with thresholds that are learned from the log's own beginning.
 
@@ -49,9 +57,11 @@ def watch(
         gain: rate of the observer [1/s].
         confirmation: [s]; counted in whole samples.
         factor: threshold over the largest |residual| of the quiet seconds.
+        joints: whose residuals are looked at, 1-based (default: all).
 
     Raises:
-        ValueError: too few quiet seconds, or more than the log has.
+        ValueError: joints that the robot does not have; too few quiet seconds, or more than the
+            log has.
     """
     settled = trace.t[0] + SETTLING / gain
     until = trace.t[0] + quiet
@@ -68,6 +78,7 @@ def watch(
         raise ValueError(f"factor: {factor}, expected above 0")
     residual = observe(robot, trace.t, trace.q, trace.qd, tau, gain)
     thresholds = factor * np.abs(residual[learning]).max(axis=0)
+    thresholds[~used(joints, robot.joints)] = np.inf
     score = (np.abs(residual) / thresholds).max(axis=1)
     samples = confirmation_samples(confirmation, trace.dt)
     alarm = confirmed((score > 1) & (trace.t >= until), samples)
@@ -85,6 +96,33 @@ def watch(
         alarms=find_alarms(trace.t, alarm),
     )
     return Watch(detection, thresholds, float(until), (note,))
+
+
+def used(joints: Sequence[int] | None, count: int) -> np.ndarray:
+    """Which of ``count`` joints are meant, shape (count,).
+
+    Raises:
+        ValueError: a joint that there is not.
+    """
+    chosen = range(1, count + 1) if joints is None else joints
+    if not chosen or min(chosen) < 1 or max(chosen) > count:
+        raise ValueError(f"joints: {tuple(chosen)}, expected some of 1 to {count}")
+    return np.isin(np.arange(1, count + 1), list(chosen))
+
+
+def watch_with(detector: CollisionDetector, trace: Trace) -> Watch:
+    """Look for collisions with a trained detector.
+
+    Raises:
+        ValueError: another number of joints or another sample rate than it was trained at.
+    """
+    detection = detector.detect(trace)
+    assert detector.arm is not None
+    joints = detector.arm.robot.joints
+    noise = detector.arm.noise if detector.arm.noise is not None else np.ones(joints)
+    thresholds = np.where(used(detector.settings.joints, joints), noise, np.inf)
+    settled = float(trace.t[0] + detector.settings.settle)
+    return Watch(detection, thresholds, settled, detector.notes)
 
 
 def loudest_joint(found: Watch, start: float, end: float) -> int:

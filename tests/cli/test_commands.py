@@ -79,3 +79,31 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     assert row["headline"]["sensitivity"]["value"] > 0.8
     assert (tmp_path / "f.png").stat().st_size > 10_000
     assert "sensitivity from 16 N m up" in capsys.readouterr().out
+
+
+def test_detect_with_a_trained_model(tmp_path, capsys):
+    """The model of a simulated arm watches a recording of it; a log at another rate is refused."""
+    from tauguard.datasets import free_episodes, struck_episodes, write_dataset
+    from tauguard.models import cura6
+
+    episodes = [
+        *struck_episodes(5, 1, 5, (30.0,)),
+        *free_episodes(5, 2, 12.0, (30.0,)),
+    ]
+    paths = write_dataset(episodes, tmp_path, workers=1)
+    model, robot = tmp_path / "model.skops", tmp_path / "arm.xml"
+    robot.write_text(cura6.arm_xml())
+    run("train", "--traces", str(tmp_path), "--model", str(model))
+    found = tmp_path / "found.json"
+    flags = ("--robot", str(robot), "--model", str(model), "--json", str(found))
+    run("detect", str(paths[0]), *flags)
+    result = json.loads(found.read_text())
+    assert result["detector"] == "srq-svr"
+    assert 3 <= len(result["events"]) <= 6
+    rows = ["time,q1,q2,q3,q4,q5,q6"] + [f"{k / 100},0,0,0,0,0,0" for k in range(500)]
+    log, columns = tmp_path / "slow.csv", tmp_path / "columns.json"
+    log.write_text("\n".join(rows))
+    names = [f"q{i}" for i in range(1, 7)]
+    columns.write_text(json.dumps({"t": "time", "q": names, "qd": names, "current": names}))
+    line = fails(capsys, "detect", str(log), *flags, "--columns", str(columns))
+    assert "trained at 1 ms" in line

@@ -20,7 +20,9 @@ def command(
     /,
     robot: Path,
     columns: str | None = None,
+    model: Path | None = None,
     quiet: float = 10.0,
+    joints: tuple[int, ...] = (1, 2, 3, 4),
     gains: tuple[float, ...] = (),
     viscous: tuple[float, ...] = (),
     coulomb: tuple[float, ...] = (),
@@ -32,15 +34,17 @@ def command(
 ) -> None:
     """Look for collisions in a log of joint positions, velocities and motor currents.
 
-    Every joint's threshold is learned from the first --quiet seconds, in which nothing may touch
-    the arm; the rest of the log is watched.
+    With --model a trained detector watches the log. Without one, every joint's threshold is learned
+    from the first --quiet seconds, in which nothing may touch the arm, and the rest is watched.
 
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
         robot: URDF or MJCF file of the arm alone.
         columns: of a CSV file: a preset (ur10e, ur_rtde) or a JSON file with the fields of
             tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], ...}.
+        model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
         quiet: seconds from the beginning that you vouch for.
+        joints: whose residuals are looked at, counted from 1 (a model brings its own).
         gains: N m per ampere, one a joint (known for the preset ur10e).
         viscous: friction in N m s/rad, one a joint.
         coulomb: friction in N m, one a joint.
@@ -52,8 +56,8 @@ def command(
     """
     from tauguard.benchmarks.report import write_json
     from tauguard.datasets import read_log
-    from tauguard.datasets.watch import watch
-    from tauguard.detectors import RobotNumbers
+    from tauguard.datasets.watch import watch, watch_with
+    from tauguard.detectors import CollisionDetector, RobotNumbers
     from tauguard.models import pin_model
 
     if out is not None and out.exists() and not out.is_dir():
@@ -61,16 +65,20 @@ def command(
     read = read_log(log, column_map(columns))
     numbers = RobotNumbers.from_pin(pin_model(robot))
     trace = matched(read.trace, numbers.joint_names)
-    drive = drive_numbers(columns, gains, viscous, coulomb, len(trace.joint_names))
-    found = watch(
-        trace,
-        numbers,
-        drive.tau(trace.current, trace.qd),
-        quiet,
-        gain=observer_gain,
-        confirmation=confirmation,
-        factor=factor,
-    )
+    if model is not None:
+        found = watch_with(CollisionDetector.load(model), trace)
+    else:
+        drive = drive_numbers(columns, gains, viscous, coulomb, len(trace.joint_names))
+        found = watch(
+            trace,
+            numbers,
+            drive.tau(trace.current, trace.qd),
+            quiet,
+            gain=observer_gain,
+            confirmation=confirmation,
+            factor=factor,
+            joints=joints,
+        )
     for note in (*read.notes, *found.notes):
         print(f"note: {note}")
     result = summary(log, trace, found)
@@ -156,6 +164,8 @@ def drive_numbers(
 
 def summary(log: Path, trace: Trace, found: Watch) -> dict[str, Any]:
     """The figures of a run, ready for JSON."""
+    import numpy as np
+
     from tauguard.datasets.watch import loudest_joint
 
     watched = float(trace.t[-1] - found.quiet_until)
@@ -170,7 +180,9 @@ def summary(log: Path, trace: Trace, found: Watch) -> dict[str, Any]:
         "joints": list(trace.joint_names),
         "seconds": float(trace.t[-1] - trace.t[0]),
         "watched_seconds": watched,
-        "thresholds_nm": found.thresholds.tolist(),
+        "detector": found.detection.detector,
+        "score_threshold": found.detection.threshold,
+        "thresholds_nm": [v if np.isfinite(v) else None for v in found.thresholds.tolist()],
         "alarms": len(events),
         "alarms_per_hour": 3600 * len(events) / watched,
         "events": events,
@@ -180,7 +192,11 @@ def summary(log: Path, trace: Trace, found: Watch) -> dict[str, Any]:
 def report(result: dict[str, Any]) -> None:
     """The figures for a reader."""
     pairs = zip(result["joints"], result["thresholds_nm"], strict=True)
-    print("thresholds: " + ", ".join(f"{name} {value:.1f} N m" for name, value in pairs))
+    used = [f"{name} {value:.1f} N m" for name, value in pairs if value is not None]
+    if result["detector"] == "threshold":
+        print("thresholds: " + ", ".join(used))
+    else:
+        print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")
     for event in result["events"]:
         print(f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}")
     print(
