@@ -22,7 +22,7 @@ def command(
     columns: str | None = None,
     model: Path | None = None,
     quiet: float = 10.0,
-    joints: tuple[int, ...] = (1, 2, 3, 4),
+    joints: tuple[int, ...] = (),
     gains: tuple[float, ...] = (),
     viscous: tuple[float, ...] = (),
     coulomb: tuple[float, ...] = (),
@@ -44,7 +44,8 @@ def command(
             tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], ...}.
         model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
         quiet: seconds from the beginning that you vouch for.
-        joints: whose residuals are looked at, counted from 1 (a model brings its own).
+        joints: whose residuals are looked at, counted from 1 (default: the first four; a model
+            brings its own).
         gains: N m per ampere, one a joint (known for the preset ur10e).
         viscous: friction in N m s/rad, one a joint.
         coulomb: friction in N m, one a joint.
@@ -77,7 +78,7 @@ def command(
             gain=observer_gain,
             confirmation=confirmation,
             factor=factor,
-            joints=joints,
+            joints=joints or range(1, min(4, numbers.joints) + 1),
         )
     for note in (*read.notes, *found.notes):
         print(f"note: {note}")
