@@ -23,8 +23,8 @@ def drive_gain():
 
 @pytest.fixture(scope="session")
 def training():
-    episodes = free_episodes(5, 6, 20.0, (10.0, 30.0, 60.0), (0.0, 2000.0, 4000.0), ARM)
-    episodes += struck_episodes(6, 2, 6, (30.0, 60.0), (0.0, 2500.0), ARM)
+    episodes = free_episodes(5, 9, 30.0, (10.0, 30.0, 60.0), (0.0, 2000.0, 4000.0), ARM)
+    episodes += struck_episodes(6, 4, 7, (10.0, 30.0, 60.0), (0.0, 2500.0), ARM)
     return [simulate(episode) for episode in episodes]
 
 
@@ -35,5 +35,5 @@ def unseen():
 
 @pytest.fixture(scope="session")
 def detector(training, robot, drive_gain):
-    settings = DetectorSettings(windows=1000, mined=80, false_alarms_per_hour=60.0)
+    settings = DetectorSettings(windows=1200, mined=200, false_alarms_per_hour=20.0)
     return CollisionDetector(settings).fit(training, robot, drive_gain)
