@@ -14,11 +14,14 @@ from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import Motion, SimulationLoop, random_motion
 from tauguard.envs.simulate import workspace
 from tauguard.models import (
+    BodyProxy,
     Clamp,
+    Cloth,
     Drive,
     Scene,
     SceneSpec,
     Striker,
+    Table,
     compose,
     cura6_drive,
     pin_model,
@@ -44,6 +47,7 @@ def costs(motion: Motion, repeats: int) -> list[Row]:
     drive = cura6_drive()
     ideal = replace(drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None)
     bare = SceneSpec(labels=False)
+    hand, cloth = BodyProxy("hand", (2.5, 0, 0.8)), Cloth(count=8, position=(2.5, 0, 0.8))
     scenes: dict[str, tuple[SceneSpec, Drive]] = {
         "ideal drive": (bare, ideal),
         "+ friction": (bare, replace(ideal, friction=drive.friction)),
@@ -53,6 +57,9 @@ def costs(motion: Motion, repeats: int) -> list[Row]:
         "whole drive, payload": (SceneSpec(labels=False, payload=True), drive),
         "whole drive, labels, striker": (SceneSpec(striker=Striker()), drive),
         "whole drive, labels, clamp": (SceneSpec(clamp=Clamp()), drive),
+        "whole drive, labels, hand proxy": (SceneSpec(proxies=(hand,)), drive),
+        "whole drive, labels, table": (SceneSpec(table=Table((2.5, 0, 0.1))), drive),
+        "whole drive, labels, cloth 8 x 8": (SceneSpec(cloth=cloth), drive),
     }
     calls: dict[str, Any] = {"mujoco.rollout, torques given": rollout_call(motion)}
     for name, (spec, parts) in scenes.items():

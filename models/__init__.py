@@ -1,20 +1,23 @@
 """What is simulated: the arm, its drive train, obstacles and the scene composer."""
 
 from tauguard.models import cura6
+from tauguard.models.arm import Arm, load_arm
+from tauguard.models.body_regions import BODY_REGIONS, BodyRegion, body_region
+from tauguard.models.cloth import Cloth
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.mismatch import Mismatch
 from tauguard.models.nominal import add_payload, compiled, pin_model
-from tauguard.models.scene import (
-    Clamp,
-    Scene,
-    SceneSpec,
-    Striker,
-    compose,
-    set_payload,
-)
+from tauguard.models.obstacles import BodyProxy, Clamp, Striker, Table
+from tauguard.models.payload import set_payload
+from tauguard.models.scene import Scene, SceneSpec, compose, with_drive
 
 __all__ = [
+    "BODY_REGIONS",
+    "Arm",
+    "BodyProxy",
+    "BodyRegion",
     "Clamp",
+    "Cloth",
     "Drive",
     "Friction",
     "Mismatch",
@@ -23,11 +26,15 @@ __all__ = [
     "SceneSpec",
     "Sensors",
     "Striker",
+    "Table",
     "add_payload",
+    "body_region",
     "compiled",
     "compose",
     "cura6",
     "cura6_drive",
+    "load_arm",
     "pin_model",
     "set_payload",
+    "with_drive",
 ]

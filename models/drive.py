@@ -10,16 +10,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.models.checks import above_zero, not_negative, shaped
+
 Array = NDArray[np.float64]
-
-
-def _per_joint(owner: object, names: tuple[str, ...], joints: int) -> None:
-    for name in names:
-        shape = np.shape(getattr(owner, name))
-        if shape != (joints,):
-            raise ValueError(
-                f"{type(owner).__name__}.{name}: shape {shape}, expected ({joints},): one a joint"
-            )
 
 
 @dataclass(frozen=True)
@@ -50,11 +43,18 @@ class Friction:
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
         per_joint = tuple(f.name for f in fields(self) if f.type == "Array")
-        _per_joint(self, per_joint, len(self.coulomb))
-        if (self.static < self.coulomb).any():
+        shaped(self, (len(self.coulomb),), "one a joint", *per_joint)
+        above_zero(self, "coulomb", "stribeck_velocity", "bristle_stiffness")
+        not_negative(self, "viscous", "load")
+        if not (self.static >= self.coulomb).all():
             raise ValueError("Friction.static: below coulomb; the breakaway level is at least it")
-        if (self.bristle_stiffness <= 0).any() or (self.stribeck_velocity <= 0).any():
-            raise ValueError("Friction: bristle_stiffness and stribeck_velocity must be above 0")
+        warm = self.temperature - self.reference_temperature
+        for name in ("coulomb_per_kelvin", "viscous_per_kelvin"):
+            if not 1 + getattr(self, name) * warm > 0:
+                raise ValueError(
+                    f"Friction.temperature {self.temperature} degC: friction would be negative by "
+                    f"{name} {getattr(self, name)}; expected nearer to {self.reference_temperature}"
+                )
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,14 @@ class Ripple:
     amplitude: Array  #: [A], shape (n, h)
     phase: Array  #: [rad], shape (n, h)
 
+    def __post_init__(self) -> None:
+        """Check shapes and values: ``ValueError`` names the field."""
+        shape = (len(self.phase), len(self.cycles))
+        shaped(self, shape, "joints, harmonics", "amplitude", "phase")
+        for name in ("cycles", "amplitude", "phase"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise ValueError(f"Ripple.{name}: not finite")
+
 
 @dataclass(frozen=True)
 class Sensors:
@@ -74,20 +82,39 @@ class Sensors:
     current_quantum: Array  #: [A], shape (n,)
     position_quantum: float = 2e-6  #: [rad]
     velocity_noise: float = 5e-4  #: standard deviation [rad/s]
+    velocity_quantum: float = 0.0  #: [rad/s]
+
+    def __post_init__(self) -> None:
+        """Check shapes and signs: ``ValueError`` names the field."""
+        shaped(self, (len(self.current_noise),), "one a joint", "current_quantum")
+        not_negative(self, *(f.name for f in fields(self)))
 
     def measure(
         self, rng: np.random.Generator, q: Array, qd: Array, current: Array
     ) -> tuple[Array, Array, Array]:
-        """What the sensors say of true signals of shape (T, n); noise first, then the quantum."""
-        noisy = current + rng.normal(size=current.shape) * self.current_noise
-        quantum = np.where(self.current_quantum > 0, self.current_quantum, 1.0)
-        read = np.where(self.current_quantum > 0, np.round(noisy / quantum) * quantum, noisy)
-        position = (
-            np.round(q / self.position_quantum) * self.position_quantum
-            if self.position_quantum > 0
-            else q.copy()
+        """What the sensors say of true signals of shape (T, n); noise first, then the quantum.
+
+        Raises:
+            ValueError: signals that are not all of one shape (T, n) for the n of these sensors.
+        """
+        if not (q.shape == qd.shape == current.shape and q.shape[-1:] == self.current_noise.shape):
+            raise ValueError(
+                f"measure: shapes {q.shape}, {qd.shape}, {current.shape}; "
+                f"expected (T, {len(self.current_noise)}) each"
+            )
+        amperes = current + rng.normal(size=current.shape) * self.current_noise
+        speed = qd + rng.normal(size=qd.shape) * self.velocity_noise
+        return (
+            _rounded(q, self.position_quantum),
+            _rounded(speed, self.velocity_quantum),
+            _rounded(amperes, self.current_quantum),
         )
-        return position, qd + rng.normal(size=qd.shape) * self.velocity_noise, read
+
+
+def _rounded(signal: Array, quantum: Array | float) -> Array:
+    """To the nearest multiple of ``quantum``; a quantum of 0 leaves the signal as it is."""
+    step = np.where(np.asarray(quantum) > 0, quantum, 1.0)
+    return np.where(np.asarray(quantum) > 0, np.round(signal / step) * step, signal)
 
 
 @dataclass(frozen=True)
@@ -104,12 +131,39 @@ class Drive:
 
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
-        joints = len(self.gain)
-        _per_joint(self, ("gain", "gear", "current_limit"), joints)
-        if (self.gain == 0).any():
-            raise ValueError("Drive.gain: 0 N m/A drives nothing")
+        joints = (len(self.gain),)
+        shaped(self, joints, "one a joint", "gear", "current_limit")
+        if not (np.isfinite(self.gain).all() and (self.gain != 0).all()):
+            raise ValueError(f"Drive.gain {self.gain}: expected N m/A other than 0")
+        if not (self.current_limit > 0).all():
+            raise ValueError(f"Drive.current_limit {self.current_limit}: expected above 0")
+        constant = self.electrical_time_constant
+        if constant is not None and not (np.isfinite(constant) and constant > 0):
+            raise ValueError(
+                f"Drive.electrical_time_constant {constant}: expected seconds above 0, or None"
+            )
+        rows: dict[str, Array] = {}
         if self.friction is not None:
-            _per_joint(self.friction, ("coulomb",), joints)
+            rows["friction"] = self.friction.coulomb
+        if self.ripple is not None:
+            rows["ripple"] = self.ripple.amplitude
+        if self.sensors is not None:
+            rows["sensors"] = self.sensors.current_noise
+        for name, values in rows.items():
+            if len(values) != joints[0]:
+                raise ValueError(f"Drive.{name}: of {len(values)} joints, expected {joints[0]}")
+
+    @classmethod
+    def ideal(cls, torque_limit: Array, gain: float = 10.0) -> Drive:
+        """Drives without losses, noise or lag, for an arm whose drives are not known.
+
+        Args:
+            torque_limit: may be infinite [N m], shape (n,).
+            gain: of every joint [N m/A].
+        """
+        limit = np.asarray(torque_limit, dtype=float)
+        same = np.full(limit.shape, gain)
+        return cls(same, np.full(limit.shape, 101.0), limit / gain, None)
 
     @property
     def torque_limit(self) -> Array:

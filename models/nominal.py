@@ -14,6 +14,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.models.checks import rigid_pose
+
 Array = NDArray[np.float64]
 
 
@@ -89,8 +91,8 @@ def pin_model(
     mujoco.mj_kinematics(m, data)
     model = pin.Model()
     model.name = "arm"
-    model.gravity.linear = np.array(m.opt.gravity if gravity is None else gravity, dtype=float)
-    base = pin.SE3(_rigid(base_pose)) if base_pose is not None else pin.SE3.Identity()
+    model.gravity.linear = _vector(m.opt.gravity if gravity is None else gravity, "gravity")
+    base = pin.SE3(rigid_pose(base_pose)) if base_pose is not None else pin.SE3.Identity()
     joint_of = {0: 0}
     offset = {0: base}
     for body in range(1, m.nbody):
@@ -143,13 +145,11 @@ def _quat(wxyz: Array) -> Array:
     return frame.reshape(3, 3)
 
 
-def _rigid(pose: ArrayLike) -> Array:
-    matrix = np.asarray(pose, dtype=float)
-    if matrix.shape != (4, 4) or not np.allclose(
-        matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-6
-    ):
-        raise ValueError("base_pose: expected a homogeneous (4, 4) matrix with a rotation in it")
-    return matrix
+def _vector(value: ArrayLike, name: str) -> Array:
+    vector = np.array(value, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name} {value!r}: expected three finite numbers")
+    return vector
 
 
 def add_payload(
@@ -162,12 +162,22 @@ def add_payload(
         mass: [kg].
         com: in the last joint's frame [m], (3,).
         inertia: about the payload's centre of mass [kg m^2], a number or (3, 3).
+
+    Raises:
+        ValueError: a mass or inertia that nothing can have, or a ``com`` that is no vector.
     """
+    if not (np.isfinite(mass) and mass >= 0):
+        raise ValueError(f"payload mass {mass} kg: expected 0 or more")
     tensor = np.asarray(inertia, dtype=float)
     tensor = np.eye(3) * tensor if tensor.ndim == 0 else tensor
+    if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T):
+        raise ValueError("payload inertia: expected a number or a symmetric (3, 3) matrix")
+    moments = np.linalg.eigvalsh(tensor)
+    if moments[0] < 0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+        raise ValueError(f"payload inertia: no body has the principal moments {moments}")
     loaded = model.copy()
     last = loaded.njoints - 1
     loaded.appendBodyToJoint(
-        last, pin.Inertia(mass, np.asarray(com, dtype=float), tensor), pin.SE3.Identity()
+        last, pin.Inertia(mass, _vector(com, "payload com"), tensor), pin.SE3.Identity()
     )
     return loaded

@@ -15,7 +15,7 @@ SHELL, HOUSING, ACCENT, STEEL = "shell", "housing", "accent", "steel"
 
 @dataclass(frozen=True)
 class Part:
-    """A cylinder or capsule of a link, in the link's frame."""
+    """A cylinder, capsule or ellipsoid of a link, in the link's frame."""
 
     start: tuple[float, float, float]  #: [m]
     end: tuple[float, float, float]  #: [m]
@@ -116,6 +116,8 @@ LINKS = (
     ),
 )  # fmt: skip
 
+#: How far the caps of the joint housings bulge, relative to their radius.
+_BULGE = 0.28
 #: Where a tool is fixed, in the frame of link 6 [m]; the flange's outward normal is +y.
 FLANGE = (0.0, 0.018, 0.0)
 #: A pose at work: elbow up, the tool axis down [rad].
@@ -169,6 +171,14 @@ def _geom(part: Part, kind: str) -> str:
     )
 
 
+def dome(cap: Part) -> Part:
+    """The bulge of a housing's cap: half an ellipsoid on its outer face; it weighs nothing."""
+    inner, outer = sorted((np.array(cap.start), np.array(cap.end)), key=lambda p: np.linalg.norm(p))
+    along = (outer - inner) / np.linalg.norm(outer - inner) * _BULGE * cap.radius
+    (x0, y0, z0), (x1, y1, z1) = (outer - along).tolist(), (outer + along).tolist()
+    return Part((x0, y0, z0), (x1, y1, z1), 0.985 * cap.radius, HOUSING, "ellipsoid")
+
+
 def mjcf() -> str:
     """The arm's MJCF text."""
     lines = [_HEAD]
@@ -189,7 +199,8 @@ def mjcf() -> str:
             f'range="{-link.reach:g} {link.reach:g}" armature="{link.rotor:g}" '
             f'actuatorfrcrange="{-link.torque:g} {link.torque:g}"/>',
         ]
-        lines += [f"{indent}  {_geom(part, 'visual')}" for part in link.looks]
+        shown = [*link.looks, *(dome(part) for part in link.looks if part.material == HOUSING)]
+        lines += [f"{indent}  {_geom(part, 'visual')}" for part in shown]
         lines += [f"{indent}  {_geom(part, 'collision')}" for part in link.collides]
     lines += [
         f'{indent}  <site name="flange" pos="{_numbers(FLANGE)}" quat="0.707107 -0.707107 0 0"/>'

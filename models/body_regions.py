@@ -1,0 +1,103 @@
+"""Body regions of a person and how hard a robot may press them: power and force limiting.
+
+The numbers are those of the power-and-force-limiting annex of ISO 10218-2:2025, formerly ISO/TS
+15066. Public copies contradict one another, so each value says whether it was confirmed from an
+open source; the others must be verified against the standard before anybody relies on them, and
+nothing here replaces the risk assessment of a real workplace.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+#: What to show beside a value that no open source confirmed.
+UNCONFIRMED = "verify against the standard"
+
+
+@dataclass(frozen=True)
+class BodyRegion:
+    """One region: what it bears, how stiff it is and how much of the body moves with it."""
+
+    name: str
+    quasi_static_force: float  #: F_QS, when clamped [N]
+    stiffness: float  #: k, of the contact [N/m]
+    mass: float  #: m_H, effective mass [kg]
+    transient: bool = True  #: False: no transient contact is allowed (skull, face)
+    force_confirmed: bool = False  #: F_QS was confirmed from an open source
+    stiffness_confirmed: bool = False  #: k was
+    mass_confirmed: bool = False  #: m_H was
+
+    @property
+    def transient_force(self) -> float:
+        """F_T, largest force of a blow [N]: twice F_QS, and 0 where no blow is allowed."""
+        return 2 * self.quasi_static_force if self.transient else 0.0
+
+    @property
+    def unconfirmed(self) -> tuple[str, ...]:
+        """Fields to show with :data:`UNCONFIRMED`."""
+        fields = ("quasi_static_force", "stiffness", "mass")
+        known = (self.force_confirmed, self.stiffness_confirmed, self.mass_confirmed)
+        return tuple(name for name, sure in zip(fields, known, strict=True) if not sure)
+
+    def peak_force(self, speed: float, robot_mass: float) -> float:
+        """Peak force [N] of a blow by the standard's two masses and one spring.
+
+        Args:
+            speed: relative speed along the contact normal [m/s].
+            robot_mass: effective mass of the robot at the contact [kg].
+        """
+        return speed * math.sqrt(self._reduced_mass(robot_mass) * self.stiffness)
+
+    def speed_limit(self, robot_mass: float) -> float:
+        """Largest relative speed [m/s] at which a blow stays within :attr:`transient_force`."""
+        return self.transient_force / math.sqrt(self._reduced_mass(robot_mass) * self.stiffness)
+
+    def _reduced_mass(self, robot_mass: float) -> float:
+        if not robot_mass > 0:
+            raise ValueError(f"robot_mass {robot_mass} kg: expected above 0")
+        if math.isinf(robot_mass):
+            return self.mass
+        return self.mass * robot_mass / (self.mass + robot_mass)
+
+
+# name, F_QS [N], k [N/mm], m_H [kg], F_QS confirmed, k confirmed; no m_H was.
+_TABLE = (
+    ("skull", 130, 150, 4.4, False, True),
+    ("face", 65, 75, 4.4, False, True),
+    ("neck", 150, 50, 1.2, False, True),
+    ("back", 210, 35, 40, True, True),
+    ("chest", 140, 25, 40, True, True),
+    ("abdomen", 110, 10, 40, True, True),
+    ("pelvis", 180, 25, 40, True, False),
+    ("upper_arm", 150, 30, 3, True, False),
+    ("lower_arm", 160, 40, 2, True, False),
+    ("hand", 140, 75, 0.6, True, False),
+    ("thigh", 220, 50, 75, False, False),
+    ("lower_leg", 130, 60, 75, False, False),
+)
+
+#: The regions by name; ``back`` stands for back and shoulders.
+BODY_REGIONS = {
+    name: BodyRegion(
+        name,
+        float(force),
+        1e3 * stiffness,
+        float(mass),
+        transient=name not in ("skull", "face"),
+        force_confirmed=force_known,
+        stiffness_confirmed=stiffness_known,
+    )
+    for name, force, stiffness, mass, force_known, stiffness_known in _TABLE
+}
+
+
+def body_region(name: str) -> BodyRegion:
+    """The region called ``name``.
+
+    Raises:
+        ValueError: no such region; the message lists them.
+    """
+    if name not in BODY_REGIONS:
+        raise ValueError(f"body region {name!r}: expected one of {', '.join(BODY_REGIONS)}")
+    return BODY_REGIONS[name]

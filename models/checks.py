@@ -1,0 +1,51 @@
+"""Argument checks that name what is wrong and what would work."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def above_zero(owner: object, *names: str) -> None:
+    """Every number of the named fields is finite and above 0, or ``ValueError``."""
+    for name in names:
+        value = np.asarray(getattr(owner, name), dtype=float)
+        if not (np.isfinite(value) & (value > 0)).all():
+            raise ValueError(f"{type(owner).__name__}.{name} {value}: expected above 0")
+
+
+def not_negative(owner: object, *names: str) -> None:
+    """Every number of the named fields is finite and 0 or more, or ``ValueError``."""
+    for name in names:
+        value = np.asarray(getattr(owner, name), dtype=float)
+        if not (np.isfinite(value) & (value >= 0)).all():
+            raise ValueError(f"{type(owner).__name__}.{name} {value}: expected 0 or more")
+
+
+def shaped(owner: object, shape: tuple[int, ...], meaning: str, *names: str) -> None:
+    """The named fields have ``shape``, or ``ValueError`` that says what the axes mean."""
+    for name in names:
+        found = np.shape(getattr(owner, name))
+        if found != shape:
+            raise ValueError(
+                f"{type(owner).__name__}.{name}: shape {found}, expected {shape}: {meaning}"
+            )
+
+
+def rigid_pose(pose: object, name: str = "base_pose") -> NDArray[np.float64]:
+    """``pose`` as an array.
+
+    Raises:
+        ValueError: not a homogeneous (4, 4) matrix of a rotation and a translation.
+    """
+    matrix = np.asarray(pose, dtype=float)
+    good = matrix.shape == (4, 4) and bool(np.isfinite(matrix).all())
+    if good:
+        turn = matrix[:3, :3]
+        good = np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0
+        good = good and np.array_equal(matrix[3], [0, 0, 0, 1])
+    if not good:
+        raise ValueError(
+            f"{name}: expected a homogeneous (4, 4) matrix with a rotation and a translation in it"
+        )
+    return matrix

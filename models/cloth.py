@@ -1,0 +1,81 @@
+"""A hanging or stretched cloth: MuJoCo's two-dimensional flex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from tauguard.models.checks import above_zero, not_negative
+
+Vector = tuple[float, float, float]
+
+#: Which vertices are held: none, the upper edge, the two upper corners, all four edges.
+PINS = ("none", "edge", "corners", "frame")
+
+
+@dataclass(frozen=True)
+class Cloth:
+    """A square cloth of ``count`` x ``count`` vertices in its own x-y plane, edges along x and y.
+
+    At about 20 x 20 a cloth costs a hundred times what the arm costs: list it only where needed.
+    """
+
+    count: int = 15  #: vertices along each side
+    size: float = 0.6  #: side [m]
+    mass: float = 0.2  #: [kg]
+    radius: float = 1e-3  #: half the thickness that contacts see [m]
+    position: Vector = (0.7, 0.0, 0.8)  #: of the middle [m]
+    quat_wxyz: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 0.5)
+    """Orientation; the default hangs it across the x axis, y edge up."""
+    pinned: str = "edge"  #: one of :data:`PINS`
+    damping: float = 0.01  #: of the edges [1/s], against ringing
+    solref: tuple[float, float] = (0.003, 1.0)  #: MuJoCo's contact parameters
+    self_collide: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the one that is out of range."""
+        if not (isinstance(self.count, int) and 2 <= self.count <= 200):
+            raise ValueError(f"Cloth.count {self.count}: expected a whole number from 2 to 200")
+        above_zero(self, "size", "mass", "radius")
+        not_negative(self, "damping")
+        if self.pinned not in PINS:
+            raise ValueError(f"Cloth.pinned {self.pinned!r}: expected one of {', '.join(PINS)}")
+
+    def pins(self) -> list[int]:
+        """Numbers of the held vertices; vertex ``i * count + j`` is row i along x, j along y."""
+        n = self.count
+        i, j = np.divmod(np.arange(n * n), n)
+        held = {
+            "none": np.zeros(n * n, dtype=bool),
+            "edge": j == n - 1,
+            "corners": (j == n - 1) & ((i == 0) | (i == n - 1)),
+            "frame": (i == 0) | (i == n - 1) | (j == 0) | (j == n - 1),
+        }
+        return [int(k) for k in np.flatnonzero(held[self.pinned])]
+
+
+def add_cloth(spec: mujoco.MjSpec, cloth: Cloth) -> None:
+    """Add the flex ``cloth_sheet`` to the world of ``spec``; it meets the arm alone."""
+    spec.attach(
+        mujoco.MjSpec.from_string(_text(cloth)),
+        frame=spec.worldbody.add_frame(pos=cloth.position, quat=cloth.quat_wxyz),
+        prefix="cloth_",
+    )
+
+
+def _text(cloth: Cloth) -> str:
+    spacing = cloth.size / (cloth.count - 1)
+    pins = " ".join(map(str, cloth.pins()))
+    pin = f'<pin id="{pins}"/>' if pins else ""
+    own = "auto" if cloth.self_collide else "none"
+    return f"""<mujoco><worldbody><body name="frame">
+      <flexcomp name="sheet" type="grid" dim="2" count="{cloth.count} {cloth.count} 1"
+        spacing="{spacing!r} {spacing!r} {spacing!r}" mass="{cloth.mass!r}"
+        radius="{cloth.radius!r}" rgba="0.35 0.5 0.75 1">
+        <edge equality="true" damping="{cloth.damping!r}"/>
+        <contact contype="2" conaffinity="1" condim="3" selfcollide="{own}"
+          solref="{cloth.solref[0]!r} {cloth.solref[1]!r}"/>
+        {pin}
+      </flexcomp></body></worldbody></mujoco>"""

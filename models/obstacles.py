@@ -1,0 +1,191 @@
+"""What the arm may meet, and contacts that are as stiff as they say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from tauguard.models.body_regions import BodyRegion, body_region
+from tauguard.models.checks import above_zero, not_negative
+
+Vector = tuple[float, float, float]
+
+#: Where an obstacle waits until it is needed [m].
+PARKED = (0.0, 0.0, 50.0)
+
+
+@dataclass(frozen=True)
+class Striker:
+    """A ball that flies freely (weightless) and strikes the arm; parked until it is launched."""
+
+    radius: float = 0.05  #: [m]
+    mass: float = 2.0  #: [kg]: with the arm's inertia it sets the length of a blow
+    stiffness: float = 3e4  #: of its contact [N/m]
+    damping: float = 60.0  #: of its contact [N s/m]
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the one that is out of range."""
+        above_zero(self, "radius", "mass", "stiffness")
+        not_negative(self, "damping")
+
+
+@dataclass(frozen=True)
+class Clamp:
+    """A ball that stands still in the arm's way; parked until it is placed."""
+
+    radius: float = 0.05  #: [m]
+    stiffness: float = 2e4  #: of its contact [N/m]
+    damping: float = 100.0  #: of its contact [N s/m]
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the one that is out of range."""
+        above_zero(self, "radius", "stiffness")
+        not_negative(self, "damping")
+
+
+@dataclass(frozen=True)
+class BodyProxy:
+    """A body region of a person: its effective mass behind its contact stiffness.
+
+    A ball, because every further contact point would multiply the stiffness. It slides along
+    ``direction``, as the two-mass model of the standard has it, or is held (``clamped``).
+    """
+
+    region: str  #: one of :data:`tauguard.models.body_regions.BODY_REGIONS`
+    position: Vector  #: of its centre [m]
+    direction: Vector = (1.0, 0.0, 0.0)  #: in which it may move; length does not matter
+    radius: float = 0.07  #: [m]
+    damping: float = 0.0  #: of its contact [N s/m]; the standard's spring has none
+    clamped: bool = False  #: held in place: the quasi-static case
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the one that is out of range."""
+        body_region(self.region)
+        above_zero(self, "radius")
+        not_negative(self, "damping")
+        for name in ("position", "direction"):
+            value = np.asarray(getattr(self, name), dtype=float)
+            if value.shape != (3,) or not np.isfinite(value).all():
+                raise ValueError(f"BodyProxy.{name} {getattr(self, name)}: expected three numbers")
+        if not np.any(self.direction):
+            raise ValueError("BodyProxy.direction: zero; expected a direction to slide along")
+
+    @property
+    def limits(self) -> BodyRegion:
+        """The region's numbers."""
+        return body_region(self.region)
+
+    @property
+    def stiffness(self) -> float:
+        """Of the contact [N/m]."""
+        return self.limits.stiffness
+
+
+@dataclass(frozen=True)
+class Table:
+    """A fixed board that the arm can touch, with MuJoCo's default contacts."""
+
+    position: Vector = (0.75, 0.0, 0.1)  #: of its centre [m]
+    half_extents: Vector = (0.35, 0.6, 0.02)  #: [m]
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the one that is out of range."""
+        if np.shape(self.half_extents) != (3,) or np.shape(self.position) != (3,):
+            raise ValueError("Table: position and half_extents are three numbers each [m]")
+        above_zero(self, "half_extents")
+
+
+Obstacle = Striker | Clamp | BodyProxy
+
+
+def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle, name: str) -> None:
+    """Add the body ``name`` to the world of ``spec``; its contacts come with :func:`add_pairs`."""
+    world = spec.worldbody
+    if isinstance(obstacle, Striker):
+        body = world.add_body(name=name, pos=PARKED, gravcomp=1)
+        body.add_freejoint()
+        _ball(body, obstacle.radius, obstacle.mass, [0.85, 0.25, 0.2, 1])
+    elif isinstance(obstacle, Clamp):
+        body = world.add_body(name=name, pos=[0, 0, -PARKED[2]], mocap=True)
+        _ball(body, obstacle.radius, 1.0, [0.75, 0.3, 0.55, 1])
+    else:
+        body = world.add_body(name=name, pos=obstacle.position, gravcomp=1, mocap=obstacle.clamped)
+        if not obstacle.clamped:
+            axis = np.asarray(obstacle.direction) / np.linalg.norm(obstacle.direction)
+            body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        _ball(body, obstacle.radius, obstacle.limits.mass, [0.87, 0.67, 0.55, 1])
+
+
+def _ball(body: mujoco.MjsBody, radius: float, mass: float, rgba: list[float]) -> None:
+    """An obstacle's geom; it meets the arm by contact pairs alone."""
+    body.add_geom(
+        name=body.name,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[radius, 0, 0],
+        mass=mass,
+        contype=0,
+        conaffinity=0,
+        rgba=rgba,
+    )
+
+
+def add_table(spec: mujoco.MjSpec, table: Table) -> None:
+    """Add the geom ``table`` to the world of ``spec``."""
+    spec.worldbody.add_geom(
+        name="table",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=table.position,
+        size=table.half_extents,
+        contype=2,
+        conaffinity=1,
+        rgba=[0.72, 0.62, 0.5, 1],
+    )
+
+
+def add_floor(spec: mujoco.MjSpec) -> None:
+    """Add the plane ``floor`` at height 0 to the world of ``spec``."""
+    spec.worldbody.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0, 0, 0.05],
+        contype=2,
+        conaffinity=1,
+        rgba=[0.75, 0.77, 0.8, 1],
+    )
+
+
+def add_pairs(
+    spec: mujoco.MjSpec, shapes: list[mujoco.MjsGeom], obstacles: dict[str, Obstacle]
+) -> None:
+    """One contact pair for every shape of the arm and every obstacle, as stiff as it says.
+
+    With d = solimp's dmin small, MuJoCo's direct solref format gives f = (K pen + B v) / A for a
+    ``solref`` of (-K, -B), whatever the pose; A is the sum of both bodies' translational
+    ``body_invweight0``, which only a compiled model tells. Two shapes of one link that touch the
+    same obstacle are two springs.
+    """
+    for geom in shapes:
+        for name in obstacles:
+            spec.add_pair(
+                name=f"{geom.name}_{name}",
+                geomname1=geom.name,
+                geomname2=name,
+                condim=1,
+                solimp=[0.001, 0.001, 0.001, 0.5, 2],
+            )
+    model = spec.compile()
+    weights = pair_weights(model)
+    for pair in spec.pairs:
+        part = obstacles.get(pair.geomname2)
+        if part is not None:
+            weight = weights[model.pair(pair.name).id]
+            pair.solref = [-part.stiffness * weight, -part.damping * weight]
+
+
+def pair_weights(model: mujoco.MjModel) -> np.ndarray:
+    """A of every contact pair: both bodies' translational ``body_invweight0``, shape (npair,)."""
+    inverse = model.body_invweight0[:, 0]
+    bodies = model.geom_bodyid
+    return np.asarray(inverse[bodies[model.pair_geom1]] + inverse[bodies[model.pair_geom2]])

@@ -1,0 +1,63 @@
+"""What the arm carries: a body at the flange whose mass changes while the simulation runs."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from tauguard.models.obstacles import pair_weights
+
+#: Length of the payload's lever: its centre of mass in front of the flange [m].
+PAYLOAD_REACH = 0.08
+#: Radius of the solid ball that gives the payload its inertia [m].
+_RADIUS = 0.05
+#: Mass [kg] and inertia [kg m^2] of an empty payload body; MuJoCo wants them above its minimum.
+_NO_MASS, _NO_INERTIA = 1e-6, 1e-9
+
+
+def add_payload_body(spec: mujoco.MjSpec, flange: mujoco.MjsSite) -> None:
+    """Add the body ``payload`` at ``flange``: nearly weightless, visible, touching nothing."""
+    body = flange.parent.add_body(name="payload", pos=flange.pos, quat=flange.quat)
+    body.explicitinertial = True
+    body.mass = _NO_MASS
+    body.ipos = [0, 0, PAYLOAD_REACH]
+    body.inertia = [_NO_INERTIA] * 3
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        pos=[0, 0, PAYLOAD_REACH],
+        size=[0.045, 0.05, 0],
+        group=2,
+        contype=0,
+        conaffinity=0,
+        density=0,
+        rgba=[0.85, 0.5, 0.15, 1],
+    )
+
+
+def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: float) -> None:
+    """Give the payload body a mass [kg], from now on; a compact load in front of the flange.
+
+    The model's derived constants are brought up to date and contact pairs keep the stiffness that
+    they say.
+
+    Args:
+        model: the scene's; changed.
+        data: the running state; not touched, its next step feels the new mass.
+        body: id of the payload body (``Scene.payload_body``).
+        mass: [kg].
+
+    Raises:
+        ValueError: a mass that is negative or not finite, or a scene without a payload body.
+    """
+    if body < 0:
+        raise ValueError("the scene has no payload: compose it with SceneSpec(payload=True)")
+    if not (np.isfinite(mass) and mass >= 0):
+        raise ValueError(f"payload {mass} kg: expected 0 or more")
+    before = pair_weights(model)
+    load = max(mass, _NO_MASS)
+    model.body_mass[body] = load
+    model.body_inertia[body] = max(load * 0.4 * _RADIUS**2, _NO_INERTIA)
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    direct = model.pair_solref[:, 0] < 0
+    ratio = pair_weights(model)[direct] / before[direct]
+    model.pair_solref[direct] *= ratio[:, None]
