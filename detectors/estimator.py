@@ -41,7 +41,7 @@ class Unknowns:
     coulomb: float = 0.1  #: relative
     slow: float = 60.0  #: time constant of payload and friction errors [s]
     fast: float = 1.0  #: time constant of the offset [s]
-    clip: float = 3.0  #: innovations count as this many standard deviations at most
+    clip: float = 3.0  #: an innovation z above this many standard deviations c counts c^2/z
     every: float = 0.01  #: time between two corrections [s]
 
     @classmethod

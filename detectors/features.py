@@ -5,7 +5,8 @@ t_I = 8 ms: 11 samples each, 44 numbers. Scaling decides whether the SVR works: 
 is sigma = 3, and raw N m residuals have a median distance near 100, which makes the kernel matrix
 almost diagonal. So each joint's residual is divided by its envelope (what free motion leaves of it
 at this speed and acceleration), compressed by asinh (a hard blow must not leave the region that
-training has seen) and multiplied by one factor that brings the median distance to ``distance``.
+training has seen) and multiplied by one factor that brings the median distance between windows of
+collisions and of free motion to ``distance``.
 """
 
 from __future__ import annotations
@@ -156,12 +157,10 @@ class Features:
         return out
 
 
-def median_distance(windows: Array, rng: np.random.Generator, pairs: int = 4000) -> float:
-    """Median Euclidean distance between random pairs of rows."""
-    a, b = rng.integers(len(windows), size=(2, pairs))
-    apart = a != b
-    gaps = np.linalg.norm(windows[a[apart]] - windows[b[apart]], axis=1)
-    return float(np.median(gaps)) if len(gaps) else 0.0
+def median_distance(a: Array, b: Array, rng: np.random.Generator, pairs: int = 4000) -> float:
+    """Median Euclidean distance between random rows of ``a`` and of ``b``."""
+    one, two = rng.integers(len(a), size=pairs), rng.integers(len(b), size=pairs)
+    return float(np.median(np.linalg.norm(a[one] - b[two], axis=1)))
 
 
 class Ring:

@@ -43,7 +43,7 @@ class DetectorSettings:
     C: float = 1.0
     epsilon: float = 0.02
     units: float = 5.0  #: envelopes of free motion that count one before the asinh
-    distance: float = 4.0  #: median distance of windows after scaling, in [2, 8] for sigma = 3
+    distance: float = 2.0  #: median distance of struck to free windows after scaling
     reference: tuple[float, ...] = (20.0, 20.0, 15.0, 6.0)
     """Torque that counts 1 in the training target, one a chosen joint (the last is repeated)."""
     windows: int = 3000  #: for the regressor
@@ -193,8 +193,8 @@ class CollisionDetector:
         )
         rng = np.random.default_rng(settings.seed)
         prepared = [self._prepare(t, e, features) for t, e in zip(traces, estimates, strict=True)]
-        windows, _ = draw_windows(rng, prepared, features, 1000)
-        spread = median_distance(windows, rng)
+        windows, target = draw_windows(rng, prepared, features, 1000)
+        spread = median_distance(windows[target > 0], windows[target == 0], rng)
         factor = settings.distance / spread if spread > 0 else 1.0
         return replace(features, factor=factor)
 
@@ -226,10 +226,10 @@ class CollisionDetector:
             hardest = []
             share = -(-settings.mined // len(prepared))
             for p in prepared:
-                score = self._scores(regressor, p.signal)
-                hardest.append(
-                    self.features.windows(p.signal, peaks(score, p.free, share, self._gap()))
-                )
+                rows = np.flatnonzero(p.free)[:: self._thin()]
+                score = regressor.predict(self.features.windows(p.signal, rows))
+                worst = peaks(score, share, max(1, self._gap() // self._thin()))
+                hardest.append(self.features.windows(p.signal, rows[worst]))
             x = np.concatenate([x, *hardest])
             y = np.concatenate([y, np.zeros(len(x) - len(y))])
             regressor = SrqSVR(settings.sigma, settings.C, settings.epsilon).fit(x, y)
@@ -238,6 +238,10 @@ class CollisionDetector:
     def _gap(self) -> int:
         """Rows between two mined moments: 0.1 s."""
         return max(1, round(0.1 / self.dt))
+
+    def _thin(self) -> int:
+        """Mining looks at rows half of t_I apart: windows next to each other are alike."""
+        return max(1, round(self.settings.interval / self.dt / 2))
 
     # -- detection --------------------------------------------------------------------------------
 

@@ -56,18 +56,16 @@ def binary_target(trace: Trace) -> Array:
     return label
 
 
-def peaks(score: Array, allowed: Bools, count: int, gap: int) -> NDArray[np.int64]:
-    """Rows of the ``count`` highest allowed scores, at least ``gap`` rows apart."""
+def peaks(score: Array, count: int, gap: int) -> NDArray[np.int64]:
+    """Indices of the ``count`` highest scores that are at least ``gap`` apart, in order."""
     chosen: list[int] = []
     blocked = np.zeros(len(score), dtype=np.bool_)
-    order = np.flatnonzero(allowed)
-    order = order[np.argsort(-score[order], kind="stable")]
-    for row in order:
+    for index in np.argsort(-score, kind="stable"):
         if len(chosen) == count:
             break
-        if not blocked[row]:
-            chosen.append(int(row))
-            blocked[max(0, row - gap) : row + gap + 1] = True
+        if not blocked[index]:
+            chosen.append(int(index))
+            blocked[max(0, index - gap) : index + gap + 1] = True
     return np.array(sorted(chosen), dtype=np.int64)
 
 

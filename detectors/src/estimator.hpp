@@ -7,8 +7,8 @@
 // viscous and Coulomb friction. Each is an Ornstein-Uhlenbeck process with its own standard deviation and
 // time constant: what no motion excites falls back to zero. A standard deviation of 0 removes an unknown.
 //
-// An innovation of more than `clip` standard deviations counts as one of `clip`: a collision moves the
-// estimate little, a payload within a second or so.
+// An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is, the less
+// it says about the model, and the sooner it is a collision.
 #pragma once
 
 #include <cmath>
@@ -179,7 +179,7 @@ class Estimator {
     for (std::size_t b = 0; b < m_; ++b) variance += row_[b] * gathered_[b];
     double innovation = residual_[j] - expected(j);
     const double limit = set_.clip * std::sqrt(variance);
-    innovation = std::clamp(innovation, -limit, limit);
+    if (std::fabs(innovation) > limit) innovation = limit * limit / innovation;
     for (std::size_t a = 0; a < m_; ++a) {
       const double k = gathered_[a] / variance;
       theta_[a] += k * innovation;

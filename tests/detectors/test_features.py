@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.features import (
     Envelope,
     Features,
@@ -72,15 +73,19 @@ def test_a_joint_without_any_residual_keeps_a_scale_above_zero():
 
 
 def test_scaling_brings_the_median_distance_to_what_was_asked(detector, training):
-    estimate = detector._estimate(training[-1])
-    f = detector.features
-    signal = f.signal(estimate.left, training[-1].qd, estimate.acceleration)
-    rows = np.arange(3000, len(signal), 7)
-    distance = median_distance(f.windows(signal, rows), np.random.default_rng(0))
-    assert 1 < distance < 8  # of the kernel's length 3; raw N m give about 100
-    plain = Features(f.joints, f.shape, None)
-    raw = plain.signal(estimate.residual, training[-1].qd, estimate.acceleration)
-    np.testing.assert_array_equal(raw, estimate.residual[:, :4])
+    trace = training[-1]
+    f, estimate = detector.features, detector._estimate(trace)
+    signal = f.signal(estimate.left, trace.qd, estimate.acceleration)
+    struck = np.flatnonzero(np.abs(trace.truth.tau_ext[:, :4]).max(axis=1) > 2)
+    free = np.flatnonzero(free_rows(trace, 3.0))[::7]
+    rng = np.random.default_rng(0)
+    distance = median_distance(f.windows(signal, struck), f.windows(signal, free), rng)
+    assert 0.5 < distance / detector.settings.distance < 2  # one trace out of two
+    raw = Features(f.joints, f.shape, None)
+    plain = raw.signal(estimate.residual, trace.qd, estimate.acceleration)
+    np.testing.assert_array_equal(plain, estimate.residual[:, :4])
+    far = median_distance(raw.windows(plain, struck), raw.windows(plain, free), rng)
+    assert far > 20  # raw N m, for a kernel of length 3
 
 
 def test_bad_window():
