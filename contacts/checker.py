@@ -1,0 +1,230 @@
+"""The one protocol of every contact checker: a state before, a state after, contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Protocol, runtime_checkable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int32]
+
+#: What may touch, by name: MuJoCo's geom types and its flexes.
+KINDS = (
+    "plane",
+    "hfield",
+    "sphere",
+    "capsule",
+    "ellipsoid",
+    "cylinder",
+    "box",
+    "mesh",
+    "sdf",
+    "flex",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where everything is at one instant.
+
+    Between two states a body's point y moves as ``xpos + t dx + exp(t [w]x) xmat y``, t in [0, 1],
+    with dx the difference of both xpos and w the shortest rotation vector from one xmat to the
+    other (what ``mj_integratePos`` does with a free joint); a flex vertex moves linearly. That
+    path is what checkers answer about and what a referee judges.
+
+    Attributes:
+        time: [s].
+        qpos: Shape (nq,), m and rad.
+        qvel: Shape (nv,), m/s and rad/s.
+        xpos: Origins of the bodies. Shape (nbody, 3), m.
+        xmat: Their rotations, by rows. Shape (nbody, 9).
+        geom_xpos: Centres of the geoms. Shape (ngeom, 3), m.
+        geom_xmat: Their rotations, by rows. Shape (ngeom, 9).
+        flexvert_xpos: Shape (nflexvert, 3), m.
+    """
+
+    time: float
+    qpos: Array
+    qvel: Array
+    xpos: Array
+    xmat: Array
+    geom_xpos: Array
+    geom_xmat: Array
+    flexvert_xpos: Array
+
+    @classmethod
+    def of(cls, model: Any, data: Any, scratch: Any = None) -> State:
+        """The state of ``data`` at its own ``qpos``; ``data`` is not changed.
+
+        After ``mj_step`` the positions in ``data`` are still those that the step began with, so
+        the kinematics are done anew in ``scratch``.
+
+        Args:
+            model: MjModel.
+            data: MjData.
+            scratch: Another MjData of the model, overwritten; ``None`` makes one (slow in a loop).
+        """
+        scratch = mujoco.MjData(model) if scratch is None else scratch
+        scratch.qpos[:] = data.qpos
+        scratch.mocap_pos[:] = data.mocap_pos
+        scratch.mocap_quat[:] = data.mocap_quat
+        mujoco.mj_kinematics(model, scratch)
+        if model.flex_centered.all() and not model.flex_interp.any():
+            vertices = scratch.xpos[model.flex_vertbodyid]
+        else:
+            mujoco.mj_comPos(model, scratch)
+            mujoco.mj_flex(model, scratch)
+            vertices = scratch.flexvert_xpos.copy()
+        return cls(
+            time=float(data.time),
+            qpos=data.qpos.copy(),
+            qvel=data.qvel.copy(),
+            xpos=scratch.xpos.copy(),
+            xmat=scratch.xmat.copy(),
+            geom_xpos=scratch.geom_xpos.copy(),
+            geom_xmat=scratch.geom_xmat.copy(),
+            flexvert_xpos=vertices,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts of one step, one a row.
+
+    Attributes:
+        time: When, as a fraction of the step in [0, 1]; 0 where they touch from the start. (K,).
+        geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
+        flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
+        feature: Which vertex, edge or element of each partner, in the checker's own numbering (of
+            MuJoCo: ``contact.vert`` or ``contact.elem``); -1 where it has no say. Shape (K, 2).
+        point: World frame. Shape (K, 3), m; NaN where it is not known.
+        normal: Unit vector from the first partner to the second. Shape (K, 3); NaN where unknown.
+        distance: Between both surfaces at ``time``, negative in penetration. Shape (K,), m.
+    """
+
+    time: Array
+    geom: Index
+    flex: Index
+    feature: Index
+    point: Array
+    normal: Array
+    distance: Array
+
+    def __post_init__(self) -> None:
+        """Check the shapes: ``ValueError`` names the field that does not fit."""
+        count = np.shape(self.time)[0] if np.ndim(self.time) == 1 else -1
+        for name, dtype, tail in _COLUMNS:
+            value = np.asarray(getattr(self, name), dtype=dtype)
+            if value.shape != (count, *tail):
+                raise ValueError(f"{name}: shape {value.shape}, expected {('K', *tail)}")
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @classmethod
+    def empty(cls) -> Contacts:
+        """No contact at all."""
+        return cls(*(np.zeros((0, *tail), dtype=dtype) for _, dtype, tail in _COLUMNS))
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Contacts]) -> Contacts:
+        """The rows of all ``parts`` in their order."""
+        if not parts:
+            return cls.empty()
+        names = [field.name for field in fields(cls)]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+    def where(self, rows: NDArray[Any]) -> Contacts:
+        """The chosen rows: a mask or indices."""
+        return Contacts(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+
+_COLUMNS: tuple[tuple[str, type[np.generic], tuple[int, ...]], ...] = (
+    ("time", np.float64, ()),
+    ("geom", np.int32, (2,)),
+    ("flex", np.int32, (2,)),
+    ("feature", np.int32, (2,)),
+    ("point", np.float64, (3,)),
+    ("normal", np.float64, (3,)),
+    ("distance", np.float64, ()),
+)
+
+
+@runtime_checkable
+class Checker(Protocol):
+    """Says what touches in a step. A factory ``(model, **options)`` makes one.
+
+    Attributes:
+        name: As registered.
+        covers: Pairs of :data:`KINDS` that it answers for, see :func:`pair_kind`.
+    """
+
+    name: str
+    covers: frozenset[tuple[str, str]]
+
+    def check(self, before: State, after: State) -> Contacts:
+        """What touches on the way between both states; see :class:`State` for the way."""
+        ...
+
+
+Factory = Callable[..., Checker]
+_FACTORIES: dict[str, Factory] = {}
+
+
+def register(name: str, factory: Factory) -> None:
+    """Make a checker known by ``name``; a later one of that name takes its place.
+
+    Args:
+        name: Not empty.
+        factory: ``factory(model, **options)`` returns a :class:`Checker`.
+
+    Raises:
+        ValueError: an empty name, or a factory that cannot be called.
+    """
+    if not name:
+        raise ValueError("name: empty, expected the name of a checker")
+    if not callable(factory):
+        raise ValueError(f"factory: {factory!r} cannot be called; expected factory(model, ...)")
+    _FACTORIES[name] = factory
+
+
+def registered() -> tuple[str, ...]:
+    """Names of the checkers there are."""
+    return tuple(_FACTORIES)
+
+
+def checker(name: str, model: Any, **options: Any) -> Checker:
+    """The checker ``name`` for ``model``.
+
+    Raises:
+        ValueError: no such checker (the message lists those there are), or a geom in the model
+            that this checker cannot handle.
+    """
+    if name not in _FACTORIES:
+        raise ValueError(f"checker {name!r}: there are {', '.join(_FACTORIES) or 'none'}")
+    return _FACTORIES[name](model, **options)
+
+
+def pair_kind(a: str, b: str) -> tuple[str, str]:
+    """Two of :data:`KINDS` in their order there.
+
+    Raises:
+        ValueError: no such kind.
+    """
+    for kind in (a, b):
+        if kind not in KINDS:
+            raise ValueError(f"kind {kind!r}: there are {', '.join(KINDS)}")
+    return (a, b) if KINDS.index(a) <= KINDS.index(b) else (b, a)
+
+
+def geom_kinds(model: Any) -> list[str]:
+    """The kind of each geom: one of :data:`KINDS`."""
+    return [
+        mujoco.mjtGeom(int(kind)).name.removeprefix("mjGEOM_").lower() for kind in model.geom_type
+    ]
