@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -13,18 +13,9 @@ from numpy.typing import NDArray
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import labels
 from tauguard.envs.episode import CollisionPlan, Episode, PayloadPick
-from tauguard.envs.injection import (
-    CLAMP_HOLD,
-    LEAD,
-    Aim,
-    Target,
-    body_points,
-    clamp_centre,
-    launch,
-    pulse_wrench,
-)
 from tauguard.envs.loop import Recording, SimulationLoop
 from tauguard.envs.motions import Workspace, random_motion
+from tauguard.envs.striking import Striking, Window
 from tauguard.models import (
     Clamp,
     Drive,
@@ -40,35 +31,6 @@ from tauguard.models import (
 from tauguard.traces import Trace, Truth
 
 Array = NDArray[np.float64]
-
-#: Out of everybody's way: where an obstacle waits [m].
-PARKED = np.array([0.0, 0.0, 50.0])
-#: Targets to try for one collision, and strengths to try on each.
-TARGETS, TRIES = 16, 10
-#: A person is not pushed harder in a collision worth detecting: such a target is given up [N].
-FORCE_LIMIT = 400.0
-#: An obstacle that touches the arm sooner than this after it was put there stood in its way [s].
-CLEAR = 0.01
-#: A clamp's strength counts from this far in front of the arm's deepest reach [m]: its depth is
-#: the strength less this, and may be negative where another part of the link reaches further.
-CLAMP_OFFSET = 0.03
-#: First guesses: strike speed [m/s], clamp depth from the offset [m], pulse force [N].
-STRENGTH = {"strike": 0.5, "clamp": CLAMP_OFFSET, "pulse": 80.0}
-#: What an obstacle or a person can do: strikes [m/s], clamps [m], pulses [N].
-STRENGTH_RANGE = {"strike": (0.02, 6.0), "clamp": (0.005, 0.1), "pulse": (1.0, 1500.0)}
-#: Largest factor between two tries of a strength.
-STRENGTH_FACTOR = {"strike": 10.0, "clamp": 1.3, "pulse": 10.0}
-
-
-@dataclass(frozen=True)
-class Window:
-    """One injected collision as it was carried out."""
-
-    begin: int  #: first row
-    recording: Recording
-    wrenches: labels.Wrenches
-    peak_tau: float  #: [N m]
-    peak_force: float  #: [N]
 
 
 def workspace(scene: Scene) -> Workspace:
@@ -133,9 +95,9 @@ class Simulation:
         self.scene = scene_for(episode)
         self.nominal = nominal or cura6_drive()
         streams = np.random.SeedSequence(episode.seed).spawn(3)
-        self._motion_rng, self._aim_rng, self._sensor_rng = map(np.random.default_rng, streams)
+        motion_rng, aim_rng, self._sensor_rng = map(np.random.default_rng, streams)
         self.motion = random_motion(
-            self._motion_rng,
+            motion_rng,
             workspace(self.scene),
             episode.seconds,
             episode.speed,
@@ -147,6 +109,7 @@ class Simulation:
         )
         self.loop = SimulationLoop(self.scene, self.nominal)
         self.loop.reset(self.motion.q[0])
+        self.striking = Striking(self.scene, self.motion, self.loop, self._follow, aim_rng)
         self._payload = 0.0
         self._windows: list[Window] = []
 
@@ -162,7 +125,7 @@ class Simulation:
             stop = len(payload) if index + 1 == len(jobs) else self._row(jobs[index + 1].time)
             start = max(row, self._row(job.time))
             if isinstance(job, CollisionPlan):
-                start, window = self._collide(job, row, start, stop, parts)
+                start, window = self.striking.carry_out(job, row, start, stop, parts)
                 if window is not None:
                     injected.append((window.begin * self.episode.timestep, job.kind))
                     parts.append(window.recording)
@@ -191,147 +154,6 @@ class Simulation:
         return self.loop.run(
             self.motion.q[rows], self.motion.qd[rows], self._feed_forward[rows], wrench, body
         )
-
-    def _collide(
-        self, plan: CollisionPlan, row: int, start: int, stop: int, parts: list[Recording]
-    ) -> tuple[int, Window | None]:
-        """Runs up to the collision's window (into ``parts``) and carries the collision out there.
-
-        Returns:
-            The row reached before the window, and the window; none where no target fitted.
-        """
-        lead = 0 if plan.kind == "pulse" else self._row(LEAD)
-        tail = self._row(0.3 if plan.kind == "strike" else plan.duration + CLAMP_HOLD)
-        aim = Aim(self.scene, self.motion)
-        late = replace(plan, time=max(plan.time, (row + lead) * self.episode.timestep))
-        at = row
-        for attempt in range(TARGETS):
-            late = self._relaxed(late, attempt)
-            target = aim.find(late, self._aim_rng, stop - tail)
-            if target is None or target.row + tail > stop or target.row - lead < at:
-                continue
-            begin = target.row - lead
-            parts.append(self._follow(at, begin))
-            at = begin
-            saved = self.loop.save()
-            window = self._search(late, target, begin, target.row + tail)
-            if window is not None:
-                return begin, window
-            self.loop.restore(saved)
-        parts.append(self._follow(at, max(at, start)))
-        return max(at, start), None
-
-    def _relaxed(self, plan: CollisionPlan, attempt: int) -> CollisionPlan:
-        """The plan as asked at first, then without what the motion may not offer.
-
-        A dwell may be missing, and a link may not move towards where a clamp could stand.
-        """
-        if attempt < TARGETS // 4:
-            return plan
-        if plan.kind != "clamp":
-            return replace(plan, at_rest=False)
-        links = len(self.scene.link_bodies)
-        return replace(plan, link=int(self._aim_rng.integers(2, links + 1)))
-
-    def _search(self, plan: CollisionPlan, target: Target, begin: int, end: int) -> Window | None:
-        """Repeats the window until the achieved peak torque lies in the plan's stratum.
-
-        The strength is scaled by what was achieved until the stratum is bracketed, then bisected
-        (geometrically). ``None`` where it cannot be reached from this target.
-        """
-        strength = plan.strength or STRENGTH[plan.kind]
-        below, above = STRENGTH_RANGE[plan.kind]
-        saved = self.loop.save()
-        bracket: list[float | None] = [None, None]
-        for _ in range(TRIES):
-            self.loop.restore(saved)
-            window = self._attempt(plan, target, strength, begin, end)
-            if window is None or window.peak_force > FORCE_LIMIT:
-                return None
-            if plan.severity is None or plan.severity[0] <= window.peak_tau < plan.severity[1]:
-                return window
-            bracket[int(window.peak_tau >= plan.severity[1])] = strength
-            if bracket[0] is not None and bracket[1] is not None:
-                wanted = float(np.sqrt(bracket[0] * bracket[1]))
-            else:
-                goal = float(np.sqrt(plan.severity[0] * plan.severity[1]))
-                most = STRENGTH_FACTOR[plan.kind]
-                wanted = strength * float(
-                    np.clip(goal / max(window.peak_tau, 1e-3), 1 / most, most)
-                )
-            if not below <= wanted <= above:
-                return None
-            strength = wanted
-        return None
-
-    def _attempt(
-        self, plan: CollisionPlan, target: Target, strength: float, begin: int, end: int
-    ) -> Window | None:
-        """The window with this strength; ``None`` where the obstacle touched too early."""
-        scene, dt = self.scene, self.episode.timestep
-        rows = end - begin
-        wrench, body = None, -1
-        if plan.kind == "pulse":
-            com = body_points(scene, self.motion.q[begin:end], target.body)
-            wrench = pulse_wrench(target, com, strength, plan.duration, dt, rows, 0)
-            body = target.body
-        elif plan.kind == "strike":
-            self._launch(target, strength)
-        else:
-            self._place_clamp(target, strength - CLAMP_OFFSET, end)
-        recording = self._follow(begin, end, wrench, body)
-        self._park(plan.kind)
-        wrenches = (
-            self._pulse_truth(wrench, target, recording, dt)
-            if wrench is not None
-            else labels.Wrenches.from_contacts(recording.contact)
-        )
-        if plan.kind != "pulse" and (wrenches.force[: self._row(CLEAR)] != 0).any():
-            return None
-        tau = labels.external_torque(scene, recording.q, wrenches)
-        peak_tau = float(np.abs(tau[:, :4]).max(initial=0.0))
-        peak_force = float(np.linalg.norm(wrenches.force, axis=2).max(initial=0.0))
-        return Window(begin, recording, wrenches, peak_tau, peak_force)
-
-    def _launch(self, target: Target, speed: float) -> None:
-        model, data = self.scene.model, self.loop.data
-        body = model.body("striker")
-        position, velocity = launch(target, speed, float(model.geom_size[body.geomadr[0], 0]))
-        joint = model.joint(int(body.jntadr[0]))
-        data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = [*position, 1, 0, 0, 0]
-        data.qvel[joint.dofadr[0] : joint.dofadr[0] + 6] = [*velocity, 0, 0, 0]
-
-    def _place_clamp(self, target: Target, depth: float, end: int) -> None:
-        model = self.scene.model
-        body = model.body("clamp")
-        references = self.motion.q[target.row : end]
-        path = body_points(self.scene, references, target.body, target.point)
-        radius = float(model.geom_size[int(body.geomadr[0]), 0])
-        self.loop.data.mocap_pos[body.mocapid[0]] = clamp_centre(target, path, depth, radius)
-
-    def _park(self, kind: str) -> None:
-        model, data = self.scene.model, self.loop.data
-        if kind == "strike":
-            joint = model.joint(int(model.body("striker").jntadr[0]))
-            data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = [*PARKED, 1, 0, 0, 0]
-            data.qvel[joint.dofadr[0] : joint.dofadr[0] + 6] = 0
-        elif kind == "clamp":
-            data.mocap_pos[model.body("clamp").mocapid[0]] = -PARKED
-
-    def _pulse_truth(
-        self, wrench: Array, target: Target, recording: Recording, dt: float
-    ) -> labels.Wrenches:
-        """The wrench that acted, told about the pushed point instead of the centre of mass."""
-        rows = len(wrench)
-        found = labels.Wrenches.empty(rows, len(self.scene.link_bodies))
-        link = int(np.flatnonzero(np.asarray(self.scene.link_bodies) == target.body)[0])
-        force = wrench[:, :3]
-        point = target.point + np.outer(np.arange(rows) * dt, target.velocity)
-        com = body_points(self.scene, recording.q, target.body)
-        found.force[:, link] = force
-        found.torque[:, link] = wrench[:, 3:] - np.cross(point - com, force)
-        found.point[:, link] = point
-        return found
 
     def _trace(
         self, recording: Recording, payload: Array, injected: list[tuple[float, str]]

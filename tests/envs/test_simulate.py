@@ -62,7 +62,7 @@ def test_contact_truth_equals_mujocos_constraint_torque():
     episode = Episode(seed=2, seconds=4.0, collisions=(CollisionPlan("strike", 1.5, 4),))
     run = Simulation(episode)
     steps = []
-    original = run._attempt
+    original = run.striking._attempt
 
     def spy(plan, target, strength, begin, end):
         saved = run.loop.save()
@@ -70,14 +70,14 @@ def test_contact_truth_equals_mujocos_constraint_torque():
         if window is not None and not steps:
             after = run.loop.save()
             run.loop.restore(saved)
-            run._launch(target, strength)
+            run.striking._launch(target, strength)
             for k in range(begin, end):
                 run._follow(k, k + 1)
                 steps.append(run.loop.data.qfrc_constraint[run.scene.dof_adr].copy())
             run.loop.restore(after)
         return window
 
-    run._attempt = spy
+    run.striking._attempt = spy
     trace = run.run()
     window = run._windows[0]
     rows = slice(window.begin, window.begin + len(window.recording.q))
