@@ -1,6 +1,7 @@
 """Momentum observer, features, collision detectors, event matching and metrics."""
 
 from tauguard.detectors.calibrate import Calibration, Priors, calibrate
+from tauguard.detectors.detector import Detector
 from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.events import Matching, find_alarms, judge, match
 from tauguard.detectors.filter import Confirmation, confirmed
@@ -17,13 +18,17 @@ from tauguard.detectors.numbers import (
 from tauguard.detectors.observer import MomentumObserver, observe
 from tauguard.detectors.pipeline import CollisionDetector, DetectorSettings
 from tauguard.detectors.svr import SrqSVR, srq_kernel
+from tauguard.detectors.thresholded import Thresholded
 from tauguard.detectors.thresholds import QuietDetector, QuietThresholds
+from tauguard.detectors.zoo import DETECTORS, make_detector
 
 __all__ = [
+    "DETECTORS",
     "ArmModel",
     "Calibration",
     "CollisionDetector",
     "Confirmation",
+    "Detector",
     "DetectorSettings",
     "Estimate",
     "Estimator",
@@ -35,6 +40,7 @@ __all__ = [
     "QuietThresholds",
     "RobotNumbers",
     "SrqSVR",
+    "Thresholded",
     "Unknowns",
     "calibrate",
     "confirmed",
@@ -43,6 +49,7 @@ __all__ = [
     "gravity_torque",
     "inverse_dynamics",
     "judge",
+    "make_detector",
     "mass_matrix",
     "match",
     "momentum_regressor",
