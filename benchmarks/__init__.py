@@ -10,5 +10,6 @@ A study is a module ``tauguard.benchmarks.<name>`` with two functions::
 STUDIES: dict[str, str] = {
     "simulation": "what each part of a scene costs, and what the time step costs in accuracy",
     "rigid": "convex overlap and sweeps by elimination (ABFME) against separating axes and coal",
+    "impact": "blows against body regions beside the two-mass model: error against cost",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
 }

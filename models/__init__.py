@@ -5,6 +5,7 @@ from tauguard.models.arm import Arm, load_arm
 from tauguard.models.body_regions import BODY_REGIONS, BodyRegion, body_region
 from tauguard.models.cloth import Cloth
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
+from tauguard.models.impact import blow_velocity, reflected_mass, standard_mass
 from tauguard.models.mismatch import Mismatch
 from tauguard.models.nominal import add_payload, compiled, pin_model
 from tauguard.models.obstacles import BodyProxy, Clamp, Striker, Table
@@ -28,6 +29,7 @@ __all__ = [
     "Striker",
     "Table",
     "add_payload",
+    "blow_velocity",
     "body_region",
     "compiled",
     "compose",
@@ -35,6 +37,8 @@ __all__ = [
     "cura6_drive",
     "load_arm",
     "pin_model",
+    "reflected_mass",
     "set_payload",
+    "standard_mass",
     "with_drive",
 ]

@@ -1,0 +1,82 @@
+"""How heavy an arm is where it strikes: its reflected mass, and the standard's simple estimate."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.models.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+def reflected_mass(
+    scene: Scene, q: ArrayLike, body: int, point: ArrayLike, direction: ArrayLike
+) -> float:
+    """Mass that a blow meets at a point of the arm [kg]: 1 / (n^T J M^-1 J^T n).
+
+    Armature included, since a blow is shorter than any drive can answer. (Khatib, "Inertial
+    properties in robotic manipulation", 1995.)
+
+    Args:
+        scene: a composed scene.
+        q: joint positions [rad], shape (n,).
+        body: id of the struck body.
+        point: where, in the world frame [m], shape (3,).
+        direction: n, of the blow; its length does not matter, shape (3,).
+
+    Raises:
+        ValueError: a zero direction, or one in which no joint can move the point.
+    """
+    mass, column = _along(scene, q, body, point, direction)
+    mobility = float(column @ np.linalg.solve(mass, column))
+    if not mobility > 0:
+        raise ValueError(
+            f"direction {np.asarray(direction).tolist()}: no joint moves body {body} along it"
+        )
+    return 1.0 / mobility
+
+
+def blow_velocity(
+    scene: Scene,
+    q: ArrayLike,
+    body: int,
+    point: ArrayLike,
+    direction: ArrayLike,
+    speed: float,
+) -> Array:
+    """Joint velocities [rad/s] that move the point at ``speed`` [m/s] along the direction, (n,).
+
+    Of all of them the ones with the least kinetic energy; arguments as in :func:`reflected_mass`.
+    """
+    mass, column = _along(scene, q, body, point, direction)
+    step = np.linalg.solve(mass, column)
+    return np.asarray(step * (speed / (column @ step)))
+
+
+def standard_mass(scene: Scene, payload: float = 0.0) -> float:
+    """The standard's estimate of a robot's effective mass [kg]: M / 2 + m_L.
+
+    M is the mass of the moving parts, m_L the payload with its tool (ISO/TS 15066:2016, annex A).
+    """
+    bodies = [int(body) for body in scene.link_bodies]
+    return float(scene.model.body_mass[bodies].sum()) / 2 + payload
+
+
+def _along(
+    scene: Scene, q: ArrayLike, body: int, point: ArrayLike, direction: ArrayLike
+) -> tuple[Array, Array]:
+    """The arm's mass matrix (n, n) and J^T n (n,)."""
+    n = np.asarray(direction, dtype=float)
+    length = np.linalg.norm(n)
+    if n.shape != (3,) or not length > 0:
+        raise ValueError(f"direction {direction}: expected three numbers, not all zero")
+    model, data = scene.model, mujoco.MjData(scene.model)
+    data.qpos[scene.qpos_adr] = q
+    mujoco.mj_forward(model, data)
+    mass, jac = np.zeros((model.nv, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    mujoco.mj_jac(model, data, jac, None, np.asarray(point, dtype=float), body)
+    dofs = scene.dof_adr
+    return mass[np.ix_(dofs, dofs)], (jac.T @ (n / length))[dofs]
