@@ -293,7 +293,9 @@ def draw(rows: list[Row], figure: Figure) -> None:
             ("driven_peak_n", "position-controlled", "#d95f02"),
         )
     ):
-        right.barh(height + 0.2 * k - 0.3, [row[key] for row in found], 0.2, label=label, color=color)
+        right.barh(
+            height + 0.2 * k - 0.3, [row[key] for row in found], 0.2, label=label, color=color
+        )
     right.set_yticks(height, names, fontsize=8)
     right.invert_yaxis()
     right.set(xlabel="peak force [N]", title=f"The arm strikes at {SPEED:g} m/s")

@@ -71,7 +71,7 @@ def _along(
     n = np.asarray(direction, dtype=float)
     length = np.linalg.norm(n)
     if n.shape != (3,) or not length > 0:
-        raise ValueError(f"direction {direction}: expected three numbers, not all zero")
+        raise ValueError(f"direction {n.tolist()}: expected three numbers, not all zero")
     model, data = scene.model, mujoco.MjData(scene.model)
     data.qpos[scene.qpos_adr] = q
     mujoco.mj_forward(model, data)
