@@ -10,9 +10,18 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.cloth import _mesh
 from tauguard.geometry import finite
 
-#: Methods of the narrow phase by name. "ab2pf" never misses; the others are earlier work, for
+#: Methods of the narrow phase by name. "ab2pf" is right on all finite doubles, "exact" is its
+#: reference (exact arithmetic throughout, some 100 us a query); the others are earlier work, for
 #: comparison: what was taken over and what was inferred stands in ``comparators.hpp``.
-METHODS: dict[str, int] = {"ab2pf": 0, "naive": 1, "iccd": 2, "dnf": 3, "scd": 4, "vcd": 5}
+METHODS: dict[str, int] = {
+    "ab2pf": 0,
+    "naive": 1,
+    "iccd": 2,
+    "dnf": 3,
+    "scd": 4,
+    "vcd": 5,
+    "exact": 6,
+}
 
 
 @dataclass(frozen=True)

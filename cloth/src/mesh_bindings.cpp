@@ -117,6 +117,7 @@ void add_counts(nb::dict& d, const Stats& s) {
   d["cubic_sign"] = s.cubic_sign;
   d["directions"] = s.directions;
   d["intervals"] = s.intervals;
+  d["exact"] = s.exact;
 }
 
 // {"pairs", "toi", "point", "normal", "weights"} and, under "counts", what led to them.

@@ -2,7 +2,8 @@
 // is clear where the coplanarity cubic has Bernstein coefficients of one sign on it, or where one direction
 // separates the features at both of its ends (and so in between: the differences are linear in time). Where
 // the cubic changes sign its root is cut out into an interval too small to matter. What cannot be cleared
-// down to a width of 2^-34 is a hit, at the interval's start: never late, never missed.
+// down to a width of 2^-34 is a hit, at the interval's start, where the signs prove it beyond rounding; where
+// they do not, exact arithmetic decides. Never late, never missed, never false.
 #include "narrow_phase.hpp"
 
 #include <algorithm>
@@ -10,10 +11,13 @@
 #include <limits>
 
 #include "comparators.hpp"
+#include "exact.hpp"
 #include "query.hpp"
 
 namespace tauguard::cloth {
 namespace {
+
+constexpr double undecided = std::numeric_limits<double>::quiet_NaN();
 
 // Does m see every gap on one side by more than the distance, at times a and b? Rounding, against |m|_1 big:
 // u of the difference, 3 u of the dot product, 6 u of the interpolation: 10 u, below the 16 u in use.
@@ -50,8 +54,37 @@ bool edge_direction(const Query& k, double t, double a, double b) {
   return false;
 }
 
-// The start of the first interval that no filter clears, or infinity. At most 4000 intervals are looked at:
-// what is then left of degenerate input counts as a hit, which is conservative.
+double determinant(const Query& k, double t) {
+  return dot(mix(k.p[0], k.p[1], t), cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t)));
+}
+
+// Is there contact between times a and b or within 2^-32 of them, whatever rounding did? The cubic changes
+// sign, so that it has a root there, and throughout the origin is inside every edge of the hull of the gaps.
+//
+// With B = big, each component of a mix carries 6 u B (u B of the differences, 5 u B of its own), a determinant
+// of three at most 174 u B^3 < 2^-45 B^3. (g x h) . n with n = q x r is below 12 B^4 and changes at most
+// 96 B^4 a unit of time, half the interval from its middle; rounding adds less than 2^-43 B^4.
+bool certain(const Query& k, double a, double b, bool vf) {
+  a = std::max(0.0, a - 0x1p-32);
+  b = std::min(1.0, b + 0x1p-32);
+  const double error = 0x1p-45 * k.big * k.big * k.big, fa = determinant(k, a), fb = determinant(k, b);
+  if (!((fa > error && fb < -error) || (fa < -error && fb > error))) return false;
+  const double t = 0.5 * (a + b), big2 = k.big * k.big, margin = (64 * (b - a) + 0x1p-43) * big2 * big2;
+  const Vec n = cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t));
+  Vec g[4];
+  for (int i = 0; i < k.gaps; ++i) g[i] = mix(k.gap[0][i], k.gap[1][i], t);
+  if (!vf) std::swap(g[2], g[3]);  // in order around the hull
+  bool left = true, right = true;
+  for (int i = 0; i < k.gaps; ++i) {
+    const double side = dot(cross(g[i], g[i + 1 < k.gaps ? i + 1 : 0]), n);
+    left = left && side > margin;
+    right = right && side < -margin;
+  }
+  return left || right;
+}
+
+// The start of the first interval that no filter clears; infinity where there is none; NaN where it cannot
+// be told whether that is contact. At most 4000 intervals are looked at.
 double first_contact(const Query& k, const Cubic& whole, bool vf, Stats& stats) {
   struct Piece { double a, b; Cubic c; };
   const double error = k.cubic_error();
@@ -70,7 +103,8 @@ double first_contact(const Query& k, const Cubic& whole, bool vf, Stats& stats) 
       if (plane_direction(k, middle, piece.a, piece.b, vf)) continue;
       if (!(crosses && width > 0x1p-30) && edge_direction(k, middle, piece.a, piece.b)) continue;
     }
-    if (width < 0x1p-34 || count > 4000 || top > 120) return piece.a;
+    if (width < 0x1p-34 || count > 4000 || top > 120)
+      return k.distance > 0 || certain(k, piece.a, piece.b, vf) ? piece.a : undecided;
     Piece left, right;
     if (crosses) {
       const double x = root(b), delta = 0x1p-37 / width;
@@ -87,7 +121,6 @@ double first_contact(const Query& k, const Cubic& whole, bool vf, Stats& stats) 
       }
     }
     const double cut = piece.a + s * width;
-    if (!(cut > piece.a && cut < piece.b)) return piece.a;
     left.a = piece.a; left.b = cut; right.a = cut; right.b = piece.b;
     halve(piece.c, s, left.c, right.c);
     stack[top++] = right;
@@ -145,6 +178,13 @@ void solve(const double* x0, const double* x1, const std::int32_t* rows, std::si
         continue;
       }
       t = first_contact(k, whole, vf, stats);
+      if (std::isnan(t)) {
+        ++stats.exact;
+        t = exact_contact(vf, x0, x1, rows + 4 * i);
+      }
+    } else if (method == Method::exact) {
+      ++stats.exact;
+      t = exact_contact(vf, x0, x1, rows + 4 * i);
     } else {
       if (filtered_out(whole, method)) {
         ++stats.cubic_sign;

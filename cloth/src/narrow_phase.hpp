@@ -6,8 +6,9 @@
 
 namespace tauguard::cloth {
 
-// ab2pf never misses; the others are comparators (comparators.hpp) and know no minimum distance.
-enum class Method : int { ab2pf = 0, naive, iccd, dnf, scd, vcd };
+// ab2pf is right and so is exact, its reference in exact arithmetic throughout; the others are comparators
+// (comparators.hpp). Only ab2pf knows a minimum distance, where it is conservative.
+enum class Method : int { ab2pf = 0, naive, iccd, dnf, scd, vcd, exact };
 
 // Row i is written where hit[i] is not 0. Weights are those of the four vertices of the row: (1, w of the
 // face's vertices), or (1 - s, s, 1 - t, t) of the two edges.
@@ -15,13 +16,15 @@ struct ImpactArrays {
   double *toi, *point, *normal, *weights;  // (n), (n, 3), (n, 3), (n, 4)
 };
 
-// How many queries each filter removed, and the intervals of time that the rest were cut into.
+// How many queries each filter removed, the intervals of time that the rest were cut into, and how many
+// queries exact arithmetic decided.
 struct Stats {
-  std::uint64_t cubic_sign = 0, directions = 0, intervals = 0;
+  std::uint64_t cubic_sign = 0, directions = 0, intervals = 0, exact = 0;
   Stats& operator+=(const Stats& o) {
     cubic_sign += o.cubic_sign;
     directions += o.directions;
     intervals += o.intervals;
+    exact += o.exact;
     return *this;
   }
 };

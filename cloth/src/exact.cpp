@@ -1,0 +1,108 @@
+// Contact is the origin in the convex hull of the features' differences g_i(t): three of a vertex and a face,
+// four (a parallelogram) of two edges. Its first time is 0, or a root of the coplanarity cubic. Where the
+// cubic is zero throughout, everything stays in one (turning) plane, and the first time has the origin on the
+// boundary of the hull: between two of its corners, g_i x g_j = 0; and where that too is zero throughout, at a
+// corner, g_i = 0. Each is a finite list of roots, at which the hull is tested by signs of quadratics.
+#include "exact.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "exact_polynomial.hpp"
+
+namespace tauguard::cloth {
+namespace {
+
+using Vector = std::array<Polynomial, 3>;  // of polynomials in time
+
+Polynomial dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Polynomial cross(const Vector& a, const Vector& b, int k) {
+  const int i = (k + 1) % 3, j = (k + 2) % 3;
+  return a[i] * b[j] - a[j] * b[i];
+}
+Vector cross(const Vector& a, const Vector& b) { return {cross(a, b, 0), cross(a, b, 1), cross(a, b, 2)}; }
+
+// The hull's corners in order around it.
+struct Hull {
+  std::array<Vector, 4> corner;
+  int corners;
+  const Vector& after(int i) const { return corner[(i + 1) % corners]; }
+};
+
+// The motion of vertex a as seen from vertex b.
+Vector motion(const double* x0, const double* x1, std::int32_t a, std::int32_t b) {
+  Vector m;
+  for (int k = 0; k < 3; ++k) {
+    const Dyadic start = Dyadic(x0[3 * a + k]) - Dyadic(x0[3 * b + k]);
+    const Dyadic end = Dyadic(x1[3 * a + k]) - Dyadic(x1[3 * b + k]);
+    m[k] = trimmed({start, end - start});
+  }
+  return m;
+}
+
+Hull hull_of(bool vf, const double* x0, const double* x1, const std::int32_t* row) {
+  const auto g = [&](int i, int j) { return motion(x0, x1, row[i], row[j]); };
+  if (vf) return {{g(0, 1), g(0, 2), g(0, 3)}, 3};
+  return {{g(2, 0), g(3, 0), g(3, 1), g(2, 1)}, 4};
+}
+
+// Is the origin between a and b?
+bool between(const Root& t, const Vector& a, const Vector& b) {
+  for (int k = 0; k < 3; ++k)
+    if (sign_at(t, cross(a, b, k)) != 0) return false;
+  return sign_at(t, dot(a, b)) <= 0;
+}
+
+// Is the origin, coplanar with the hull at t, in it?
+bool contains_origin(const Hull& hull, const Root& t) {
+  // Seen along an axis on which the hull has area, the origin is on the same side of every edge.
+  for (int k = 0; k < 3; ++k) {
+    Polynomial area;
+    for (int i = 0; i < hull.corners; ++i) area = area + cross(hull.corner[i], hull.after(i), k);
+    const int side = sign_at(t, area);
+    if (side == 0) continue;
+    for (int i = 0; i < hull.corners; ++i)
+      if (sign_at(t, cross(hull.corner[i], hull.after(i), k)) == -side) return false;
+    return true;
+  }
+  for (int i = 0; i < hull.corners; ++i)
+    for (int j = i + 1; j < hull.corners; ++j)
+      if (between(t, hull.corner[i], hull.corner[j])) return true;
+  return false;
+}
+
+// Adds the roots of the first component that is not zero throughout; false where there is none.
+bool add_roots(const Vector& v, std::vector<Root>& times) {
+  for (const auto& component : v) {
+    if (component.empty()) continue;
+    for (auto& root : roots_of(component)) times.push_back(std::move(root));
+    return true;
+  }
+  return false;
+}
+
+std::vector<Root> candidate_times(const Hull& hull) {
+  const auto& g = hull.corner;
+  const Polynomial cubic = dot(g[0], cross(g[1], g[2]));
+  if (!cubic.empty()) return roots_of(cubic);
+  std::vector<Root> times{{Dyadic(), Dyadic(), {}}};
+  for (int i = 0; i < hull.corners; ++i)
+    if (!add_roots(cross(g[i], hull.after(i)), times)) {
+      add_roots(g[i], times);
+      add_roots(hull.after(i), times);
+    }
+  std::sort(times.begin(), times.end(), [](const Root& a, const Root& b) { return a.lo < b.lo; });
+  return times;
+}
+
+}  // namespace
+
+double exact_contact(bool vf, const double* x_t0, const double* x_t1, const std::int32_t* row) {
+  const Hull hull = hull_of(vf, x_t0, x_t1, row);
+  for (const auto& t : candidate_times(hull))
+    if (contains_origin(hull, t)) return t.floor();
+  return std::numeric_limits<double>::infinity();
+}
+
+}  // namespace tauguard::cloth

@@ -1,0 +1,12 @@
+// The reference: does a query hit, and when first, in exact arithmetic. Right for all finite doubles.
+#pragma once
+
+#include <cstdint>
+
+namespace tauguard::cloth {
+
+// Infinity without a hit, else the first time of contact, rounded down (by 2^-52 of it or 2^-70).
+// row: 4 indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge.
+double exact_contact(bool vf, const double* x_t0, const double* x_t1, const std::int32_t* row);
+
+}  // namespace tauguard::cloth

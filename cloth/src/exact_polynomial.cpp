@@ -1,0 +1,187 @@
+#include "exact_polynomial.hpp"
+
+#include <algorithm>
+
+namespace tauguard::cloth {
+namespace {
+
+const Dyadic one(1.0);
+
+Dyadic magnitude(const Dyadic& x) { return x.sign() < 0 ? -x : x; }
+
+// a := |lead b|^n a - quotient b, of degree below b's. The multiplier is positive, so that signs stay;
+// `quotient`, if asked for, is up to that multiplier.
+Polynomial remainder(Polynomial a, const Polynomial& b, Polynomial* quotient = nullptr) {
+  const Dyadic lead = magnitude(b.back());
+  if (quotient) quotient->assign(a.size() < b.size() ? 0 : a.size() - b.size() + 1, Dyadic());
+  while (a.size() >= b.size()) {
+    const std::size_t shift = a.size() - b.size();
+    const Dyadic top = b.back().sign() < 0 ? -a.back() : a.back();
+    for (auto& c : a) c *= lead;
+    for (std::size_t i = 0; i < b.size(); ++i) a[shift + i] -= top * b[i];
+    if (quotient) {
+      for (auto& c : *quotient) c *= lead;
+      (*quotient)[shift] = top;
+    }
+    a.pop_back();
+    a = trimmed(std::move(a));
+  }
+  return a;
+}
+
+// The signed remainder sequence that starts with a, b.
+std::vector<Polynomial> sequence(Polynomial a, Polynomial b) {
+  std::vector<Polynomial> all{std::move(a)};
+  while (!b.empty()) {
+    Polynomial next = remainder(all.back(), b);
+    for (auto& c : next) c = -c;
+    all.push_back(std::move(b));
+    b = std::move(next);
+  }
+  return all;
+}
+
+int variations(const std::vector<Polynomial>& sequence, const Dyadic& x) {
+  int count = 0, last = 0;
+  for (const auto& p : sequence) {
+    const int s = value(p, x).sign();
+    if (s == 0) continue;
+    count += last != 0 && s != last;
+    last = s;
+  }
+  return count;
+}
+
+// p without what it shares with its derivative: the same roots, all simple.
+Polynomial square_free(const Polynomial& p) {
+  const auto all = sequence(p, derivative(p));
+  if (all.back().size() == 1) return p;
+  Polynomial quotient;
+  remainder(p, all.back(), &quotient);
+  return quotient;
+}
+
+// p / (t - x) for a root x.
+Polynomial deflated(const Polynomial& p, const Dyadic& x) {
+  Polynomial q(p.size() - 1);
+  Dyadic carry;
+  for (std::size_t i = p.size() - 1; i > 0; --i) q[i - 1] = carry = p[i] + carry * x;
+  return q;
+}
+
+void refine(Root& root) {
+  const int below = value(root.of, root.lo).sign();
+  while (!(root.hi - root.lo < one.scaled(-70))) {
+    const Dyadic middle = (root.lo + root.hi).scaled(-1);
+    const int s = value(root.of, middle).sign();
+    if (s == 0) {
+      root = {middle, middle, {}};
+      return;
+    }
+    (s == below ? root.lo : root.hi) = middle;
+  }
+}
+
+// Intervals with one root each of p, which has no double roots and none at 0 or 1. Where a midpoint is a
+// root, it is returned through `found` and nothing else is of use.
+std::vector<Root> isolate(const Polynomial& p, Dyadic& found) {
+  const auto sturm = sequence(p, derivative(p));
+  struct Part { Dyadic lo, hi; int at_lo, at_hi; };
+  std::vector<Part> open{{Dyadic(), one, variations(sturm, Dyadic()), variations(sturm, one)}};
+  std::vector<Root> roots;
+  while (!open.empty()) {
+    const Part part = open.back();
+    open.pop_back();
+    const int count = part.at_lo - part.at_hi;
+    if (count == 1) roots.push_back({part.lo, part.hi, p});
+    if (count < 2) continue;
+    const Dyadic middle = (part.lo + part.hi).scaled(-1);
+    if (value(p, middle).is_zero()) {
+      found = middle;
+      return {};
+    }
+    const int at = variations(sturm, middle);
+    open.push_back({middle, part.hi, at, part.at_hi});
+    open.push_back({part.lo, middle, part.at_lo, at});
+  }
+  return roots;
+}
+
+}  // namespace
+
+Polynomial trimmed(Polynomial p) {
+  while (!p.empty() && p.back().is_zero()) p.pop_back();
+  return p;
+}
+
+Polynomial operator+(const Polynomial& a, const Polynomial& b) {
+  Polynomial sum = a.size() < b.size() ? b : a;
+  const Polynomial& other = a.size() < b.size() ? a : b;
+  for (std::size_t i = 0; i < other.size(); ++i) sum[i] += other[i];
+  return trimmed(std::move(sum));
+}
+
+Polynomial operator-(const Polynomial& a, const Polynomial& b) {
+  Polynomial negative = b;
+  for (auto& c : negative) c = -c;
+  return a + negative;
+}
+
+Polynomial operator*(const Polynomial& a, const Polynomial& b) {
+  if (a.empty() || b.empty()) return {};
+  Polynomial product(a.size() + b.size() - 1);
+  for (std::size_t i = 0; i < a.size(); ++i)
+    for (std::size_t j = 0; j < b.size(); ++j) product[i + j] += a[i] * b[j];
+  return product;
+}
+
+Polynomial derivative(const Polynomial& p) {
+  Polynomial d;
+  for (std::size_t i = 1; i < p.size(); ++i) d.push_back(Dyadic::from_int(static_cast<std::int64_t>(i)) * p[i]);
+  return d;
+}
+
+Dyadic value(const Polynomial& p, const Dyadic& x) {
+  Dyadic sum;
+  for (std::size_t i = p.size(); i-- > 0;) sum = sum * x + p[i];
+  return sum;
+}
+
+std::vector<Root> roots_of(const Polynomial& p) {
+  std::vector<Root> roots;
+  Polynomial rest = square_free(p);
+  const auto take = [&](const Dyadic& x) {
+    roots.push_back({x, x, {}});
+    rest = deflated(rest, x);
+  };
+  for (const Dyadic& end : {Dyadic(), one})
+    if (value(rest, end).is_zero()) take(end);
+  while (rest.size() > 1) {
+    Dyadic found;
+    auto isolated = isolate(rest, found);
+    if (found.is_zero()) {
+      roots.insert(roots.end(), isolated.begin(), isolated.end());
+      break;
+    }
+    take(found);
+  }
+  for (auto& root : roots)
+    if (!root.exact()) refine(root);
+  std::sort(roots.begin(), roots.end(), [](const Root& a, const Root& b) { return a.lo < b.lo; });
+  return roots;
+}
+
+int sign_at(const Root& root, const Polynomial& g) {
+  if (g.empty()) return 0;
+  const int at_lo = value(g, root.lo).sign();
+  if (root.exact()) return at_lo;
+  // Of degree 2 at most, g keeps its sign where both ends and the control point between them agree.
+  if (g.size() <= 3) {
+    const Dyadic control = value(g, root.lo).scaled(1) + (root.hi - root.lo) * value(derivative(g), root.lo);
+    if (at_lo != 0 && control.sign() == at_lo && value(g, root.hi).sign() == at_lo) return at_lo;
+  }
+  const auto tarski = sequence(root.of, remainder(derivative(root.of) * g, root.of));
+  return variations(tarski, root.lo) - variations(tarski, root.hi);
+}
+
+}  // namespace tauguard::cloth

@@ -1,0 +1,40 @@
+// Polynomials with dyadic coefficients, and signs of one at a root of another: Sturm's theorem and its
+// generalisation by Tarski (Basu, Pollack & Roy, "Algorithms in Real Algebraic Geometry", chapter 2). No
+// rounding anywhere, and no bisection down to the distance of two roots where a sign is zero.
+#pragma once
+
+#include <vector>
+
+#include "tauguard/geometry/dyadic.hpp"
+
+namespace tauguard::cloth {
+
+using geometry::Dyadic;
+
+// Coefficients in ascending powers; the leading one is not zero. No coefficients: the zero polynomial.
+using Polynomial = std::vector<Dyadic>;
+
+Polynomial trimmed(Polynomial p);
+Polynomial operator+(const Polynomial& a, const Polynomial& b);
+Polynomial operator-(const Polynomial& a, const Polynomial& b);
+Polynomial operator*(const Polynomial& a, const Polynomial& b);
+Polynomial derivative(const Polynomial& p);
+Dyadic value(const Polynomial& p, const Dyadic& x);
+
+// A root in (0, 1) or at an end: either exactly `lo` == `hi`, or the only root of `of` in (lo, hi), where
+// `of` has no double roots and is not zero at either end.
+struct Root {
+  Dyadic lo, hi;
+  Polynomial of;
+  bool exact() const { return of.empty(); }
+  // The largest double below the interval: at most 2^-70 before the root, or it.
+  double floor() const { return lo.to_double(); }
+};
+
+// Every root of p in [0, 1], ascending, within 2^-70. p must not be the zero polynomial.
+std::vector<Root> roots_of(const Polynomial& p);
+
+// The sign of g at a root.
+int sign_at(const Root& root, const Polynomial& g);
+
+}  // namespace tauguard::cloth
