@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from tauguard.models.checks import above_zero, not_negative
 
@@ -13,6 +15,9 @@ Vector = tuple[float, float, float]
 
 #: Which vertices are held: none, the upper edge, the two upper corners, all four edges.
 PINS = ("none", "edge", "corners", "frame")
+
+#: Rayleigh damping of an elastic sheet's stiffness [s]: a hundredth of a millisecond.
+RAYLEIGH = 1e-5
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,10 @@ class Cloth:
     quat_wxyz: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 0.5)
     """Orientation; the default hangs it across the x axis, y edge up."""
     pinned: str = "edge"  #: one of :data:`PINS`
-    damping: float = 0.01  #: of the edges [1/s], against ringing
+    damping: float = 0.01  #: of the edges [1/s], against ringing; not of an elastic sheet
+    young: float | None = None
+    """Young's modulus of an elastic sheet of thickness 2 ``radius`` [Pa], Poisson's ratio 0.3. It
+    needs the integrator ``discrete``. ``None``: edges that hold their length by constraints."""
     solref: tuple[float, float] = (0.003, 1.0)  #: MuJoCo's contact parameters
     self_collide: bool = False
 
@@ -40,6 +48,8 @@ class Cloth:
             raise ValueError(f"Cloth.count {self.count}: expected a whole number from 2 to 200")
         above_zero(self, "size", "mass", "radius")
         not_negative(self, "damping")
+        if self.young is not None:
+            above_zero(self, "young")
         if self.pinned not in PINS:
             raise ValueError(f"Cloth.pinned {self.pinned!r}: expected one of {', '.join(PINS)}")
 
@@ -65,6 +75,40 @@ def add_cloth(spec: mujoco.MjSpec, cloth: Cloth) -> None:
     )
 
 
+def add_sheet(
+    spec: mujoco.MjSpec,
+    points: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    mass: float,
+    radius: float,
+    young: float,
+    name: str = "garment",
+) -> None:
+    """Add an elastic sheet of any shape as the flex ``name_sheet``, unpinned; it meets the arm.
+
+    Args:
+        spec: whose integrator is ``discrete``.
+        points: Vertices at rest in the world frame. Shape (V, 3), m.
+        faces: Shape (F, 3).
+        mass: [kg].
+        radius: half the thickness that contacts see [m].
+        young: Young's modulus [Pa]; Poisson's ratio is 0.3.
+        name: prefix of its names.
+    """
+    text = f"""<mujoco><worldbody><body name="frame">
+      <flexcomp name="sheet" type="direct" dim="2" mass="{mass!r}" radius="{radius!r}"
+        point="{_numbers(points)}" element="{_numbers(faces)}" rgba="0.35 0.5 0.75 1">
+        {_elastic(young, radius)}
+        <contact contype="2" conaffinity="1" condim="3" selfcollide="none" solref="0.003 1"/>
+      </flexcomp></body></worldbody></mujoco>"""
+    part = mujoco.MjSpec.from_string(text)
+    spec.attach(part, frame=spec.worldbody.add_frame(), prefix=f"{name}_")
+
+
+def _numbers(values: NDArray[Any]) -> str:
+    return " ".join(map(repr, values.ravel().tolist()))
+
+
 def _text(cloth: Cloth) -> str:
     spacing = cloth.size / (cloth.count - 1)
     pins = " ".join(map(str, cloth.pins()))
@@ -74,8 +118,21 @@ def _text(cloth: Cloth) -> str:
       <flexcomp name="sheet" type="grid" dim="2" count="{cloth.count} {cloth.count} 1"
         spacing="{spacing!r} {spacing!r} {spacing!r}" mass="{cloth.mass!r}"
         radius="{cloth.radius!r}" rgba="0.35 0.5 0.75 1">
-        <edge equality="true" damping="{cloth.damping!r}"/>
+        {_elasticity(cloth)}
         <contact contype="2" conaffinity="1" condim="3" selfcollide="{own}"
           solref="{cloth.solref[0]!r} {cloth.solref[1]!r}"/>
         {pin}
       </flexcomp></body></worldbody></mujoco>"""
+
+
+def _elasticity(cloth: Cloth) -> str:
+    if cloth.young is None:
+        return f'<edge equality="true" damping="{cloth.damping!r}"/>'
+    return _elastic(cloth.young, cloth.radius)
+
+
+def _elastic(young: float, radius: float) -> str:
+    return (
+        f'<elasticity elastic2d="stretch" young="{young!r}" poisson="0.3" '
+        f'thickness="{2 * radius!r}" damping="{RAYLEIGH!r}"/>'
+    )

@@ -67,6 +67,11 @@ class SceneSpec:
             raise ValueError(
                 f"integrator {self.integrator!r}: expected one of {', '.join(INTEGRATORS)}"
             )
+        elastic = self.cloth is not None and self.cloth.young is not None
+        if elastic and self.integrator != "discrete":
+            raise ValueError(
+                f"integrator {self.integrator!r}: a cloth with young= needs 'discrete'"
+            )
         if self.base_pose is not None:
             pose = rigid_pose(self.base_pose)
             object.__setattr__(self, "base_pose", tuple(map(tuple, pose.tolist())))

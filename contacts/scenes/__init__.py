@@ -1,0 +1,40 @@
+"""Scenes in which contacts are hard to find, each holding only what it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tauguard.contacts.scenes.arms import arm_boxes, two_arms
+from tauguard.contacts.scenes.fabrics import arm_cloth, garment_chest, sleeve_arm
+from tauguard.contacts.scenes.impacts import ball_cloth, sphere_plate
+from tauguard.contacts.scenes.scene import ContactScene, Control
+from tauguard.contacts.scenes.table import bunny_table
+
+#: Builders by name; each has defaults for all its arguments.
+SCENES: dict[str, Callable[..., ContactScene]] = {
+    build.__name__: build
+    for build in (
+        arm_cloth,
+        sleeve_arm,
+        garment_chest,
+        ball_cloth,
+        sphere_plate,
+        arm_boxes,
+        two_arms,
+        bunny_table,
+    )
+}
+
+__all__ = [
+    "SCENES",
+    "ContactScene",
+    "Control",
+    "arm_boxes",
+    "arm_cloth",
+    "ball_cloth",
+    "bunny_table",
+    "garment_chest",
+    "sleeve_arm",
+    "sphere_plate",
+    "two_arms",
+]

@@ -1,0 +1,90 @@
+"""Arms that touch rigid things: boxes on both sides, and one another over a table."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.contacts.scenes.drives import follow, sway
+from tauguard.contacts.scenes.scene import ContactScene
+from tauguard.models import SceneSpec, Table, compose, load_arm
+from tauguard.models.scene import INTEGRATORS
+
+Array = NDArray[np.float64]
+
+#: Between the pedestals of both arms [m].
+DISTANCE = 1.0
+#: How far their first three joints swing [rad].
+REACH = (0.15, 0.25, 0.1)
+
+
+def arm_boxes(speed: float = 1.0) -> ContactScene:
+    """The arm swings its base joint between two rows of boxes and a loose one in its way.
+
+    Args:
+        speed: of the swing, 1 is a period of 1.2 s.
+    """
+    spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False)).xml)
+    for i, (x, y, z) in enumerate(
+        [(0.42, 0.42, 0.72), (0.42, -0.16, 0.72), (0.1, 0.42, 0.55), (0.58, 0.2, 0.97)]
+    ):
+        spec.worldbody.add_geom(
+            name=f"box{i}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[0.08, 0.05, 0.12],
+            pos=[x, y, z],
+            quat=[0.97, 0.05 * i, 0.1, 0.2],
+            contype=2,
+            conaffinity=1,
+        )
+    loose = spec.worldbody.add_body(name="loose", pos=[0.39, 0.24, 0.66], gravcomp=1)
+    loose.add_freejoint()
+    loose.add_geom(
+        name="loose",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[0.03, 0.03, 0.05],
+        mass=0.3,
+        contype=2,
+        conaffinity=3,
+    )
+    return _swinging("arm_boxes", spec, [""], (0.45, 0.25, -0.15), 1.2 / speed)
+
+
+def two_arms(speed: float = 1.0) -> ContactScene:
+    """Two arms face each other over one table, reach for its middle and meet there.
+
+    Args:
+        speed: of the swing, 1 is a period of 1.2 s.
+    """
+    table = Table(position=(DISTANCE / 2, 0.15, 0.5), half_extents=(0.2, 0.5, 0.02))
+    spec = mujoco.MjSpec.from_string(compose(SceneSpec(labels=False, table=table)).xml)
+    other = load_arm("cura6").spec
+    for geom in other.geoms:  # they meet the first arm and the table, not one another
+        if geom.contype or geom.conaffinity:
+            geom.contype, geom.conaffinity = 4, 3
+    frame = spec.worldbody.add_frame(pos=[DISTANCE, 0.3, 0], quat=[0, 0, 0, 1])
+    spec.attach(other, frame=frame, prefix="other_")
+    return _swinging("two_arms", spec, ["", "other_"], REACH, 1.2 / speed)
+
+
+def _swinging(
+    name: str,
+    spec: mujoco.MjSpec,
+    prefixes: list[str],
+    amplitude: tuple[float, float, float],
+    period: float,
+) -> ContactScene:
+    """The scene ``spec`` in which every arm sways its first three joints about its home pose."""
+    spec.option.integrator = INTEGRATORS["implicitfast"]
+    model = spec.compile()
+    arm = load_arm("cura6")
+    qpos, qvel, arms = model.qpos0.copy(), np.zeros(model.nv), []
+    for prefix in prefixes:
+        joints = [model.joint(prefix + joint) for joint in arm.joints]
+        places = np.array([joint.qposadr[0] for joint in joints])
+        dofs = np.array([joint.dofadr[0] for joint in joints])
+        reference = sway(arm.home, np.arange(3), np.array(amplitude), period)
+        qpos[places], qvel[dofs] = reference(0.0)
+        arms.append((places, dofs, reference))
+    return ContactScene(name, model, qpos, qvel, 2 * period, follow(model, qpos, arms))

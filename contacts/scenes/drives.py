@@ -1,0 +1,75 @@
+"""What moves the arms of the contact scenes: a stiff position control along a formula of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.contacts.scenes.scene import Control
+
+Array = NDArray[np.float64]
+
+#: Where the joints should be and how fast at a time: ``reference(t) -> (q, qd)``, rad and rad/s.
+Reference = Callable[[float], tuple[Array, Array]]
+#: Natural frequency of every joint's loop [rad/s].
+BANDWIDTH = 25.0
+
+
+def turn(home: Array, joint: int, speed: float, reach: float) -> Reference:
+    """One joint turns at ``speed`` [rad/s] by ``reach`` [rad] and stays there."""
+
+    def reference(t: float) -> tuple[Array, Array]:
+        q, qd = home.copy(), np.zeros_like(home)
+        moving = abs(speed * t) < abs(reach)
+        q[joint] += speed * t if moving else np.copysign(reach, speed)
+        qd[joint] = speed if moving else 0.0
+        return q, qd
+
+    return reference
+
+
+def sway(home: Array, joints: NDArray[Any], amplitude: Array, period: float) -> Reference:
+    """The chosen joints swing about ``home`` by ``amplitude`` [rad] with ``period`` [s]."""
+    rate = 2 * np.pi / period
+
+    def reference(t: float) -> tuple[Array, Array]:
+        q, qd = home.copy(), np.zeros_like(home)
+        q[joints] += amplitude * np.sin(rate * t)
+        qd[joints] = amplitude * rate * np.cos(rate * t)
+        return q, qd
+
+    return reference
+
+
+def follow(
+    model: mujoco.MjModel, qpos: Array, arms: list[tuple[NDArray[Any], NDArray[Any], Reference]]
+) -> Control:
+    """Position control with gravity compensation, written into ``qfrc_applied``.
+
+    Args:
+        model: of the whole scene.
+        qpos: the pose whose inertia sets the gains, shape (nq,).
+        arms: of each arm its places in qpos, in qvel, and its reference.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    stiffness = BANDWIDTH**2 * np.diag(mass)
+    damping = 2 * BANDWIDTH * np.diag(mass)
+
+    def control(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        for places, dofs, reference in arms:
+            q, qd = reference(data.time)
+            data.qfrc_applied[dofs] = (
+                data.qfrc_bias[dofs]
+                + stiffness[dofs] * (q - data.qpos[places])
+                + damping[dofs] * (qd - data.qvel[dofs])
+            )
+
+    return control

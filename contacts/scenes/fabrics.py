@@ -1,0 +1,111 @@
+"""Fabrics and bodies: a hanging cloth in the arm's way, a sleeve over it, a garment on a chest."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.contacts.scenes.drives import Reference, follow, sway, turn
+from tauguard.contacts.scenes.scene import ContactScene
+from tauguard.models import BodyProxy, Cloth, Scene, SceneSpec, compose
+from tauguard.models.cloth import add_sheet
+
+Array = NDArray[np.float64]
+
+#: Of the fabrics here: 400 N/m over their width, a soft knit [Pa].
+FABRIC_YOUNG = 2e5
+#: Which geom of the arm wears the sleeve: the capsule of the forearm's link.
+SLEEVED_LINK = "link3"
+
+
+def arm_cloth(count: int = 15, speed: float = 1.5) -> ContactScene:
+    """The arm turns about its base into a cloth of 0.6 m that hangs from its upper edge.
+
+    Args:
+        count: vertices along each side of the cloth.
+        speed: of the base joint [rad/s].
+    """
+    cloth = Cloth(
+        count=count,
+        position=(0.4, 0.3, 0.75),
+        quat_wxyz=(0.5**0.5, 0.5**0.5, 0.0, 0.0),
+        young=FABRIC_YOUNG,
+    )
+    scene = compose(SceneSpec(labels=False, cloth=cloth, integrator="discrete"))
+    return _moving("arm_cloth", scene, scene.model, 0.6, turn(scene.home, 0, speed, 0.7))
+
+
+def sleeve_arm(around: int = 14, along: int = 10, speed: float = 1.0) -> ContactScene:
+    """A loose tube of fabric lies around the forearm, which sways; nothing else holds it.
+
+    Args:
+        around: vertices around the tube.
+        along: vertices along it.
+        speed: of the swing, 1 is a period of 0.8 s.
+    """
+    scene = compose(SceneSpec(labels=False, integrator="discrete"))
+    model, data = scene.model, mujoco.MjData(scene.model)
+    data.qpos[scene.qpos_adr] = scene.home
+    mujoco.mj_kinematics(model, data)
+    body = model.body(SLEEVED_LINK)
+    shapes = range(body.geomadr[0], body.geomadr[0] + body.geomnum[0])
+    arm = next(g for g in shapes if model.geom_contype[g])
+    radius, half = model.geom_size[arm, :2]
+    points, faces = tube(around, along, radius + 0.012, half)
+    points = points @ data.geom_xmat[arm].reshape(3, 3).T + data.geom_xpos[arm]
+    spec = mujoco.MjSpec.from_string(scene.xml)
+    add_sheet(spec, points, faces, mass=0.08, radius=1e-3, young=FABRIC_YOUNG)
+    reference = sway(scene.home, np.array([0, 2]), np.array([0.15, 0.12]), 0.8 / speed)
+    return _moving("sleeve_arm", scene, spec.compile(), 0.8 / speed, reference)
+
+
+def tube(around: int, along: int, radius: float, length: float) -> tuple[Array, NDArray[np.int32]]:
+    """An open tube about the z axis: points (around * along, 3) [m] and faces (F, 3)."""
+    angle = 2 * np.pi * np.arange(around) / around
+    ring = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    height = np.linspace(-length / 2, length / 2, along)
+    points = np.concatenate([np.tile(ring, (along, 1)), np.repeat(height, around)[:, None]], axis=1)
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(along - 1), np.arange(around), indexing="ij"))
+    a, b = i * around + j, i * around + (j + 1) % around
+    c, d = a + around, b + around
+    faces = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+    return points, faces.astype(np.int32)
+
+
+def garment_chest(count: int = 15, speed: float = 0.8) -> ContactScene:
+    """A cloth hangs over a person's chest (a held proxy), and the arm presses into both.
+
+    Args:
+        count: vertices along each side of the cloth.
+        speed: of the base joint [rad/s].
+    """
+    chest = BodyProxy("chest", (0.32, 0.42, 0.78), (0.0, 1.0, 0.0), radius=0.1, clamped=True)
+    cloth = Cloth(
+        count=count,
+        size=0.5,
+        mass=0.12,
+        position=(0.38, 0.305, 0.74),
+        quat_wxyz=(0.5**0.5, 0.5**0.5, 0.0, 0.0),
+        young=FABRIC_YOUNG,
+    )
+    scene = compose(SceneSpec(labels=False, proxies=(chest,), cloth=cloth, integrator="discrete"))
+    spec = mujoco.MjSpec.from_string(scene.xml)
+    worn = spec.geom("chest")
+    worn.contype, worn.conaffinity = 4, 6  # meets the cloth; the arm meets it by contact pairs
+    for flex in spec.flexes:
+        flex.contype, flex.conaffinity = 6, 5
+    return _moving("garment_chest", scene, spec.compile(), 0.7, turn(scene.home, 0, speed, 0.6))
+
+
+def _moving(
+    name: str, scene: Scene, model: mujoco.MjModel, seconds: float, reference: Reference
+) -> ContactScene:
+    """``scene``, perhaps compiled anew as ``model``, whose arm follows ``reference``."""
+    joints = [model.joint(joint) for joint in scene.joint_names]
+    places = np.array([joint.qposadr[0] for joint in joints])
+    dofs = np.array([joint.dofadr[0] for joint in joints])
+    qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
+    qpos[places], qvel[dofs] = reference(0.0)
+    control = follow(model, qpos, [(places, dofs, reference)])
+    return ContactScene(name, model, qpos, qvel, seconds, control)

@@ -1,0 +1,144 @@
+"""Fast spheres against thin things: what steps of fixed length pass by."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.contacts.scenes.scene import ContactScene
+from tauguard.models.cloth import Cloth, add_cloth
+from tauguard.models.scene import INTEGRATORS
+
+Array = NDArray[np.float64]
+
+BALL_RADIUS = 0.010  #: [m]
+PLATE_HALF_THICKNESS = 0.001  #: [m]
+BALL_MASS = 0.020  #: [kg]
+#: Of the cloth: 20 kN/m over its width, a woven fabric [Pa].
+CLOTH_YOUNG = 1e7
+#: The ball's surface is this far from the cloth's at the start, before ``offset`` [m].
+BALL_GAP = 0.005
+#: Contact parameters stiff enough that a fast ball does not sink through: solref, solimp.
+STIFF = ((1e-4, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0))
+#: MuJoCo's extra contact modes by name: the enable bit of each.
+MODES = {
+    "plain": 0,
+    "speculative": int(mujoco.mjtEnableBit.mjENBL_SPECULATIVE),
+    "ipc": int(mujoco.mjtEnableBit.mjENBL_IPC),
+}
+#: Where the ball hits the cloth, as weights of one face's three vertices.
+IMPACT_POINTS = {
+    "vertex": (1.0, 0.0, 0.0),
+    "edge": (0.5, 0.5, 0.0),
+    "face": (1 / 3, 1 / 3, 1 / 3),
+}
+
+
+def ball_cloth(
+    speed: float = 10.0,
+    offset: float = 0.0,
+    impact: str = "face",
+    stiff: bool = True,
+    mode: str = "plain",
+    count: int = 15,
+    pinned: str = "frame",
+) -> ContactScene:
+    """A ball (10 mm, 20 g) flies straight into a stretched cloth of 0.3 m; no gravity.
+
+    Args:
+        speed: of the ball, along -z [m/s].
+        offset: by how much farther away it starts [m].
+        impact: one of :data:`IMPACT_POINTS`, on a face in the middle of the cloth.
+        stiff: the cloth's contacts use :data:`STIFF`; otherwise MuJoCo's averaging of the cloth's
+            0.003 s with the ball's default 0.02 s.
+        mode: one of :data:`MODES`.
+        count: vertices along each side of the cloth.
+        pinned: which of its vertices are held, see :class:`tauguard.models.Cloth`.
+
+    Raises:
+        ValueError: an unknown impact point or mode, a speed that is not above 0.
+    """
+    if impact not in IMPACT_POINTS:
+        raise ValueError(f"impact {impact!r}: expected one of {', '.join(IMPACT_POINTS)}")
+    if mode not in MODES:
+        raise ValueError(f"mode {mode!r}: expected one of {', '.join(MODES)}")
+    if not 0 < speed < np.inf:
+        raise ValueError(f"speed {speed} m/s: expected above 0")
+    cloth = Cloth(
+        count=count,
+        size=0.3,
+        mass=0.05,
+        position=(0.0, 0.0, 0.0),
+        quat_wxyz=(1.0, 0.0, 0.0, 0.0),
+        pinned=pinned,
+        young=CLOTH_YOUNG,
+        solref=STIFF[0] if stiff else (0.003, 1.0),
+    )
+    spec = mujoco.MjSpec()
+    spec.option.gravity = [0, 0, 0]
+    spec.option.integrator = INTEGRATORS["discrete"]
+    spec.option.enableflags = MODES[mode]
+    add_cloth(spec, cloth)
+    ball = spec.worldbody.add_body(name="ball")
+    ball.add_freejoint()
+    ball.add_geom(name="ball", size=[BALL_RADIUS, 0, 0], mass=BALL_MASS, conaffinity=2)
+    model = spec.compile()
+    if stiff:
+        model.flex_priority[0] = 1
+        model.flex_solimp[0] = STIFF[1]
+    qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
+    joint = model.body("ball").jntadr[0]
+    where, how = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+    height = BALL_RADIUS + cloth.radius + BALL_GAP + offset
+    qpos[where : where + 3] = _impact_point(model, impact) + np.array([0.0, 0.0, height])
+    qvel[how + 2] = -speed
+    seconds = (BALL_GAP + offset) / speed + 0.03
+    return ContactScene("ball_cloth", model, qpos, qvel, seconds)
+
+
+def _impact_point(model: mujoco.MjModel, impact: str) -> Array:
+    """A point of the face that is nearest to the cloth's middle, shape (3,) [m]."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    faces = data.flexvert_xpos[model.flex_elem.reshape(-1, 3)]
+    middle = data.flexvert_xpos.mean(axis=0)
+    face = faces[np.argmin(np.linalg.norm(faces.mean(axis=1) - middle, axis=1))]
+    return np.asarray(np.array(IMPACT_POINTS[impact]) @ face, dtype=np.float64)
+
+
+def sphere_plate(
+    speed: float = 10.0, offset: float = 0.0, stiff: bool = True, mode: str = "plain"
+) -> ContactScene:
+    """A rigid sphere (10 mm, 20 g) flies straight into a fixed plate 2 mm thick; no gravity.
+
+    Args:
+        speed: of the sphere, along -z [m/s].
+        offset: by how much farther away it starts [m].
+        stiff: the plate's contacts use :data:`STIFF` instead of MuJoCo's default.
+        mode: ``plain`` or ``speculative``.
+
+    Raises:
+        ValueError: another mode, a speed that is not above 0.
+    """
+    if mode not in ("plain", "speculative"):
+        raise ValueError(f"mode {mode!r}: expected plain or speculative")
+    if not 0 < speed < np.inf:
+        raise ValueError(f"speed {speed} m/s: expected above 0")
+    spec = mujoco.MjSpec()
+    spec.option.gravity = [0, 0, 0]
+    spec.option.integrator = INTEGRATORS["implicitfast"]
+    spec.option.enableflags = MODES[mode]
+    plate = spec.worldbody.add_geom(
+        name="plate", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, PLATE_HALF_THICKNESS]
+    )
+    if stiff:
+        plate.priority, plate.solref, plate.solimp = 1, STIFF[0], STIFF[1]
+    ball = spec.worldbody.add_body(name="ball")
+    ball.add_freejoint()
+    ball.add_geom(name="ball", size=[BALL_RADIUS, 0, 0], mass=BALL_MASS)
+    model = spec.compile()
+    qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
+    qpos[:3] = [0.013, 0.007, PLATE_HALF_THICKNESS + BALL_RADIUS + BALL_GAP + offset]
+    qvel[2] = -speed
+    return ContactScene("sphere_plate", model, qpos, qvel, (BALL_GAP + offset) / speed + 0.03)

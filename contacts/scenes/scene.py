@@ -1,0 +1,44 @@
+"""What a contact scene is: a compiled model, where it starts, and what drives it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Called before every step; writes ``data.ctrl`` or ``data.qfrc_applied`` from the state alone.
+Control = Callable[[mujoco.MjModel, mujoco.MjData], None]
+
+
+@dataclass(frozen=True)
+class ContactScene:
+    """One scene to look for contacts in; the same arguments give the same bits."""
+
+    name: str
+    model: mujoco.MjModel
+    qpos: Array  #: where it starts, shape (nq,)
+    qvel: Array  #: how fast, shape (nv,)
+    seconds: float = 1.0  #: after which everything of interest has happened [s]
+    control: Control | None = None
+
+    def start(self, timestep: float | None = None) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """A copy of the model, at ``timestep`` [s] if given, and data in the first state.
+
+        Raises:
+            ValueError: a timestep that is not above 0 or not finite.
+        """
+        model = copy.copy(self.model)
+        if timestep is not None:
+            if not 0 < timestep < np.inf:
+                raise ValueError(f"timestep {timestep}: expected seconds above 0")
+            model.opt.timestep = timestep
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:] = self.qpos, self.qvel
+        mujoco.mj_forward(model, data)
+        return model, data
