@@ -72,7 +72,7 @@ def pin_model(
     base_pose: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> pin.Model:
-    """The Pinocchio model of an arm: hinge and slide joints, armature included.
+    """The Pinocchio model of an arm: hinge and slide joints, armature included, sites as frames.
 
     Args:
         source: MJCF or URDF (text or file), a spec or a compiled model, holding the arm only.
@@ -113,6 +113,11 @@ def pin_model(
                 @ _quat(m.body_iquat[body]).T,
             )
             model.appendBodyToJoint(joint, inertia, here)
+    for i in range(m.nsite):
+        name, body = m.site(i).name, int(m.site_bodyid[i])
+        if name:
+            place = offset[body] * pin.SE3(_quat(m.site_quat[i]), m.site_pos[i])
+            model.addFrame(pin.Frame(name, joint_of[body], place, pin.FrameType.OP_FRAME), False)
     return model
 
 
