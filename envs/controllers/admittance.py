@@ -34,8 +34,8 @@ class Admittance:
             mass: M [kg m^2], a number or (n,), above 0.
             damping: D [N m s/rad], a number or (n,).
             stiffness: K [N m/rad], a number or (n,).
-            dead_band: torque that counts as none [N m], a number or (n,): what an observer's residual
-                shows without any contact.
+            dead_band: torque that counts as none [N m], a number or (n,): what an observer's
+                residual shows without any contact.
 
         Raises:
             ValueError: gains of another shape or out of range, or a ``dt`` not above 0.

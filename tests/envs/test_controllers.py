@@ -28,7 +28,7 @@ def simulate(law, steps, q=None):
 
 
 def test_pd_with_gravity_compensation_reaches_its_pose():
-    target = SCENE.home + [0.3, -0.2, 0.2, 0.4, -0.3, 0.5]
+    target = SCENE.home + np.array([0.3, -0.2, 0.2, 0.4, -0.3, 0.5])
     control = GravityPD(ARM, kp=300.0, kd=60.0)
     path, _ = simulate(lambda k, q, qd: control.torque(q, qd, target), 6000)
     np.testing.assert_allclose(path[-1, 0], target, atol=1e-3)
