@@ -44,7 +44,7 @@ class Admittance:
         n = len(self.rest)
         self.mass = per_joint(mass, n, "mass")
         if not (self.mass > 0).all() or not dt > 0:
-            raise ValueError(f"mass {mass} and dt {dt}: expected above 0")
+            raise ValueError(f"mass {mass!r} and dt {dt}: expected above 0")
         self.damping = per_joint(damping, n, "damping")
         self.stiffness = per_joint(stiffness, n, "stiffness")
         self.dead_band = per_joint(dead_band, n, "dead_band")

@@ -18,5 +18,5 @@ def per_joint(value: ArrayLike, joints: int, name: str) -> Array:
     if gain.shape not in ((), (joints,)):
         raise ValueError(f"{name}: shape {gain.shape}; expected a number or ({joints},)")
     if not (np.isfinite(gain) & (gain >= 0)).all():
-        raise ValueError(f"{name} {value}: expected finite gains of 0 or more")
+        raise ValueError(f"{name} {value!r}: expected finite gains of 0 or more")
     return np.array(np.broadcast_to(gain, (joints,)))
