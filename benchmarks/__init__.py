@@ -11,5 +11,6 @@ STUDIES: dict[str, str] = {
     "simulation": "what each part of a scene costs, and what the time step costs in accuracy",
     "rigid": "convex overlap and sweeps by elimination (ABFME) against separating axes and coal",
     "impact": "blows against body regions beside the two-mass model: error against cost",
+    "rigid": "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
 }

@@ -1,18 +1,26 @@
-"""Rigid bodies: convex pairs (table 2.1)."""
+"""Rigid bodies: convex pairs (table 2.1), meshes (table 2.2), time of impact."""
 
 from __future__ import annotations
 
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
-from tauguard.benchmarks import rigid_convex
+from tauguard.benchmarks import rigid_convex, rigid_impact, rigid_mesh
 from tauguard.benchmarks.report import Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PARTS = (rigid_convex, rigid_mesh, rigid_impact)
 
 
 def run(quick: bool, seed: int) -> list[Row]:
-    """The rows of table 2.1 and what belongs to it."""
-    return rigid_convex.run(quick, seed)
+    """The rows of every part."""
+    return [row for part in PARTS for row in part.run(quick, seed)]
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
-    """Ratios of table 2.1."""
-    rigid_convex.draw(rows, figure.add_subplot())
+    """Table 2.1 above, the other parts below."""
+    grid = figure.add_gridspec(2, 2)
+    panels = [grid[0, :], grid[1, 0], grid[1, 1]]
+    for part, panel in zip(PARTS, panels, strict=True):
+        part.draw(rows, figure.add_subplot(panel))

@@ -96,3 +96,37 @@ def _convex(coal: Any, points: NDArray[np.float64], faces: Any) -> Any:
     for face in faces:
         triangles.append(coal.Triangle(*face))
     return coal.Convex(cloud, triangles)
+
+
+def mesh(vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]) -> tuple[Any, float]:
+    """coal's OBBRSS model of a mesh, and the seconds its construction took."""
+    coal = coal_module()
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for p in vertices:
+        points.append(p)
+    for face in faces.tolist():
+        triangles.append(coal.Triangle(*face))
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(faces), len(vertices))
+    start = time.perf_counter()
+    model.addSubModel(points, triangles)
+    model.endModel()
+    return model, time.perf_counter() - start
+
+
+def collide_mesh(
+    model: Any, other: Any, poses: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """First hit of two models, the other one posed: answers and seconds of every single call."""
+    coal = coal_module()
+    here = coal.Transform3s.Identity()
+    there = [coal.Transform3s(pose[:3, :3], pose[:3, 3]) for pose in poses]
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    request.enable_contact = False
+    hit, seconds = np.empty(len(poses), dtype=np.bool_), np.empty(len(poses))
+    for i, pose in enumerate(there):
+        result.clear()
+        start = time.perf_counter()
+        hit[i] = coal.collide(model, here, other, pose, request, result) > 0
+        seconds[i] = time.perf_counter() - start
+    return hit, seconds

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tauguard.benchmarks import rigid_convex
-from tauguard.rigid import overlap
+from tauguard.benchmarks import rigid_convex, rigid_impact, rigid_mesh
+from tauguard.rigid import Boxes, Motion, overlap
 
 
 def test_a_static_cell_counts_wrong_answers():
@@ -43,3 +43,59 @@ def test_coal_agrees_away_from_contact():
     for pair in rigid_convex.PAIRS:
         for outcome, a, b in rigid_convex.static_cells(rng, pair, 100, 10):
             assert (overlap(a, b, "gjk").hit == (outcome == "collision")).mean() > 0.98
+
+
+def test_the_bracket_of_a_falling_cube_holds_the_time_that_geometry_says():
+    cube = Boxes(np.zeros((2, 3)), np.full((2, 3), 0.5), np.tile(np.eye(3), (2, 1, 1)))
+    pose = np.tile(np.eye(4), (2, 1, 1))
+    pose[:, 2, 3] = 2.0
+    rest = Motion(np.tile(np.eye(4), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3)))
+    fall = Motion(pose, [[0, 0, -4.0], [0, 0, 4.0]], np.zeros((2, 3)))
+    early, touch = rigid_impact.bracket(cube, cube, rest, fall)
+    assert early[0] <= 0.25 <= touch[0]
+    assert touch[0] - early[0] < 1e-10
+    assert np.isinf(early[1])
+    assert np.isinf(touch[1])
+
+
+def test_a_wrong_time_of_impact_would_show():
+    early, touch = np.array([0.3, 0.5, np.inf, np.inf]), np.array([0.3, 0.5, np.inf, np.inf])
+    row = rigid_impact.judged(early, touch, np.array([0.3 + 1e-6, np.inf, np.inf, 0.2]))
+    assert [row[name]["value"] for name in ("missed", "false", "late")] == [0.5, 0.5, 0.5]
+    assert row["toi_error_max"] == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize("kind", ["boxes", "tetrahedra"])
+def test_moving_bodies_are_never_late_never_missed_and_close(kind):
+    a, b, ma, mb = rigid_impact.pairs(np.random.default_rng(4), kind, 300)
+    row = rigid_impact.our_row(kind, a, b, ma, mb, *rigid_impact.bracket(a, b, ma, mb))
+    assert row["hits"] > 10
+    assert [row[name]["value"] for name in ("missed", "false", "late")] == [0, 0, 0]
+    assert row["toi_error_max"] <= 1e-7
+
+
+def test_mesh_rows_on_a_generated_mesh(monkeypatch):
+    pytest.importorskip("coal")
+    monkeypatch.delenv("TAUGUARD_DATA", raising=False)
+    monkeypatch.delenv("TAUGUARD_MESH", raising=False)
+    mesh = rigid_mesh.load(quick=True)
+    assert (mesh.name, len(mesh.faces)) == ("generated", 7200)
+    poses = rigid_mesh.poses_near(mesh, np.random.default_rng(0), 60)
+    peer = rigid_mesh.Peer(mesh, poses)
+    static = rigid_mesh.static_rows(mesh, poses, peer, 1)
+    assert len(static) == 8
+    assert all(row["disagree"]["value"] == 0 for row in static)
+    for row in rigid_mesh.dynamic_rows(mesh, poses, peer, np.random.default_rng(1), 6):
+        assert row["late_or_missed"]["value"] == 0
+        assert row["not_touching_1e-7_later"]["value"] in (0, None)
+
+
+def test_a_mesh_file_can_be_named(monkeypatch, tmp_path):
+    path = tmp_path / "one.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    monkeypatch.setenv("TAUGUARD_MESH", str(path))
+    mesh = rigid_mesh.load(quick=True)
+    assert (mesh.name, len(mesh.faces), mesh.size) == ("one", 1, np.sqrt(2))
+    monkeypatch.setenv("TAUGUARD_MESH", str(tmp_path / "none.obj"))
+    with pytest.raises(ValueError, match=r"TAUGUARD_MESH: none\.obj"):
+        rigid_mesh.load(quick=True)
