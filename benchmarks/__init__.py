@@ -9,7 +9,6 @@ A study is a module ``tauguard.benchmarks.<name>`` with two functions::
 #: Every study and its one-line description, in the order of ``tauguard bench list``.
 STUDIES: dict[str, str] = {
     "simulation": "what each part of a scene costs, and what the time step costs in accuracy",
-    "rigid": "convex overlap and sweeps by elimination (ABFME) against separating axes and coal",
     "impact": "blows against body regions beside the two-mass model: error against cost",
     "rigid": "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
