@@ -11,14 +11,23 @@ from tauguard.contacts.checker import (
     register,
     registered,
 )
+from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
+from tauguard.contacts.rigid_checker import RigidChecker
+
+register("rigid", RigidChecker)
 
 __all__ = [
     "KINDS",
     "Checker",
     "Contacts",
+    "Pairs",
+    "RigidChecker",
     "State",
     "checker",
+    "flex_pairs",
+    "geom_flex_pairs",
     "geom_kinds",
+    "geom_pairs",
     "pair_kind",
     "register",
     "registered",

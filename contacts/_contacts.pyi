@@ -1,0 +1,43 @@
+import numpy as np
+from numpy.typing import NDArray
+
+Doubles = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Answer = tuple[Ints, Doubles, tuple[int, int, int]]
+
+class Scene:
+    def __init__(self) -> None: ...
+    def add(
+        self,
+        core: int,
+        size: Doubles,
+        radius: float,
+        body: int,
+        pos: Doubles,
+        mat: Doubles,
+        vertices: Doubles,
+        normals: Doubles,
+        edges: Doubles,
+    ) -> None: ...
+    def pairs(self, pairs: Ints, reach: Doubles) -> None: ...
+    def find(
+        self, xpos_t0: Doubles, xmat_t0: Doubles, xpos_t1: Doubles, xmat_t1: Doubles
+    ) -> Answer: ...
+    def find_flex(
+        self,
+        xpos_t0: Doubles,
+        xmat_t0: Doubles,
+        xpos_t1: Doubles,
+        xmat_t1: Doubles,
+        x_t0: Doubles,
+        x_t1: Doubles,
+        elements: Ints,
+        radius: float,
+        geoms: Ints,
+        reach: Doubles,
+        skip: NDArray[np.uint8],
+    ) -> Answer: ...
+
+def simplices(
+    x_t0: Doubles, x_t1: Doubles, a: Ints, b: Ints, pairs: Ints, distance: float
+) -> Answer: ...

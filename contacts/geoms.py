@@ -1,0 +1,94 @@
+"""MuJoCo's geoms as the convex shapes of the native kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from tauguard.contacts._contacts import Scene
+from tauguard.contacts.checker import Array, geom_kinds
+
+#: Numbers of the native cores: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
+_CORES = {
+    "plane": 0,
+    "sphere": 1,
+    "capsule": 2,
+    "ellipsoid": 3,
+    "cylinder": 4,
+    "box": 5,
+    "mesh": 6,
+}
+#: Kinds that have one.
+CONVEX = tuple(_CORES)
+_NONE = np.zeros((0, 3))
+
+
+def native_scene(model: Any, geoms: Iterable[int], checker: str) -> Scene:
+    """A native scene of these geoms, numbered as in the list.
+
+    Raises:
+        ValueError: a geom of a kind that has no convex shape (named).
+    """
+    scene = Scene()
+    kinds = geom_kinds(model)
+    for geom in geoms:
+        kind = kinds[int(geom)]
+        if kind not in _CORES:
+            raise ValueError(
+                f"{checker}: geom {geom_name(model, int(geom))} is a {kind}; this checker handles "
+                f"{', '.join(CONVEX)} (skip=({kind!r},) leaves such geoms out)"
+            )
+        _add(scene, model, int(geom), kind)
+    return scene
+
+
+def geom_name(model: Any, geom: int) -> str:
+    """The geom's name, or its number and body."""
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom)
+    if name:
+        return repr(name)
+    body = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, int(model.geom_bodyid[geom]))
+    return f"{geom} (of body {body!r})"
+
+
+def hull_vertices(model: Any, geom: int) -> Array:
+    """Vertices of a mesh geom's convex hull, in the geom's frame. Shape (V, 3), m.
+
+    MuJoCo stores the hull's graph with the mesh (:class:`mjModel.mesh_graph`); a mesh without one
+    gives all its vertices, which have the same hull.
+    """
+    mesh = int(model.geom_dataid[geom])
+    start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    vertices: Array = np.asarray(model.mesh_vert[start : start + count], dtype=np.float64)
+    graph = int(model.mesh_graphadr[mesh])
+    if graph < 0:
+        return vertices
+    number = int(model.mesh_graph[graph])
+    ids = model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]
+    return vertices[np.asarray(ids)]
+
+
+def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:
+    size = model.geom_size[geom].astype(np.float64)
+    radius = float(size[0]) if kind in ("sphere", "capsule") else 0.0
+    mat = np.zeros(9)
+    mujoco.mju_quat2Mat(mat, model.geom_quat[geom])
+    vertices = normals = edges = _NONE
+    if kind == "mesh":
+        vertices = np.ascontiguousarray(hull_vertices(model, geom))
+    elif kind == "box":
+        normals = edges = np.eye(3)
+    scene.add(
+        _CORES[kind],
+        size,
+        radius,
+        int(model.geom_bodyid[geom]),
+        np.ascontiguousarray(model.geom_pos[geom], dtype=np.float64),
+        mat,
+        vertices,
+        normals,
+        edges,
+    )

@@ -1,0 +1,138 @@
+"""Which geoms and flexes may touch: MuJoCo's rules, applied once to a compiled model.
+
+The rules are those of the manual's chapter "Collision detection: selection": explicit pairs always
+count; other pairs need two bodies that are not welded together, not parent and child (unless the
+parent is the world), not excluded and not both immovable, and masks that agree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.contacts.checker import Array, Index, geom_kinds
+
+#: Kinds that MuJoCo never tests against one another.
+_NEVER = ({"plane"}, {"plane", "hfield"}, {"hfield"})
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Pairs that may touch.
+
+    Attributes:
+        first: Ids of geoms (or of flexes, between flexes). Shape (P,).
+        second: Ids of geoms or flexes. Shape (P,).
+        margin: A force acts where the surfaces are closer than this. Shape (P,), m.
+        gap: MuJoCo lists contacts up to margin + gap. Shape (P,), m.
+    """
+
+    first: Index
+    second: Index
+    margin: Array
+    gap: Array
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def reach(self, threshold: str) -> Array:
+        """How far apart counts as contact: 0, the margin, or margin + gap; never below 0."""
+        zero = np.zeros(len(self))
+        reach = {"surface": zero, "margin": self.margin, "gap": self.margin + self.gap}
+        if threshold not in reach:
+            raise ValueError(f"threshold {threshold!r}: there are {', '.join(reach)}")
+        return np.asarray(np.maximum(reach[threshold], 0.0), dtype=np.float64)
+
+
+def geom_pairs(model: Any) -> Pairs:
+    """Geoms that may touch, lower type first as in MuJoCo's contacts, then lower id."""
+    if _disabled(model):
+        return _pairs(model, [])
+    kinds = geom_kinds(model)
+    explicit = {}
+    for i in range(model.npair):
+        key = _ordered(model, int(model.pair_geom1[i]), int(model.pair_geom2[i]))
+        explicit[key] = (*key, float(model.pair_margin[i]), float(model.pair_gap[i]))
+    first, second = _dynamic(model)
+    chosen = dict(explicit)
+    for i, j in zip(first.tolist(), second.tolist(), strict=True):
+        key = _ordered(model, i, j)
+        margin = float(model.geom_margin[i] + model.geom_margin[j])
+        gap = float(model.geom_gap[i] + model.geom_gap[j])
+        chosen.setdefault(key, (*key, margin, gap))
+    rows = [row for row in chosen.values() if {kinds[row[0]], kinds[row[1]]} not in _NEVER]
+    return _pairs(model, sorted(rows))
+
+
+def geom_flex_pairs(model: Any) -> Pairs:
+    """Geoms (``first``) that may touch flexes (``second``)."""
+    rows = []
+    for f in range(0 if _disabled(model) else model.nflex):
+        for g in range(model.ngeom):
+            if _masks(model.geom_contype, model.geom_conaffinity, g, model, f):
+                margin = float(model.geom_margin[g] + model.flex_margin[f])
+                rows.append((g, f, margin, float(model.geom_gap[g] + model.flex_gap[f])))
+    return _pairs(model, rows)
+
+
+def flex_pairs(model: Any) -> Pairs:
+    """Flexes that may touch one another, or themselves (then without margin)."""
+    rows = []
+    for f in range(0 if _disabled(model) else model.nflex):
+        own = int(model.flex_contype[f]) & int(model.flex_conaffinity[f])
+        if own and model.flex_selfcollide[f] and not model.flex_rigid[f]:
+            rows.append((f, f, 0.0, 0.0))
+        for g in range(f + 1, model.nflex):
+            if _masks(model.flex_contype, model.flex_conaffinity, f, model, g):
+                margin = float(model.flex_margin[f] + model.flex_margin[g])
+                rows.append((f, g, margin, float(model.flex_gap[f] + model.flex_gap[g])))
+    pairs = _pairs(model, rows)
+    own_rows = pairs.first == pairs.second
+    return Pairs(pairs.first, pairs.second, np.where(own_rows, 0.0, pairs.margin), pairs.gap)
+
+
+def _dynamic(model: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of geoms that the bodies and masks allow; i < j."""
+    i, j = np.triu_indices(model.ngeom, 1)
+    body = model.geom_bodyid.astype(np.int64)
+    weld = model.body_weldid[body]
+    parent = model.body_weldid[model.body_parentid[weld]]
+    movable = model.body_dofnum[weld] > 0
+    allowed = (weld[i] != weld[j]) & (movable[i] | movable[j])
+    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
+        related = (weld[i] == parent[j]) | (weld[j] == parent[i])
+        allowed &= ~(related & (weld[i] != 0) & (weld[j] != 0))
+    low, high = np.minimum(body[i], body[j]), np.maximum(body[i], body[j])
+    allowed &= ~np.isin((low << 16) + high, model.exclude_signature)
+    contype, conaffinity = model.geom_contype, model.geom_conaffinity
+    allowed &= ((contype[i] & conaffinity[j]) | (contype[j] & conaffinity[i])) != 0
+    return i[allowed], j[allowed]
+
+
+def _ordered(model: Any, a: int, b: int) -> tuple[int, int]:
+    key = sorted((a, b), key=lambda g: (int(model.geom_type[g]), g))
+    return key[0], key[1]
+
+
+def _masks(contype: Any, conaffinity: Any, i: int, model: Any, flex: int) -> bool:
+    return bool(
+        int(contype[i]) & int(model.flex_conaffinity[flex])
+        or int(model.flex_contype[flex]) & int(conaffinity[i])
+    )
+
+
+def _disabled(model: Any) -> bool:
+    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    return bool(model.opt.disableflags & off)
+
+
+def _pairs(model: Any, rows: list[tuple[int, int, float, float]]) -> Pairs:
+    table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    margin = np.ascontiguousarray(table[:, 2])
+    if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
+        margin = np.full(len(rows), float(model.opt.o_margin))
+    return Pairs(table[:, 0].astype(np.int32), table[:, 1].astype(np.int32), margin, table[:, 3])

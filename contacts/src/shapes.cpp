@@ -1,0 +1,191 @@
+#include "shapes.hpp"
+
+#include <algorithm>
+
+namespace tauguard::contacts {
+
+Vec Shape::support(const Vec& d) const {
+  switch (core) {
+    case Core::half_space:
+    case Core::point:
+      return {0, 0, 0};
+    case Core::segment:
+      return {0, 0, d[2] >= 0 ? size[1] : -size[1]};
+    case Core::box:
+      return {d[0] >= 0 ? size[0] : -size[0], d[1] >= 0 ? size[1] : -size[1], d[2] >= 0 ? size[2] : -size[2]};
+    case Core::ellipsoid: {
+      const Vec e = {size[0] * d[0], size[1] * d[1], size[2] * d[2]};
+      const double length = norm(e);
+      if (!(length > 0)) return {size[0], 0, 0};
+      return {size[0] * e[0] / length, size[1] * e[1] / length, size[2] * e[2] / length};
+    }
+    case Core::disc_prism: {
+      const double across = std::sqrt(d[0] * d[0] + d[1] * d[1]), z = d[2] >= 0 ? size[1] : -size[1];
+      if (!(across > 0)) return {0, 0, z};
+      return {size[0] * d[0] / across, size[0] * d[1] / across, z};
+    }
+    case Core::hull: {
+      std::size_t best = 0;
+      double most = -INFINITY;
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        const double p = d[0] * x[i] + d[1] * y[i] + d[2] * z[i];
+        if (p > most) most = p, best = i;
+      }
+      return {x[best], y[best], z[best]};
+    }
+  }
+  return {};
+}
+
+double Shape::extent() const {
+  switch (core) {
+    case Core::half_space:
+    case Core::point:
+      return 0;
+    case Core::segment:
+      return size[1];
+    case Core::box:
+      return norm(Vec{size[0], size[1], size[2]});
+    case Core::ellipsoid:
+      return std::max({size[0], size[1], size[2]});
+    case Core::disc_prism:
+      return std::hypot(size[0], size[1]);
+    case Core::hull: {
+      double most = 0;
+      for (std::size_t i = 0; i < x.size(); ++i) most = std::max(most, norm(Vec{x[i], y[i], z[i]}));
+      return most;
+    }
+  }
+  return 0;
+}
+
+RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1,
+                           const double* xmat_t1) {
+  double pose[16] = {}, linear[3], angular[3] = {};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) pose[4 * i + j] = xmat_t0[3 * i + j];
+    pose[4 * i + 3] = xpos_t0[i];
+    linear[i] = xpos_t1[i] - xpos_t0[i];
+  }
+  pose[15] = 1;
+  if (!std::equal(xmat_t0, xmat_t0 + 9, xmat_t1)) {
+    double r[3][3];  // from the first orientation to the second, world frame
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        r[i][j] = xmat_t1[3 * i] * xmat_t0[3 * j] + xmat_t1[3 * i + 1] * xmat_t0[3 * j + 1] +
+                  xmat_t1[3 * i + 2] * xmat_t0[3 * j + 2];
+    // The quaternion from its largest entry (Shepperd 1978): accurate for every angle.
+    const double trace = r[0][0] + r[1][1] + r[2][2];
+    double q[4];
+    int k = -1;
+    for (int i = 0; i < 3; ++i)
+      if (r[i][i] > (k < 0 ? trace : r[k][k])) k = i;
+    if (k < 0) {
+      const double s = 2 * std::sqrt(std::max(0.0, 1 + trace));
+      q[0] = s / 4;
+      q[1] = (r[2][1] - r[1][2]) / s, q[2] = (r[0][2] - r[2][0]) / s, q[3] = (r[1][0] - r[0][1]) / s;
+    } else {
+      const int j = (k + 1) % 3, l = (k + 2) % 3;
+      const double s = 2 * std::sqrt(std::max(0.0, 1 + r[k][k] - r[j][j] - r[l][l]));
+      q[0] = (r[l][j] - r[j][l]) / s;
+      q[1 + k] = s / 4, q[1 + j] = (r[j][k] + r[k][j]) / s, q[1 + l] = (r[l][k] + r[k][l]) / s;
+    }
+    const Vec axis = {q[1], q[2], q[3]};
+    const double sine = norm(axis), sign = q[0] < 0 ? -1 : 1;
+    if (sine > 0) {
+      const double scale = sign * 2 * std::atan2(sine, std::fabs(q[0])) / sine;
+      for (int i = 0; i < 3; ++i) angular[i] = scale * axis[i];
+    }
+  }
+  return RigidMotion(pose, linear, angular);
+}
+
+Mover::Mover(const Shape& shape, const Frame& in_body, const RigidMotion& motion, const Vec& origin)
+    : shape_(&shape), in_body_(in_body), motion_(&motion), turning_(true), shift_(motion.x0 - origin),
+      radius_(shape.radius) {
+  reach_ = norm(in_body.at) + shape.extent();
+  magnitude_ = norm(shift_) + norm(motion.linear) + (4 + motion.speed) * reach_ + radius_;
+}
+
+Mover::Mover(const double* const* x_t0, const double* const* x_t1, int count, double radius, const Vec& origin)
+    : count_(count), radius_(radius) {
+  for (int i = 0; i < count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      start_[i][k] = x_t0[i][k] - origin[k];
+      velocity_[i][k] = x_t1[i][k] - x_t0[i][k];
+    }
+    magnitude_ = std::max(magnitude_, norm(start_[i]) + norm(velocity_[i]) + radius);
+    reach_ = std::max(reach_, norm(start_[i] - start_[0]));
+  }
+}
+
+void Mover::move_to(double t) {
+  if (!turning_) {
+    for (int i = 0; i < count_; ++i) now_[i] = start_[i] + t * velocity_[i];
+    return;
+  }
+  centre_ = shift_ + t * motion_->linear;
+  Frame body{{motion_->r0[0], motion_->r0[1], motion_->r0[2]}, centre_};
+  if (motion_->speed != 0) {
+    const double angle = motion_->speed * t, c = std::cos(angle), s = std::sin(angle), half = std::sin(0.5 * angle);
+    const Vec& u = motion_->axis;
+    for (int j = 0; j < 3; ++j) {  // column by column: the rotated axes
+      const Vec w = {motion_->r0[0][j], motion_->r0[1][j], motion_->r0[2][j]};
+      const Vec turned = c * w + s * cross(u, w) + (2 * half * half * dot(u, w)) * u;
+      for (int i = 0; i < 3; ++i) body.row[i][j] = turned[i];
+    }
+  }
+  frame_.at = body.out(in_body_.at);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      frame_.row[i][j] = body.row[i][0] * in_body_.row[0][j] + body.row[i][1] * in_body_.row[1][j] +
+                         body.row[i][2] * in_body_.row[2][j];
+}
+
+Vec Mover::support(const Vec& d) const {
+  if (turning_) return frame_.out(shape_->support(frame_.back(d)));
+  int best = 0;
+  double most = dot(d, now_[0]);
+  for (int i = 1; i < count_; ++i) {
+    const double p = dot(d, now_[i]);
+    if (p > most) most = p, best = i;
+  }
+  return now_[best];
+}
+
+double Mover::tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift) const {
+  if (turning_) {
+    // x = centre + y and x' = linear + w x y, and n.(w x y) = y.(n x w).
+    const Vec m = n + h * (r + cross(n, angular()));
+    const Vec y = support(m) - centre_, from = centre_ - c;
+    return dot(n, from) + h * (dot(r, from) + dot(n, motion_->linear - drift)) + dot(m, y);
+  }
+  double most = -INFINITY;
+  for (int i = 0; i < count_; ++i) {
+    const Vec x = now_[i] - c;
+    most = std::max(most, dot(n, x) + h * (dot(r, x) + dot(n, velocity_[i] - drift)));
+  }
+  return most;
+}
+
+double Mover::speed_about(const Vec& drift) const {
+  if (turning_) return norm(motion_->linear - drift) + motion_->speed * reach_;
+  double most = 0;
+  for (int i = 0; i < count_; ++i) most = std::max(most, norm(velocity_[i] - drift));
+  return most;
+}
+
+double Mover::acceleration(const Vec& n, double drift) const {
+  if (!turning_ || motion_->speed == 0) return 0;
+  const Vec across = n - dot(n, motion_->axis) * motion_->axis;
+  return motion_->speed * motion_->speed * reach_ * (norm(across) + drift + 0x1p-40);
+}
+
+Vec Mover::middle() const {
+  if (turning_) return frame_.at;
+  Vec sum{};
+  for (int i = 0; i < count_; ++i) sum = sum + now_[i];
+  return (1.0 / count_) * sum;
+}
+
+}  // namespace tauguard::contacts

@@ -1,0 +1,83 @@
+// Convex shapes by their support functions, and how they move in a step.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "motion_body.hpp"
+
+namespace tauguard::contacts {
+
+using rigid::cross;
+using rigid::dot;
+using rigid::norm;
+using rigid::RigidMotion;
+using rigid::Vec;
+using rigid::operator+;
+using rigid::operator-;
+using rigid::operator*;
+
+constexpr double unit_roundoff = 0x1p-53;
+
+enum class Core : std::uint8_t { half_space, point, segment, ellipsoid, disc_prism, box, hull };
+
+// A convex core and a radius around it, in the geom's own frame (MuJoCo's: axes along z, sizes are half
+// lengths). A plane is the half space z <= 0.
+struct Shape {
+  Core core;
+  double size[3];
+  double radius;
+  std::vector<double> x, y, z;  // the vertices of a hull, by coordinate
+  std::vector<Vec> normals, edges;  // of a polytope, where they are few
+
+  Vec support(const Vec& d) const;  // a point of the core that is furthest along d
+  double extent() const;            // no point of the core is further from the frame's origin
+  bool polytope() const { return core == Core::box || core == Core::hull; }
+};
+
+struct Frame {
+  Vec row[3];  // of the rotation
+  Vec at;
+  Vec out(const Vec& y) const { return Vec{dot(row[0], y), dot(row[1], y), dot(row[2], y)} + at; }
+  Vec turn(const Vec& y) const { return {dot(row[0], y), dot(row[1], y), dot(row[2], y)}; }
+  Vec back(const Vec& d) const { return d[0] * row[0] + d[1] * row[1] + d[2] * row[2]; }
+};
+
+// The motion of a body between two poses: its origin moves linearly, its frame turns at a constant rate
+// about the shortest rotation vector.
+RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1, const double* xmat_t1);
+
+// A shape on a moving body, or a simplex whose vertices move linearly. Positions are relative to an origin
+// near both partners.
+class Mover {
+ public:
+  Mover(const Shape& shape, const Frame& in_body, const RigidMotion& motion, const Vec& origin);
+  Mover(const double* const* x_t0, const double* const* x_t1, int count, double radius, const Vec& origin);
+
+  void move_to(double t);
+  Vec support(const Vec& d) const;
+  // Max over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)): the tangent of the projection on n + h r.
+  double tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift) const;
+  double speed_about(const Vec& drift) const;             // no point moves faster than this against drift
+  double acceleration(const Vec& n, double drift) const;  // bound on |n.x''| for n within drift of the given one
+  Vec angular() const { return turning_ ? motion_->speed * motion_->axis : Vec{}; }
+  Vec linear() const { return turning_ ? motion_->linear : velocity_[0]; }
+  Vec centre() const { return turning_ ? centre_ : now_[0]; }
+  Vec middle() const;
+  Vec plane_normal() const { return {frame_.row[0][2], frame_.row[1][2], frame_.row[2][2]}; }
+  bool half_space() const { return shape_ != nullptr && shape_->core == Core::half_space; }
+  double radius() const { return radius_; }
+  double reach() const { return reach_; }
+  double magnitude() const { return magnitude_; }
+
+ private:
+  const Shape* shape_ = nullptr;
+  Frame in_body_{}, frame_{};
+  const RigidMotion* motion_ = nullptr;
+  bool turning_ = false;
+  int count_ = 0;
+  Vec start_[4], velocity_[4], now_[4], shift_{}, centre_{};
+  double radius_ = 0, reach_ = 0, magnitude_ = 0;
+};
+
+}  // namespace tauguard::contacts

@@ -1,0 +1,97 @@
+// A scene's pairs over one step: swept boxes first, then the time of impact of what is left.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "advance.hpp"
+
+namespace tauguard::contacts {
+
+// How far apart counts, beside touching: contacts up to `reach` are listed where the surfaces do not touch.
+struct GeomPair {
+  std::int32_t a, b;
+  double reach;
+};
+
+struct Row {
+  std::int32_t first, second, feature;
+  double t, distance;
+  Vec point, normal;
+};
+
+struct Box {
+  Vec lo, hi;
+  bool meets(const Box& o) const {
+    return lo[0] <= o.hi[0] && o.lo[0] <= hi[0] && lo[1] <= o.hi[1] && o.lo[1] <= hi[1] && lo[2] <= o.hi[2] &&
+           o.lo[2] <= hi[2];
+  }
+};
+
+// Where the bodies are at both ends of a step: (nbody, 3) and (nbody, 9).
+struct Poses {
+  const double *xpos_t0, *xmat_t0, *xpos_t1, *xmat_t1;
+};
+
+struct Counts {
+  std::int64_t moved = 0, reused = 0, candidates = 0;
+};
+
+class Geoms {
+ public:
+  void add(Shape shape, int body, const Frame& in_body);
+  std::size_t size() const { return shapes_.size(); }
+
+  // Brings motions and swept boxes up to date, of bodies that moved in this step or since the last one.
+  void update(const Poses& poses);
+  bool still(int geom) const { return still_[body_[geom]]; }      // unmoved in this step
+  bool as_before(int geom) const { return same_[body_[geom]]; }   // and where it was throughout the last one
+  const Box& box(int geom) const { return boxes_[geom]; }
+  const Shape& shape(int geom) const { return shapes_[geom]; }
+  const Frame& in_body(int geom) const { return in_body_[geom]; }
+  const RigidMotion& motion(int geom) const { return motions_[body_[geom]]; }
+  Mover mover(int geom, const Vec& origin) const;
+  std::int64_t moved() const { return moved_; }
+
+ private:
+  std::vector<Shape> shapes_;
+  std::vector<Frame> in_body_;
+  std::vector<int> body_;
+  std::vector<int> bodies_;             // those that have geoms
+  std::vector<RigidMotion> motions_;    // by body, as the rest
+  std::vector<char> still_, same_, seen_;
+  std::vector<Box> boxes_;
+  std::vector<double> last_;            // 24 a body: both poses of the last step
+  std::int64_t moved_ = 0;
+};
+
+class RigidPairs {
+ public:
+  explicit RigidPairs(std::vector<GeomPair> pairs) : pairs_(std::move(pairs)), cache_(pairs_.size()) {}
+  Counts find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows);
+
+ private:
+  struct Cached {
+    bool known = false, hit = false;
+    Row row{};
+  };
+  std::vector<GeomPair> pairs_;
+  std::vector<Cached> cache_;
+};
+
+// The simplices of a flex against geoms; `skip` leaves out a simplex that hangs on the geom's own body.
+struct FlexPair {
+  std::int32_t geom;
+  double reach;
+  const std::uint8_t* skip;  // one a simplex
+};
+
+Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1, const std::int32_t* elements,
+                 std::size_t count, int corners, double radius, const std::vector<FlexPair>& pairs,
+                 std::vector<Row>* rows);
+
+// Two simplices of linearly moving vertices; true where they come within `distance` of one another.
+bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t* a, const std::int32_t* b, int corners,
+                     double distance, Touch* touch);
+
+}  // namespace tauguard::contacts
