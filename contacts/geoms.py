@@ -62,13 +62,13 @@ def hull_vertices(model: Any, geom: int) -> Array:
     """
     mesh = int(model.geom_dataid[geom])
     start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    vertices: Array = np.asarray(model.mesh_vert[start : start + count], dtype=np.float64)
+    vertices = np.asarray(model.mesh_vert[start : start + count], dtype=np.float64)
     graph = int(model.mesh_graphadr[mesh])
     if graph < 0:
         return vertices
     number = int(model.mesh_graph[graph])
     ids = model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]
-    return vertices[np.asarray(ids)]
+    return np.asarray(vertices[ids], dtype=np.float64)
 
 
 def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:
