@@ -6,6 +6,7 @@ import ctypes
 import functools
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -61,16 +62,48 @@ class Recording:
 
 
 @functools.cache
-def _step_address() -> int:
-    """Address of ``mj_step`` in the library that the Python binding has loaded."""
+def _library() -> ctypes.CDLL:
+    """The MuJoCo library that the Python binding has loaded."""
     folder = Path(mujoco.__file__).parent
     names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib")]
     if not names:
         raise OSError(f"no MuJoCo library beside its Python binding in {folder.name}")
-    library = ctypes.CDLL(str(names[0]))
-    address = ctypes.cast(library.mj_step, ctypes.c_void_p).value
+    return ctypes.CDLL(str(names[0]))
+
+
+def function_address(name: str) -> int:
+    """Address of one of its functions."""
+    address = ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value
     assert address is not None
     return address
+
+
+def drive_numbers(drive: Drive, nominal: Drive, gains: Gains) -> list[dict[str, Any]]:
+    """What the native joints are made of: the simulated drive, the servo's gains and beliefs."""
+    friction, ripple = drive.friction, drive.ripple
+    warm = 0.0 if friction is None else friction.temperature - friction.reference_temperature
+    level = 0.0 if friction is None else 1 + friction.coulomb_per_kelvin * warm
+    thick = 0.0 if friction is None else 1 + friction.viscous_per_kelvin * warm
+    return [
+        {
+            "gain": drive.gain[i],
+            "nominal_gain": nominal.gain[i],
+            "limit": drive.current_limit[i],
+            "gear": drive.gear[i],
+            "coulomb": 0.0 if friction is None else friction.coulomb[i] * level,
+            "breakaway": 0.0 if friction is None else friction.static[i] * level,
+            "stribeck_velocity": 1.0 if friction is None else friction.stribeck_velocity[i],
+            "viscous": 0.0 if friction is None else friction.viscous[i] * thick,
+            "bristle_stiffness": 0.0 if friction is None else friction.bristle_stiffness[i],
+            "load": 0.0 if friction is None else friction.load[i],
+            "kp": gains.kp[i],
+            "kd": gains.kd[i],
+            "cycles": [] if ripple is None else [float(c) for c in ripple.cycles],
+            "amplitude": [] if ripple is None else [float(a) for a in ripple.amplitude[i]],
+            "phase": [] if ripple is None else [float(p) for p in ripple.phase[i]],
+        }
+        for i in range(len(drive.gain))
+    ]
 
 
 class SimulationLoop:
@@ -95,7 +128,7 @@ class SimulationLoop:
         dt = scene.model.opt.timestep
         constant = drive.electrical_time_constant
         self._loop = _loop.Loop(
-            step=_step_address(),
+            step=function_address("mj_step"),
             model=scene.model._address,
             data=data._address,
             dt=dt,
@@ -126,31 +159,8 @@ class SimulationLoop:
         return int(model.sensor_adr[first]), links * SENSOR_WIDTH
 
     def _configure(self, drive: Drive) -> None:
-        friction, ripple = drive.friction, drive.ripple
-        for i in range(len(drive.gain)):
-            warm = (
-                0.0 if friction is None else friction.temperature - friction.reference_temperature
-            )
-            level = 0.0 if friction is None else 1 + friction.coulomb_per_kelvin * warm
-            thick = 0.0 if friction is None else 1 + friction.viscous_per_kelvin * warm
-            self._loop.set_joint(
-                i,
-                gain=drive.gain[i],
-                nominal_gain=self._nominal.gain[i],
-                limit=drive.current_limit[i],
-                gear=drive.gear[i],
-                coulomb=0.0 if friction is None else friction.coulomb[i] * level,
-                breakaway=0.0 if friction is None else friction.static[i] * level,
-                stribeck_velocity=1.0 if friction is None else friction.stribeck_velocity[i],
-                viscous=0.0 if friction is None else friction.viscous[i] * thick,
-                bristle_stiffness=0.0 if friction is None else friction.bristle_stiffness[i],
-                load=0.0 if friction is None else friction.load[i],
-                kp=self.gains.kp[i],
-                kd=self.gains.kd[i],
-                cycles=[] if ripple is None else [float(c) for c in ripple.cycles],
-                amplitude=[] if ripple is None else [float(a) for a in ripple.amplitude[i]],
-                phase=[] if ripple is None else [float(p) for p in ripple.phase[i]],
-            )
+        for i, numbers in enumerate(drive_numbers(drive, self._nominal, self.gains)):
+            self._loop.set_joint(i, **numbers)
 
     def reset(self, q: Array) -> None:
         """Start at rest at ``q`` [rad], shape (n,), with no current and relaxed bristles."""

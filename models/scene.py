@@ -46,7 +46,7 @@ class SceneSpec:
     payload: bool = False  #: a body at the flange whose mass ``set_payload`` changes
     striker: Striker | None = None
     clamp: Clamp | None = None
-    labels: bool = True  #: a contact sensor on every link
+    labels: bool = True  #: a contact sensor on every link and every body region
     floor: bool = False  #: a plane at height 0
     arm: str = "cura6"  #: or an MJCF or URDF file with one serial arm in it
     base_pose: tuple[tuple[float, ...], ...] | None = None  #: of the arm's world, (4, 4)
@@ -157,6 +157,8 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     if spec.labels:
         for i, link in enumerate(arm.links, start=1):
             _add_label(whole, link, f"contact_link{i}")
+        for proxy in spec.proxies:
+            _add_label(whole, proxy.region, f"contact_{proxy.region}")
     if obstacles:
         add_pairs(whole, arm.shapes(), obstacles)
     return tuple(obstacles)

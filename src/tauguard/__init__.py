@@ -9,4 +9,8 @@ tauguard is a research tool, not a certified safety function.
 
 from importlib.metadata import version
 
+from tauguard.environments import register_environments
+
 __version__ = version("tauguard")
+
+register_environments()

@@ -1,0 +1,218 @@
+"""What every environment shares: the step, the information beside it, seeing, and errors."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.envs.cell import (
+    COST,
+    DISTANCE,
+    DIVERGED,
+    FORCE,
+    LINK,
+    ONSET,
+    ONSET_TIME,
+    RATIO,
+    REGION,
+    REGION_FORCE,
+    TIME,
+    Cell,
+)
+from tauguard.envs.rendering import Picture
+from tauguard.envs.settings import Settings, one_of
+from tauguard.envs.world import World, build_world
+
+Array = NDArray[np.float64]
+
+#: Why a diverged episode ended.
+DIVERGED_REASON = (
+    "diverged: a position is not finite or a speed beyond 1000; a smaller timestep would hold"
+)
+RENDER_MODES = ("rgb_array", "human")
+
+
+class Task:
+    """What is to be done in a cell: where an episode starts and what a step is worth."""
+
+    #: Keywords that differ from those of :class:`tauguard.envs.settings.Settings`.
+    defaults: ClassVar[dict[str, Any]] = {}
+    #: How many arms the scene has.
+    arms: ClassVar[int] = 1
+    #: Keywords of the task itself, with their defaults.
+    options: ClassVar[dict[str, Any]] = {}
+
+    def __init__(self, cell: Cell, **options: Any) -> None:
+        """Keep the cell."""
+        self.cell = cell
+
+    def start(self, i: int, rng: np.random.Generator) -> None:
+        """Begin an episode of copy ``i``; the last thing it does is :meth:`Cell.start`."""
+        raise NotImplementedError
+
+    def score(self) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Reward, whether the task is over, and success of the last step, shape (rows,) each."""
+        raise NotImplementedError
+
+    def after(self, i: int, rng: np.random.Generator) -> None:
+        """What follows a success of copy ``i``, before its observation is shown."""
+
+
+class ArmEnv(gymnasium.Env[Array, Array]):
+    """One arm scene as a Gymnasium environment; subclasses name their task.
+
+    The keywords are those of :class:`tauguard.envs.settings.Settings` and of the task.
+
+    Every ``info`` has the same keys and shapes: ``time`` [s], ``distance`` to the target [m],
+    ``success``, ``force`` (peak on a link [N]), ``cost`` (peak force on body regions beyond their
+    limits [N]), ``pressure`` (peak mean pressure [N/cm^2], where the keyword ``contact_area`` says
+    the area; a point contact has none, else it is 0), ``limit_ratio`` (peak force over the region's
+    transient limit, or its quasi-static one after 0.5 s of contact or where the region cannot
+    move), ``region`` (of that ratio, 1-based, 0 for none; names in :attr:`regions`), ``tau_ext``
+    [N m], ``residual`` [N m] and ``alarm`` of the detector, ``onset`` (a collision began in this
+    step), ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
+    0: none), and ``reason``, why an episode was cut short ("" where it was not). Peaks are over
+    the physics steps of the action. With checkers, ``contacts`` has the pairs that each reported.
+
+    The limits follow ISO 10218-2:2025; not every value could be confirmed from an open source:
+    ``unwrapped.regions`` says which were not. A simulated force replaces no measurement.
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
+    task_type: ClassVar[type[Task]] = Task
+
+    def __init__(self, render_mode: str | None = None, **keywords: Any) -> None:
+        """Compile the scene.
+
+        Args:
+            render_mode: "rgb_array", "human" or None.
+            **keywords: see :class:`tauguard.envs.settings.Settings`.
+
+        Raises:
+            ValueError: an unknown keyword or a value that cannot be; the message says what would
+                work.
+            FileNotFoundError: no such robot file.
+        """
+        if render_mode is not None:
+            one_of("render_mode", render_mode, RENDER_MODES)
+        self.render_mode = render_mode
+        self.world, self.cell, self.task = build(self.task_type, keywords, 1)
+        self.metadata = frame_rate(self.world)
+        self.action_space, self.observation_space = make_spaces(self.cell)
+        self._picture: Picture | None = None
+        self._begun = False
+
+    @property
+    def regions(self) -> tuple[Any, ...]:
+        """The body regions in the scene: names, limits, and which values are unconfirmed."""
+        return self.world.regions
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode."""
+        super().reset(seed=seed)
+        self.task.start(0, self.np_random)
+        self._begun = True
+        if self.render_mode == "human":
+            self.render()
+        return self.cell.observation[0].copy(), self._info(False)
+
+    def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Act for one control step; entries beyond [-1, 1] count as -1 and 1.
+
+        Raises:
+            ValueError: an action of another shape, or with entries that are not finite.
+        """
+        if not self._begun:
+            raise gymnasium.error.ResetNeeded("call reset before step")
+        cell = self.cell
+        values = np.ascontiguousarray(action, dtype=np.float64)
+        if values.shape != self.action_space.shape:
+            raise ValueError(
+                f"action: shape {values.shape}, expected {self.action_space.shape}: "
+                f"{', '.join(entry.name for entry in cell.actions)}"
+            )
+        cell.step(0, values, self.np_random)
+        rewards, overs, successes = self.task.score()
+        success = bool(successes[0])
+        diverged = bool(cell.figure[0, DIVERGED])
+        info = self._info(success)
+        if success and not diverged:
+            self.task.after(0, self.np_random)
+        if self.render_mode == "human":
+            self.render()
+        over = bool(overs[0]) and not diverged
+        return cell.observation[0].copy(), float(rewards[0]), over, diverged, info
+
+    def _info(self, success: bool) -> dict[str, Any]:
+        cell = self.cell
+        figure = cell.figure[0].tolist()
+        area = self.world.settings.contact_area
+        info = {
+            "time": figure[TIME],
+            "distance": figure[DISTANCE],
+            "success": success,
+            "force": figure[FORCE],
+            "cost": figure[COST],
+            "pressure": figure[REGION_FORCE] / area if area else 0.0,
+            "limit_ratio": figure[RATIO],
+            "region": int(figure[REGION]),
+            "tau_ext": cell.tau_ext[0].copy(),
+            "residual": cell.residual[0].copy(),
+            "alarm": bool(cell.alarm[0]),
+            "onset": bool(figure[ONSET]),
+            "onset_time": figure[ONSET_TIME],
+            "link": int(figure[LINK]),
+            "reason": DIVERGED_REASON if figure[DIVERGED] else "",
+        }
+        if cell.checkers:
+            info["contacts"] = cell.contacts[0].copy()
+        return info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (480, 640, 3) in ``rgb_array`` mode; in ``human`` mode the window follows."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render_mode was not given to make: nothing to render")
+            return None
+        if self._picture is None:
+            self._picture = Picture(self.world, self.cell.datas[0], self.render_mode)
+        return self._picture.show(self.cell.target[0])
+
+    def close(self) -> None:
+        """Close the window or the renderer."""
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None
+
+
+def build(task_type: type[Task], keywords: dict[str, Any], rows: int) -> tuple[World, Cell, Task]:
+    """World, cell and task of an environment with these keywords."""
+    own = {name: keywords.pop(name, value) for name, value in task_type.options.items()}
+    try:
+        settings = Settings.from_keywords(task_type.defaults, keywords)
+    except ValueError as error:
+        if own and str(error).startswith("keyword "):
+            raise ValueError(f"{error}, {', '.join(own)}") from None
+        raise
+    world = build_world(settings, task_type.arms)
+    cell = Cell(world, rows)
+    return world, cell, task_type(cell, **own)
+
+
+def frame_rate(world: World) -> dict[str, Any]:
+    """The metadata of an environment: a picture shows one action."""
+    rate = max(1, round(world.settings.control_rate))
+    return {"render_modes": list(RENDER_MODES), "render_fps": rate}
+
+
+def make_spaces(cell: Cell) -> tuple[Any, Any]:
+    """Of one environment's actions and observations."""
+    low = np.array([entry.low for entry in cell.observations])
+    high = np.array([entry.high for entry in cell.observations])
+    action = spaces.Box(-1.0, 1.0, (len(cell.actions),), np.float32)
+    return action, spaces.Box(low, high, dtype=np.float64)

@@ -1,0 +1,207 @@
+"""One or many running copies of a world: the native plants and the arrays that they share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.envs import _env
+from tauguard.envs.actions import Entry, action_scale, action_table, observation_table
+from tauguard.envs.loop import drive_numbers, function_address
+from tauguard.envs.sensing import Sensing, make_detector
+from tauguard.envs.settings import CONTROLS
+from tauguard.envs.world import World
+
+Array = NDArray[np.float64]
+
+#: Columns of :attr:`Cell.figure`, in the native order.
+FIGURES = (
+    "time", "distance", "force", "cost", "limit_ratio", "region_force",
+    "onset", "onset_time", "link", "region", "diverged", "speed_ratio",
+)  # fmt: skip
+(
+    TIME,
+    DISTANCE,
+    FORCE,
+    COST,
+    RATIO,
+    REGION_FORCE,
+    ONSET,
+    ONSET_TIME,
+    LINK,
+    REGION,
+    DIVERGED,
+    SPEED,
+) = range(len(FIGURES))
+assert len(FIGURES) == _env.FIGURES
+
+
+class Cell:
+    """``rows`` copies of a world that run side by side and know nothing of one another.
+
+    Attributes:
+        observation: shape (rows, size).
+        figure: shape (rows, len(FIGURES)).
+        tau_ext: external joint torque at the last physics step [N m], shape (rows, n).
+        target: of the tools [m], shape (rows, arms, 3).
+        residual: of the detector [N m], shape (rows, n); zero without one.
+        alarm: of the detector, shape (rows,).
+        q, qd, current: at every physics step of the last action, shape (rows, substeps, n).
+    """
+
+    def __init__(self, world: World, rows: int, checkers: Sequence[object] = ()) -> None:
+        """Allocate the data of every copy and bind the plants."""
+        self.world, self.rows = world, rows
+        self.observations: list[Entry] = observation_table(world)
+        self.actions: list[Entry] = action_table(world)
+        n, steps = len(world.scene.joint_names), world.settings.substeps
+        self.observation = np.zeros((rows, len(self.observations)))
+        self.figure = np.zeros((rows, len(FIGURES)))
+        self.tau_ext, self.residual = np.zeros((rows, n)), np.zeros((rows, n))
+        self.alarm = np.zeros(rows, dtype=np.bool_)
+        self.target = np.zeros((rows, world.arms, 3))
+        self.q, self.qd, self.current = (np.zeros((rows, steps, n)) for _ in range(3))
+        self.datas = [mujoco.MjData(world.scene.model) for _ in range(rows)]
+        self.plants = [self._plant(i) for i in range(rows)]
+        self.sensing: list[Sensing] | None = None
+        self.attach(world.settings.detector)
+        self.checkers = tuple(checkers)
+        self.contacts = np.zeros((rows, len(self.checkers)), dtype=np.int64)
+
+    def attach(self, detector: object) -> None:
+        """Put a detector into every copy's loop; ``None`` takes it out."""
+        needed = detector is not None or self.world.settings.noise
+        self.sensing = (
+            [Sensing(self.world, make_detector(self.world, detector)) for _ in range(self.rows)]
+            if needed
+            else None
+        )
+        self.residual[:], self.alarm[:] = 0.0, False
+
+    def place(self, i: int, q: Array) -> None:
+        """Put copy ``i`` at rest at ``q`` [rad], shape (n,), everything else where it began."""
+        model, data = self.world.scene.model, self.datas[i]
+        mujoco.mj_resetData(model, data)
+        data.qpos[self.world.scene.qpos_adr] = q
+
+    def start(self, i: int) -> None:
+        """Begin an episode of copy ``i`` from the state in its data."""
+        mujoco.mj_forward(self.world.scene.model, self.datas[i])
+        self.plants[i].reset()
+        self.residual[i], self.alarm[i] = 0.0, False
+        if self.sensing is not None:
+            self.sensing[i].reset()
+
+    def step(self, i: int, action: Array, rng: np.random.Generator) -> None:
+        """One action of copy ``i``, shape (m,)."""
+        if self.checkers:
+            self._watched(i, action)
+        else:
+            self.plants[i].step(action)
+        if self.sensing is not None:
+            self._sense(i, rng)
+
+    def step_all(
+        self, actions: Array, mask: NDArray[np.bool_], rngs: list[np.random.Generator], threads: int
+    ) -> None:
+        """One action of every copy that ``mask`` chooses, shape (rows, m), on a thread pool."""
+        if self.checkers:
+            for i in np.flatnonzero(mask):
+                self._watched(int(i), actions[i])
+        else:
+            _env.step_all(self.plants, actions, mask, threads)
+        if self.sensing is not None:
+            for i in np.flatnonzero(mask):
+                self._sense(int(i), rngs[i])
+
+    def _sense(self, i: int, rng: np.random.Generator) -> None:
+        assert self.sensing is not None
+        if self.figure[i, DIVERGED]:
+            return
+        sensing = self.sensing[i]
+        measured = sensing.measure(rng, self.q[i], self.qd[i], self.current[i])
+        self.residual[i], self.alarm[i] = sensing.detect(*measured)
+        if self.world.settings.noise:
+            sensing.show(self.observation[i], *measured)
+
+    def _watched(self, i: int, action: Array) -> None:
+        """A step with contact checkers: each sees every physics step."""
+        plant, data = self.plants[i], self.datas[i]
+        plant.begin(action)
+        for checker in self.checkers:
+            checker.begin(i)  # type: ignore[attr-defined]
+        for _ in range(self.world.settings.substeps):
+            plant.run(1)
+            for checker in self.checkers:
+                checker.see(i, data)  # type: ignore[attr-defined]
+        plant.finish()
+
+    def _plant(self, i: int) -> _env.Plant:
+        world, model, data = self.world, self.world.scene.model, self.datas[i]
+        scale = action_scale(world)
+        fields = ("qpos", "qvel", "qfrc_applied", "sensordata", "site_xpos")
+        addresses = {name: getattr(data, name).ctypes.data for name in fields}
+        addresses |= {n: getattr(data, n).ctypes.data for n in ("xpos", "xaxis", "xmat", "xanchor")}
+        addresses |= {name: function_address(name) for name in ("mj_step", "mj_kinematics")}
+        addresses |= {"model": model._address, "data": data._address}
+        rows = {"observation", "figure", "tau_ext", "target"}
+        addresses |= {name: getattr(self, name)[i].ctypes.data for name in rows}
+        addresses |= {f"row_{k}": getattr(self, k)[i].ctypes.data for k in ("q", "qd", "current")}
+        constant = world.scene.drive.electrical_time_constant
+        dt = float(model.opt.timestep)
+        numbers = {
+            "mass": world.nominal_mass,
+            "com": world.nominal_com.ravel(),
+            "gravity": model.opt.gravity,
+            "times": [dt, float(np.exp(-dt / constant)) if constant else 0.0],
+            "scale": scale[1],
+            "centre": scale[0],
+            "max_speed": world.max_speed,
+            "torque_limit": world.torque_limit,
+            "low": [entry.low for entry in self.observations],
+            "high": [entry.high for entry in self.observations],
+            "regions": [
+                x for r in world.regions for x in (r.quasi_static, r.transient, r.span, r.speed)
+            ],
+        }
+        plain = {key: [float(x) for x in value] for key, value in numbers.items()}
+        return _env.Plant(addresses, _layout(world), plain, _drive(world))
+
+
+def _layout(world: World) -> dict[str, list[int]]:
+    model, scene = world.scene.model, world.scene
+    each = len(scene.joint_names) // world.arms
+    joints = world.ids()
+    regions: list[int] = []
+    for r in world.regions:
+        sensor = -1
+        if scene.spec.labels:
+            sensor = int(model.sensor_adr[model.sensor(f"contact_{r.name}").id])
+        at = (model.jnt_qposadr[r.joint], model.jnt_dofadr[r.joint]) if r.joint >= 0 else (-1, -1)
+        regions += [r.body, r.joint, int(at[0]), int(at[1]), sensor]
+    begin = int(model.sensor_adr[model.sensor("contact_link1").id]) if scene.spec.labels else -1
+    sizes = [model.nq, model.nv, world.settings.substeps, begin]
+    return {
+        "joint": [int(j) for j in joints],
+        "body": [int(b) for b in scene.link_bodies],
+        "first": [i // each * each for i in range(len(joints))],
+        "slide": [int(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE) for j in joints],
+        "qpos_adr": [int(a) for a in scene.qpos_adr],
+        "dof_adr": [int(a) for a in scene.dof_adr],
+        "tool_site": [tool[0] for tool in world.tools],
+        "tool_body": [tool[1] for tool in world.tools],
+        "tool_first": [tool[2] for tool in world.tools],
+        "sizes": [*sizes, CONTROLS.index(world.settings.control)],
+        "regions": regions,
+    }
+
+
+def _drive(world: World) -> list[dict[str, list[float]]]:
+    """What the native joints are made of; the servo divides by the nominal gain."""
+    return [
+        {key: value if isinstance(value, list) else [float(value)] for key, value in joint.items()}
+        for joint in drive_numbers(world.scene.drive, world.nominal, world.gains)
+    ]

@@ -1,0 +1,140 @@
+"""Reach-v0: bring the tool to one place after another while body regions cross the path."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.envs.base import ArmEnv, Task
+from tauguard.envs.cell import DISTANCE, Cell
+from tauguard.envs.vector import VectorArmEnv
+from tauguard.envs.world import LOWEST, NEAREST, pose_box, tool_position
+
+Array = NDArray[np.float64]
+
+#: A target counts as reached this near [m], and is worth this much reward.
+TOLERANCE, BONUS = 0.03, 1.0
+#: An episode starts this near to home [rad].
+START_SPREAD = 0.1
+#: A target is at least this far from where the tool is [m].
+APART = 0.1
+
+
+class Reach(Task):
+    """Reward: how much nearer the tool came [m], and 1 for a target; then comes the next one."""
+
+    defaults: ClassVar[dict[str, Any]] = {"obstacles": ("hand", "lower_arm", "chest")}
+
+    def __init__(self, cell: Cell, **options: Any) -> None:
+        """Prepare drawing targets."""
+        super().__init__(cell)
+        self._scratch = mujoco.MjData(cell.world.scene.model)
+        self._distance = np.zeros(cell.rows)
+        low, high = pose_box(cell.world.scene)
+        each = len(low) // self.arms
+        self._low, self._high, self._each = low, high, each
+        base = cell.world.scene.model.joint(cell.world.scene.joint_names[0]).id
+        mujoco.mj_forward(cell.world.scene.model, self._scratch)
+        self._base = self._scratch.xanchor[base].copy()
+
+    def start(self, i: int, rng: np.random.Generator) -> None:
+        """Near home, regions anywhere on their lines, a new target."""
+        cell = self.cell
+        home = cell.world.scene.home
+        cell.place(i, home + rng.uniform(-START_SPREAD, START_SPREAD, len(home)))
+        self.send_regions(i, rng)
+        for arm in range(cell.world.arms):
+            cell.target[i, arm] = self.draw(rng, arm, None)
+        cell.start(i)
+        self._distance[i] = cell.figure[i, DISTANCE]
+
+    def send_regions(self, i: int, rng: np.random.Generator) -> None:
+        """Each at its speed towards the middle of its line, from its outer part."""
+        model, data = self.cell.world.scene.model, self.cell.datas[i]
+        for region in self.cell.world.regions:
+            side, place = rng.choice((-1.0, 1.0)), rng.uniform(0.5, 1.0)
+            if region.joint >= 0:
+                data.qpos[model.jnt_qposadr[region.joint]] = side * place * region.span
+                data.qvel[model.jnt_dofadr[region.joint]] = -side * region.speed
+
+    def draw(self, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
+        """A place [m] that the tool can reach, at least :data:`APART` from ``apart``."""
+        world, scratch = self.cell.world, self._scratch
+        part = slice(arm * self._each, (arm + 1) * self._each)
+        place = np.zeros(3)
+        for _ in range(100):
+            scratch.qpos[world.scene.qpos_adr[part]] = rng.uniform(
+                self._low[part], self._high[part]
+            )
+            mujoco.mj_kinematics(world.scene.model, scratch)
+            place = tool_position(world, scratch, arm)
+            near = arm == 0 and np.hypot(*(place - self._base)[:2]) < NEAREST
+            still = apart is not None and np.linalg.norm(place - apart) < APART
+            if place[2] >= LOWEST and not near and not still:
+                break
+        return place
+
+    def score(self) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Progress and bonus; never over by itself."""
+        distance = self.cell.figure[:, DISTANCE]
+        reached = distance < TOLERANCE
+        reward = self._distance - distance + BONUS * reached
+        self._distance[:] = distance
+        return reward, np.zeros(len(reward), dtype=np.bool_), reached
+
+    def after(self, i: int, rng: np.random.Generator) -> None:
+        """The next target."""
+        cell = self.cell
+        for arm in range(cell.world.arms):
+            cell.target[i, arm] = self.draw(rng, arm, cell.target[i, arm].copy())
+        cell.plants[i].refresh()
+        self._distance[i] = cell.figure[i, DISTANCE]
+
+
+class ReachEnv(ArmEnv):
+    """Bring the tool to places while body regions of a person cross the path.
+
+    ## Actions (joint velocity, the default; n joints)
+
+    | index | name | range | meaning of 1 |
+    |---|---|---|---|
+    | 0 .. n-1 | velocity of joint i | -1 to 1 | the joint's largest speed [rad/s] |
+
+    | ``control=`` | size | meaning of 1 |
+    |---|---|---|
+    | "current" | n | largest motor current [A]; nothing holds the arm up |
+    | "torque" | n | largest torque [N m] on top of gravity compensation |
+    | "joint_velocity" | n | largest speed [rad/s], servo-controlled |
+    | "joint_position" | n | 2 rad from home or the end of its range, at largest speed |
+    | "cartesian" | 6 | tool: 0.5 m/s along and 1.5 rad/s about x, y, z, a step's worth |
+
+    ``unwrapped.cell.actions`` and ``unwrapped.cell.observations`` are these tables with numbers.
+
+    ## Observations (n joints, k body regions; 3 n + 6 + 6 k numbers)
+
+    | index | name | range | unit |
+    |---|---|---|---|
+    | 0 .. n-1 | position of joint i | its range and 0.5 beyond | rad |
+    | n .. 2n-1 | velocity of joint i | -100 to 100 | rad/s |
+    | 2n .. 3n-1 | motor torque of joint i, nominal gain times current | 1.5 times limit | N m |
+    | 3n .. 3n+2 | position of the tool | -100 to 100 | m |
+    | 3n+3 .. 3n+5 | target less tool | -100 to 100 | m |
+    | 3n+6+6j .. +2 | position of region j | -100 to 100 | m |
+    | 3n+9+6j .. +2 | velocity of region j | -100 to 100 | m/s |
+
+    ## Reward, end and cost
+
+    The reward is how much nearer the tool came [m], and 1 within 3 cm of the target; then the next
+    target appears. An episode has 1000 steps. ``info["cost"]`` is the price of hitting somebody.
+    """
+
+    task_type = Reach
+
+
+class ReachVectorEnv(VectorArmEnv):
+    """Many Reach-v0 at once; see :class:`ReachEnv`."""
+
+    task_type = Reach

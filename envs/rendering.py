@@ -1,0 +1,122 @@
+"""Pictures of an environment; nothing of it is imported before the first one."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.envs.world import World
+
+#: Of a picture [px].
+HEIGHT, WIDTH = 480, 640
+#: Groups that are shown: bodies and obstacles, and the arm's visual shapes; not its collision ones.
+SHOWN = (0, 1, 2)
+#: Lights, and what is seen where nothing is.
+AMBIENT, DIFFUSE, BACKGROUND = 0.35, 0.55, (228, 233, 240)
+#: The floor that is drawn (not simulated): half extents [m], height [m] and colour.
+FLOOR, FLOOR_HEIGHT, FLOOR_COLOUR = (2.0, 2.0, 0.001), -0.002, (0.62, 0.65, 0.7, 1.0)
+#: Radius [m] and colour of the ball that marks a target.
+MARK, MARK_COLOUR = 0.03, (0.1, 0.8, 0.3, 0.7)
+
+
+def _need_display() -> None:
+    """A window on Linux without a display would end the process."""
+    if sys.platform == "linux" and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise RuntimeError(
+            "render_mode 'human' needs a display and there is none; use 'rgb_array' with "
+            "MUJOCO_GL=egl, or `tauguard watch`"
+        )
+
+
+class Picture:
+    """A camera on one copy of a world: off-screen, or a window."""
+
+    def __init__(self, world: World, data: mujoco.MjData, mode: str) -> None:
+        """Open it.
+
+        Raises:
+            RuntimeError: there is nothing to draw with; the message says what would help.
+        """
+        self._world, self._data, self._mode = world, data, mode
+        self._window: Any = None
+        self._renderer: Any = None
+        model = world.scene.model
+        model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)
+        model.vis.global_.offheight = max(model.vis.global_.offheight, HEIGHT)
+        model.vis.headlight.ambient[:] = AMBIENT
+        model.vis.headlight.diffuse[:] = DIFFUSE
+        self._camera = mujoco.MjvCamera()
+        self._look(self._camera)
+        self._options = mujoco.MjvOption()
+        self._options.geomgroup[:] = [int(group in SHOWN) for group in range(6)]
+        if mode == "human":
+            _need_display()
+        try:
+            if mode == "human":
+                from mujoco import viewer
+
+                self._window = viewer.launch_passive(
+                    model, data, show_left_ui=False, show_right_ui=False
+                )
+                self._look(self._window.cam)
+            else:
+                self._renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
+        except Exception as error:
+            raise RuntimeError(
+                f"no picture: {error}; without a display use render_mode='rgb_array' and set "
+                "MUJOCO_GL=egl (or osmesa) before Python starts"
+            ) from error
+
+    def _look(self, camera: Any) -> None:
+        reach = self._world.reach
+        camera.lookat[:] = (0.35 * reach, 0.0, 0.35 * reach)
+        camera.distance, camera.azimuth, camera.elevation = 2.0 * reach, 140.0, -20.0
+
+    def show(self, targets: NDArray[np.float64]) -> NDArray[np.uint8] | None:
+        """Draw the state and a ball at each target, shape (arms, 3)."""
+        if self._window is not None:
+            with self._window.lock():
+                scene = self._window.user_scn
+                scene.ngeom = 0
+                self._mark(scene, targets)
+            self._window.sync()
+            return None
+        model, data = self._world.scene.model, self._data
+        mujoco.mj_camlight(model, data)
+        self._renderer.update_scene(data, self._camera, self._options)
+        self._mark(self._renderer.scene, targets)
+        pixels: NDArray[np.uint8] = self._renderer.render()
+        pixels[(pixels == 0).all(axis=2)] = BACKGROUND
+        return pixels
+
+    def _mark(self, scene: Any, targets: NDArray[np.float64]) -> None:
+        """The floor and a ball at each target."""
+        box, ball = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_SPHERE
+        parts = [(box, FLOOR, (0.0, 0.0, FLOOR_HEIGHT), FLOOR_COLOUR)]
+        parts += [(ball, (MARK,) * 3, tuple(target), MARK_COLOUR) for target in targets]
+        for kind, size, place, colour in parts:
+            if scene.ngeom >= scene.maxgeom:
+                return
+            mujoco.mjv_initGeom(
+                scene.geoms[scene.ngeom],
+                kind,
+                np.array(size),
+                np.array(place),
+                np.eye(3).ravel(),
+                np.array(colour, dtype=np.float32),
+            )
+            scene.ngeom += 1
+
+    def close(self) -> None:
+        """Close window or renderer."""
+        for part in (self._window, self._renderer):
+            if part is not None:
+                part.close()
+        self._window = self._renderer = None

@@ -1,0 +1,97 @@
+// What touches the arm and how hard, kept up to date at every physics step: the net force, the external
+// joint torque, the onset of a collision, and each body region's force against its limits.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "chain.hpp"
+
+namespace tauguard::envs {
+
+// A body region in the scene; -1 where it has no joint (held in place).
+struct Region {
+  int body = -1, joint = -1, qpos = -1, dof = -1;
+  int sensor = -1;                       // address of its ten contact numbers
+  double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no blow is allowed
+  double span = 0, speed = 0;            // it turns back this far from its origin [m], at this speed [m/s]
+  double touching = 0;                   // unbroken contact so far [s]
+};
+
+// The largest values over one control step, and what lasts longer.
+struct Contact {
+  double force = 0;   // peak net force on a link [N]
+  double cost = 0;    // peak force beyond the regions' limits [N]
+  double ratio = 0;   // peak force over the limit
+  double region_force = 0;  // peak force on a region [N]
+  int link = 0;       // 1-based, of the peak force; 0: none
+  int region = 0;     // 1-based, of the peak ratio; 0: none
+  bool onset = false;
+  double onset_time = -1, last = -1e9;  // [s]
+  void begin_step() {
+    force = cost = ratio = region_force = 0;
+    link = region = 0;
+    onset = false;
+  }
+};
+
+constexpr double merge_gap = 0.5;       // contacts closer than this are one collision [s]
+constexpr double transient_time = 0.5;  // longer contacts are quasi-static [s]
+constexpr int sensor_width = 10;        // found, force (3), torque (3), position (3)
+
+// Reads the links' contact sensors at time t; tau receives tau_ext.
+inline void read_links(const Chain& chain, const double* sensor, double t, Contact& c, double* tau) {
+  std::fill(tau, tau + chain.size(), 0.0);
+  double strongest = 0;
+  for (std::size_t link = 0; link < chain.size(); ++link) {
+    const double* s = sensor + sensor_width * link;
+    if (s[0] == 0) continue;
+    const Vec3 force = -1.0 * load(s + 1), torque = -1.0 * load(s + 4);
+    const double size = norm(force);
+    if (size == 0) continue;
+    chain.push(link, load(s + 7), force, torque, tau);
+    strongest = std::max(strongest, size);
+    if (size > c.force) {
+      c.force = size;
+      c.link = static_cast<int>(link) + 1;
+    }
+  }
+  if (strongest > 0) {
+    if (t - c.last >= merge_gap) {
+      c.onset = true;
+      c.onset_time = t;
+    }
+    c.last = t;
+  }
+}
+
+// Reads the regions' contact sensors. A blow counts against the transient limit, unbroken contact
+// beyond half a second and a region that cannot move away against the quasi-static one. Where no blow is
+// allowed the whole force is cost, and the ratio is against the quasi-static limit.
+inline void read_regions(std::vector<Region>& regions, const double* sensors, double dt, Contact& c) {
+  double cost = 0;
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    Region& r = regions[i];
+    const double* s = sensors + r.sensor;
+    const double force = s[0] == 0 ? 0.0 : norm(load(s + 1));
+    if (force == 0) {
+      r.touching = 0;
+      continue;
+    }
+    r.touching += dt;
+    const bool blow = r.joint >= 0 && r.touching <= transient_time;
+    const double limit = blow ? r.transient : r.quasi_static;
+    const double ratio = force / (limit > 0 ? limit : r.quasi_static);
+    cost += std::max(0.0, force - limit);
+    c.region_force = std::max(c.region_force, force);
+    if (ratio > c.ratio) {
+      c.ratio = ratio;
+      c.region = static_cast<int>(i) + 1;
+    }
+  }
+  c.cost = std::max(c.cost, cost);
+}
+
+}  // namespace tauguard::envs

@@ -1,0 +1,116 @@
+"""A second arm opposite the first, in the same scene."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import mujoco
+import numpy as np
+
+from tauguard.models import BodyProxy, Drive, Scene
+from tauguard.models.arm import ARM_BITS, OBSTACLE_BITS
+from tauguard.models.mjcf import xml_text
+from tauguard.models.obstacles import Obstacle, add_pairs
+from tauguard.models.scene import _add_label
+
+#: Names of the second arm's parts begin with this.
+PREFIX = "arm2_"
+#: The second arm stands here in the first one's frame [m] and faces it.
+PLACE = (1.1, 0.0, 0.0)
+
+
+def add_second_arm(scene: Scene, proxies: tuple[BodyProxy, ...]) -> Scene:
+    """The scene with a second, nominal arm of the same kind; joints and links of both in a row.
+
+    The two arms can touch one another, and both can touch what stands around.
+    """
+    whole = mujoco.MjSpec.from_string(scene.xml)
+    other = mujoco.MjSpec.from_string(scene.arm_xml)
+    for key in list(other.keys):
+        other.delete(key)
+    for key in list(whole.keys):
+        whole.delete(key)
+    frame = whole.worldbody.add_frame(pos=PLACE, quat=[0, 0, 0, 1])
+    whole.attach(other, frame=frame, prefix=PREFIX)
+    first = {scene.model.body(int(b)).name for b in scene.link_bodies}
+    links = [PREFIX + scene.model.body(int(b)).name for b in scene.link_bodies]
+    _set_bits(whole)
+    shapes = []
+    for link in links:
+        shapes += [g for g in whole.body(link).geoms if g.contype or g.conaffinity]
+    for i, geom in enumerate(shapes):
+        geom.name = geom.name or f"{PREFIX}collision{i}"
+    if scene.spec.labels:
+        # The links' sensors must follow one another: those of the regions come after them all.
+        for sensor in [s for s in whole.sensors if s.name.startswith("contact_")]:
+            if sensor.objname not in first:
+                whole.delete(sensor)
+        for i, link in enumerate(links, start=len(first) + 1):
+            _add_label(whole, link, f"contact_link{i}")
+        for proxy in proxies:
+            _add_label(whole, proxy.region, f"contact_{proxy.region}")
+    if proxies:
+        obstacles: dict[str, Obstacle] = {proxy.region: proxy for proxy in proxies}
+        add_pairs(whole, shapes, obstacles)
+    return _located(scene, whole, links)
+
+
+def _set_bits(whole: mujoco.MjSpec) -> None:
+    """The second arm touches the first, and everything else touches both."""
+    for geom in whole.geoms:
+        if not (geom.contype or geom.conaffinity):
+            continue
+        second = _of_second(geom.parent)
+        if second:
+            geom.contype, geom.conaffinity = OBSTACLE_BITS, ARM_BITS
+        elif geom.contype == OBSTACLE_BITS:
+            geom.contype = geom.conaffinity = ARM_BITS | OBSTACLE_BITS
+
+
+def _of_second(body: mujoco.MjsBody) -> bool:
+    while body is not None and body.name != "world":
+        if body.name.startswith(PREFIX):
+            return True
+        body = body.parent
+    return False
+
+
+def _located(scene: Scene, whole: mujoco.MjSpec, links: list[str]) -> Scene:
+    model = whole.compile()
+    names = (*scene.joint_names, *(PREFIX + name for name in scene.joint_names))
+    joints = [model.joint(name) for name in names]
+    bodies = [scene.model.body(int(b)).name for b in scene.link_bodies] + links
+    return replace(
+        scene,
+        model=model,
+        xml=xml_text(whole),
+        joint_names=names,
+        link_bodies=np.array([model.body(name).id for name in bodies]),
+        qpos_adr=np.array([joint.qposadr[0] for joint in joints]),
+        dof_adr=np.array([joint.dofadr[0] for joint in joints]),
+        payload_body=model.body("payload").id if scene.payload_body >= 0 else -1,
+        drive=_both(scene.drive),
+        home=np.tile(scene.home, 2),
+    )
+
+
+def _both(drive: Drive) -> Drive:
+    """The drives of both arms: every row that belongs to a joint twice."""
+    parts: dict[str, object] = {}
+    for field in fields(drive):
+        value = getattr(drive, field.name)
+        if isinstance(value, np.ndarray):
+            parts[field.name] = np.concatenate([value, value])
+        elif value is not None and not isinstance(value, float):
+            parts[field.name] = _doubled(value)
+    return replace(drive, **parts)  # type: ignore[arg-type]
+
+
+def _doubled(part: object) -> object:
+    """Friction, ripple or sensors of both arms; ``cycles`` is common to all joints."""
+    rows = {
+        field.name: np.concatenate([value, value])
+        for field in fields(part)  # type: ignore[arg-type]
+        if isinstance(value := getattr(part, field.name), np.ndarray) and field.name != "cycles"
+    }
+    return replace(part, **rows)  # type: ignore[type-var]

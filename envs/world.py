@@ -1,0 +1,256 @@
+"""The compiled side of an environment: its scene and what a controller knows about the arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.envs.loop import Gains
+from tauguard.envs.settings import Settings
+from tauguard.models import (
+    BodyProxy,
+    Drive,
+    Mismatch,
+    Scene,
+    SceneSpec,
+    compose,
+    cura6,
+    cura6_drive,
+    set_payload,
+)
+
+Array = NDArray[np.float64]
+
+#: Joint speed of an arm whose file states none [rad/s].
+DEFAULT_SPEED = 2.0
+#: Poses are drawn this far around home, the CURA6-like arm's joints and others' [rad].
+CURA6_SPREAD, SPREAD = (1.2, 0.5, 0.6, 0.9, 0.9, 1.5), 0.8
+#: A tool pose to reach lies at least this high and this far from the base's axis [m].
+LOWEST, NEAREST = 0.12, 0.2
+#: Where the body regions cross: position and direction in units of the arm's reach, span [reach].
+LINES = {
+    "hand": ((0.55, 0.0, 0.40), (0.0, 1.0, 0.0)),
+    "lower_arm": ((0.70, 0.10, 0.30), (1.0, 0.0, 0.0)),
+    "upper_arm": ((0.75, -0.10, 0.45), (1.0, 0.3, 0.0)),
+    "chest": ((0.95, 0.0, 0.45), (0.2, 1.0, 0.0)),
+}
+#: Any other region's.
+OTHER_LINE = ((0.85, 0.0, 0.50), (0.0, 1.0, 0.0))
+#: A region turns back this far from the middle of its line, in units of the reach.
+SPAN = 0.6
+#: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
+#: a torso at less.
+HAND_SPEED, BODY_SPEED = 0.8, 0.3
+
+
+@dataclass(frozen=True)
+class RegionInfo:
+    """A body region in the scene."""
+
+    name: str
+    body: int
+    joint: int  #: -1: held in place
+    quasi_static: float  #: limit [N]
+    transient: float  #: limit [N]; 0: no blow is allowed
+    span: float  #: [m]
+    speed: float  #: [m/s]
+    unconfirmed: tuple[str, ...]  #: values that no open source confirmed
+
+
+@dataclass(frozen=True)
+class World:
+    """A scene, and what the controller and the observation need to know about it."""
+
+    settings: Settings
+    scene: Scene
+    nominal: Drive  #: what the controller believes about the drive
+    gains: Gains
+    nominal_mass: Array  #: of the links [kg], shape (n,)
+    nominal_com: Array  #: in the links' frames [m], shape (n, 3)
+    joint_range: Array  #: [rad], infinite where free, shape (n, 2)
+    torque_limit: Array  #: [N m], shape (n,)
+    max_speed: Array  #: [rad/s], shape (n,)
+    tools: tuple[tuple[int, int, int], ...]  #: an arm: site or -1, body, index of its first joint
+    regions: tuple[RegionInfo, ...]
+    reach: float  #: from the first joint to the tool at most [m]
+
+    @property
+    def arms(self) -> int:
+        """How many arms there are."""
+        return len(self.tools)
+
+    def ids(self) -> NDArray[np.int64]:
+        """MuJoCo ids of the arm's joints, shape (n,)."""
+        return np.array([self.scene.model.joint(name).id for name in self.scene.joint_names])
+
+
+def build_world(settings: Settings, arms: int = 1) -> World:
+    """Compile what ``settings`` ask for, and nothing else.
+
+    Raises:
+        ValueError, FileNotFoundError: a robot that cannot be used.
+    """
+    from tauguard.envs.two_arms_scene import add_second_arm
+
+    spec = SceneSpec(
+        timestep=settings.timestep,
+        integrator=settings.integrator,
+        mismatch=settings.mismatch if isinstance(settings.mismatch, Mismatch) else None,
+        payload=settings.payload_g > 0,
+        labels=settings.labels,
+        arm=settings.robot,
+        table=settings.table,
+        cloth=settings.cloth,
+    )
+    bare = compose(replace(spec, payload=False, labels=False, cloth=None, mismatch=None))
+    reach = arm_reach(bare)
+    proxies = tuple(_proxy(item, reach) for item in settings.obstacles)
+    scene = compose(replace(spec, proxies=proxies))
+    if arms == 2:
+        scene = add_second_arm(scene, proxies)
+    if settings.ideal_drive:
+        ideal = replace(
+            scene.drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None
+        )
+        scene = replace(scene, drive=ideal)
+    if settings.payload_g > 0:
+        data = mujoco.MjData(scene.model)
+        set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
+    # A diverged state must stay visible instead of starting again at the origin by itself.
+    scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return _known(settings, scene, bare, proxies, reach, arms)
+
+
+def _known(
+    settings: Settings,
+    scene: Scene,
+    bare: Scene,
+    proxies: tuple[BodyProxy, ...],
+    reach: float,
+    arms: int,
+) -> World:
+    model = scene.model
+    joints = [model.joint(name).id for name in scene.joint_names]
+    limited = model.jnt_limited[joints].astype(bool)[:, None]
+    nominal = nominal_drive(settings, bare)
+    gains = Gains.for_scene(bare)
+    own = (
+        np.array(cura6.MAX_SPEED)
+        if settings.robot == "cura6"
+        else np.full(len(bare.joint_names), DEFAULT_SPEED)
+    )
+    speed = own if settings.max_speed is None else np.full(len(own), settings.max_speed)
+    bodies = bare.link_bodies
+    return World(
+        settings=settings,
+        scene=scene,
+        nominal=_repeat_drive(nominal, arms),
+        gains=Gains(np.tile(gains.kp, arms), np.tile(gains.kd, arms)),
+        nominal_mass=np.tile(bare.model.body_mass[bodies], arms),
+        nominal_com=np.tile(bare.model.body_ipos[bodies], (arms, 1)),
+        joint_range=np.where(limited, model.jnt_range[joints], [-np.inf, np.inf]),
+        torque_limit=np.tile(nominal.torque_limit, arms),
+        max_speed=np.tile(speed, arms),
+        tools=_tools(scene, arms),
+        regions=tuple(_region(scene, proxy, reach) for proxy in proxies),
+        reach=reach,
+    )
+
+
+def nominal_drive(settings: Settings, bare: Scene) -> Drive:
+    """What the controller believes: the arm's nominal drive."""
+    return cura6_drive() if settings.robot == "cura6" else bare.drive
+
+
+def _repeat_drive(drive: Drive, arms: int) -> Drive:
+    """The gains of every arm's drive; friction and the rest stay unknown to the servo."""
+    return replace(
+        drive,
+        gain=np.tile(drive.gain, arms),
+        gear=np.tile(drive.gear, arms),
+        current_limit=np.tile(drive.current_limit, arms),
+        friction=drive.friction if arms == 1 else None,
+        ripple=drive.ripple if arms == 1 else None,
+        sensors=drive.sensors if arms == 1 else None,
+    )
+
+
+def _proxy(item: str | BodyProxy, reach: float) -> BodyProxy:
+    if isinstance(item, BodyProxy):
+        return item
+    position, direction = LINES.get(item, OTHER_LINE)
+    x, y, z = (reach * c for c in position)
+    return BodyProxy(item, position=(x, y, z), direction=direction)
+
+
+def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
+    limits = proxy.limits
+    slow = limits.mass > 5
+    return RegionInfo(
+        name=proxy.region,
+        body=int(scene.model.body(proxy.region).id),
+        joint=-1 if proxy.clamped else int(scene.model.joint(proxy.region).id),
+        quasi_static=limits.quasi_static_force,
+        transient=limits.transient_force,
+        span=SPAN * reach,
+        speed=BODY_SPEED if slow else HAND_SPEED,
+        unconfirmed=limits.unconfirmed,
+    )
+
+
+def _tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:
+    """The tool of each arm: the flange's site where its file has one, else the last link."""
+    model, each = scene.model, len(scene.joint_names) // arms
+    found = []
+    for a in range(arms):
+        body = int(scene.link_bodies[(a + 1) * each - 1])
+        names = ("flange", "attachment_site", "tool0", "ee_site")
+        sites = [s for s in range(model.nsite) if _carried(model, int(model.site_bodyid[s]), body)]
+        named = [s for s in sites if model.site(s).name.split("arm2_")[-1] in names]
+        found.append((named[0] if named else -1, body, a * each))
+    return tuple(found)
+
+
+def _carried(model: mujoco.MjModel, body: int, by: int) -> bool:
+    """Whether ``body`` is ``by`` or something that it carries."""
+    while body > by:
+        body = int(model.body_parentid[body])
+    return body == by
+
+
+def tool_position(world: World, data: mujoco.MjData, arm: int = 0) -> Array:
+    """Where a tool is [m], shape (3,); kinematics must be up to date."""
+    site, body, _ = world.tools[arm]
+    return np.array(data.site_xpos[site] if site >= 0 else data.xpos[body])
+
+
+def arm_reach(scene: Scene) -> float:
+    """Largest distance from the first joint to the last link over 200 fixed random poses [m]."""
+    model, data = scene.model, mujoco.MjData(scene.model)
+    rng = np.random.default_rng(0)
+    low, high = pose_box(scene)
+    first = scene.model.joint(scene.joint_names[0]).id
+    best = 0.0
+    for _ in range(200):
+        data.qpos[scene.qpos_adr] = rng.uniform(low, high)
+        mujoco.mj_kinematics(model, data)
+        way = data.xpos[scene.link_bodies[-1]] - data.xanchor[first]
+        best = max(best, float(np.linalg.norm(way)))
+    return best
+
+
+def pose_box(scene: Scene) -> tuple[Array, Array]:
+    """Poses to draw from: around home, within the joints' ranges [rad], shapes (n,)."""
+    model = scene.model
+    joints = [model.joint(name).id for name in scene.joint_names]
+    known = scene.spec.arm == "cura6"
+    spread = np.resize(CURA6_SPREAD, len(joints)) if known else np.full(len(joints), SPREAD)
+    slides = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
+    spread = np.where(slides, 0.3, spread)
+    limited = model.jnt_limited[joints].astype(bool)
+    low = np.where(limited, model.jnt_range[joints, 0], -np.inf)
+    high = np.where(limited, model.jnt_range[joints, 1], np.inf)
+    return np.maximum(low, scene.home - spread), np.minimum(high, scene.home + spread)

@@ -1,0 +1,22 @@
+"""Names of the environments for ``gymnasium.make``; nothing of them is imported before."""
+
+from __future__ import annotations
+
+from gymnasium.envs.registration import register, registry
+
+#: Name -> module and class prefix, and how many actions an episode has.
+ENVIRONMENTS = {
+    "tauguard/Reach-v0": ("reach", "Reach", 1000),
+}
+
+
+def register_environments() -> None:
+    """Put them into Gymnasium's registry, once."""
+    for name, (module, prefix, steps) in ENVIRONMENTS.items():
+        if name not in registry:
+            register(
+                id=name,
+                entry_point=f"tauguard.envs.{module}:{prefix}Env",
+                vector_entry_point=f"tauguard.envs.{module}:{prefix}VectorEnv",
+                max_episode_steps=steps,
+            )
