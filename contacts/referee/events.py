@@ -1,0 +1,74 @@
+"""From verdicts step by step to events, and which of them a checker saw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tauguard.contacts.referee.judge import Verdicts
+
+#: Shorter gaps than this between touching steps are part of one event, and never less than two
+#: steps [s].
+GAP = 5e-3
+
+#: Two partners, sorted: ("body", id) or ("flex", id).
+Pair = tuple[tuple[str, int], tuple[str, int]]
+
+
+@dataclass(frozen=True)
+class Event:
+    """One contact of two partners, from touch to parting."""
+
+    pair: Pair
+    onset: float  #: first touch [s]
+    end: float  #: end of the last step in which they touch [s]
+    depth: float  #: largest seen [m]
+    counts: bool  #: False: don't-care throughout
+
+    def seen(self, times: Sequence[float], timestep: float) -> bool:
+        """Whether one of a checker's ``times`` [s] falls to it, up to one step beside it."""
+        return any(self.onset - timestep <= t <= self.end + timestep for t in times)
+
+
+def pair_of(model: Any, geom: Any, flex: Any) -> Pair:
+    """The partners of one row of contacts or verdicts: bodies of geoms, or flexes."""
+    partners = [
+        ("flex", int(f)) if g < 0 else ("body", int(model.geom_bodyid[g]))
+        for g, f in zip(geom, flex, strict=True)
+    ]
+    first, second = sorted(partners)
+    return first, second
+
+
+def events(model: Any, times: Sequence[float], verdicts: Sequence[Verdicts]) -> list[Event]:
+    """The events of a run, by onset.
+
+    Args:
+        model: the scene's.
+        times: of the states, one more than ``verdicts`` [s].
+        verdicts: of the steps between them.
+
+    Raises:
+        ValueError: numbers that do not fit.
+    """
+    if len(times) != len(verdicts) + 1:
+        raise ValueError(
+            f"times: {len(times)} states, expected {len(verdicts) + 1}, one more than verdicts"
+        )
+    open_: dict[Pair, Event] = {}
+    done: list[Event] = []
+    for step, verdict in enumerate(verdicts):
+        begin, length = times[step], times[step + 1] - times[step]
+        for k in range(len(verdict)):
+            pair = pair_of(model, verdict.geom[k], verdict.flex[k])
+            onset, end = begin + float(verdict.time[k]) * length, begin + length
+            depth, counts = float(verdict.depth[k]), bool(verdict.counts[k])
+            last = open_.get(pair)
+            if last is not None and onset - last.end <= max(GAP, 2 * length):
+                onset, depth = min(last.onset, onset), max(last.depth, depth)
+                counts = counts or last.counts
+            elif last is not None:
+                done.append(last)
+            open_[pair] = Event(pair, onset, end, depth, counts)
+    return sorted([*done, *open_.values()], key=lambda event: (event.onset, event.pair))

@@ -1,0 +1,203 @@
+"""The referee: which pairs touch on the very path that checkers are told, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.contacts.checker import State, geom_kinds, pair_kind
+from tauguard.contacts.referee import triangles
+from tauguard.contacts.referee.motion import Step
+from tauguard.contacts.referee.pairs import Index, flex_geoms, geom_pairs
+from tauguard.contacts.referee.search import Found, search
+
+Array = NDArray[np.float64]
+
+#: A pair that is never deeper than this is nobody's mistake, reported or not [m].
+TOLERANCE = 1e-5
+#: Kinds of geoms that a flex may meet here.
+FLEX_MEETS = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
+
+
+@dataclass(frozen=True, eq=False)
+class Verdicts:
+    """Pairs that touch within one step, one a row.
+
+    Attributes:
+        geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
+        flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
+        time: Of the first touch, as a fraction of the step. Shape (K,).
+        depth: Largest depth seen; once it is above the tolerance no deeper one is looked for.
+            Shape (K,), m.
+        counts: False: don't-care, no deeper than :data:`TOLERANCE` anywhere. Shape (K,).
+    """
+
+    geom: Index
+    flex: Index
+    time: Array
+    depth: Array
+    counts: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+class Referee:
+    """Judges every pair of a scene: rigid geoms against one another and against flexes.
+
+    Rigid pairs by ``mj_geomDistance`` at poses in between, flex elements (triangles of thickness
+    2 ``flex_radius``) in closed form against spheres, capsules and planes, by coal's GJK against
+    other convex geoms. Margins do not count: a pair touches where its surfaces do. It is slow and
+    shares no code with the checkers.
+
+    Args:
+        model: the scene's.
+
+    Raises:
+        ValueError: a flex that is not two-dimensional, or that may meet a geom of another kind than
+            :data:`FLEX_MEETS`.
+    """
+
+    def __init__(self, model: Any) -> None:
+        """Note the pairs and each geom's size about its centre."""
+        self.model = model
+        self._data = mujoco.MjData(model)
+        kinds = geom_kinds(model)
+        self._pairs = geom_pairs(model)
+        self._plane = np.array([kind == "plane" for kind in kinds], dtype=bool)
+        self._radius = np.where(self._plane, 0.0, model.geom_rbound)
+        self._meets: list[tuple[int, int, str]] = []
+        for flex in range(model.nflex):
+            for geom in flex_geoms(model, flex):
+                name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
+                if model.flex_dim[flex] != 2 or kinds[geom] not in FLEX_MEETS:
+                    raise ValueError(
+                        f"flex {name!r} (dim {model.flex_dim[flex]}) and geom "
+                        f"{geom} ({kinds[geom]}): the referee judges flexes of dim 2 against "
+                        f"{', '.join(FLEX_MEETS)}"
+                    )
+                self._meets.append((flex, geom, kinds[geom]))
+        self.covers = frozenset(
+            [pair_kind(kinds[i], kinds[j]) for i, j in self._pairs]
+            + [pair_kind(kind, "flex") for _, _, kind in self._meets]
+        )
+        self._hulls = {
+            geom: triangles.HullDistance(model, geom, kind)
+            for _, geom, kind in self._meets
+            if kind not in ("plane", "sphere", "capsule")
+        }
+
+    def judge(self, before: State, after: State) -> Verdicts:
+        """The pairs that touch anywhere between both states."""
+        step = Step.between(self.model, before, after)
+        rows = self._rigid(step)
+        for flex, geom, kind in self._meets:
+            rows += self._soft(step, flex, geom, kind)
+        rows.sort()
+        columns: list[Any] = list(zip(*rows, strict=True)) if rows else [[] for _ in range(5)]
+        return Verdicts(
+            geom=np.array(columns[0], dtype=np.int32).reshape(-1, 2),
+            flex=np.array(columns[1], dtype=np.int32).reshape(-1, 2),
+            time=np.array(columns[2], dtype=np.float64),
+            depth=np.array(columns[3], dtype=np.float64),
+            counts=np.array(columns[4], dtype=bool),
+        )
+
+    def _rigid(self, step: Step) -> list[tuple[Any, ...]]:
+        """Rows of :class:`Verdicts` of the rigid pairs."""
+        i, j = self._pairs.T
+        center, xmat = step.poses(np.arange(self.model.ngeom), np.zeros(self.model.ngeom))
+        bound = (
+            np.linalg.norm(step.shift[i] - step.shift[j], axis=1)
+            + step.reach(i, self._radius[i])
+            + step.reach(j, self._radius[j])
+        )
+        apart = np.linalg.norm(center[i] - center[j], axis=1)
+        for plane, other in ((i, j), (j, i)):
+            height = np.einsum("ij,ij->i", center[other] - center[plane], xmat[plane][:, :, 2])
+            apart = np.where(self._plane[plane], height, apart)
+        near = apart - self._radius[i] - self._radius[j] <= bound + TOLERANCE
+        i, j = i[near], j[near]
+        if not len(i):
+            return []
+
+        def distance(rows: NDArray[Any], s: Array) -> Array:
+            return self._geom_distances(step, i[rows], j[rows], s)
+
+        found = search(distance, bound[near], TOLERANCE)
+        return [
+            ((int(i[k]), int(j[k])), (-1, -1), *_verdict(found, k))
+            for k in np.flatnonzero(np.isfinite(found.time))
+        ]
+
+    def _geom_distances(self, step: Step, i: NDArray[Any], j: NDArray[Any], s: Array) -> Array:
+        data, out = self._data, np.empty(len(s))
+        ci, ri = step.poses(i, s)
+        cj, rj = step.poses(j, s)
+        for k in range(len(s)):
+            data.geom_xpos[i[k]], data.geom_xmat[i[k]] = ci[k], ri[k].ravel()
+            data.geom_xpos[j[k]], data.geom_xmat[j[k]] = cj[k], rj[k].ravel()
+            out[k] = mujoco.mj_geomDistance(self.model, data, int(i[k]), int(j[k]), 1e3, None)
+        return out
+
+    def _soft(self, step: Step, flex: int, geom: int, kind: str) -> list[tuple[Any, ...]]:
+        """The row of one flex and one geom, if they touch: the first and deepest element's."""
+        model = self.model
+        begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
+        elements = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3)
+        elements = elements + int(model.flex_vertadr[flex])
+        corners, travel = step.vertices[elements], step.travel[elements]
+        geoms = np.full(count, geom)
+        bound = np.linalg.norm(travel - step.shift[geom], axis=2).max(axis=1)
+        bound = bound + step.reach(geoms, self._radius[geoms])
+        shape = self._soft_distance(geom, kind)
+        thickness = float(model.flex_radius[flex])
+        near = np.arange(count)
+        if kind != "plane":
+            center = step.origin[geom] + step.arm[geom]
+            middle = corners.mean(axis=1)
+            size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+            apart = np.linalg.norm(middle - center, axis=1) - size - self._radius[geom]
+            near = np.flatnonzero(apart - thickness <= bound + TOLERANCE)
+        if not len(near):
+            return []
+        corners, travel = corners[near], travel[near]
+
+        def distance(rows: NDArray[Any], s: Array) -> Array:
+            center, xmat = step.poses(geoms[rows], s)
+            now = corners[rows] + s[:, None, None] * travel[rows]
+            return shape(center, xmat, now) - thickness
+
+        found = search(distance, bound[near], TOLERANCE)
+        if not np.isfinite(found.time).any():
+            return []
+        first, deepest = int(np.argmin(found.time)), float(found.depth.max())
+        return [((geom, -1), (-1, flex), float(found.time[first]), deepest, deepest > TOLERANCE)]
+
+    def _soft_distance(self, geom: int, kind: str) -> Callable[[Array, Array, Array], Array]:
+        """Distance of a flex element's middle surface to ``geom``: (center, xmat, corners)."""
+        size = self.model.geom_size[geom]
+        if kind == "plane":
+            return lambda center, xmat, corners: np.asarray(
+                np.einsum("kij,kj->ki", corners - center[:, None], xmat[:, :, 2]).min(axis=1)
+            )
+        if kind == "sphere":
+            return lambda center, xmat, corners: triangles.point_triangle(center, corners) - size[0]
+        if kind == "capsule":
+            return lambda center, xmat, corners: (
+                triangles.segment_triangle(
+                    center - size[1] * xmat[:, :, 2], center + size[1] * xmat[:, :, 2], corners
+                )
+                - size[0]
+            )
+        return self._hulls[geom]
+
+
+def _verdict(found: Found, k: Any) -> tuple[float, float, bool]:
+    depth = float(found.depth[k])
+    return float(found.time[k]), depth, depth > TOLERANCE

@@ -1,0 +1,61 @@
+"""Where geoms and flex vertices are within a step: the path that checkers are told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tauguard.contacts.checker import State
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a whole scene, geom by geom.
+
+    A body's point y moves as ``xpos + s dx + exp(s [w]x) xmat y``, s in [0, 1]; flex vertices move
+    linearly.
+    """
+
+    origin: Array  #: the body's origin at s = 0, for each geom, shape (ngeom, 3) [m]
+    shift: Array  #: dx, shape (ngeom, 3) [m]
+    turn: Array  #: w in the world frame, shape (ngeom, 3) [rad]
+    arm: Array  #: from the body's origin to the geom's centre at s = 0, shape (ngeom, 3) [m]
+    xmat: Array  #: the geom's rotation at s = 0, shape (ngeom, 3, 3)
+    vertices: Array  #: flex vertices at s = 0, shape (V, 3) [m]
+    travel: Array  #: and how far they move, shape (V, 3) [m]
+
+    @classmethod
+    def between(cls, model: Any, before: State, after: State) -> Step:
+        """The step from ``before`` to ``after``."""
+        body = model.geom_bodyid
+        start = before.xmat.reshape(-1, 3, 3)
+        between = after.xmat.reshape(-1, 3, 3) @ start.transpose(0, 2, 1)
+        turn = Rotation.from_matrix(between).as_rotvec()
+        same = (before.xmat == after.xmat).all(axis=1)
+        turn[same] = 0.0
+        return cls(
+            origin=before.xpos[body],
+            shift=(after.xpos - before.xpos)[body],
+            turn=turn[body],
+            arm=before.geom_xpos - before.xpos[body],
+            xmat=before.geom_xmat.reshape(-1, 3, 3),
+            vertices=before.flexvert_xpos,
+            travel=after.flexvert_xpos - before.flexvert_xpos,
+        )
+
+    def poses(self, geoms: NDArray[Any], s: Array) -> tuple[Array, Array]:
+        """Centres (K, 3) and rotations (K, 3, 3) of ``geoms`` (K,) at ``s`` (K,)."""
+        turn = Rotation.from_rotvec(s[:, None] * self.turn[geoms])
+        center = self.origin[geoms] + s[:, None] * self.shift[geoms] + turn.apply(self.arm[geoms])
+        return center, turn.as_matrix() @ self.xmat[geoms]
+
+    def reach(self, geoms: NDArray[Any], radius: Array) -> Array:
+        """How far turning can move any point of ``geoms`` within ``radius`` (K,) of its centre."""
+        spin = np.linalg.norm(self.turn[geoms], axis=1)
+        return np.asarray(spin * (np.linalg.norm(self.arm[geoms], axis=1) + radius))

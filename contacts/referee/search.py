@@ -1,0 +1,94 @@
+"""First touch and depth along a path, from nothing but a distance and a bound on its change.
+
+A signed distance d(s) between two things whose points move by at most L relative to one another
+over the step obeys |d(s) - d(t)| <= L |s - t|. Hence d has no zero in [a, b] while
+d(a) + d(b) > L (b - a): intervals are halved until each is cleared, known to be deep, or shorter
+than the resolution (Piyavskii 1972; the same bound moves a conservative advancement on). Samples
+alone would prove nothing between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+#: Signed distance [m] of the pairs ``rows`` at ``s``: both shape (K,), result (K,).
+Distance = Callable[[NDArray[Any], Array], Array]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search says about each pair; every field has shape (N,)."""
+
+    time: (
+        Array  #: of the first touch, fraction of the step, late by less than resolution / L; or inf
+    )
+    depth: Array  #: largest depth seen [m]; 0 where none
+    near: NDArray[np.bool_]  #: within the resolution of touching, and not known to be deep
+
+
+def search(
+    distance: Distance, bound: Array, tolerance: float = 1e-5, resolution: float = 2e-6
+) -> Found:
+    """Find the first touch of each pair and whether any is deeper than ``tolerance``.
+
+    Args:
+        distance: of pairs at given times.
+        bound: L of each pair [m], shape (N,).
+        tolerance: depth above which a pair counts [m]; the search stops looking for more.
+        resolution: distances below it are not told apart from touching [m].
+    """
+    n = len(bound)
+    rows = np.arange(n)
+    first, deepest = np.full(n, np.inf), np.full(n, np.inf)
+    near = np.zeros(n, dtype=bool)
+
+    def sample(pairs: NDArray[Any], s: Array) -> Array:
+        d = distance(pairs, s)
+        np.minimum.at(deepest, pairs, d)
+        touching = d <= 0
+        np.minimum.at(first, pairs[touching], s[touching])
+        return d
+
+    a, b = np.zeros(n), np.ones(n)
+    da, db = sample(rows, a), sample(rows, b)
+    while len(rows):
+        length = bound[rows] * (b - a)
+        # After the first touch only a depth is looked for that tips the verdict.
+        known = (deepest[rows] < -tolerance) | ((da + db - length) / 2 > -tolerance)
+        settled = known & (a >= first[rows])
+        open_ = (da + db <= length) & ~settled
+        short = open_ & (length <= resolution)
+        near[rows[short]] = True
+        np.minimum.at(first, rows[short], b[short])
+        keep = open_ & ~short
+        rows, a, b, da, db = rows[keep], a[keep], b[keep], da[keep], db[keep]
+        # Both ends are clear for d / L: the middle of what is left splits it best.
+        low = a + np.maximum(da, 0) / bound[rows]
+        high = np.maximum(b - np.maximum(db, 0) / bound[rows], low)
+        middle = np.clip((low + high) / 2, a + 0.05 * (b - a), b - 0.05 * (b - a))
+        dm = sample(rows, middle)
+        rows = np.concatenate([rows, rows])
+        a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
+        da, db = np.concatenate([da, dm]), np.concatenate([dm, db])
+    _polish(distance, first, bound, resolution)
+    depth = np.maximum(-deepest, 0.0)
+    return Found(first, depth, near & (depth <= tolerance))
+
+
+def _polish(distance: Distance, first: Array, bound: Array, resolution: float) -> None:
+    """Bisect the last stretch before each first touch, in place."""
+    rows = np.flatnonzero(np.isfinite(first) & (first > 0))
+    high = first[rows]
+    low = np.maximum(high - 2 * resolution / bound[rows], 0.0)
+    for _ in range(12):
+        middle = (low + high) / 2
+        touching = distance(rows, middle) <= 0
+        high = np.where(touching, middle, high)
+        low = np.where(touching, low, middle)
+    first[rows] = high
