@@ -11,19 +11,26 @@ from tauguard.contacts.checker import (
     register,
     registered,
 )
+from tauguard.contacts.cloth_checker import ClothChecker
+from tauguard.contacts.mujoco_checker import MujocoChecker, contacts_of
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
 from tauguard.contacts.rigid_checker import RigidChecker
 
+register("mujoco", MujocoChecker)
+register("cloth", ClothChecker)
 register("rigid", RigidChecker)
 
 __all__ = [
     "KINDS",
     "Checker",
+    "ClothChecker",
     "Contacts",
+    "MujocoChecker",
     "Pairs",
     "RigidChecker",
     "State",
     "checker",
+    "contacts_of",
     "flex_pairs",
     "geom_flex_pairs",
     "geom_kinds",
