@@ -5,13 +5,28 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable
 
+from tauguard.detectors.boosting import Boosting
+from tauguard.detectors.current_network import CurrentNetwork
+from tauguard.detectors.current_threshold import CurrentThreshold
+from tauguard.detectors.cusum import Cusum
 from tauguard.detectors.detector import Detector
+from tauguard.detectors.one_class import OneClass
+from tauguard.detectors.residual_thresholds import MovingThresholds, ResidualThresholds
 from tauguard.detectors.srq_svr import SvrDetector
+from tauguard.detectors.window_network import WindowNetwork
 
 #: Every detector, in the order that reports show them.
 DETECTORS: dict[str, Callable[[], Detector]] = {
     "srq-svr": SvrDetector,
     "srq-svr-plain": SvrDetector.plain,
+    "current-network": CurrentNetwork,
+    "current-threshold": CurrentThreshold,
+    "residual-thresholds": ResidualThresholds,
+    "moving-thresholds": MovingThresholds,
+    "cusum": Cusum,
+    "one-class": OneClass,
+    "window-network": WindowNetwork,
+    "boosting": Boosting,
 }
 
 

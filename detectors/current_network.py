@@ -1,0 +1,114 @@
+"""The current-predicting network (Czubenko & Kowalczuk 2021): a residual in amperes.
+
+A network learns on collision-free motion what current every motor draws, from windows of joint
+positions, velocities and accelerations. The score is the largest difference between measured and
+predicted current over the joints, so its threshold is in amperes (1.6 A and 2.0 A in the original).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.calibrate import free_rows
+from tauguard.detectors.current_threshold import smoothed
+from tauguard.detectors.detector import check_interval, common_interval
+from tauguard.detectors.estimator import ArmModel
+from tauguard.detectors.model_parts import arm_from_parts, arm_parts
+from tauguard.detectors.network import Network
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: The original's thresholds on the residual current [A].
+THRESHOLDS = (1.6, 2.0)
+#: Rate of the filter that differentiates the velocity [1/s].
+DERIVATIVE = 60.0
+
+
+@dataclass
+class CurrentNetwork:
+    """Predicts every motor's current from the motion; what is left over is the score."""
+
+    lags: tuple[float, ...] = (0.0, 0.04, 0.08)  #: ages of the window's samples [s]
+    hidden: tuple[int, ...] = (64, 32)
+    rows: int = 30_000  #: collision-free samples to train on
+    epochs: int = 60
+    seed: int = 0
+    settle: float = 0.5  #: [s]
+    network: Network | None = None
+    dt: float = 1e-3
+    known: ArmModel | None = None  #: as given; nothing of it is used
+    name: str = "current-network"
+
+    @property
+    def arm(self) -> ArmModel:
+        """The arm as it was given."""
+        if self.known is None:
+            raise ValueError("this detector is not fitted: call fit or load a model file first")
+        return self.known
+
+    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> CurrentNetwork:
+        """Train on collision-free samples, drawn evenly from all traces."""
+        self.dt, self.known = common_interval(traces, robot), robot
+        rng = np.random.default_rng([self.seed, 7])
+        free = [np.flatnonzero(free_rows(trace, self.settle)) for trace in traces]
+        total = sum(len(rows) for rows in free)
+        if total == 0:
+            raise ValueError("no collision-free motion in the traces")
+        x, y = [], []
+        for trace, rows in zip(traces, free, strict=True):
+            share = min(len(rows), -(-self.rows * len(rows) // total))
+            own = np.sort(rng.choice(rows, share, replace=False))
+            x.append(self._inputs(trace, own))
+            y.append(trace.current[own])
+        self.network = Network.fit(
+            np.concatenate(x), np.concatenate(y), self.hidden, seed=self.seed, epochs=self.epochs
+        )
+        return self
+
+    def _inputs(self, trace: Trace, rows: NDArray[np.intp]) -> Array:
+        """Position, velocity and acceleration at the window's ages, shape (len(rows), d)."""
+        slow = smoothed(trace.qd, DERIVATIVE, self.dt)
+        acceleration = DERIVATIVE * (trace.qd - slow)
+        signals = np.concatenate([trace.q, trace.qd, acceleration], axis=1)
+        ages = [round(lag / self.dt) for lag in self.lags]
+        return np.concatenate([signals[np.maximum(rows - age, 0)] for age in ages], axis=1)
+
+    def scores(self, trace: Trace) -> Array:
+        """The largest |measured - predicted current| over the joints [A], shape (T,)."""
+        if self.network is None:
+            raise ValueError("this detector is not fitted: call fit or load a model file first")
+        joints = self.network.biases[-1].shape[0]
+        if trace.q.shape[1] != joints:
+            raise ValueError(f"the trace has {trace.q.shape[1]} joints, this detector {joints}")
+        check_interval("the trace", trace, self.dt)
+        predicted = self.network(self._inputs(trace, np.arange(len(trace.t))))
+        score: Array = np.abs(trace.current - predicted).max(axis=1)
+        return score
+
+    def parts(self) -> dict[str, Any]:
+        """What a model file keeps."""
+        assert self.network is not None
+        return {
+            "lags": list(self.lags),
+            "settle": self.settle,
+            "dt": self.dt,
+            "network": self.network.parts(),
+            "arm": arm_parts(self.arm),
+        }
+
+    @classmethod
+    def from_parts(cls, parts: dict[str, Any]) -> CurrentNetwork:
+        """The detector again from :meth:`parts`."""
+        return cls(
+            lags=tuple(float(lag) for lag in parts["lags"]),
+            settle=float(parts["settle"]),
+            dt=float(parts["dt"]),
+            network=Network.from_parts(parts["network"]),
+            known=arm_from_parts(parts["arm"]),
+        )

@@ -1,0 +1,127 @@
+"""What the detectors on the residual share: a calibrated arm and what free motion leaves of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.calibrate import calibrate, free_rows
+from tauguard.detectors.detector import check_interval, common_interval
+from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
+from tauguard.detectors.features import Envelope
+from tauguard.detectors.model_parts import arm_from_parts, arm_parts
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: Every so many samples of free motion are enough to fit an envelope.
+THIN = 5
+
+
+@dataclass
+class FrontEnd:
+    """From a trace to the residual in units of its envelope.
+
+    The envelope is the standard deviation that free motion shows at this speed and acceleration
+    (see :class:`~tauguard.detectors.features.Envelope`), so a ratio of 5 means the same at rest and
+    at full speed.
+    """
+
+    gain: float = 100.0  #: of the observer [1/s]
+    adapt: bool = True  #: track payload, offsets and friction errors
+    settle: float = 3.0  #: until the payload is found [s]
+    joints: int = 4  #: the first so many joints are looked at (all, if there are fewer)
+    arm: ArmModel | None = None
+    envelope: Envelope | None = None
+    dt: float = 1e-3  #: sample interval [s]
+
+    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> list[Estimate]:
+        """Identify the arm from the collision-free rows, and the envelope.
+
+        Returns:
+            The estimates of the traces, which training goes on with.
+
+        Raises:
+            ValueError: traces that do not fit, or without collision-free motion.
+        """
+        self.dt = common_interval(traces, robot)
+        free = [np.flatnonzero(free_rows(trace, self.settle))[::THIN] for trace in traces]
+        if not sum(len(rows) for rows in free):
+            raise ValueError(
+                f"no collision-free motion after the first {self.settle:g} s of any trace"
+            )
+        self.arm = calibrate(robot, traces, friction=robot.friction).arm
+        estimates = [self._run(self.arm, trace) for trace in traces]
+        tables = (
+            [e.left for e in estimates],
+            [t.qd for t in traces],
+            [e.acceleration for e in estimates],
+        )
+        gathered = [
+            np.concatenate([values[rows] for values, rows in zip(own, free, strict=True)])
+            for own in tables
+        ]
+        self.envelope = Envelope.fit(*gathered)
+        return estimates
+
+    def fitted(self) -> tuple[ArmModel, Envelope]:
+        """The arm and its envelope; ``ValueError`` before :meth:`fit`."""
+        if self.arm is None or self.envelope is None:
+            raise ValueError("this detector is not fitted: call fit or load a model file first")
+        return self.arm, self.envelope
+
+    def ratio(self, trace: Trace, estimate: Estimate | None = None) -> Array:
+        """Residual over envelope of the joints looked at, shape (T, joints).
+
+        Args:
+            trace: of the arm, at the rate of training.
+            estimate: of this trace, where it is known already.
+
+        Raises:
+            ValueError: not fitted, other joints or another rate.
+        """
+        arm, envelope = self.fitted()
+        if len(trace.joint_names) != arm.robot.joints:
+            raise ValueError(
+                f"the trace has {len(trace.joint_names)} joints, this detector "
+                f"{arm.robot.joints}: {', '.join(arm.robot.joint_names)}"
+            )
+        check_interval("the trace", trace, self.dt)
+        known = estimate or self._run(arm, trace)
+        ratio = known.left / envelope.scale(trace.qd, known.acceleration)
+        return np.ascontiguousarray(ratio[:, : self.joints])
+
+    def _run(self, arm: ArmModel, trace: Trace) -> Estimate:
+        unknowns = None if self.adapt else Unknowns.none()
+        estimator = Estimator(arm, self.gain, self.dt, unknowns)
+        return estimator.run(trace.t, trace.q, trace.qd, trace.current)
+
+    def parts(self) -> dict[str, Any]:
+        """What a model file keeps of it."""
+        arm, envelope = self.fitted()
+        return {
+            "gain": self.gain,
+            "adapt": self.adapt,
+            "settle": self.settle,
+            "joints": self.joints,
+            "dt": self.dt,
+            "arm": arm_parts(arm),
+            "envelope": envelope.weights,
+        }
+
+    @classmethod
+    def from_parts(cls, parts: dict[str, Any]) -> FrontEnd:
+        """The front end again from :meth:`parts`."""
+        return cls(
+            gain=float(parts["gain"]),
+            adapt=bool(parts["adapt"]),
+            settle=float(parts["settle"]),
+            joints=int(parts["joints"]),
+            dt=float(parts["dt"]),
+            arm=arm_from_parts(parts["arm"]),
+            envelope=Envelope(np.asarray(parts["envelope"], dtype=np.float64)),
+        )
