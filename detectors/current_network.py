@@ -1,8 +1,10 @@
 """The current-predicting network (Czubenko & Kowalczuk 2021): a residual in amperes.
 
-A network learns on collision-free motion what current every motor draws, from windows of joint
-positions, velocities and accelerations. The score is the largest difference between measured and
-predicted current over the joints, so its threshold is in amperes (1.6 A and 2.0 A in the original).
+A network learns on collision-free motion what current every motor draws, from the joint positions,
+windows of velocities and accelerations, and (the auto-regressive form) the currents of a moment
+ago: those carry the payload, the temperature and the friction of the day, which no position tells.
+The score is the largest difference between measured and predicted current over the joints, so its
+threshold is in amperes (1.6 A and 2.0 A in the original).
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.current_threshold import smoothed
-from tauguard.detectors.detector import check_interval, common_interval
+from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.model_parts import arm_from_parts, arm_parts
 from tauguard.detectors.network import Network
@@ -27,7 +29,9 @@ Array = NDArray[np.float64]
 #: The original's thresholds on the residual current [A].
 THRESHOLDS = (1.6, 2.0)
 #: Rate of the filter that differentiates the velocity [1/s].
-DERIVATIVE = 60.0
+DERIVATIVE = 30.0
+#: Friction changes its sign within about this velocity [rad/s].
+REVERSAL = 0.02
 
 
 @dataclass
@@ -35,6 +39,7 @@ class CurrentNetwork:
     """Predicts every motor's current from the motion; what is left over is the score."""
 
     lags: tuple[float, ...] = (0.0, 0.04, 0.08)  #: ages of the window's samples [s]
+    memory: float = 0.1  #: age of the past sample that is fed back [s]; 0: none, the static form
     hidden: tuple[int, ...] = (64, 32)
     rows: int = 30_000  #: collision-free samples to train on
     epochs: int = 60
@@ -44,6 +49,11 @@ class CurrentNetwork:
     dt: float = 1e-3
     known: ArmModel | None = None  #: as given; nothing of it is used
     name: str = "current-network"
+
+    @classmethod
+    def static(cls) -> CurrentNetwork:
+        """The form without past currents: a payload that it is not told is a residual."""
+        return cls(memory=0.0, name="current-network-static")
 
     @property
     def arm(self) -> ArmModel:
@@ -72,21 +82,27 @@ class CurrentNetwork:
         return self
 
     def _inputs(self, trace: Trace, rows: NDArray[np.intp]) -> Array:
-        """Position, velocity and acceleration at the window's ages, shape (len(rows), d)."""
-        slow = smoothed(trace.qd, DERIVATIVE, self.dt)
-        acceleration = DERIVATIVE * (trace.qd - slow)
-        signals = np.concatenate([trace.q, trace.qd, acceleration], axis=1)
-        ages = [round(lag / self.dt) for lag in self.lags]
-        return np.concatenate([signals[np.maximum(rows - age, 0)] for age in ages], axis=1)
+        """What the network sees at ``rows``, shape (len(rows), d).
+
+        Position as sine and cosine, direction of motion, velocity and acceleration at the window's
+        ages, and the past sample's currents and position.
+        """
+        q, qd = trace.q[rows], trace.qd[rows]
+        parts = [np.sin(q), np.cos(q), np.tanh(qd / REVERSAL)]
+        acceleration = DERIVATIVE * (trace.qd - smoothed(trace.qd, DERIVATIVE, self.dt))
+        for lag in self.lags:
+            past = np.maximum(rows - round(lag / self.dt), 0)
+            parts += [trace.qd[past], acceleration[past]]
+        if self.memory > 0:
+            past = np.maximum(rows - max(1, round(self.memory / self.dt)), 0)
+            parts += [trace.current[past], trace.q[past] - q]
+        return np.concatenate(parts, axis=1)
 
     def scores(self, trace: Trace) -> Array:
         """The largest |measured - predicted current| over the joints [A], shape (T,)."""
         if self.network is None:
             raise ValueError("this detector is not fitted: call fit or load a model file first")
-        joints = self.network.biases[-1].shape[0]
-        if trace.q.shape[1] != joints:
-            raise ValueError(f"the trace has {trace.q.shape[1]} joints, this detector {joints}")
-        check_interval("the trace", trace, self.dt)
+        check_trace(trace, len(self.network.biases[-1]), self.dt)
         predicted = self.network(self._inputs(trace, np.arange(len(trace.t))))
         score: Array = np.abs(trace.current - predicted).max(axis=1)
         return score
@@ -96,6 +112,8 @@ class CurrentNetwork:
         assert self.network is not None
         return {
             "lags": list(self.lags),
+            "memory": self.memory,
+            "name": self.name,
             "settle": self.settle,
             "dt": self.dt,
             "network": self.network.parts(),
@@ -107,6 +125,8 @@ class CurrentNetwork:
         """The detector again from :meth:`parts`."""
         return cls(
             lags=tuple(float(lag) for lag in parts["lags"]),
+            memory=float(parts["memory"]),
+            name=str(parts["name"]),
             settle=float(parts["settle"]),
             dt=float(parts["dt"]),
             network=Network.from_parts(parts["network"]),

@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 from scipy.signal import lfilter
 
 from tauguard.detectors.calibrate import free_rows
-from tauguard.detectors.detector import check_interval, common_interval
+from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.model_parts import arm_from_parts, arm_parts
 from tauguard.traces.trace import Trace
@@ -82,11 +82,7 @@ class CurrentThreshold:
         """The largest ratio over the joints, shape (T,)."""
         if self.weights is None:
             raise ValueError("this detector is not fitted: call fit or load a model file first")
-        if trace.current.shape[1] != len(self.weights):
-            raise ValueError(
-                f"the trace has {trace.current.shape[1]} joints, this detector {len(self.weights)}"
-            )
-        check_interval("the trace", trace, self.dt)
+        check_trace(trace, len(self.weights), self.dt)
         fast, table = self._columns(trace.current)
         score: Array = (np.abs(fast) / np.einsum("tjc,jc->tj", table, self.weights)).max(axis=1)
         return score
@@ -105,9 +101,6 @@ class CurrentThreshold:
     @classmethod
     def from_parts(cls, parts: dict[str, Any]) -> CurrentThreshold:
         """The detector again from :meth:`parts`."""
-        numbers = {key: float(parts[key]) for key in ("slow", "follow", "settle", "dt")}
-        return cls(
-            **numbers,
-            weights=np.asarray(parts["weights"]),
-            known=arm_from_parts(parts["arm"]),
-        )
+        slow, follow, settle, dt = (float(parts[k]) for k in ("slow", "follow", "settle", "dt"))
+        weights, known = np.asarray(parts["weights"]), arm_from_parts(parts["arm"])
+        return cls(slow, follow, settle, weights, dt, known)

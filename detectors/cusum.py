@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.detectors import _ranking
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.front_end import FrontEnd
@@ -17,28 +18,33 @@ from tauguard.traces.trace import Trace
 Array = NDArray[np.float64]
 
 
-def cusum(increments: ArrayLike) -> Array:
-    """g_k = max(0, g_{k-1} + x_k), g_{-1} = 0, along the first axis.
+#: The statistic is bounded to what this much time without a residual takes away again [s]: a long
+#: contact would otherwise leave an alarm behind that lasts longer than itself.
+RECOVERY = 0.1
 
-    Computed as S - min(0, min S) over the running sum S, which is the same number.
+
+def bounded_cusum(increments: ArrayLike, cap: ArrayLike) -> Array:
+    """g_k = min(cap, max(0, g_{k-1} + x_k)) down the rows, from g_{-1} = 0.
 
     Args:
-        increments: shape (T, ...).
+        increments: shape (T, c).
+        cap: at or above 0, one number or one a column.
     """
-    total = np.cumsum(np.asarray(increments, dtype=np.float64), axis=0)
-    lowest = np.minimum(np.minimum.accumulate(total, axis=0), 0.0)
-    above: Array = total - lowest
-    return above
+    x = np.ascontiguousarray(increments, dtype=np.float64)
+    bound = np.ascontiguousarray(np.broadcast_to(cap, x.shape[1:]), dtype=np.float64)
+    out = np.empty_like(x)
+    _ranking.bounded_cusum(x, bound, np.zeros(x.shape[1]), out)
+    return out
 
 
 @dataclass
 class Cusum:
     """Two-sided CUSUM of every joint's residual in units of its envelope; the largest counts.
 
-    The statistic grows by (|ratio| - drift) dt while the ratio keeps its sign and falls to zero
-    otherwise; it is measured in envelope seconds. Below the drift nothing accumulates: the residual
-    of free motion is not white (friction errors last), so the drift is what free motion exceeds in
-    one sample of a hundred, not the half of a shift that white noise would ask for.
+    The statistic grows by (|ratio| - drift) dt while the ratio keeps its sign, falls otherwise,
+    and stays between 0 and a bound; the score is in seconds times the drift. The residual of free
+    motion is not white (friction errors last), so the drift is what free motion exceeds in one
+    sample of a hundred, not the half of a shift that white noise would ask for.
     """
 
     front: FrontEnd = field(default_factory=FrontEnd)
@@ -66,12 +72,14 @@ class Cusum:
         return self
 
     def scores(self, trace: Trace) -> Array:
-        """The largest statistic over joints and signs, in envelope seconds, shape (T,)."""
+        """The largest statistic over joints and signs, in units of its drift [s], shape (T,)."""
         ratio = self.front.ratio(trace)
         assert self.drift is not None
         ratio[trace.t - trace.t[0] < self.settle] = 0.0
-        up, down = cusum(ratio - self.drift), cusum(-ratio - self.drift)
-        score: Array = np.maximum(up, down).max(axis=1) * self.front.dt
+        both = np.concatenate([ratio, -ratio], axis=1)
+        drift = np.concatenate([self.drift, self.drift])
+        level = bounded_cusum((both - drift) * self.front.dt, drift * RECOVERY)
+        score: Array = (level / drift).max(axis=1)
         return score
 
     def parts(self) -> dict[str, Any]:

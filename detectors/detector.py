@@ -84,6 +84,17 @@ def common_interval(traces: Sequence[Trace], robot: ArmModel) -> float:
     return dt
 
 
+def check_trace(trace: Trace, joints: int, dt: float) -> None:
+    """Refuse a trace of another arm or at another rate than training's.
+
+    Raises:
+        ValueError: says what the trace has and what the detector works with.
+    """
+    if len(trace.joint_names) != joints:
+        raise ValueError(f"the trace has {len(trace.joint_names)} joints, this detector {joints}")
+    check_interval("the trace", trace, dt)
+
+
 def check_interval(what: str, trace: Trace, dt: float) -> None:
     """Refuse a trace that is not sampled every ``dt`` seconds, to a quarter.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.calibrate import calibrate, free_rows
-from tauguard.detectors.detector import check_interval, common_interval
+from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.features import Envelope
 from tauguard.detectors.model_parts import arm_from_parts, arm_parts
@@ -85,12 +85,7 @@ class FrontEnd:
             ValueError: not fitted, other joints or another rate.
         """
         arm, envelope = self.fitted()
-        if len(trace.joint_names) != arm.robot.joints:
-            raise ValueError(
-                f"the trace has {len(trace.joint_names)} joints, this detector "
-                f"{arm.robot.joints}: {', '.join(arm.robot.joint_names)}"
-            )
-        check_interval("the trace", trace, self.dt)
+        check_trace(trace, arm.robot.joints, self.dt)
         known = estimate or self._run(arm, trace)
         ratio = known.left / envelope.scale(trace.qd, known.acceleration)
         return np.ascontiguousarray(ratio[:, : self.joints])

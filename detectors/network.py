@@ -49,7 +49,7 @@ class Network:
         outputs = y.reshape(len(y), -1)
         mean, spread = outputs.mean(axis=0), np.maximum(outputs.std(axis=0), 1e-9)
         model = MLPRegressor(
-            tuple(hidden),
+            hidden_layer_sizes=tuple(hidden),
             alpha=decay,
             max_iter=epochs,
             early_stopping=True,

@@ -52,7 +52,8 @@ class OneClass(Windowed):
         self.weights = np.ascontiguousarray(model.dual_coef_[0])
 
     def _predict(self, x: Array) -> Array:
-        assert self.vectors is not None and self.weights is not None
+        assert self.vectors is not None
+        assert self.weights is not None
         out = np.empty(len(x))
         _kernel.KernelSum(self.vectors, -self.weights, 0.0, self.sigma).rows(
             np.ascontiguousarray(x), out, 0

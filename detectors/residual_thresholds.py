@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.calibrate import free_rows
-from tauguard.detectors.detector import check_interval
+from tauguard.detectors.detector import check_trace
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.front_end import FrontEnd
 from tauguard.detectors.thresholded import plain_residual
@@ -58,7 +58,7 @@ class ResidualThresholds:
         """The largest |residual| over its joint's threshold, shape (T,)."""
         arm, _ = self.front.fitted()
         assert self.limits is not None
-        check_interval("the trace", trace, self.front.dt)
+        check_trace(trace, arm.robot.joints, self.front.dt)
         residual = plain_residual(arm, trace)[:, : len(self.limits)]
         score: Array = (np.abs(residual) / self.limits).max(axis=1)
         return score

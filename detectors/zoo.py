@@ -20,6 +20,7 @@ DETECTORS: dict[str, Callable[[], Detector]] = {
     "srq-svr": SvrDetector,
     "srq-svr-plain": SvrDetector.plain,
     "current-network": CurrentNetwork,
+    "current-network-static": CurrentNetwork.static,
     "current-threshold": CurrentThreshold,
     "residual-thresholds": ResidualThresholds,
     "moving-thresholds": MovingThresholds,

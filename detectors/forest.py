@@ -1,0 +1,93 @@
+"""A forest of regression trees in flat arrays: scikit-learn grows it, native code walks it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.ensemble import GradientBoostingRegressor
+
+from tauguard.detectors import _ranking
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Forest:
+    """Trees of all nodes in one table; a leaf is its own left and right child."""
+
+    roots: Ids  #: first node of each tree, shape (trees,)
+    feature: Ids  #: column that a node looks at, shape (nodes,)
+    threshold: Array  #: at or below goes left, shape (nodes,)
+    left: Ids  #: shape (nodes,)
+    right: Ids  #: shape (nodes,)
+    value: Array  #: of a leaf, shape (nodes,)
+    base: float  #: added to the sum of one leaf a tree
+    inputs: int  #: columns that a row must have
+
+    @classmethod
+    def boosted(
+        cls, x: Array, y: Array, *, trees: int, depth: int, rate: float, seed: int
+    ) -> Forest:
+        """Stochastic gradient boosting (Friedman 2002) on squares.
+
+        Args:
+            x: shape (N, d).
+            y: shape (N,).
+            trees: how many.
+            depth: of each.
+            rate: what each counts.
+            seed: of the half of the rows and the share of the columns that each tree sees.
+        """
+        model = GradientBoostingRegressor(
+            n_estimators=trees,
+            max_depth=depth,
+            learning_rate=rate,
+            subsample=0.5,
+            max_features=0.3,
+            min_samples_leaf=10,
+            init="zero",
+            random_state=seed,
+        )
+        base = float(np.mean(y))
+        model.fit(x, y - base)
+        grown = [tree.tree_ for tree in model.estimators_[:, 0]]
+        roots = np.cumsum([0, *(tree.node_count for tree in grown)])[:-1]
+        columns: list[list[NDArray[Any]]] = [[], [], [], [], []]
+        for root, tree in zip(roots, grown, strict=True):
+            own = np.arange(tree.node_count)
+            leaf = tree.children_left < 0
+            columns[0].append(np.where(leaf, 0, tree.feature))
+            columns[1].append(tree.threshold)
+            columns[2].append(root + np.where(leaf, own, tree.children_left))
+            columns[3].append(root + np.where(leaf, own, tree.children_right))
+            columns[4].append(rate * tree.value[:, 0, 0])
+        feature, threshold, left, right, value = (np.concatenate(c) for c in columns)
+        ids = [np.ascontiguousarray(a, dtype=np.int64) for a in (roots, feature, left, right)]
+        return cls(ids[0], ids[1], threshold, ids[2], ids[3], value, base, x.shape[1])
+
+    def __call__(self, x: Array, *, threads: int = 0) -> Array:
+        """Values at the rows of x, shape (N, inputs) -> (N,); the threads do not change them.
+
+        Raises:
+            ValueError: rows of another length.
+        """
+        rows = np.ascontiguousarray(x, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != self.inputs:
+            raise ValueError(f"x: shape {rows.shape}, expected (N, {self.inputs})")
+        out = np.empty(len(rows))
+        tables = (self.roots, self.feature, self.threshold, self.left, self.right, self.value)
+        _ranking.forest(rows, *tables, self.base, out, threads)
+        return out
+
+    def parts(self) -> dict[str, Any]:
+        """What a model file keeps."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @classmethod
+    def from_parts(cls, parts: dict[str, Any]) -> Forest:
+        """The forest again from :meth:`parts`."""
+        return cls(**parts)

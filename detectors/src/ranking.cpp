@@ -1,0 +1,71 @@
+// tauguard.detectors._ranking: bounded cumulative sums, and forests of regression trees.
+#include <nanobind/nanobind.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "bindings.hpp"
+#include "tauguard/geometry/thread_pool.hpp"
+
+namespace tauguard::detectors {
+namespace {
+
+using geometry::ThreadPool;
+
+// g = min(cap, max(0, g + x)) down the rows of x (T, c); `state` holds g before and after.
+void bounded_cusum(In2 x, In1 cap, Out1 state, Out2 out) {
+  const std::size_t columns = x.shape(1);
+  require(cap.shape(0) == columns && state.shape(0) == columns && out.shape(0) == x.shape(0) &&
+              out.shape(1) == columns,
+          "bounded_cusum: arrays differ in shape");
+  nb::gil_scoped_release release;
+  for (std::size_t t = 0; t < x.shape(0); ++t)
+    for (std::size_t c = 0; c < columns; ++c) {
+      double& g = state.data()[c];
+      g = std::min(cap.data()[c], std::max(0.0, g + x.data()[t * columns + c]));
+      out.data()[t * columns + c] = g;
+    }
+}
+
+// base + the sum of one leaf of every tree, tree by tree. Node k goes left where the feature, rounded to single
+// precision as in training, is at or below its threshold; a leaf is its own child.
+void forest(In2 x, Ids roots, Ids feature, In1 threshold, Ids left, Ids right, In1 value, double base, Out1 out,
+            int threads) {
+  const std::size_t nodes = feature.shape(0), d = x.shape(1);
+  require(threshold.shape(0) == nodes && left.shape(0) == nodes && right.shape(0) == nodes &&
+              value.shape(0) == nodes && out.shape(0) == x.shape(0),
+          "forest: arrays differ in shape");
+  const auto within = [&](std::int64_t k, std::size_t size) { return k >= 0 && static_cast<std::size_t>(k) < size; };
+  for (std::size_t k = 0; k < roots.shape(0); ++k) require(within(roots.data()[k], nodes), "forest: a root is no node");
+  for (std::size_t k = 0; k < nodes; ++k) {
+    require(within(feature.data()[k], d), "forest: a feature that the rows do not have");
+    const std::int64_t l = left.data()[k], r = right.data()[k], own = static_cast<std::int64_t>(k);
+    require((l == own && r == own) || (l > own && r > own && within(l, nodes) && within(r, nodes)),
+            "forest: a child that does not come after its node");
+  }
+  nb::gil_scoped_release release;
+  ThreadPool::shared().parallel_for(x.shape(0), threads, 64, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i) {
+      const double* row = x.data() + i * d;
+      double sum = base;
+      for (std::size_t tree = 0; tree < roots.shape(0); ++tree) {
+        std::int64_t k = roots.data()[tree];
+        while (left.data()[k] != k)
+          k = static_cast<float>(row[feature.data()[k]]) <= threshold.data()[k] ? left.data()[k] : right.data()[k];
+        sum += value.data()[k];
+      }
+      out.data()[i] = sum;
+    }
+  });
+}
+
+}  // namespace
+}  // namespace tauguard::detectors
+
+NB_MODULE(_ranking, m) {
+  using namespace tauguard::detectors;
+  m.def("bounded_cusum", &bounded_cusum, nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert());
+  m.def("forest", &forest, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
+        nb::arg().noconvert(), nb::arg());
+}
