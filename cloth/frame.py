@@ -17,8 +17,10 @@ class FrameStats:
     Attributes:
         vf: Counts of the vertex-face side, in the order in which work is left out: ``node_tests``,
             ``front`` (entries kept for the next frame), ``leaf_pairs``; pairs of features left out
-            as ``adjacent`` or ``kept_apart`` (by groups); ``candidates``; how many of them each
-            filter of the narrow phase removed; ``hits``.
+            as ``adjacent`` or ``kept_apart`` (by groups); ``candidates``; how many of them the
+            cubic cleared (``cubic_sign``: no root) and its roots (``roots``: no contact at any);
+            how many were ``resolved`` one by one, cut into how many ``intervals`` of time, and how
+            many of them ``exact`` arithmetic decided; ``hits``.
         ee: The same of the edge-edge side.
         seconds: Wall time of each phase: ``project`` (positions onto the axes), ``build``,
             ``refit``, ``traverse``, ``vf`` and ``ee`` (candidates and narrow phase of each side),

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "batch.hpp"
 #include "frame.hpp"
 #include "mesh_ccd.hpp"
 #include "tauguard/geometry/rounding.hpp"
@@ -115,7 +116,8 @@ nb::tuple candidates(Mesh& mesh, Positions x_t0, Positions x_t1, double min_dist
 
 void add_counts(nb::dict& d, const Stats& s) {
   d["cubic_sign"] = s.cubic_sign;
-  d["directions"] = s.directions;
+  d["roots"] = s.roots;
+  d["resolved"] = s.resolved;
   d["intervals"] = s.intervals;
   d["exact"] = s.exact;
 }
@@ -205,6 +207,9 @@ NB_MODULE(_mesh, m) {
     (vf ? solve_vf : solve_ee)(x_t0.data(), x_t1.data(), rows.data(), hit.shape(0), Method(method), min_distance,
                                hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats);
   });
+  // For tests: the narrow phase's kernels from now on ("portable", "avx2"); another name: the fastest again.
+  m.def("force_batch_kernels", [](const std::string& name) { return force_batch_kernels(name.c_str()); },
+        nb::arg("name"));
   // For tests: the lanes of each row that overlap, by the named variant; empty where it cannot run here.
   m.def("overlap_rows", [](const std::string& variant,
                            nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,

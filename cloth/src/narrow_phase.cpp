@@ -1,133 +1,24 @@
-// A query is answered by cutting [0, 1] into intervals of time and clearing them, earliest first. An interval
-// is clear where the coplanarity cubic has Bernstein coefficients of one sign on it, or where one direction
-// separates the features at both of its ends (and so in between: the differences are linear in time). Where
-// the cubic changes sign its root is cut out into an interval too small to matter. What cannot be cleared
-// down to a width of 2^-34 is a hit, at the interval's start, where the signs prove it beyond rounding; where
-// they do not, exact arithmetic decides. Never late, never missed, never false.
+// Queries are answered in batches. Most have a coplanarity cubic without a root. The time of the others is split
+// into pieces of one root each (Descartes' rule in Bernstein form, which is Vincent's), and at each root, earliest
+// first, the features touch or not, beyond rounding and beyond what the root's own error can change. What that
+// leaves open goes through intervals.hpp, and what those leave open through exact.hpp.
 #include "narrow_phase.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "batch.hpp"
 #include "comparators.hpp"
 #include "exact.hpp"
+#include "intervals.hpp"
 #include "query.hpp"
 
 namespace tauguard::cloth {
 namespace {
 
-constexpr double undecided = std::numeric_limits<double>::quiet_NaN();
-
-// Does m see every gap on one side by more than the distance, at times a and b? Rounding, against |m|_1 big:
-// u of the difference, 3 u of the dot product, 6 u of the interpolation: 10 u, below the 16 u in use.
-bool separated(const Query& k, Vec m, double a, double b) {
-  const double m1 = std::fabs(m.x) + std::fabs(m.y) + std::fabs(m.z);
-  const double margin = 16 * u * m1 * k.big + k.distance * std::sqrt(dot(m, m)) * (1 + 16 * u);
-  bool above = true, below = true;
-  for (int i = 0; i < k.gaps; ++i) {
-    const double g0 = dot(m, k.gap[0][i]), g1 = dot(m, k.gap[1][i]);
-    const double ga = g0 + a * (g1 - g0), gb = g0 + b * (g1 - g0);
-    above = above && ga > margin && gb > margin;
-    below = below && ga < -margin && gb < -margin;
-  }
-  return above || below;
-}
-
-// The directions that separate nearly everything that is apart: the normal and those in the plane.
-bool plane_direction(const Query& k, double t, double a, double b, bool vf) {
-  const Vec q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t), n = cross(q, r);
-  return separated(k, cross(n, q), a, b) || separated(k, cross(n, r), a, b) ||
-         (vf && separated(k, cross(n, r - q), a, b)) || separated(k, n, a, b);
-}
-// The rest: between vertices, and between a vertex and an edge.
-bool edge_direction(const Query& k, double t, double a, double b) {
-  const Vec q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
-  for (int i = 0; i < k.gaps; ++i) {
-    const Vec d = mix(k.gap[0][i], k.gap[1][i], t);
-    if (separated(k, d, a, b)) return true;
-    for (Vec e : {q, r}) {
-      const double ee = dot(e, e);
-      if (ee > 0 && separated(k, d - (dot(d, e) / ee) * e, a, b)) return true;
-    }
-  }
-  return false;
-}
-
-double determinant(const Query& k, double t) {
-  return dot(mix(k.p[0], k.p[1], t), cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t)));
-}
-
-// Is there contact between times a and b or within 2^-32 of them, whatever rounding did? The cubic changes
-// sign, so that it has a root there, and throughout the origin is inside every edge of the hull of the gaps.
-//
-// With B = big, each component of a mix carries 6 u B (u B of the differences, 5 u B of its own), a determinant
-// of three at most 174 u B^3 < 2^-45 B^3. (g x h) . n with n = q x r is below 12 B^4 and changes at most
-// 96 B^4 a unit of time, half the interval from its middle; rounding adds less than 2^-43 B^4.
-bool certain(const Query& k, double a, double b, bool vf) {
-  a = std::max(0.0, a - 0x1p-32);
-  b = std::min(1.0, b + 0x1p-32);
-  const double error = 0x1p-45 * k.big * k.big * k.big, fa = determinant(k, a), fb = determinant(k, b);
-  if (!((fa > error && fb < -error) || (fa < -error && fb > error))) return false;
-  const double t = 0.5 * (a + b), big2 = k.big * k.big, margin = (64 * (b - a) + 0x1p-43) * big2 * big2;
-  const Vec n = cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t));
-  Vec g[4];
-  for (int i = 0; i < k.gaps; ++i) g[i] = mix(k.gap[0][i], k.gap[1][i], t);
-  if (!vf) std::swap(g[2], g[3]);  // in order around the hull
-  bool left = true, right = true;
-  for (int i = 0; i < k.gaps; ++i) {
-    const double side = dot(cross(g[i], g[i + 1 < k.gaps ? i + 1 : 0]), n);
-    left = left && side > margin;
-    right = right && side < -margin;
-  }
-  return left || right;
-}
-
-// The start of the first interval that no filter clears; infinity where there is none; NaN where it cannot
-// be told whether that is contact. At most 4000 intervals are looked at.
-double first_contact(const Query& k, const Cubic& whole, bool vf, Stats& stats) {
-  struct Piece { double a, b; Cubic c; };
-  const double error = k.cubic_error();
-  Piece stack[128];
-  int top = 0;
-  stack[top++] = {0, 1, whole};
-  for (int count = 0; top > 0; ++count) {
-    const Piece piece = stack[--top];
-    ++stats.intervals;
-    if (k.distance == 0 && one_sign(piece.c, error) != 0) continue;
-    const double width = piece.b - piece.a, *b = piece.c.b;
-    const bool crosses = k.distance == 0 && (b[0] > 0) != (b[3] > 0);
-    double s = 0.5;
-    {
-      const double middle = 0.5 * (piece.a + piece.b);
-      if (plane_direction(k, middle, piece.a, piece.b, vf)) continue;
-      if (!(crosses && width > 0x1p-30) && edge_direction(k, middle, piece.a, piece.b)) continue;
-    }
-    if (width < 0x1p-34 || count > 4000 || top > 120)
-      return k.distance > 0 || certain(k, piece.a, piece.b, vf) ? piece.a : undecided;
-    Piece left, right;
-    if (crosses) {
-      const double x = root(b), delta = 0x1p-37 / width;
-      // Around the root: [x - delta, x + delta] is small enough to be the answer at once.
-      const double lo = x - delta, hi = x + delta;
-      if (lo > 0 && hi < 1) {
-        Piece rest, near;
-        halve(piece.c, lo, left.c, rest.c);
-        halve(rest.c, (hi - lo) / (1 - lo), near.c, right.c);
-        left.a = piece.a; left.b = near.a = piece.a + lo * width;
-        near.b = right.a = piece.a + hi * width; right.b = piece.b;
-        stack[top++] = right; stack[top++] = near; stack[top++] = left;
-        continue;
-      }
-    }
-    const double cut = piece.a + s * width;
-    left.a = piece.a; left.b = cut; right.a = cut; right.b = piece.b;
-    halve(piece.c, s, left.c, right.c);
-    stack[top++] = right;
-    stack[top++] = left;
-  }
-  return std::numeric_limits<double>::infinity();
-}
+constexpr int batch = 128;
+constexpr double never = std::numeric_limits<double>::infinity();
 
 Vec at(const double* x0, const double* x1, std::int32_t v, double t) { return mix(load(x0, v), load(x1, v), t); }
 
@@ -164,41 +55,184 @@ void describe(const double* x0, const double* x1, const std::int32_t* row, doubl
   std::copy(nl, nl + 3, out.normal + 3 * i);
 }
 
+// Exactly one root: the ends have different signs and the coefficients between them one variation.
+bool one_root(const double* b, double error) {
+  const double s = b[0] > 0 ? 1 : -1;
+  return s * b[0] > error && s * b[3] < -error && (s * b[1] > error || s * b[2] < -error);
+}
+
+// Where to cut a cubic for pieces of one root: ends on one side, at the extremum towards the other (where the
+// derivative turns to their side); else at the inflection, on either side of which there are two at most.
+double cut_of(const double* b) {
+  const double s = b[0] > 0 ? 1 : -1, d0 = s * (b[1] - b[0]), d1 = s * (b[2] - b[1]), d2 = s * (b[3] - b[2]);
+  const double a = d0 - 2 * d1 + d2, h = d1 - d0;
+  double cut = -h / a;
+  if (s * b[3] > 0) {
+    const double root = std::sqrt(std::max(0.0, h * h - a * d0));
+    cut = h > 0 ? -d0 / (h + root) : (root - h) / a;
+  }
+  return cut > 0x1p-20 && cut < 1 - 0x1p-20 ? cut : 0.5;
+}
+
+// Pieces with one root each that hold every root of the cubic, in order; -1 where rounding leaves that open.
+// At most three cuts in a row, which the error allows for.
+int split(const double* b, double error, std::int32_t query, Piece* pieces) {
+  struct Part { double start, length; Cubic c; int cuts; } stack[8];
+  stack[0] = {0, 1, {{b[0], b[1], b[2], b[3]}}, 0};
+  int count = 0;
+  for (int top = 1; top > 0;) {
+    const Part part = stack[--top];
+    const double* c = part.c.b;
+    if (one_sign(part.c, error) != 0) continue;
+    if (one_root(c, error)) {
+      pieces[count++] = {part.start, part.length, {c[0], c[1], c[2], c[3]}, query};
+      continue;
+    }
+    if (part.cuts == 3 || !(std::fabs(c[0]) > error && std::fabs(c[3]) > error)) return -1;
+    const double cut = cut_of(c), middle = part.start + cut * part.length;
+    Part &right = stack[top++], &left = stack[top++];
+    left = {part.start, middle - part.start, {}, part.cuts + 1};
+    right = {middle, part.start + part.length - middle, {}, part.cuts + 1};
+    halve(part.c, cut, left.c, right.c);
+  }
+  return count;
+}
+
+// The rest, one by one: by intervals, then exactly.
+template <bool vf>
+double resolve(const double* x0, const double* x1, const std::int32_t* row, double distance, Stats& stats) {
+  ++stats.resolved;
+  const double t = first_contact(make<vf>(x0, x1, row, distance), vf, stats);
+  if (!std::isnan(t)) return t;
+  ++stats.exact;
+  return exact_contact(vf, x0, x1, row);
+}
+
+// A batch on its way through the stages.
+struct Batch {
+  Group groups[batch / width];
+  Piece pieces[3 * batch];
+  Outcome outcome[3 * batch];
+  double at[3 * batch];
+  std::int32_t open[batch];
+  int count = 0, left = 0;  // pieces; queries that stay open
+};
+
+// Pieces of all queries that may have contact, those of one piece first; returns how many these are.
+int make_pieces(Batch& b, int n, Stats& stats) {
+  std::uint8_t rest[batch / width];
+  const int groups = (n + width - 1) / width;
+  for (int g = 0; g < groups; ++g) {
+    const Group& group = b.groups[g];
+    const unsigned present = (1u << std::min(width, n - g * width)) - 1;
+    rest[g] = static_cast<std::uint8_t>(present & ~group.no_root & ~group.one_root);
+    stats.cubic_sign += __builtin_popcount(present & group.no_root);
+    for (unsigned lanes = present & group.one_root; lanes; lanes &= lanes - 1) {
+      const int lane = __builtin_ctz(lanes);
+      Piece& piece = b.pieces[b.count++];
+      piece.start = 0;
+      piece.length = 1;
+      for (int j = 0; j < 4; ++j) piece.cubic[j] = group.value[Group::cubic + j][lane];
+      piece.query = g * width + lane;
+    }
+  }
+  const int single = b.count;
+  for (int g = 0; g < groups; ++g)
+    for (unsigned lanes = rest[g]; lanes; lanes &= lanes - 1) {
+      const Group& group = b.groups[g];
+      const int lane = __builtin_ctz(lanes), query = g * width + lane;
+      double c[4];
+      for (int j = 0; j < 4; ++j) c[j] = group.value[Group::cubic + j][lane];
+      const bool odd = group.odd >> lane & 1;
+      const int found = odd ? -1 : split(c, group.value[Group::error][lane], query, b.pieces + b.count);
+      if (found < 0) b.open[b.left++] = query;
+      if (found == 0) ++stats.cubic_sign;
+      b.count += std::max(found, 0);
+    }
+  return single;
+}
+
+// One batch: the time of contact of each query, or `never`.
+template <bool vf>
+void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, double* toi, Stats& stats) {
+  static thread_local Batch b;
+  const BatchKernels& kernels = batch_kernels();
+  b.count = b.left = 0;
+  kernels.gather(vf, x0, x1, rows, n, b.groups);
+  std::fill(toi, toi + n, never);
+  const int single = make_pieces(b, n, stats);
+  kernels.at_roots(vf, b.groups, b.pieces, b.count, b.outcome, b.at);
+  for (int i = 0; i < single; ++i) {
+    toi[b.pieces[i].query] = b.outcome[i] == Outcome::contact ? b.at[i] : never;
+    stats.roots += b.outcome[i] == Outcome::clear;
+    if (b.outcome[i] == Outcome::unknown) b.open[b.left++] = b.pieces[i].query;
+  }
+  for (int i = single; i < b.count;) {
+    const std::int32_t query = b.pieces[i].query;
+    int first = i;  // the first piece that is not clear
+    while (first < b.count && b.pieces[first].query == query && b.outcome[first] == Outcome::clear) ++first;
+    if (first == b.count || b.pieces[first].query != query) {
+      ++stats.roots;
+    } else if (b.outcome[first] == Outcome::contact) {
+      toi[query] = b.at[first];
+    } else {
+      b.open[b.left++] = query;
+    }
+    while (i < b.count && b.pieces[i].query == query) ++i;
+  }
+  for (int i = 0; i < b.left; ++i) toi[b.open[i]] = resolve<vf>(x0, x1, rows + 4 * b.open[i], 0, stats);
+}
+
+template <bool vf>
+void one_by_one(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method,
+                double distance, double* toi, Stats& stats) {
+  for (int i = 0; i < n; ++i) {
+    const std::int32_t* row = rows + 4 * i;
+    if (method == Method::ab2pf) {
+      toi[i] = resolve<vf>(x0, x1, row, distance, stats);
+    } else {
+      ++stats.exact;
+      toi[i] = exact_contact(vf, x0, x1, row);
+    }
+  }
+}
+
+template <bool vf>
+void compare(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method, double* toi,
+             Stats& stats) {
+  for (int i = 0; i < n; ++i) {
+    const Query k = make<vf>(x0, x1, rows + 4 * i, 0);
+    const Cubic whole = cubic(k);
+    toi[i] = never;
+    if (filtered_out(whole, method)) {
+      ++stats.cubic_sign;
+    } else {
+      toi[i] = first_root_inside(k, whole, method, vf);
+      stats.roots += !(toi[i] <= 1);
+    }
+  }
+}
+
 template <bool vf>
 void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n, Method method,
            double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats) {
-  for (std::size_t i = 0; i < n; ++i) {
-    const Query k = make<vf>(x0, x1, rows + 4 * i, distance);
-    hit[i] = 0;
-    const Cubic whole = cubic(k);
-    double t;
-    if (method == Method::ab2pf) {
-      if (k.distance == 0 && one_sign(whole, k.cubic_error()) != 0) {
-        ++stats.cubic_sign;
-        continue;
-      }
-      t = first_contact(k, whole, vf, stats);
-      if (std::isnan(t)) {
-        ++stats.exact;
-        t = exact_contact(vf, x0, x1, rows + 4 * i);
-      }
-    } else if (method == Method::exact) {
-      ++stats.exact;
-      t = exact_contact(vf, x0, x1, rows + 4 * i);
+  double toi[batch];
+  for (std::size_t first = 0; first < n; first += batch) {
+    const int count = static_cast<int>(std::min<std::size_t>(batch, n - first));
+    const std::int32_t* part = rows + 4 * first;
+    if (method == Method::ab2pf && distance == 0) {
+      ab2pf<vf>(x0, x1, part, count, toi, stats);
+    } else if (method == Method::ab2pf || method == Method::exact) {
+      one_by_one<vf>(x0, x1, part, count, method, distance, toi, stats);
     } else {
-      if (filtered_out(whole, method)) {
-        ++stats.cubic_sign;
-        continue;
-      }
-      t = first_root_inside(k, whole, method, vf);
+      compare<vf>(x0, x1, part, count, method, toi, stats);
     }
-    if (!(t <= 1)) {
-      ++stats.directions;
-      continue;
+    for (int i = 0; i < count; ++i) {
+      hit[first + i] = toi[i] <= 1;
+      if (!hit[first + i]) continue;
+      out.toi[first + i] = toi[i];
+      describe<vf>(x0, x1, part + 4 * i, toi[i], out, first + i);
     }
-    hit[i] = 1;
-    out.toi[i] = t;
-    describe<vf>(x0, x1, rows + 4 * i, t, out, i);
   }
 }
 }  // namespace

@@ -16,13 +16,14 @@ struct ImpactArrays {
   double *toi, *point, *normal, *weights;  // (n), (n, 3), (n, 3), (n, 4)
 };
 
-// How many queries each filter removed, the intervals of time that the rest were cut into, and how many
-// queries exact arithmetic decided.
+// How many queries each filter removed (no root of the cubic; no contact at its roots); how many were resolved
+// one by one and cut into how many intervals of time; how many of them exact arithmetic decided.
 struct Stats {
-  std::uint64_t cubic_sign = 0, directions = 0, intervals = 0, exact = 0;
+  std::uint64_t cubic_sign = 0, roots = 0, resolved = 0, intervals = 0, exact = 0;
   Stats& operator+=(const Stats& o) {
     cubic_sign += o.cubic_sign;
-    directions += o.directions;
+    roots += o.roots;
+    resolved += o.resolved;
     intervals += o.intervals;
     exact += o.exact;
     return *this;

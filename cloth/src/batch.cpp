@@ -1,0 +1,246 @@
+#include "batch.hpp"
+
+#include <algorithm>
+#include <atomic>
+
+namespace tauguard::cloth {
+namespace {
+
+TAUGUARD_INLINE Wide3 field(const Group& g, int f) {
+  return {load(g.value[f]), load(g.value[f + 1]), load(g.value[f + 2])};
+}
+TAUGUARD_INLINE void set(Group& g, int f, Wide3 v) {
+  store(g.value[f], v.x);
+  store(g.value[f + 1], v.y);
+  store(g.value[f + 2], v.z);
+}
+
+// 2^-e for 2^e <= x < 2^(e + 1), of normal x below 2^1023.
+TAUGUARD_INLINE Wide inverse_power(Wide x) {
+  const Choice exponent = (Choice)x & (std::int64_t{0x7ff} << 52);
+  return (Wide)((std::int64_t{0x7fe} << 52) - exponent);
+}
+
+// With u = 2^-53 and M the product of the largest |p|, |q|, |r|. Differences carry u. A triple product of
+// differences is 6 products: 3 u and 5 u of arithmetic on each: 48 u M. The mixed ones double the cross
+// product: 108 u M, and with 48 u M of the other and the sums, divided by three: 64 u M for each coefficient,
+// which is at most 6 M. Each of three cuts adds 54 u M, a value of the polynomial 60 u M, its argument's own
+// rounding 324 u M: 610 u M in all, below the 1024 u M = 2^-43 M in use. Underflow adds less than 2^-1000.
+TAUGUARD_INLINE void finish(Group& g) {
+  Wide3 p[2], q[2], r[2];
+  Wide sizes[3] = {splat(0), splat(0), splat(0)};
+  for (int e = 0; e < 2; ++e) {
+    p[e] = field(g, Group::p + 3 * e);
+    q[e] = field(g, Group::q + 3 * e);
+    r[e] = field(g, Group::r + 3 * e);
+    sizes[0] = max(sizes[0], size(p[e]));
+    sizes[1] = max(sizes[1], size(q[e]));
+    sizes[2] = max(sizes[2], size(r[e]));
+  }
+  const Wide big = max(max(sizes[0], sizes[1]), sizes[2]);
+  const Choice fair = (big > 0x1p-900) & (big < 0x1p900);
+  const Wide s = inverse_power(big);
+  for (int e = 0; e < 2; ++e) {
+    set(g, Group::p + 3 * e, p[e] = s * p[e]);
+    set(g, Group::q + 3 * e, q[e] = s * q[e]);
+    set(g, Group::r + 3 * e, r[e] = s * r[e]);
+  }
+  const Wide3 c00 = cross(q[0], r[0]), c11 = cross(q[1], r[1]), mixed = cross(q[0], r[1]) + cross(q[1], r[0]);
+  const Wide b0 = dot(p[0], c00), b1 = (1.0 / 3) * (dot(p[1], c00) + dot(p[0], mixed)),
+             b2 = (1.0 / 3) * (dot(p[0], c11) + dot(p[1], mixed)), b3 = dot(p[1], c11);
+  const Wide error = 0x1p-43 * ((s * sizes[0]) * (s * sizes[1]) * (s * sizes[2])) + 0x1p-1000;
+  const Wide least = min(min(b0, b1), min(b2, b3)), most = max(max(b0, b1), max(b2, b3));
+  // One variation: the ends have different signs, and not both coefficients between them the other end's.
+  const Choice falls = (b0 > error) & (b3 < -error) & ((b1 > error) | (b2 < -error));
+  const Choice rises = (b0 < -error) & (b3 > error) & ((b1 < -error) | (b2 > error));
+  g.odd = static_cast<std::uint8_t>(bits(~fair));
+  g.no_root = static_cast<std::uint8_t>(bits(fair & ((least > error) | (most < -error))));
+  g.one_root = static_cast<std::uint8_t>(bits(fair & (falls | rises)));
+  store(g.value[Group::cubic], b0);
+  store(g.value[Group::cubic + 1], b1);
+  store(g.value[Group::cubic + 2], b2);
+  store(g.value[Group::cubic + 3], b3);
+  store(g.value[Group::error], error);
+  store(g.value[Group::big], s * big);
+}
+
+constexpr int ahead = 8;  // queries between asking for positions and using them
+
+template <bool vf>
+TAUGUARD_INLINE void gather(const double* x0, const double* x1, const std::int32_t* rows, int n, Group* groups) {
+  for (int first = 0; first < n; first += width, ++groups) {
+    for (int i = 0; i < width; ++i) {
+      const std::int32_t* row = rows + 4 * std::min(first + i, n - 1);
+      const std::int32_t* soon = rows + 4 * std::min(first + i + ahead, n - 1);
+      for (int v = 0; v < 4; ++v) {
+        __builtin_prefetch(x0 + 3 * std::ptrdiff_t(soon[v]));
+        __builtin_prefetch(x1 + 3 * std::ptrdiff_t(soon[v]));
+      }
+      for (int e = 0; e < 2; ++e) {
+        const double* x = e ? x1 : x0;
+        const double *a = x + 3 * std::ptrdiff_t(row[0]), *b = x + 3 * std::ptrdiff_t(row[1]),
+                     *c = x + 3 * std::ptrdiff_t(row[2]), *d = x + 3 * std::ptrdiff_t(row[3]);
+        for (int k = 0; k < 3; ++k) {
+          groups->value[Group::p + 3 * e + k][i] = vf ? a[k] - b[k] : c[k] - a[k];
+          groups->value[Group::q + 3 * e + k][i] = vf ? c[k] - b[k] : b[k] - a[k];
+          groups->value[Group::r + 3 * e + k][i] = vf ? d[k] - b[k] : d[k] - c[k];
+        }
+      }
+    }
+    finish(*groups);
+  }
+}
+
+// Pieces, transposed, with the differences of their queries.
+struct Pieces {
+  Wide3 p[2], q[2], r[2];
+  Wide start, length, root, cubic[4], error, big;
+};
+TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const double* roots, int n,
+                              Pieces& out) {
+  alignas(64) double value[Group::fields][width], own[7][width];
+  for (int i = 0; i < width; ++i) {
+    const Piece& piece = pieces[std::min(i, n - 1)];
+    const Group& g = groups[piece.query / width];
+    const int lane = piece.query % width;
+    for (int f = 0; f < Group::fields; ++f) value[f][i] = g.value[f][lane];
+    own[0][i] = piece.start;
+    own[1][i] = piece.length;
+    for (int j = 0; j < 4; ++j) own[2 + j][i] = piece.cubic[j];
+    own[6][i] = roots[std::min(i, n - 1)];
+  }
+  for (int e = 0; e < 2; ++e) {
+    const auto vector = [&](int f) { return Wide3{load(value[f]), load(value[f + 1]), load(value[f + 2])}; };
+    out.p[e] = vector(Group::p + 3 * e);
+    out.q[e] = vector(Group::q + 3 * e);
+    out.r[e] = vector(Group::r + 3 * e);
+  }
+  out.start = load(own[0]);
+  out.length = load(own[1]);
+  for (int j = 0; j < 4; ++j) out.cubic[j] = load(own[2 + j]);
+  out.root = load(own[6]);
+  out.error = load(value[Group::error]);
+  out.big = load(value[Group::big]);
+}
+
+// In Bernstein form.
+TAUGUARD_INLINE Wide at(const Wide* b, Wide x) {
+  const Wide y = 1 - x;
+  return y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
+}
+
+// Roots in (0, 1) of many cubics: Newton's steps kept within the bracket until a step is below 2^-24, after which
+// the root is off by less than 2^-40 or so (what is not is found out). A lane stops by itself, so that a root
+// does not depend on its neighbours; several groups at once hide the latency of the divisions.
+constexpr int together = 4;
+TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
+  alignas(64) double value[5][together * width];
+  for (int first = 0; first < n; first += together * width) {
+    for (int i = 0; i < together * width; ++i)
+      for (int j = 0; j < 4; ++j) value[j][i] = pieces[std::min(first + i, n - 1)].cubic[j];
+    Wide b[together][4], lo[together], hi[together], x[together];
+    Choice done[together];
+    for (int k = 0; k < together; ++k) {
+      for (int j = 0; j < 4; ++j) b[k][j] = load(value[j] + k * width);
+      lo[k] = splat(0);
+      hi[k] = splat(1);
+      x[k] = b[k][0] / (b[k][0] - b[k][3]);
+      done[k] = Choice{};
+    }
+    for (int i = 0; i < 40; ++i) {
+      Choice all = done[0] | ~done[0];
+      for (int k = 0; k < together; ++k) {
+        const Wide* c = b[k];
+        const Wide y = 1 - x[k], yy = y * y, xy = y * x[k], xx = x[k] * x[k];
+        const Wide f = yy * (c[0] * y + 3 * c[1] * x[k]) + xx * (3 * c[2] * y + c[3] * x[k]);
+        const Choice before = (f > 0) == (c[0] > 0);
+        lo[k] = before ? x[k] : lo[k];
+        hi[k] = before ? hi[k] : x[k];
+        const Wide slope = 3 * ((c[1] - c[0]) * yy + 2 * (c[2] - c[1]) * xy + (c[3] - c[2]) * xx);
+        Wide next = x[k] - f / slope;
+        next = (next > lo[k]) & (next < hi[k]) ? next : 0.5 * (lo[k] + hi[k]);
+        const Wide step = abs(next - x[k]);
+        x[k] = done[k] ? x[k] : next;
+        done[k] |= step < 0x1p-24;
+        all &= done[k];
+      }
+      if (bits(all) == (1u << width) - 1) break;
+    }
+    for (int k = 0; k < together; ++k) store(value[4] + k * width, x[k]);
+    for (int i = 0; i < together * width && first + i < n; ++i) roots[first + i] = value[4][i];
+  }
+}
+
+// Contact at a root is the origin in the hull of the features' differences g_i: on the same side of all its
+// edges, (g_i x g_j) . n >= 0 with n = q x r. Let d = 2^-33 be what the time may be off, B the largest |p|, |q|,
+// |r|, and G that of the g_i near the root. Then |q|, |r| <= 2 G, |n| <= 8 G^2, and since g changes by at most
+// 6 B a unit of time, q and r by 2 B, a side changes by at most (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 a unit:
+// 2^-23.6 B G^3 in d. Rounding adds less than 2^-38 B G^3. In use: 2^-23 B G^3.
+template <bool vf>
+TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, Outcome* outcome, double* toi) {
+  find_roots(pieces, n, toi);
+  for (int first = 0; first < n; first += width) {
+    Pieces k;
+    transpose(groups, pieces + first, toi + first, n - first, k);
+    const Wide t = k.start + k.length * k.root;
+    const Wide lo = max(t - 0x1p-33, k.start), hi = min(t + 0x1p-33, k.start + k.length);
+    const Wide f_lo = at(k.cubic, (lo - k.start) / k.length), f_hi = at(k.cubic, (hi - k.start) / k.length);
+    const Choice bracket = ((f_lo > k.error) & (f_hi < -k.error)) | ((f_lo < -k.error) & (f_hi > k.error));
+
+    const Wide3 p = k.p[0] + t * (k.p[1] - k.p[0]), q = k.q[0] + t * (k.q[1] - k.q[0]),
+                r = k.r[0] + t * (k.r[1] - k.r[0]), normal = cross(q, r);
+    const Wide a = dot(cross(p, r), normal), b = dot(cross(q, p), normal), nn = dot(normal, normal);
+    Wide extent = max(max(size(p), size(p - q)), size(vf ? p - r : p + r));
+    Wide least = vf ? min(min(a, b), nn - a - b) : min(min(a, nn - a), min(-b, nn + b));
+    if (!vf) extent = max(extent, size(p + r - q));
+    extent += 0x1p-30 * k.big;
+    const Wide margin = 0x1p-23 * k.big * (extent * extent * extent);
+    const unsigned inside = bits(bracket & (least > margin)), outside = bits(bracket & (least < -margin));
+    for (int i = 0; i < width && first + i < n; ++i) {
+      outcome[first + i] = inside >> i & 1 ? Outcome::contact : outside >> i & 1 ? Outcome::clear : Outcome::unknown;
+      toi[first + i] = lo[i];
+    }
+  }
+}
+
+#define TAUGUARD_VARIANT(name, attributes)                                                                     \
+  attributes void gather_##name(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n,  \
+                                Group* groups) {                                                               \
+    vf ? gather<true>(x0, x1, rows, n, groups) : gather<false>(x0, x1, rows, n, groups);                       \
+  }                                                                                                            \
+  attributes void at_roots_##name(bool vf, const Group* groups, const Piece* pieces, int n, Outcome* outcome,  \
+                                  double* toi) {                                                               \
+    vf ? at_roots<true>(groups, pieces, n, outcome, toi) : at_roots<false>(groups, pieces, n, outcome, toi);   \
+  }                                                                                                            \
+  constexpr BatchKernels name{gather_##name, at_roots_##name};
+
+TAUGUARD_VARIANT(portable, )
+#if defined(__x86_64__)
+TAUGUARD_VARIANT(avx2, __attribute__((target("avx2"))))
+#endif
+
+std::atomic<const BatchKernels*> forced{nullptr};
+
+}  // namespace
+
+const BatchKernels* batch_kernels(const char* wanted) {
+  if (std::strcmp(wanted, "portable") == 0) return &portable;
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (std::strcmp(wanted, "avx2") == 0 && __builtin_cpu_supports("avx2")) return &avx2;
+#endif
+  return nullptr;
+}
+
+const BatchKernels& batch_kernels() {
+  static const BatchKernels* best = batch_kernels("avx2") ? batch_kernels("avx2") : &portable;
+  const BatchKernels* chosen = forced.load(std::memory_order_relaxed);
+  return chosen ? *chosen : *best;
+}
+
+bool force_batch_kernels(const char* name) {
+  forced = batch_kernels(name);
+  return forced != nullptr;
+}
+
+}  // namespace tauguard::cloth

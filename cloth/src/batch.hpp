@@ -1,0 +1,41 @@
+// Several queries at a time: the coplanarity cubics of many queries, and what happens at their roots.
+#pragma once
+
+#include <cstdint>
+
+#include "lanes.hpp"
+
+namespace tauguard::cloth {
+
+// `width` queries in differences (query.hpp), scaled by powers of two so that the largest is in [1, 2).
+struct Group {
+  enum Field { p = 0, q = 6, r = 12, cubic = 18, error = 22, big = 23, fields = 24 };
+  alignas(64) double value[fields][width];  // p, q, r: x, y, z at the start, then at the end
+  // A bit per query, beyond rounding: the Bernstein coefficients of its cubic have one sign, so that it has no
+  // root; or one variation, so that it has one. Both 0 where the query's size keeps it out of this.
+  std::uint8_t no_root, one_root;
+  std::uint8_t odd;  // that size: too small, too large or not finite
+};
+
+// A part [start, start + length] of a query's time in which its cubic has exactly one root, beyond rounding.
+struct Piece {
+  double start, length, cubic[4];
+  std::int32_t query;
+};
+enum class Outcome : std::uint8_t { clear, contact, unknown };
+
+struct BatchKernels {
+  // (n + width - 1) / width groups of n queries; the last is filled up with copies of the last query.
+  void (*gather)(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n, Group* groups);
+  // Per piece: is there contact at its root, and from when on can that be (at most 2^-32 before it).
+  void (*at_roots)(bool vf, const Group* groups, const Piece* pieces, int n, Outcome* outcome, double* toi);
+};
+
+// The fastest that this processor runs; every variant gives the same bits.
+const BatchKernels& batch_kernels();
+// By name: "portable", "avx2"; null where the processor lacks it.
+const BatchKernels* batch_kernels(const char* name);
+// For tests: these from now on; the fastest again, and false, where there are none of that name.
+bool force_batch_kernels(const char* name);
+
+}  // namespace tauguard::cloth
