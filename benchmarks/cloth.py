@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tauguard.benchmarks import cloth_frames, cloth_scaling
+from tauguard.benchmarks import cloth_adversarial, cloth_frames, cloth_queries, cloth_scaling
 from tauguard.benchmarks.report import Row
 
 if TYPE_CHECKING:
@@ -28,6 +28,13 @@ def run(quick: bool, seed: int) -> list[Row]:
     rows += cloth_frames.means(rows)
     for frame in frames:
         rows += cloth_frames.peers(frame, repeats, *((20_000, 500) if quick else (10**7, 20_000)))
+    for frame in frames:
+        if data and frame.name == "cloth-ball":
+            most = (40_000, 400) if quick else (10**7, 20_000)
+            rows += cloth_queries.on_recording(frame, seed, *most, repeats)
+    if data:
+        rows += cloth_queries.on_hard_sets(Path(data) / "ccd", 20 if quick else 250)
+    rows += cloth_adversarial.adversarial(12_000 if quick else 1_000_000, seed)
     rows += cloth_scaling.volumes(triangles, seed, repeats)
     rows += cloth_scaling.front(triangles, seed, 15 if quick else 60)
     sizes = [1_000, 10_000] if quick else [1_000, 10_000, 100_000, 1_000_000]

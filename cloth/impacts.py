@@ -1,4 +1,13 @@
-"""Single queries: does a moving vertex meet a moving face, do two moving edges meet?"""
+"""Single queries: does a moving vertex meet a moving face, do two moving edges meet?
+
+ab2pf answers for the doubles given: contact at some time of the step, in exact arithmetic, is a
+hit, nothing else is, and ``toi`` is at most 1e-9 of the step before the first such time. What a
+query can cost is bounded: three cuts of its cubic into at most three pieces of one root, 40 Newton
+steps each; then 40 intervals of at most 20 separating directions; then a fixed number of signs of
+polynomials of degree 3 in exact integers. That is some 50 ns for most, 200 us at worst for
+positions of like magnitude; 0.2 s where magnitudes within one query span 10^600, the widest that
+doubles can. With a minimum distance: 4000 intervals, no exact arithmetic, conservative.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +63,8 @@ def vertex_face(
         x_t0: Positions at the start of the step [any unit]: vertex, three of the face. (N, 4, 3).
         x_t1: At its end. Shape (N, 4, 3).
         method: One of ``METHODS``.
-        min_distance: Counts as contact, in the unit of the positions; conservative there.
+        min_distance: Counts as contact, in the unit of the positions; conservative there. Only
+            ab2pf has one.
 
     Raises:
         ValueError: wrong shapes, entries that are not finite, no such method, a negative distance.

@@ -69,17 +69,66 @@ Polynomial deflated(const Polynomial& p, const Dyadic& x) {
   return q;
 }
 
+// Sign variations of the Bernstein coefficients on [0, 1]: 0 means no root in between, 1 means one.
+int variations_between_ends(const Polynomial& p) {
+  // Of degree n, up to factors: the coefficients of the sum of p_i t^i (1 + t)^(n - i).
+  Polynomial sum, power{one};
+  for (std::size_t i = p.size(); i-- > 0;) {
+    Polynomial term(i, Dyadic());
+    for (const auto& c : power) term.push_back(p[i] * c);
+    sum = sum + trimmed(std::move(term));
+    power = power * Polynomial{one, one};
+  }
+  int count = 0, last = 0;
+  for (const auto& c : sum) {
+    if (c.sign() == 0) continue;
+    count += last != 0 && c.sign() != last;
+    last = c.sign();
+  }
+  return count;
+}
+
+// Halves the interval where `middle` is in it; true where `middle` is the root.
+bool narrow(Root& root, const Dyadic& middle, int below) {
+  if (!(root.lo < middle && middle < root.hi)) return false;
+  const int s = value(root.of, middle).sign();
+  if (s == 0) {
+    root = {middle, middle, {}};
+    return true;
+  }
+  (s == below ? root.lo : root.hi) = middle;
+  return false;
+}
+
+// The root in double precision, by bisection on coefficients scaled to about 1.
+double estimate(const Root& root) {
+  std::int64_t top = 0;
+  bool any = false;
+  for (const auto& c : root.of)
+    if (!c.is_zero()) top = any ? std::max(top, c.floor_log2()) : c.floor_log2(), any = true;
+  std::vector<double> c;
+  for (const auto& exact : root.of) c.push_back(exact.scaled(-top).to_double());
+  double lo = root.lo.to_double(), hi = root.hi.to_double();
+  const auto f = [&c](double t) {
+    double sum = 0;
+    for (std::size_t i = c.size(); i-- > 0;) sum = sum * t + c[i];
+    return sum;
+  };
+  for (const bool below = f(lo) > 0; hi - lo > 0x1p-52;) {
+    const double middle = 0.5 * (lo + hi);
+    ((f(middle) > 0) == below ? lo : hi) = middle;
+  }
+  return lo;
+}
+
+// Bisects to 2^-70, starting from a guess where it is good.
 void refine(Root& root) {
   const int below = value(root.of, root.lo).sign();
-  while (!(root.hi - root.lo < one.scaled(-70))) {
-    const Dyadic middle = (root.lo + root.hi).scaled(-1);
-    const int s = value(root.of, middle).sign();
-    if (s == 0) {
-      root = {middle, middle, {}};
-      return;
-    }
-    (s == below ? root.lo : root.hi) = middle;
-  }
+  const double guess = estimate(root);
+  for (double off : {-0x1p-44, 0x1p-44, 0.0})
+    if (guess + off > 0 && narrow(root, Dyadic(guess + off), below)) return;
+  while (!(root.hi - root.lo < one.scaled(-70)))
+    if (narrow(root, (root.lo + root.hi).scaled(-1), below)) return;
 }
 
 // Intervals with one root each of p, which has no double roots and none at 0 or 1. Where a midpoint is a
@@ -149,21 +198,25 @@ Dyadic value(const Polynomial& p, const Dyadic& x) {
 
 std::vector<Root> roots_of(const Polynomial& p) {
   std::vector<Root> roots;
-  Polynomial rest = square_free(p);
+  Polynomial rest = p;
   const auto take = [&](const Dyadic& x) {
     roots.push_back({x, x, {}});
-    rest = deflated(rest, x);
+    while (rest.size() > 1 && value(rest, x).is_zero()) rest = deflated(rest, x);
   };
   for (const Dyadic& end : {Dyadic(), one})
     if (value(rest, end).is_zero()) take(end);
-  while (rest.size() > 1) {
-    Dyadic found;
-    auto isolated = isolate(rest, found);
-    if (found.is_zero()) {
+  const int variations = variations_between_ends(rest);
+  if (variations == 1) roots.push_back({Dyadic(), one, rest});
+  if (variations > 1) {
+    // Sturm's count of distinct roots; a midpoint that is a root is divided out.
+    rest = square_free(rest);
+    for (bool open = rest.size() > 1; open;) {
+      Dyadic found;
+      const auto isolated = isolate(rest, found);
       roots.insert(roots.end(), isolated.begin(), isolated.end());
-      break;
+      open = !found.is_zero();
+      if (open) take(found);
     }
-    take(found);
   }
   for (auto& root : roots)
     if (!root.exact()) refine(root);

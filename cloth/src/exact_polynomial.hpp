@@ -22,7 +22,7 @@ Polynomial derivative(const Polynomial& p);
 Dyadic value(const Polynomial& p, const Dyadic& x);
 
 // A root in (0, 1) or at an end: either exactly `lo` == `hi`, or the only root of `of` in (lo, hi), where
-// `of` has no double roots and is not zero at either end.
+// it is simple and `of` is not zero at either end.
 struct Root {
   Dyadic lo, hi;
   Polynomial of;

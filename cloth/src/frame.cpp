@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "tauguard/geometry/rounding.hpp"
+
 namespace tauguard::cloth {
 namespace {
 
@@ -72,6 +74,7 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const double* x_t0,
   std::vector<Collisions> parts(ccd.chunks(kind));
   const auto start = std::chrono::steady_clock::now();
   ccd.for_each_block(kind, [&](const CandidateBlock& block, std::size_t chunk) {
+    const geometry::RoundToNearest guard;  // of this thread
     static thread_local Answers answers;
     Collisions& part = parts[chunk];
     const auto begin = std::chrono::steady_clock::now();

@@ -82,6 +82,7 @@ bool certain(const Query& k, double a, double b, bool vf) {
 double first_contact(const Query& k, bool vf, Stats& stats) {
   struct Piece { double a, b; Cubic c; };
   const double error = k.cubic_error();
+  const int most = k.distance > 0 ? 4000 : 40;
   Piece stack[128];
   int top = 0;
   stack[top++] = {0, 1, cubic(k)};
@@ -97,8 +98,8 @@ double first_contact(const Query& k, bool vf, Stats& stats) {
       if (plane_direction(k, middle, piece.a, piece.b, vf)) continue;
       if (!(crosses && width > 0x1p-30) && edge_direction(k, middle, piece.a, piece.b)) continue;
     }
-    if (width < 0x1p-34 || count > 4000 || top > 120)
-      return k.distance > 0 || certain(k, piece.a, piece.b, vf) ? piece.a : undecided;
+    if (width < 0x1p-34 || count > most || top > 120)
+      return k.distance > 0 || (width < 0x1p-33 && certain(k, piece.a, piece.b, vf)) ? piece.a : undecided;
     Piece left, right;
     if (crosses) {
       const double x = root(b), delta = 0x1p-37 / width;

@@ -201,11 +201,16 @@ NB_MODULE(_mesh, m) {
                       nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> point,
                       nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> normal,
                       nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig> weights) {
-    const nb::gil_scoped_release release;
-    const tauguard::geometry::RoundToNearest guard;
     Stats stats;
-    (vf ? solve_vf : solve_ee)(x_t0.data(), x_t1.data(), rows.data(), hit.shape(0), Method(method), min_distance,
-                               hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats);
+    {
+      const nb::gil_scoped_release release;
+      const tauguard::geometry::RoundToNearest guard;
+      (vf ? solve_vf : solve_ee)(x_t0.data(), x_t1.data(), rows.data(), rows.shape(0), Method(method), min_distance,
+                                 hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats);
+    }
+    nb::dict counts;
+    add_counts(counts, stats);
+    return counts;
   });
   // For tests: the narrow phase's kernels from now on ("portable", "avx2"); another name: the fastest again.
   m.def("force_batch_kernels", [](const std::string& name) { return force_batch_kernels(name.c_str()); },

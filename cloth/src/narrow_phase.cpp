@@ -197,17 +197,33 @@ void one_by_one(const double* x0, const double* x1, const std::int32_t* rows, in
   }
 }
 
+Query query_of(const Group& g, int lane) {
+  const auto vector = [&](int f) { return Vec{g.value[f][lane], g.value[f + 1][lane], g.value[f + 2][lane]}; };
+  Query k{};
+  for (int e = 0; e < 2; ++e) {
+    k.p[e] = vector(Group::p + 3 * e);
+    k.q[e] = vector(Group::q + 3 * e);
+    k.r[e] = vector(Group::r + 3 * e);
+  }
+  return k;
+}
+
+// The comparators, on the same differences and cubics.
 template <bool vf>
 void compare(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method, double* toi,
              Stats& stats) {
+  static thread_local Group groups[batch / width];
+  batch_kernels().gather(vf, x0, x1, rows, n, groups);
   for (int i = 0; i < n; ++i) {
-    const Query k = make<vf>(x0, x1, rows + 4 * i, 0);
-    const Cubic whole = cubic(k);
+    const Group& g = groups[i / width];
+    const int lane = i % width;
+    Cubic whole;
+    for (int j = 0; j < 4; ++j) whole.b[j] = g.value[Group::cubic + j][lane];
     toi[i] = never;
     if (filtered_out(whole, method)) {
       ++stats.cubic_sign;
     } else {
-      toi[i] = first_root_inside(k, whole, method, vf);
+      toi[i] = first_root_inside(query_of(g, lane), whole, method, vf);
       stats.roots += !(toi[i] <= 1);
     }
   }

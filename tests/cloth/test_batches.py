@@ -32,7 +32,7 @@ def test_every_variant_gives_the_same_bits(kind, fastest_after):
     x = queries(0)
     assert _mesh.force_batch_kernels("portable")
     portable = QUERIES[kind](x[:, 0], x[:, 1])
-    assert 500 < portable.hit.sum() < 4_000
+    assert 200 < portable.hit.sum() < 4_000
     for name in ("avx2", ""):
         if not _mesh.force_batch_kernels(name) and name:
             continue
@@ -58,4 +58,4 @@ def test_batches_agree_with_exact_arithmetic(kind):
     assert np.array_equal(ours.hit, exact.hit)
     early = exact.toi[exact.hit] - ours.toi[exact.hit]
     assert early.min() >= 0
-    assert early.max() <= 1e-9
+    assert early.max() <= 1e-9  # of the step
