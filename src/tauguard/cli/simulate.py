@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tauguard.envs import Episode
 
 
 def command(
@@ -37,7 +41,6 @@ def command(
     from tauguard.benchmarks.report import write_json
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
     from tauguard.models import Mismatch
-    from tauguard.traces import read_mcap
 
     if episodes < 1:
         raise ValueError(f"--episodes {episodes}: expected 1 or more")
@@ -50,23 +53,26 @@ def command(
         else free_episodes(seed, episodes, seconds, speeds, payloads_g, arm)
     )
     paths = write_dataset(planned, out, workers)
-    rows = []
-    for path, episode in zip(paths, planned, strict=True):
-        trace, _ = read_mcap(path)
-        found = trace.truth.collisions if trace.truth else ()
-        rows.append(
-            {
-                "file": path.name,
-                "seconds": episode.seconds,
-                "speed": episode.speed,
-                "payload_g": episode.payload_g,
-                "collisions": len(found),
-                "peak_tau": max((c.peak_tau for c in found), default=0.0),
-            }
-        )
-        print(
-            f"{path.name}  {episode.seconds:6.1f} s  {episode.speed:5.1f} %  "
-            f"{episode.payload_g:6.0f} g  {len(found)} collisions"
-        )
+    rows = [told(path, episode) for path, episode in zip(paths, planned, strict=True)]
     if json is not None:
         write_json(json, {"name": "simulate", "seed": seed, "rows": rows})
+
+
+def told(path: Path, episode: Episode) -> dict[str, object]:
+    """What one recording holds, printed as a line and given for JSON."""
+    from tauguard.traces import read_mcap
+
+    trace, _ = read_mcap(path)
+    found = trace.truth.collisions if trace.truth else ()
+    print(
+        f"{path.name}  {episode.seconds:6.1f} s  {episode.speed:5.1f} %  "
+        f"{episode.payload_g:6.0f} g  {len(found)} collisions"
+    )
+    return {
+        "file": path.name,
+        "seconds": episode.seconds,
+        "speed": episode.speed,
+        "payload_g": episode.payload_g,
+        "collisions": len(found),
+        "peak_tau": max((c.peak_tau for c in found), default=0.0),
+    }

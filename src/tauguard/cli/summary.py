@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from tauguard.detectors import Matching
 
 
@@ -65,39 +67,51 @@ def draw(path: Path, summary: Mapping[str, Any], matchings: Sequence[Matching]) 
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
-    import numpy as np
 
     figure, axes = plt.subplots(1, 3, figsize=(14, 4.6), layout="constrained")
-    strata = {k: v for k, v in summary["strata"].items() if v["sensitivity"]["n"]}
-    values = [v["sensitivity"]["value"] for v in strata.values()]
-    low = [v["sensitivity"]["value"] - v["sensitivity"]["low"] for v in strata.values()]
-    high = [v["sensitivity"]["high"] - v["sensitivity"]["value"] for v in strata.values()]
-    axes[0].bar(range(len(strata)), values, color="#2a788e", yerr=[low, high], capsize=4)
-    labels = [f"{k}\nn = {v['sensitivity']['n']}" for k, v in strata.items()]
-    axes[0].set_xticks(range(len(strata)), labels)
-    axes[0].set(
+    _draw_strata(axes[0], summary["strata"])
+    _draw_confusion(axes[1], summary["confusion"], summary["false_alarms_per_hour"])
+    _draw_delays(axes[2], matchings)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _draw_strata(axes: Axes, strata: Mapping[str, Any]) -> None:
+    judged = {k: v for k, v in strata.items() if v["sensitivity"]["n"]}
+    figures = [v["sensitivity"] for v in judged.values()]
+    values = [figure["value"] for figure in figures]
+    low = [figure["value"] - figure["low"] for figure in figures]
+    high = [figure["high"] - figure["value"] for figure in figures]
+    axes.bar(range(len(judged)), values, color="#2a788e", yerr=[low, high], capsize=4)
+    axes.set_xticks(
+        range(len(judged)), [f"{k}\nn = {v['n']}" for k, v in zip(judged, figures, strict=True)]
+    )
+    axes.set(
         xlabel="achieved peak |tau_ext|, joints 1-4 [N m]",
         ylabel="sensitivity (95 % interval)",
         ylim=(0, 1.05),
         title="Collisions found, by severity",
     )
-    confusion = summary["confusion"]
+
+
+def _draw_confusion(axes: Axes, confusion: Mapping[str, int], alarms: Mapping[str, Any]) -> None:
+    import numpy as np
+
     table = np.array([[confusion["tp"], confusion["fn"]], [confusion["fp"], confusion["tn"]]])
-    axes[1].imshow(table / table.sum(axis=1, keepdims=True), cmap="YlGnBu", vmin=0, vmax=1)
-    for i in range(2):
-        for j in range(2):
-            share = table[i, j] / max(table[i].sum(), 1)
-            axes[1].text(
-                j, i, f"{table[i, j]}", ha="center", va="center", fontsize=15,
-                color="white" if share > 0.6 else "black",
-            )  # fmt: skip
-    axes[1].set_xticks([0, 1], ["alarm", "no alarm"])
-    axes[1].set_yticks([0, 1], ["collision", "no collision\n(2 s cases)"])
-    alarms = summary["false_alarms_per_hour"]
-    axes[1].set_title(
+    share = table / np.maximum(table.sum(axis=1, keepdims=True), 1)
+    axes.imshow(share, cmap="YlGnBu", vmin=0, vmax=1)
+    for (i, j), number in np.ndenumerate(table):
+        color = "white" if share[i, j] > 0.6 else "black"
+        axes.text(j, i, f"{number}", ha="center", va="center", fontsize=15, color=color)
+    axes.set_xticks([0, 1], ["alarm", "no alarm"])
+    axes.set_yticks([0, 1], ["collision", "no collision\n(2 s cases)"])
+    axes.set_title(
         f"Confusion matrix\n{alarms['value']:.1f} false alarms per hour "
         f"[{alarms['low']:.1f}, {alarms['high']:.1f}]"
     )
+
+
+def _draw_delays(axes: Axes, matchings: Sequence[Matching]) -> None:
     colours = {"strike": "#d95f02", "clamp": "#7570b3", "pulse": "#1b9e77"}
     for kind, colour in colours.items():
         pairs = [
@@ -107,16 +121,14 @@ def draw(path: Path, summary: Mapping[str, Any], matchings: Sequence[Matching]) 
             if c.kind == kind and d is not None
         ]
         if pairs:
-            axes[2].scatter(*zip(*pairs, strict=True), s=22, color=colour, label=kind)
-    axes[2].set(
+            axes.scatter(*zip(*pairs, strict=True), s=22, color=colour, label=kind)
+    axes.set(
         xscale="log",
         yscale="log",
         xlabel="achieved peak |tau_ext|, joints 1-4 [N m]",
         ylabel="delay after onset [ms]",
         title="Detection delay",
     )
-    axes[2].grid(alpha=0.3)
-    if axes[2].get_legend_handles_labels()[0]:
-        axes[2].legend()
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    axes.grid(alpha=0.3)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend()
