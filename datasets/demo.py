@@ -23,6 +23,11 @@ class DemoPlan:
     judge_free: list[Episode]
     showcase: Episode
 
+    @property
+    def seconds(self) -> float:
+        """Simulated for training and judging [s]."""
+        return sum(e.seconds for e in (*self.train, *self.judge_struck, *self.judge_free))
+
 
 def demo_plan(seed: int) -> DemoPlan:
     """75 training collisions, 72 judged ones, 10 judged collision-free minutes and a showcase.

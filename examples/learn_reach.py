@@ -77,9 +77,8 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     np.save(options.out / "policy.npy", weights)
     for generation, (value, reached, seconds) in enumerate(curve):
-        print(
-            f"generation {generation:3d}: return {value:6.2f}, targets {reached:.2f}, {seconds:5.1f} s"
-        )
+        line = f"generation {generation:3d}: return {value:6.2f}, targets {reached:.2f}"
+        print(f"{line}, {seconds:5.1f} s")
 
     import matplotlib
 

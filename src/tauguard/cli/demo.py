@@ -39,8 +39,6 @@ def command(
     from tauguard.datasets import demo_plan, simulate_all
     from tauguard.detectors import figures, judge
     from tauguard.envs import simulate
-    from tauguard.replay import write_rrd
-    from tauguard.traces import write_mcap
 
     plan = demo_plan(seed)
     training = list(simulate_all(plan.train, workers, "simulate training"))
@@ -54,12 +52,9 @@ def command(
         judge(detection, trace, detector.settings.settle)
         for detection, trace in zip(detections, judged, strict=True)
     ]
-    showcase = simulate(plan.showcase)
-    shown = detector.detect(showcase)
-    seconds = sum(e.seconds for e in (*plan.train, *plan.judge_struck, *plan.judge_free))
     summary: dict[str, Any] = {
         "seed": seed,
-        "simulated_seconds": seconds,
+        "simulated_seconds": plan.seconds,
         "judged_seconds": sum(m.free_seconds for m in matchings),
         "not_judged_seconds": detector.settings.settle * len(judged),
         "collisions_by_kind": count(judged, lambda c: c.kind),
@@ -70,14 +65,13 @@ def command(
             "simulate_s": simulated - started,
             "train_s": fitted - simulated,
             "detect_s": detected - fitted,
-            "real_time_factor": seconds / (simulated - started),
+            "real_time_factor": plan.seconds / (simulated - started),
             "simulation_us_per_sample": simulation_timing(plan.judge_free[0]),
             **detector_timing(detector, judged, detected - fitted),
         },
     }
-    write_mcap(out / "demo.mcap", showcase, shown)
-    write_rrd(out / "demo.rrd", showcase, shown)
-    detector.save(out / "model.skops")
+    showcase = simulate(plan.showcase)
+    leave(out, showcase, detector)
     draw(out / "summary.png", summary, matchings)
     summary["timing"]["total_s"] = time.perf_counter() - started
     for path in filter(None, (out / "summary.json", json)):
@@ -85,6 +79,17 @@ def command(
     print(text(summary))
     print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
     print(f"look at the recording with: rerun {out / 'demo.rrd'}")
+
+
+def leave(out: Path, showcase: Trace, detector: CollisionDetector) -> None:
+    """Write the recording, what the viewer shows of it, and the detector into the folder."""
+    from tauguard.replay import write_rrd
+    from tauguard.traces import write_mcap
+
+    shown = detector.detect(showcase)
+    write_mcap(out / "demo.mcap", showcase, shown)
+    write_rrd(out / "demo.rrd", showcase, shown)
+    detector.save(out / "model.skops")
 
 
 def count(traces: list[Trace], key: Any) -> dict[str, int]:

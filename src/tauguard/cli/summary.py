@@ -121,7 +121,8 @@ def _draw_delays(axes: Axes, matchings: Sequence[Matching]) -> None:
             if c.kind == kind and d is not None
         ]
         if pairs:
-            axes.scatter(*zip(*pairs, strict=True), s=22, color=colour, label=kind)
+            peaks, delays = zip(*pairs, strict=True)
+            axes.scatter(peaks, delays, s=22, color=colour, label=kind)
     axes.set(
         xscale="log",
         yscale="log",
