@@ -1,7 +1,10 @@
 """The learning example learns: targets that nobody reached at first."""
 
 import importlib.util
+import runpy
 from pathlib import Path
+
+import pytest
 
 SOURCE = Path(__file__).parents[2] / "examples" / "learn_reach.py"
 
@@ -15,3 +18,11 @@ def test_the_cross_entropy_method_reaches_targets():
     assert curve[0, 1] == 0
     assert curve[-2:, 1].mean() >= 0.5  # targets an episode of two seconds
     assert curve[-2:, 0].mean() > curve[0, 0] + 0.3
+
+
+def test_stable_baselines_trains(monkeypatch, capsys):
+    pytest.importorskip("stable_baselines3", reason="the extra `learn` is not installed")
+    source = SOURCE.with_name("learn_sb3.py")
+    monkeypatch.setattr("sys.argv", [source.name, "--steps", "4096"])
+    runpy.run_path(str(source), run_name="__main__")
+    assert "mean return of one more episode" in capsys.readouterr().out
