@@ -10,6 +10,7 @@ A study is a module ``tauguard.benchmarks.<name>`` with two functions::
 STUDIES: dict[str, str] = {
     "simulation": "what each part of a scene costs, and what the time step costs in accuracy",
     "impact": "blows against body regions beside the two-mass model: error against cost",
+    "detection_conformal": "false alarms per hour: what calibration promises, and what is counted",
     "rigid": "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
 }

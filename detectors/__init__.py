@@ -1,6 +1,12 @@
 """Momentum observer, features, collision detectors, event matching and metrics."""
 
 from tauguard.detectors.calibrate import Calibration, Priors, calibrate
+from tauguard.detectors.conformal import (
+    EpisodeLevels,
+    Promise,
+    calibrate_threshold,
+    promised,
+)
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.events import Matching, find_alarms, judge, match
@@ -30,12 +36,14 @@ __all__ = [
     "Confirmation",
     "Detector",
     "DetectorSettings",
+    "EpisodeLevels",
     "Estimate",
     "Estimator",
     "FrictionModel",
     "Matching",
     "MomentumObserver",
     "Priors",
+    "Promise",
     "QuietDetector",
     "QuietThresholds",
     "RobotNumbers",
@@ -43,6 +51,7 @@ __all__ = [
     "Thresholded",
     "Unknowns",
     "calibrate",
+    "calibrate_threshold",
     "confirmed",
     "figures",
     "find_alarms",
@@ -56,6 +65,7 @@ __all__ = [
     "momentum_terms",
     "observe",
     "poisson_rate",
+    "promised",
     "srq_kernel",
     "wilson",
 ]

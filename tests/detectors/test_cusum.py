@@ -1,13 +1,14 @@
 """CUSUM against its recursion."""
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tauguard.detectors.cusum import bounded_cusum
 
 
+@settings(deadline=None)
 @given(
     arrays(float, st.tuples(st.integers(0, 60), st.integers(1, 3)), elements=st.floats(-9, 9)),
     st.floats(0, 20),
