@@ -12,8 +12,10 @@ from tauguard.contacts.checker import (
     registered,
 )
 from tauguard.contacts.cloth_checker import ClothChecker
+from tauguard.contacts.compare import compare
 from tauguard.contacts.mujoco_checker import MujocoChecker, contacts_of
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
+from tauguard.contacts.report import Disagreement, Outcome, Report, Score
 from tauguard.contacts.rigid_checker import RigidChecker
 
 register("mujoco", MujocoChecker)
@@ -25,11 +27,16 @@ __all__ = [
     "Checker",
     "ClothChecker",
     "Contacts",
+    "Disagreement",
     "MujocoChecker",
+    "Outcome",
     "Pairs",
+    "Report",
     "RigidChecker",
+    "Score",
     "State",
     "checker",
+    "compare",
     "contacts_of",
     "flex_pairs",
     "geom_flex_pairs",

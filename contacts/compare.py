@@ -1,0 +1,127 @@
+"""Several checkers on one run of a scene, beside MuJoCo and a referee: who saw what, and when."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from tauguard.contacts.checker import Checker, Contacts, State, checker
+from tauguard.contacts.mujoco_checker import MujocoChecker
+from tauguard.contacts.referee import Referee, Verdicts
+from tauguard.contacts.report import Report
+from tauguard.contacts.scenes import SCENES, ContactScene
+from tauguard.contacts.scoring import judge, score
+
+
+@dataclass
+class Run:
+    """What happened in a run, step by step; ``times`` has one entry more than the lists.
+
+    Attributes:
+        times: Of the states [s].
+        contacts: By checker, one :class:`Contacts` a step.
+        verdicts: Of the referee, one a step; empty without one.
+        seconds: By checker, what each call took [s].
+        step_seconds: What each ``mj_step`` took [s].
+        state_seconds: What copying each state took [s].
+    """
+
+    times: list[float]
+    contacts: dict[str, list[Contacts]]
+    verdicts: list[Verdicts] = field(default_factory=list)
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+    step_seconds: list[float] = field(default_factory=list)
+    state_seconds: list[float] = field(default_factory=list)
+
+
+def compare(
+    scene: ContactScene | str,
+    checkers: Sequence[str] = ("mujoco", "cloth", "rigid"),
+    timestep: float | None = None,
+    seconds: float | None = None,
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+    referee: bool = True,
+) -> Report:
+    """Run a scene in MuJoCo as it is and let every checker judge every step.
+
+    The checkers only look on. All of them, and the referee, are told the same path: see
+    :class:`tauguard.contacts.State`.
+
+    Args:
+        scene: A :class:`ContactScene`, or the name of one of ``SCENES``.
+        checkers: Names of registered checkers.
+        timestep: Of MuJoCo [s]; ``None``: the scene's.
+        seconds: How long [s]; ``None``: the scene's own time.
+        options: By checker, what to hand to its factory.
+        referee: Whether the referee judges (slow); without it there is no precision or recall.
+
+    Raises:
+        ValueError: an unknown scene or checker, a geom that a checker or the referee cannot
+            handle, a timestep or duration that is not above 0.
+    """
+    if isinstance(scene, str):
+        if scene not in SCENES:
+            raise ValueError(f"scene {scene!r}: there are {', '.join(SCENES)}")
+        scene = SCENES[scene]()
+    duration = scene.seconds if seconds is None else seconds
+    if not 0 < duration < np.inf:
+        raise ValueError(f"seconds {duration}: expected a time above 0")
+    model, data = scene.start(timestep)
+    chosen = {
+        name: checker(name, model, **dict((options or {}).get(name, {}))) for name in checkers
+    }
+    # MuJoCo's own contacts are the yardstick of leads and depths, asked for or not.
+    yardstick = chosen.get("mujoco") or MujocoChecker(model)
+    judging = Referee(model) if referee else None
+    judged = judging.covers if judging is not None else None
+    run = _simulate(model, data, scene, duration, {**chosen, "mujoco": yardstick}, judging)
+    outcomes = judge(model, run.times, run.verdicts, run.contacts["mujoco"])
+    scores = tuple(score(model, name, one.covers, judged, run) for name, one in chosen.items())
+    return Report(
+        scene=scene.name,
+        timestep=float(model.opt.timestep),
+        steps=len(run.step_seconds),
+        scores=scores,
+        outcomes=outcomes,
+        disagreements=tuple(d for s in scores for d in s.disagreements),
+        step_us=1e6 * float(np.median(run.step_seconds)),
+        state_us=1e6 * float(np.median(run.state_seconds)),
+    )
+
+
+def _simulate(
+    model: Any,
+    data: Any,
+    scene: ContactScene,
+    duration: float,
+    checkers: Mapping[str, Checker],
+    referee: Referee | None,
+) -> Run:
+    scratch = mujoco.MjData(model)
+    before = State.of(model, data, scratch)
+    run = Run([before.time], {name: [] for name in checkers})
+    run.seconds = {name: [] for name in checkers}
+    for _ in range(max(1, round(duration / model.opt.timestep))):
+        if scene.control is not None:
+            scene.control(model, data)
+        clock = time.perf_counter()
+        mujoco.mj_step(model, data)
+        stepped = time.perf_counter()
+        after = State.of(model, data, scratch)
+        run.state_seconds.append(time.perf_counter() - stepped)
+        run.step_seconds.append(stepped - clock)
+        for name, one in checkers.items():
+            clock = time.perf_counter()
+            found = one.check(before, after)
+            run.seconds[name].append(time.perf_counter() - clock)
+            run.contacts[name].append(found)
+        if referee is not None:
+            run.verdicts.append(referee.judge(before, after))
+        run.times.append(after.time)
+        before = after
+    return run

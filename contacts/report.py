@@ -1,0 +1,164 @@
+"""What a comparison says: a score for every checker, events and disagreements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import mujoco
+
+from tauguard.contacts.referee import Pair
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """Where a checker and the referee differ."""
+
+    checker: str
+    kind: str  #: "missed": an event without a report; "false": a report without a touch
+    time: float  #: [s]
+    partners: tuple[str, str]
+    depth: float  #: that the referee saw, or the checker claimed [m]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What MuJoCo made of one event."""
+
+    partners: tuple[str, str]
+    onset: float  #: [s]
+    end: float  #: [s]
+    generated: bool  #: MuJoCo listed a contact of this pair while it lasted
+    held: bool  #: and it kept the partners from passing through one another
+
+
+@dataclass(frozen=True)
+class Score:
+    """How one checker did. ``None``: there was nothing to count, or no referee.
+
+    Attributes:
+        checker: Its name.
+        events: Contacts of two partners, from touch to parting, over the pairs it covers.
+        recalled: Of them, seen: a report within a step of them.
+        reports: Steps and partners that it reported.
+        correct: Of them, those that the referee agrees with or does not care about.
+        steps: Steps and partners that touch beyond the tolerance.
+        steps_found: Of them, reported in that very step.
+        delay_ms: From an event's onset to its first report, median [ms].
+        lead_ms: How much earlier than MuJoCo it reports a pair's first contact, median [ms].
+        depth_mm: Difference from MuJoCo's depth at the same state, median [mm].
+        normal_deg: Angle between its normal and MuJoCo's, median [deg].
+        us_per_step: Its own time, median [us].
+        share: Of the time of ``mj_step``.
+        disagreements: By time.
+    """
+
+    checker: str
+    events: int | None = None
+    recalled: int | None = None
+    reports: int | None = None
+    correct: int | None = None
+    steps: int | None = None
+    steps_found: int | None = None
+    delay_ms: float | None = None
+    lead_ms: float | None = None
+    depth_mm: float | None = None
+    normal_deg: float | None = None
+    us_per_step: float = 0.0
+    share: float = 0.0
+    disagreements: tuple[Disagreement, ...] = ()
+
+    @property
+    def recall(self) -> float | None:
+        """Share of the events that were seen."""
+        return self.recalled / self.events if self.events and self.recalled is not None else None
+
+    @property
+    def precision(self) -> float | None:
+        """Share of the reports that are right."""
+        return self.correct / self.reports if self.reports and self.correct is not None else None
+
+
+@dataclass(frozen=True)
+class Report:
+    """The comparison of several checkers on one run of a scene.
+
+    Attributes:
+        scene: Its name.
+        timestep: [s].
+        steps: How many were run.
+        scores: One a checker.
+        outcomes: What MuJoCo made of every event, by onset.
+        disagreements: Of all checkers.
+        step_us: Of ``mj_step``, median [us].
+        state_us: Of copying a state with its kinematics, which all checkers share, median [us].
+    """
+
+    scene: str
+    timestep: float
+    steps: int
+    scores: tuple[Score, ...]
+    outcomes: tuple[Outcome, ...]
+    disagreements: tuple[Disagreement, ...]
+    step_us: float
+    state_us: float
+
+    def __getitem__(self, checker: str) -> Score:
+        for score in self.scores:
+            if score.checker == checker:
+                return score
+        raise KeyError(f"{checker!r}: there are {', '.join(s.checker for s in self.scores)}")
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One flat dictionary a checker."""
+        skip = {"disagreements", "checker"}
+        return [
+            {
+                "scene": self.scene,
+                "timestep_ms": 1e3 * self.timestep,
+                "checker": score.checker,
+                "precision": score.precision,
+                "recall": score.recall,
+                **{f.name: getattr(score, f.name) for f in fields(score) if f.name not in skip},
+                "mj_step_us": self.step_us,
+            }
+            for score in self.scores
+        ]
+
+    def __str__(self) -> str:
+        shown = ["checker", "precision", "recall", "events", "delay_ms", "lead_ms", "depth_mm"]
+        shown += ["normal_deg", "us_per_step", "share"]
+        table = [shown] + [[_cell(row[name]) for name in shown] for row in self.rows()]
+        widths = [max(len(line[i]) for line in table) for i in range(len(shown))]
+        lines = [
+            "  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)).rstrip()
+            for line in table
+        ]
+        missed = sum(not o.generated for o in self.outcomes)
+        lost = sum(not o.held for o in self.outcomes)
+        lines.append(
+            f"{self.scene}: {self.steps} steps of {1e3 * self.timestep:g} ms, "
+            f"{len(self.outcomes)} contacts, by MuJoCo {missed} not generated, {lost} not held; "
+            f"mj_step {self.step_us:.0f} us"
+        )
+        for d in self.disagreements[:20]:
+            names = " and ".join(d.partners)
+            lines.append(f"{d.time:8.4f} s  {d.checker} {d.kind}: {names}, {1e3 * d.depth:.3g} mm")
+        if len(self.disagreements) > 20:
+            lines.append(f"... and {len(self.disagreements) - 20} more disagreements")
+        return "\n".join(lines)
+
+
+def pair_names(model: Any, pair: Pair) -> tuple[str, str]:
+    """Names of the partners: ``body forearm``, ``flex sheet``."""
+    types = {"body": mujoco.mjtObj.mjOBJ_BODY, "flex": mujoco.mjtObj.mjOBJ_FLEX}
+    first, second = (
+        f"{kind} {mujoco.mj_id2name(model, types[kind], number) or number}" for kind, number in pair
+    )
+    return first, second
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

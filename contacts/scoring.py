@@ -1,0 +1,278 @@
+"""How a checker did in one run, against the referee and beside MuJoCo."""
+
+from __future__ import annotations
+
+import itertools
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.contacts.checker import Contacts, geom_kinds, pair_kind
+from tauguard.contacts.referee import TOLERANCE, Event, Pair, Verdicts, events, pair_of
+from tauguard.contacts.report import Disagreement, Outcome, Score, pair_names
+
+if TYPE_CHECKING:
+    from tauguard.contacts.compare import Run
+
+Covers = frozenset[tuple[str, str]]
+#: By geoms, flexes and features: depth [m], inner radius [m], normal.
+_Rows = dict[tuple[int, ...], tuple[float, float, NDArray[np.float64]]]
+
+
+def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run) -> Score:
+    """Precision, recall, lead, differences and cost of one checker.
+
+    Recall counts events (a contact of two partners from touch to parting, don't-care ones left
+    out), precision counts reports (a step and two partners); both only over kinds of pairs that the
+    checker and the referee cover. A report is a row whose surfaces touch; margins are not scored.
+    """
+    kinds = geom_kinds(model)
+    mine = run.contacts[name]
+    reports = _reports(model, run.times, mine)
+    counted: dict[str, Any] = {}
+    wrong: list[Disagreement] = []
+    if judged is not None:
+        both = covers & judged
+        verdicts = [_covered(v, kinds, both) for v in run.verdicts]
+        truth = [e for e in events(model, run.times, verdicts) if e.counts]
+        step = float(model.opt.timestep)
+        seen = [e.seen(reports.get(e.pair, []), step) for e in truth]
+        right, total, false = _precision(model, run, mine, verdicts, kinds, both)
+        positive, found = _steps(model, mine, verdicts)
+        counted = {
+            "events": len(truth),
+            "recalled": sum(seen),
+            "reports": total,
+            "correct": right,
+            "steps": positive,
+            "steps_found": found,
+            "delay_ms": _delay(truth, reports, step),
+        }
+        wrong = [
+            Disagreement(name, "missed", e.onset, pair_names(model, e.pair), e.depth)
+            for e, ok in zip(truth, seen, strict=True)
+            if not ok
+        ] + [Disagreement(name, "false", t, pair_names(model, p), d) for t, p, d in false]
+    depth, angle = _differences(mine, run.contacts["mujoco"])
+    return Score(
+        checker=name,
+        **counted,
+        lead_ms=_lead(reports, _reports(model, run.times, run.contacts["mujoco"])),
+        depth_mm=depth,
+        normal_deg=angle,
+        us_per_step=1e6 * float(np.median(run.seconds[name])),
+        share=float(np.median(run.seconds[name]) / np.median(run.step_seconds)),
+        disagreements=tuple(sorted(wrong, key=lambda d: d.time)),
+    )
+
+
+def judge(
+    model: Any, times: Sequence[float], verdicts: Sequence[Verdicts], mine: Sequence[Contacts]
+) -> tuple[Outcome, ...]:
+    """What MuJoCo made of every event: did it list it, and did it hold?
+
+    Held: listed, never deeper than the thinner partner's inner radius (planes and cloth have
+    none), and no geom or triangle is pushed the other way from one step to the next.
+    """
+    if not verdicts:
+        return ()
+    step = float(model.opt.timestep)
+    reports = _reports(model, times, mine)
+    tracks = _tracks(model, times, mine)
+    out = []
+    for event in events(model, times, verdicts):
+        if not event.counts:
+            continue
+        generated = event.seen(reports.get(event.pair, []), step)
+        track = [
+            rows
+            for time, rows in tracks.get(event.pair, [])
+            if event.onset - step <= time <= event.end + step
+        ]
+        held = generated and not any(_passed(*two) for two in itertools.pairwise([{}, *track]))
+        out.append(Outcome(pair_names(model, event.pair), event.onset, event.end, generated, held))
+    return tuple(out)
+
+
+def _touching(contacts: Contacts) -> Contacts:
+    # Swept checkers stop within 1e-10 of the shapes' size of touching; 1e-8 m is far below the
+    # tolerance of the referee.
+    return contacts.where(contacts.distance <= 1e-8)
+
+
+def _reports(
+    model: Any, times: Sequence[float], steps: Sequence[Contacts]
+) -> dict[Pair, list[float]]:
+    """Times of all reports by pair, rising [s]."""
+    out: dict[Pair, list[float]] = defaultdict(list)
+    for k, contacts in enumerate(steps):
+        first: dict[Pair, float] = {}
+        touching = _touching(contacts)
+        for geom, flex, t in zip(touching.geom, touching.flex, touching.time, strict=True):
+            pair = pair_of(model, geom, flex)
+            first[pair] = min(first.get(pair, np.inf), float(t))
+        for pair, t in first.items():
+            out[pair].append(times[k] + t * (times[k + 1] - times[k]))
+    return dict(out)
+
+
+def _row_kind(kinds: Sequence[str], geom: Any, flex: Any) -> tuple[str, str]:
+    names = ["flex" if g < 0 else kinds[g] for g, _ in zip(geom, flex, strict=True)]
+    return pair_kind(names[0], names[1])
+
+
+def _covered(verdicts: Verdicts, kinds: Sequence[str], covers: Covers) -> Verdicts:
+    keep = _mask(verdicts.geom, verdicts.flex, kinds, covers)
+    fields = ("geom", "flex", "time", "depth", "counts")
+    return Verdicts(*(getattr(verdicts, name)[keep] for name in fields))
+
+
+def _mask(geom: Any, flex: Any, kinds: Sequence[str], covers: Covers) -> NDArray[np.bool_]:
+    rows = zip(geom, flex, strict=True)
+    return np.array([_row_kind(kinds, g, f) in covers for g, f in rows], dtype=bool)
+
+
+def _pairs(model: Any, geom: Any, flex: Any) -> list[Pair]:
+    return [pair_of(model, g, f) for g, f in zip(geom, flex, strict=True)]
+
+
+def _precision(
+    model: Any,
+    run: Run,
+    mine: Sequence[Contacts],
+    verdicts: Sequence[Verdicts],
+    kinds: Sequence[str],
+    covers: Covers,
+) -> tuple[int, int, list[tuple[float, Pair, float]]]:
+    """Reports that the referee agrees with (or does not care about), all reports, the others."""
+    right = total = 0
+    false = []
+    for k, (contacts, verdict) in enumerate(zip(mine, verdicts, strict=True)):
+        touching = _touching(contacts)
+        touching = touching.where(_mask(touching.geom, touching.flex, kinds, covers))
+        said: dict[Pair, float] = {}
+        rows = zip(_pairs(model, touching.geom, touching.flex), touching.distance, strict=True)
+        for pair, distance in rows:
+            said[pair] = min(said.get(pair, np.inf), float(distance))
+        true = set(_pairs(model, verdict.geom, verdict.flex))
+        for pair, distance in said.items():
+            total += 1
+            if pair in true or distance > -TOLERANCE:
+                right += 1  # no deeper than the tolerance: nobody's mistake
+            else:
+                false.append((run.times[k], pair, -distance))
+    return right, total, false
+
+
+def _steps(model: Any, mine: Sequence[Contacts], verdicts: Sequence[Verdicts]) -> tuple[int, int]:
+    """Steps and pairs that touch beyond the tolerance, and those reported in that very step."""
+    positive = found = 0
+    for contacts, verdict in zip(mine, verdicts, strict=True):
+        true = {
+            pair
+            for pair, counts in zip(
+                _pairs(model, verdict.geom, verdict.flex), verdict.counts, strict=True
+            )
+            if counts
+        }
+        if true:
+            touching = _touching(contacts)
+            positive += len(true)
+            found += len(true & set(_pairs(model, touching.geom, touching.flex)))
+    return positive, found
+
+
+def _delay(truth: Sequence[Event], reports: dict[Pair, list[float]], step: float) -> float | None:
+    """Median time from onset to first report of the events seen [ms]."""
+    delays = []
+    for event in truth:
+        times = [
+            t for t in reports.get(event.pair, []) if event.onset - step <= t <= event.end + step
+        ]
+        if times:
+            delays.append(1e3 * (times[0] - event.onset))
+    return float(np.median(delays)) if delays else None
+
+
+def _lead(mine: dict[Pair, list[float]], theirs: dict[Pair, list[float]]) -> float | None:
+    """Median of how much earlier than MuJoCo each pair's first contact was reported [ms]."""
+    leads = [1e3 * (theirs[pair][0] - mine[pair][0]) for pair in mine if pair in theirs]
+    return float(np.median(leads)) if leads else None
+
+
+def _differences(
+    mine: Sequence[Contacts], theirs: Sequence[Contacts]
+) -> tuple[float | None, float | None]:
+    """Medians of the depth's [mm] and the normal's [deg] difference from MuJoCo.
+
+    At the same state: rows that touch from the start of a step beside the rows that MuJoCo listed
+    at the end of the step before; of each pair (and element) the deepest.
+    """
+    depth, angle = [], []
+    steps = zip(mine[1:], theirs[:-1], strict=True) if mine is not theirs else []
+    for here, there in steps:
+        ours = _deepest(here.where((here.time == 0) & (here.distance < 0)))
+        for key, (distance, normal) in _deepest(there.where(there.distance < 0)).items():
+            if key in ours:
+                depth.append(abs(distance - ours[key][0]))
+                angle.append(np.arccos(np.clip(abs(normal @ ours[key][1]), -1, 1)))
+    if not depth:
+        return None, None
+    return 1e3 * float(np.median(depth)), float(np.degrees(np.nanmedian(angle)))
+
+
+def _deepest(contacts: Contacts) -> dict[tuple[int, ...], tuple[float, NDArray[np.float64]]]:
+    out: dict[tuple[int, ...], tuple[float, NDArray[np.float64]]] = {}
+    for k in np.argsort(-contacts.distance):
+        key = (*contacts.geom[k].tolist(), *contacts.flex[k].tolist())
+        if (contacts.flex[k] >= 0).any():
+            key = (*key, *contacts.feature[k].tolist())
+        out[key] = (float(contacts.distance[k]), contacts.normal[k])
+    return out
+
+
+def _passed(before: _Rows, rows: _Rows) -> bool:
+    """Whether a partner is through: too deep, or the same features pushed the other way."""
+    if any(depth >= inner for depth, inner, _ in rows.values()):
+        return True
+    return any(before[key][2] @ rows[key][2] < 0 for key in before.keys() & rows.keys())
+
+
+def _tracks(
+    model: Any, times: Sequence[float], steps: Sequence[Contacts]
+) -> dict[Pair, list[tuple[float, _Rows]]]:
+    """By pair: the time of each step in which it touches, and its rows, by what touches."""
+    inner = _inner_radius(model)
+    out: dict[Pair, list[tuple[float, _Rows]]] = defaultdict(list)
+    for k, contacts in enumerate(steps):
+        touching = contacts.where(contacts.distance <= 0)
+        found: dict[Pair, _Rows] = defaultdict(dict)
+        for i in np.argsort(-touching.distance):
+            geom, flex = touching.geom[i], touching.flex[i]
+            thin = min((inner[g] for g in geom if g >= 0), default=np.inf)
+            key = (*geom.tolist(), *flex.tolist(), *touching.feature[i].tolist())
+            row = (-float(touching.distance[i]), thin, touching.normal[i])
+            found[pair_of(model, geom, flex)][key] = row
+        for pair, rows in found.items():
+            out[pair].append((times[k + 1], rows))
+    return dict(out)
+
+
+def _inner_radius(model: Any) -> NDArray[np.float64]:
+    """Half the smallest thickness of each geom [m]; inf for a plane."""
+    kinds = geom_kinds(model)
+    out = np.full(model.ngeom, np.inf)
+    for g, kind in enumerate(kinds):
+        size = model.geom_size[g]
+        if kind in ("sphere", "capsule"):
+            out[g] = size[0]
+        elif kind == "cylinder":
+            out[g] = size[:2].min()
+        elif kind in ("box", "ellipsoid"):
+            out[g] = size.min()
+        elif kind == "mesh":
+            out[g] = model.geom_aabb[g, 3:].min()
+    return out

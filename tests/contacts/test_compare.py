@@ -1,0 +1,124 @@
+"""The comparison's counts, on runs whose contacts are known."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from tauguard.contacts import Contacts, compare, pair_kind, register
+from tauguard.contacts.scenes import ContactScene, arm_boxes, ball_cloth, sphere_plate
+
+BOUNCE = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody>
+  <body name="wall"><geom type="box" size=".1 1 1" pos="1.1 0 0"/></body>
+  <body name="ball"><freejoint/><geom size=".1" mass="1" solref="-40000 0"/></body>
+  </worldbody></mujoco>"""
+
+
+def bounce(speed):
+    """A ball that reaches the wall after 0.9 m."""
+    model = mujoco.MjModel.from_xml_string(BOUNCE)
+    qvel = np.array([speed, 0, 0, 0, 0, 0.0])
+    return ContactScene("bounce", model, model.qpos0.copy(), qvel, seconds=0.5)
+
+
+def test_one_bounce_is_one_event_seen_at_its_time():
+    report = compare(bounce(2.001), ["mujoco", "rigid", "cloth"])
+    assert len(report.outcomes) == 1
+    outcome = report.outcomes[0]
+    assert outcome.partners == ("body wall", "body ball")
+    assert outcome.onset == pytest.approx(0.9 / 2.001, abs=1e-6)
+    assert outcome.generated
+    assert outcome.held
+    rigid = report["rigid"]
+    assert (rigid.events, rigid.recalled, rigid.recall, rigid.precision) == (1, 1, 1.0, 1.0)
+    assert rigid.steps == rigid.steps_found > 1
+    assert rigid.delay_ms == pytest.approx(0, abs=1e-3)
+    # MuJoCo knows at the end of the step in which it happens.
+    steps = 0.9 / 2.001 / 0.002
+    assert rigid.lead_ms == pytest.approx(2 * (np.ceil(steps) - steps), abs=1e-3)
+    assert rigid.depth_mm == pytest.approx(0, abs=1e-9)
+    assert rigid.normal_deg == pytest.approx(0, abs=1e-6)
+    assert report["mujoco"].lead_ms == 0
+    assert report["cloth"].events == 0
+    assert report["cloth"].recall is None
+    assert not report.disagreements
+    assert rigid.us_per_step > 0
+    assert report.steps == 250
+
+
+class Blind:
+    name = "blind"
+    covers = frozenset({pair_kind("box", "sphere")})
+
+    def __init__(self, model):
+        pass
+
+    def check(self, before, after):
+        return Contacts.empty()
+
+
+class Jumpy(Blind):
+    """Claims a deep contact of the two geoms in every step."""
+
+    name = "jumpy"
+
+    def check(self, before, after):
+        return Contacts([0.5], [[0, 1]], [[-1, -1]], [[-1, -1]], [[0, 0, 0]], [[1, 0, 0]], [-0.01])
+
+
+def test_a_blind_and_a_jumpy_checker_are_told_apart():
+    register("blind", Blind)
+    register("jumpy", Jumpy)
+    report = compare(bounce(2.0), ["blind", "jumpy"])
+    blind, jumpy = report["blind"], report["jumpy"]
+    assert (blind.recall, blind.precision, blind.reports) == (0.0, None, 0)
+    assert [d.kind for d in blind.disagreements] == ["missed"]
+    assert jumpy.recall == 1.0
+    assert jumpy.reports == 250
+    assert jumpy.precision == jumpy.correct / 250
+    assert jumpy.steps <= jumpy.correct <= jumpy.steps + 2
+    assert sum(d.kind == "false" for d in jumpy.disagreements) == 250 - jumpy.correct
+    text = str(report)
+    assert "blind missed: body wall and body ball" in text
+    assert "more disagreements" in text
+    assert {row["checker"] for row in report.rows()} == {"blind", "jumpy"}
+
+
+@pytest.mark.parametrize("build", [ball_cloth, sphere_plate])
+def test_what_mujoco_steps_over_the_swept_checkers_see(build):
+    report = compare(build(speed=40.0), timestep=5e-3)
+    outcome = report.outcomes[0]
+    assert not outcome.generated
+    assert not outcome.held
+    seen = "cloth" if build is ball_cloth else "rigid"
+    assert report[seen].recall == 1.0
+    assert report[seen].precision == 1.0
+    assert report["mujoco"].recall == 0.0
+    assert [d.checker for d in report.disagreements] == ["mujoco"]
+
+
+def test_recall_of_the_arm_between_boxes_is_one():
+    report = compare(arm_boxes(), timestep=5e-3)
+    rigid = report["rigid"]
+    assert rigid.events >= 3
+    assert rigid.recall == 1.0
+    assert rigid.steps_found == rigid.steps
+    assert rigid.precision == 1.0
+
+
+def test_without_a_referee_there_is_cost_but_no_judgement():
+    report = compare(bounce(2.0), ["rigid"], seconds=0.05, referee=False)
+    assert report["rigid"].recall is None
+    assert report["rigid"].events is None
+    assert report.steps == 25
+    assert report.outcomes == ()
+
+
+def test_bad_input_is_named():
+    with pytest.raises(ValueError, match=r"scene 'moon': there are arm_cloth"):
+        compare("moon")
+    with pytest.raises(ValueError, match=r"checker 'eye': there are .*mujoco"):
+        compare(bounce(1.0), ["eye"])
+    with pytest.raises(ValueError, match="seconds -1"):
+        compare(bounce(1.0), seconds=-1)
+    with pytest.raises(KeyError, match="'cloth': there are rigid"):
+        compare(bounce(1.0), ["rigid"], seconds=0.01)["cloth"]
