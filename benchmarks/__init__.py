@@ -12,5 +12,6 @@ STUDIES: dict[str, str] = {
     "impact": "blows against body regions beside the two-mass model: error against cost",
     "detection_conformal": "false alarms per hour: what calibration promises, and what is counted",
     "rigid": "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
+    "contacts": "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
 }

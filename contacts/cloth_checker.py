@@ -48,7 +48,7 @@ class ClothChecker:
         kinds = np.array(geom_kinds(model))
         pairs = geom_flex_pairs(model)
         keep = ~np.isin(kinds[pairs.first], skip)
-        pairs = Pairs(*(getattr(pairs, f)[keep] for f in ("first", "second", "margin", "gap")))
+        pairs = pairs.where(keep)
         between = flex_pairs(model)
         used = {*pairs.second.tolist()}
         if self_collision:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from tauguard.contacts._contacts import Scene
-from tauguard.contacts.checker import Array, geom_kinds
+from tauguard.contacts.checker import Array, Index, geom_kinds
 
 #: Numbers of the native cores: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
 _CORES = {
@@ -26,8 +26,14 @@ CONVEX = tuple(_CORES)
 _NONE = np.zeros((0, 3))
 
 
-def native_scene(model: Any, geoms: Iterable[int], checker: str) -> Scene:
+def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool = False) -> Scene:
     """A native scene of these geoms, numbered as in the list.
+
+    Args:
+        model: MjModel.
+        geoms: Their ids.
+        checker: Name for messages.
+        surfaces: Whether a mesh is its surface instead of its convex hull.
 
     Raises:
         ValueError: a geom of a kind that has no convex shape (named).
@@ -42,6 +48,8 @@ def native_scene(model: Any, geoms: Iterable[int], checker: str) -> Scene:
                 f"{', '.join(CONVEX)} (skip=({kind!r},) leaves such geoms out)"
             )
         _add(scene, model, int(geom), kind)
+        if surfaces and kind == "mesh":
+            scene.surface(*mesh_surface(model, int(geom)))
     return scene
 
 
@@ -69,6 +77,16 @@ def hull_vertices(model: Any, geom: int) -> Array:
     number = int(model.mesh_graph[graph])
     ids = model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]
     return np.asarray(vertices[ids], dtype=np.float64)
+
+
+def mesh_surface(model: Any, geom: int) -> tuple[Array, Index]:
+    """Vertices (V, 3) [m] and faces (F, 3) of a mesh geom, in the geom's frame."""
+    mesh = int(model.geom_dataid[geom])
+    start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    first, number = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    vertices = np.ascontiguousarray(model.mesh_vert[start : start + count], dtype=np.float64)
+    faces = np.ascontiguousarray(model.mesh_face[first : first + number], dtype=np.int32)
+    return vertices, faces
 
 
 def _add(scene: Scene, model: Any, geom: int, kind: str) -> None:

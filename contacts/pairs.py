@@ -39,6 +39,10 @@ class Pairs:
     def __len__(self) -> int:
         return len(self.first)
 
+    def where(self, rows: NDArray[Any]) -> Pairs:
+        """The chosen rows: a mask or indices."""
+        return Pairs(self.first[rows], self.second[rows], self.margin[rows], self.gap[rows])
+
     def reach(self, threshold: str) -> Array:
         """How far apart counts as contact: 0, the margin, or margin + gap; never below 0."""
         zero = np.zeros(len(self))

@@ -49,6 +49,8 @@ class Score:
         depth_mm: Difference from MuJoCo's depth at the same state, median [mm].
         normal_deg: Angle between its normal and MuJoCo's, median [deg].
         us_per_step: Its own time, median [us].
+        us_low: 10 % quantile.
+        us_high: 90 % quantile.
         share: Of the time of ``mj_step``.
         disagreements: By time.
     """
@@ -65,6 +67,8 @@ class Score:
     depth_mm: float | None = None
     normal_deg: float | None = None
     us_per_step: float = 0.0
+    us_low: float = 0.0
+    us_high: float = 0.0
     share: float = 0.0
     disagreements: tuple[Disagreement, ...] = ()
 

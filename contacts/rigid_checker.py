@@ -10,7 +10,8 @@ import numpy as np
 
 from tauguard.contacts.checker import Contacts, State, geom_kinds, pair_kind
 from tauguard.contacts.geoms import CONVEX, native_scene
-from tauguard.contacts.pairs import Pairs, geom_pairs
+from tauguard.contacts.pairs import geom_pairs
+from tauguard.contacts.surface_pairs import SurfacePairs
 
 
 @dataclass(frozen=True)
@@ -41,25 +42,42 @@ class RigidChecker:
             within MuJoCo's margin, where a force acts; ``"gap"``: within margin + gap, as MuJoCo
             lists them. A row whose surfaces do not touch has a positive distance.
         skip: Kinds of geoms to leave out.
+        mesh: ``"hull"``: a mesh is its convex hull, as in MuJoCo; ``"surface"``: its triangles,
+            without an inside. Against meshes and boxes surfaces then have no margin and no depth.
 
     Raises:
         ValueError: a geom that may touch something and is of a kind that cannot be handled
-            (named), an unknown threshold.
+            (named), an unknown threshold or meaning of a mesh.
     """
 
     name = "rigid"
 
-    def __init__(self, model: Any, threshold: str = "margin", skip: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        model: Any,
+        threshold: str = "margin",
+        skip: Sequence[str] = (),
+        mesh: str = "hull",
+    ) -> None:
         """Choose the pairs and copy the shapes."""
+        if mesh not in ("hull", "surface"):
+            raise ValueError(f"mesh {mesh!r}: there are hull, surface")
         kinds = np.array(geom_kinds(model))
         pairs = geom_pairs(model)
         keep = ~(np.isin(kinds[pairs.first], skip) | np.isin(kinds[pairs.second], skip))
-        self.pairs = Pairs(*(getattr(pairs, f)[keep] for f in ("first", "second", "margin", "gap")))
-        geoms, index = np.unique([self.pairs.first, self.pairs.second], return_inverse=True)
+        self.pairs = pairs.where(keep)
+        trees = np.zeros(len(self.pairs), dtype=bool)
+        if mesh == "surface":
+            flat = np.isin(kinds[self.pairs.first], ("box", "mesh"))
+            trees = flat & (kinds[self.pairs.second] == "mesh")
+        swept, meshes = self.pairs.where(~trees), self.pairs.where(trees)
+        rows = zip(meshes.first.tolist(), meshes.second.tolist(), strict=True)
+        self._surfaces = SurfacePairs(model, list(rows)) if len(meshes) else None
+        geoms, index = np.unique([swept.first, swept.second], return_inverse=True)
         self._geoms = geoms.astype(np.int32)
-        self._scene = native_scene(model, self._geoms, self.name)
+        self._scene = native_scene(model, self._geoms, self.name, surfaces=mesh == "surface")
         numbered = index.reshape(2, -1).T.astype(np.int32)
-        self._scene.pairs(np.ascontiguousarray(numbered), self.pairs.reach(threshold))
+        self._scene.pairs(np.ascontiguousarray(numbered), swept.reach(threshold))
         self.covers = frozenset(
             pair_kind(a, b) for a in CONVEX for b in CONVEX if not a == b == "plane"
         )
@@ -69,12 +87,16 @@ class RigidChecker:
         """What touches on the way; at most one contact a pair, the first."""
         ids, values, work = self._scene.find(before.xpos, before.xmat, after.xpos, after.xmat)
         self.work = Work(*work)
-        return Contacts(
+        none = np.full((len(ids), 2), -1, dtype=np.int32)
+        found = Contacts(
             time=values[:, 0],
             geom=self._geoms[ids[:, :2]],
-            flex=np.full((len(ids), 2), -1, dtype=np.int32),
-            feature=np.full((len(ids), 2), -1, dtype=np.int32),
+            flex=none,
+            feature=np.stack([none[:, 0], ids[:, 2]], axis=1),
             point=values[:, 2:5],
             normal=values[:, 5:8],
             distance=values[:, 1],
         )
+        if self._surfaces is None:
+            return found
+        return Contacts.concatenate([found, self._surfaces.check(before, after)])

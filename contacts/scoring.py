@@ -57,13 +57,16 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
             if not ok
         ] + [Disagreement(name, "false", t, pair_names(model, p), d) for t, p, d in false]
     depth, angle = _differences(mine, run.contacts["mujoco"])
+    low, middle, high = 1e6 * np.quantile(run.seconds[name], [0.1, 0.5, 0.9])
     return Score(
         checker=name,
         **counted,
         lead_ms=_lead(reports, _reports(model, run.times, run.contacts["mujoco"])),
         depth_mm=depth,
         normal_deg=angle,
-        us_per_step=1e6 * float(np.median(run.seconds[name])),
+        us_per_step=float(middle),
+        us_low=float(low),
+        us_high=float(high),
         share=float(np.median(run.seconds[name]) / np.median(run.step_seconds)),
         disagreements=tuple(sorted(wrong, key=lambda d: d.time)),
     )

@@ -67,6 +67,26 @@ class Scene {
     geoms_.add(std::move(shape), body, frame);
   }
 
+  // The surface of the geom added last, instead of its hull.
+  void surface(Rows3 vertices, IntRows faces) {
+    const std::vector<Vec> points = vectors(vertices);
+    Surface surface;
+    for (std::size_t i = 0; i < faces.shape(0); ++i) {
+      Shape triangle{Core::hull, {0, 0, 0}, 0, {}, {}, {}, {}, {}};
+      Vec middle{};
+      for (int k = 0; k < 3; ++k) {
+        const Vec& p = points[faces.data()[3 * i + k]];
+        triangle.x.push_back(p[0]), triangle.y.push_back(p[1]), triangle.z.push_back(p[2]);
+        middle = middle + (1.0 / 3) * p;
+      }
+      double radius = 0;
+      for (int k = 0; k < 3; ++k) radius = std::max(radius, norm(points[faces.data()[3 * i + k]] - middle));
+      surface.triangles.push_back(std::move(triangle));
+      surface.centre.push_back(middle), surface.radius.push_back(radius);
+    }
+    geoms_.add_surface(std::move(surface));
+  }
+
   void pairs(IntRows pairs, Doubles reach) {
     std::vector<GeomPair> list(pairs.shape(0));
     for (std::size_t i = 0; i < list.size(); ++i)
@@ -134,6 +154,7 @@ NB_MODULE(_contacts, m) {
   nb::class_<Scene>(m, "Scene")
       .def(nb::init<>())
       .def("add", &Scene::add)
+      .def("surface", &Scene::surface)
       .def("pairs", &Scene::pairs)
       .def("find", &Scene::find)
       .def("find_flex", &Scene::find_flex);

@@ -37,9 +37,18 @@ struct Counts {
   std::int64_t moved = 0, reused = 0, candidates = 0;
 };
 
+// The triangles of a mesh, for pairs in which its surface counts and not its hull.
+struct Surface {
+  std::vector<Shape> triangles;
+  std::vector<Vec> centre;     // of a ball around each, in the geom's frame
+  std::vector<double> radius;
+};
+
 class Geoms {
  public:
   void add(Shape shape, int body, const Frame& in_body);
+  // Gives the last geom a surface.
+  void add_surface(Surface surface) { surfaces_.back() = std::move(surface); }
   std::size_t size() const { return shapes_.size(); }
 
   // Brings motions and swept boxes up to date, of bodies that moved in this step or since the last one.
@@ -48,6 +57,7 @@ class Geoms {
   bool as_before(int geom) const { return same_[body_[geom]]; }   // and where it was throughout the last one
   const Box& box(int geom) const { return boxes_[geom]; }
   const Shape& shape(int geom) const { return shapes_[geom]; }
+  const Surface& surface(int geom) const { return surfaces_[geom]; }
   const Frame& in_body(int geom) const { return in_body_[geom]; }
   const RigidMotion& motion(int geom) const { return motions_[body_[geom]]; }
   Mover mover(int geom, const Vec& origin) const;
@@ -55,6 +65,7 @@ class Geoms {
 
  private:
   std::vector<Shape> shapes_;
+  std::vector<Surface> surfaces_;
   std::vector<Frame> in_body_;
   std::vector<int> body_;
   std::vector<int> bodies_;             // those that have geoms

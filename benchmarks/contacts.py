@@ -1,0 +1,197 @@
+"""Contact checkers beside MuJoCo's own contacts: what each sees, how early, at what cost.
+
+Three studies. ``scenes``: every checker in every contact scene, judged by a referee on the very
+path that the checkers are told. ``crossing``: a ball into pinned cloth, from starts spread over one
+step's travel, where the time of impact is known in closed form. ``cost``: a large cloth, where a
+checker's time is a share of MuJoCo's step. Precision, recall and lead are those of
+:func:`tauguard.contacts.compare`; a time is the median with the 10 % and 90 % quantiles.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from tauguard.benchmarks.report import Row, rate
+from tauguard.contacts import Report, Score, State, checker, compare, contacts_of
+from tauguard.contacts.scenes import SCENES, arm_cloth, ball_cloth
+
+CHECKERS = ("mujoco", "cloth", "rigid")
+#: Seconds of a scene in a quick run, where its own time is long.
+QUICK_SECONDS = {"sleeve_arm": 0.3, "arm_boxes": 1.2, "two_arms": 1.2}
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """Rows of the three studies; the scenes have no random input, so ``seed`` changes nothing."""
+    timesteps = (5e-3,) if quick else (1e-3, 2e-3, 5e-3)
+    rows = [
+        row
+        for timestep, name in itertools.product(timesteps, SCENES)
+        for row in _scene(name, timestep, QUICK_SECONDS.get(name) if quick else None)
+    ]
+    speeds = (10.0, 50.0) if quick else (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+    modes = ("plain",) if quick else ("plain", "speculative", "ipc")
+    offsets = 5 if quick else 20
+    for mode, timestep, speed in itertools.product(modes, timesteps, speeds):
+        rows.append(_crossing(speed, timestep, mode, offsets))
+    return rows + _cost(0.45 if quick else 0.6)
+
+
+def _scene(name: str, timestep: float, seconds: float | None) -> list[Row]:
+    """One row a checker."""
+    report = compare(SCENES[name](), CHECKERS, timestep=timestep, seconds=seconds)
+    missed = sum(not outcome.generated for outcome in report.outcomes)
+    lost = sum(not outcome.held for outcome in report.outcomes)
+    return [
+        {
+            "study": "scenes",
+            "scene": name,
+            "timestep_ms": 1e3 * timestep,
+            "checker": score.checker,
+            "precision": rate(score.correct or 0, score.reports or 0),
+            "recall": rate(score.recalled or 0, score.events or 0),
+            "steps_recall": rate(score.steps_found or 0, score.steps or 0),
+            "delay_ms": score.delay_ms,
+            "lead_ms": score.lead_ms,
+            "depth_mm": score.depth_mm,
+            "normal_deg": score.normal_deg,
+            **_times(score, report),
+            "not_generated": missed if score.checker == "mujoco" else None,
+            "not_held": lost if score.checker == "mujoco" else None,
+        }
+        for score in report.scores
+    ]
+
+
+def _times(score: Score, report: Report) -> Row:
+    return {
+        "us_per_step": {"median": score.us_per_step, "low": score.us_low, "high": score.us_high},
+        "mj_step_us": report.step_us,
+        "share": score.share,
+    }
+
+
+def _crossing(speed: float, timestep: float, mode: str, offsets: int) -> Row:
+    """Runs from evenly spread starts and three impact points, until the ball has had its time."""
+    generated = held = crossings = seen = 0
+    error = 0.0
+    for impact in ("vertex", "edge", "face"):
+        for offset in np.arange(offsets) / offsets * speed * timestep:
+            one = _fly(speed, timestep, mode, impact, float(offset))
+            generated += one["generated"]
+            held += one["held"]
+            crossings += 1
+            seen += np.isfinite(one["error"])
+            error = max(error, one["error"]) if np.isfinite(one["error"]) else error
+    return {
+        "study": "crossing",
+        "scene": "ball_cloth",
+        "timestep_ms": 1e3 * timestep,
+        "speed": speed,
+        "mode": mode,
+        "mujoco_generates": rate(generated, crossings),
+        "mujoco_holds": rate(held, crossings),
+        "cloth_recall": rate(seen, crossings),
+        "cloth_time_error": error,
+    }
+
+
+def _fly(speed: float, timestep: float, mode: str, impact: str, offset: float) -> dict[str, Any]:
+    """One flight: did MuJoCo list and hold the contact, and how far off is the checker's time?
+
+    Before the first contact the ball moves uniformly and the cloth rests, so the time of impact is
+    the gap over the speed. Held: the ball's centre never crosses the middle surface.
+    """
+    scene = ball_cloth(speed=speed, offset=offset, impact=impact, mode=mode)
+    model, data = scene.start(timestep)
+    scratch = mujoco.MjData(model)
+    check = checker("cloth", model)
+    before = State.of(model, data, scratch)
+    ball = int(model.geom_bodyid[0])
+    level = float(before.flexvert_xpos[:, 2].mean())
+    gap = before.xpos[ball, 2] - level - model.geom_size[0, 0] - model.flex_radius[0]
+    truth = gap / speed
+    generated, held, found = False, True, np.inf
+    for _ in range(int(np.ceil(scene.seconds / timestep))):
+        mujoco.mj_step(model, data)
+        after = State.of(model, data, scratch)
+        generated |= len(contacts_of(data)) > 0
+        if not np.isfinite(found):
+            contacts = check.check(before, after)
+            if len(contacts):
+                found = before.time + float(contacts.time.min()) * timestep
+        held &= _above(model, after, ball)
+        before = after
+    return {"generated": generated, "held": generated and held, "error": abs(found - truth)}
+
+
+def _above(model: Any, state: State, ball: int) -> bool:
+    """Whether the ball's centre is above the cloth's middle surface, where it came from."""
+    corners = state.flexvert_xpos[model.flex_elem.reshape(-1, 3)]
+    centre = state.xpos[ball]
+    (ux, uy), (vx, vy) = ((corners[:, k] - corners[:, 0])[:, :2].T for k in (1, 2))
+    px, py = (centre - corners[:, 0])[:, :2].T
+    area = ux * vy - uy * vx
+    s, t = (px * vy - py * vx) / area, (ux * py - uy * px) / area
+    inside = (s >= -1e-9) & (t >= -1e-9) & (s + t <= 1 + 1e-9)
+    weights = np.stack([1 - s - t, s, t], axis=1)
+    heights = (weights * corners[:, :, 2]).sum(axis=1)[inside]
+    return bool(len(heights) == 0 or centre[2] > heights.min())
+
+
+def _cost(seconds: float) -> list[Row]:
+    """The arm into cloth of 40 x 40 vertices: what a checker adds to MuJoCo's step."""
+    report = compare(arm_cloth(count=40), CHECKERS, timestep=2e-3, seconds=seconds, referee=False)
+    return [
+        {
+            "study": "cost",
+            "scene": "arm_cloth",
+            "cloth": "40x40",
+            "timestep_ms": 2.0,
+            "checker": score.checker,
+            **_times(score, report),
+            "state_us": report.state_us,
+            "share_with_state": score.share + report.state_us / report.step_us,
+        }
+        for score in report.scores
+    ]
+
+
+def draw(rows: list[Row], figure: Any) -> None:
+    """Error against cost in every scene, and the ball's contacts against its speed."""
+    left, right = figure.subplots(1, 2)
+    colours = dict(zip(CHECKERS, ("tab:grey", "tab:blue", "tab:orange"), strict=True))
+    scenes = [r for r in rows if r["study"] == "scenes" and r["recall"]["n"]]
+    for row in scenes:
+        late = abs(row["delay_ms"]) if row["delay_ms"] is not None else np.inf
+        missed = row["recall"]["value"] < 1
+        left.plot(
+            row["share"],
+            row["timestep_ms"] if missed else max(late, 1e-9),
+            "x" if missed else "o",
+            color=colours[row["checker"]],
+        )
+    for name, colour in colours.items():
+        left.plot([], [], "o", color=colour, label=name)
+    left.plot([], [], "x", color="black", label="misses contacts (at its timestep)")
+    left.set(xscale="log", yscale="log")
+    left.set(xlabel="cost: share of mj_step", ylabel="error: onset to first report [ms]")
+    left.legend()
+    crossing = [r for r in rows if r["study"] == "crossing"]
+    for mode, timestep in sorted({(r["mode"], r["timestep_ms"]) for r in crossing}):
+        mine = [r for r in crossing if (r["mode"], r["timestep_ms"]) == (mode, timestep)]
+        right.plot(
+            [r["speed"] for r in mine],
+            [r["mujoco_generates"]["value"] for r in mine],
+            "o-",
+            label=f"MuJoCo, {mode}, {timestep:g} ms",
+        )
+    speeds = sorted({r["speed"] for r in crossing})
+    cloth = [min(r["cloth_recall"]["value"] for r in crossing if r["speed"] == v) for v in speeds]
+    right.plot(speeds, cloth, "k--", label="cloth, every step")
+    right.set(xscale="log", xlabel="ball's speed [m/s]", ylabel="share of contacts generated")
+    right.set_ylim(-0.05, 1.05)
+    right.legend(fontsize="small")
