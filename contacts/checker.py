@@ -92,6 +92,25 @@ class State:
         )
 
 
+def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:
+    """``state``, if its poses are finite and of the model's size.
+
+    Raises:
+        ValueError: another shape, or an entry that is not finite (the field and first bad row).
+    """
+    shapes = {"xpos": (bodies, 3), "xmat": (bodies, 9), "flexvert_xpos": (vertices, 3)}
+    for field_name, shape in shapes.items():
+        value = getattr(state, field_name)
+        if not vertices and field_name == "flexvert_xpos":
+            continue
+        if value.shape != shape:
+            raise ValueError(f"{name}.{field_name}: shape {value.shape}, the model has {shape}")
+        if not np.isfinite(value).all():
+            row = int(np.argmin(np.isfinite(value).all(axis=1)))
+            raise ValueError(f"{name}.{field_name}: row {row} is {value[row].tolist()}, not finite")
+    return state
+
+
 @dataclass(frozen=True, eq=False)
 class Contacts:
     """Contacts of one step, one a row.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tauguard.cloth import Groups, MeshCCD
 from tauguard.contacts._contacts import simplices
-from tauguard.contacts.checker import Contacts, Index, State, geom_kinds, pair_kind
+from tauguard.contacts.checker import Contacts, Index, State, checked, geom_kinds, pair_kind
 from tauguard.contacts.geoms import CONVEX, native_scene
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs
 
@@ -69,10 +69,19 @@ class ClothChecker:
         if self_collision and len(between):
             self._cloths = _Cloths(model, self._flexes, between, between.reach(threshold))
         self.covers = frozenset(pair_kind("flex", kind) for kind in (*CONVEX, "flex"))
+        self._size = (int(model.nbody), int(model.nflexvert))
         self._last: tuple[State, State, Contacts] | None = None
 
     def check(self, before: State, after: State) -> Contacts:
-        """What touches on the way; at most one contact a triangle and geom, or two triangles."""
+        """What touches on the way; at most one contact a triangle and geom, or two triangles.
+
+        Raises:
+            ValueError: a state of another model, or that is not finite.
+        """
+        before, after = (
+            checked(name, state, *self._size)
+            for name, state in (("before", before), ("after", after))
+        )
         if self._last is not None and _same(self._last[0], before) and _same(self._last[1], after):
             return self._last[2]
         parts = []

@@ -46,6 +46,7 @@ def compare(
     seconds: float | None = None,
     options: Mapping[str, Mapping[str, Any]] | None = None,
     referee: bool = True,
+    fine: int | None = None,
 ) -> Report:
     """Run a scene in MuJoCo as it is and let every checker judge every step.
 
@@ -59,10 +60,12 @@ def compare(
         seconds: How long [s]; ``None``: the scene's own time.
         options: By checker, what to hand to its factory.
         referee: Whether the referee judges (slow); without it there is no precision or recall.
+        fine: A second yardstick: the scene is also run with steps this many times shorter, up to
+            its first contact (from there on the two runs part); ``None``: it is not.
 
     Raises:
         ValueError: an unknown scene or checker, a geom that a checker or the referee cannot
-            handle, a timestep or duration that is not above 0.
+            handle, a timestep or duration that is not above 0, a ``fine`` below 1.
     """
     if isinstance(scene, str):
         if scene not in SCENES:
@@ -71,6 +74,8 @@ def compare(
     duration = scene.seconds if seconds is None else seconds
     if not 0 < duration < np.inf:
         raise ValueError(f"seconds {duration}: expected a time above 0")
+    if fine is not None and fine < 1:
+        raise ValueError(f"fine {fine}: expected 1 or more steps in one")
     model, data = scene.start(timestep)
     chosen = {
         name: checker(name, model, **dict((options or {}).get(name, {}))) for name in checkers
@@ -88,6 +93,7 @@ def compare(
         steps=len(run.step_seconds),
         scores=scores,
         outcomes=outcomes,
+        first_contact=_first_contact(scene, model.opt.timestep / fine, duration) if fine else None,
         disagreements=tuple(d for s in scores for d in s.disagreements),
         step_us=1e6 * float(np.median(run.step_seconds)),
         state_us=1e6 * float(np.median(run.state_seconds)),
@@ -125,3 +131,16 @@ def _simulate(
         run.times.append(after.time)
         before = after
     return run
+
+
+def _first_contact(scene: ContactScene, timestep: float, seconds: float) -> float | None:
+    """When MuJoCo alone first lists surfaces that touch, in steps of ``timestep`` [s]."""
+    model, data = scene.start(timestep)
+    for _ in range(max(1, round(seconds / timestep))):
+        if scene.control is not None:
+            scene.control(model, data)
+        now = float(data.time)
+        mujoco.mj_step(model, data)  # lists the contacts of the state it starts from
+        if (data.contact.dist <= 0).any():
+            return now
+    return None

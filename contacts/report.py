@@ -45,6 +45,7 @@ class Score:
         steps: Steps and partners that touch beyond the tolerance.
         steps_found: Of them, reported in that very step.
         delay_ms: From an event's onset to its first report, median [ms].
+        first: Its first report of any pair [s].
         lead_ms: How much earlier than MuJoCo it reports a pair's first contact, median [ms].
         depth_mm: Difference from MuJoCo's depth at the same state, median [mm].
         normal_deg: Angle between its normal and MuJoCo's, median [deg].
@@ -63,6 +64,7 @@ class Score:
     steps: int | None = None
     steps_found: int | None = None
     delay_ms: float | None = None
+    first: float | None = None
     lead_ms: float | None = None
     depth_mm: float | None = None
     normal_deg: float | None = None
@@ -94,6 +96,7 @@ class Report:
         scores: One a checker.
         outcomes: What MuJoCo made of every event, by onset.
         disagreements: Of all checkers.
+        first_contact: The scene's first contact in a finely stepped run of MuJoCo [s].
         step_us: Of ``mj_step``, median [us].
         state_us: Of copying a state with its kinematics, which all checkers share, median [us].
     """
@@ -103,6 +106,7 @@ class Report:
     steps: int
     scores: tuple[Score, ...]
     outcomes: tuple[Outcome, ...]
+    first_contact: float | None
     disagreements: tuple[Disagreement, ...]
     step_us: float
     state_us: float

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.contacts.checker import Contacts, State, geom_kinds, pair_kind
+from tauguard.contacts.checker import Contacts, State, checked, geom_kinds, pair_kind
 from tauguard.contacts.geoms import CONVEX, native_scene
 from tauguard.contacts.pairs import geom_pairs
 from tauguard.contacts.surface_pairs import SurfacePairs
@@ -82,9 +82,18 @@ class RigidChecker:
             pair_kind(a, b) for a in CONVEX for b in CONVEX if not a == b == "plane"
         )
         self.work = Work(0, 0, 0)
+        self._bodies = int(model.nbody)
 
     def check(self, before: State, after: State) -> Contacts:
-        """What touches on the way; at most one contact a pair, the first."""
+        """What touches on the way; at most one contact a pair, the first.
+
+        Raises:
+            ValueError: a state of another model, or that is not finite.
+        """
+        before, after = (
+            checked(name, state, self._bodies)
+            for name, state in (("before", before), ("after", after))
+        )
         ids, values, work = self._scene.find(before.xpos, before.xmat, after.xpos, after.xmat)
         self.work = Work(*work)
         none = np.full((len(ids), 2), -1, dtype=np.int32)

@@ -61,6 +61,7 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
     return Score(
         checker=name,
         **counted,
+        first=min((times[0] for times in reports.values()), default=None),
         lead_ms=_lead(reports, _reports(model, run.times, run.contacts["mujoco"])),
         depth_mm=depth,
         normal_deg=angle,

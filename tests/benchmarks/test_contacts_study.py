@@ -22,7 +22,7 @@ def test_a_crossing_is_timed_and_mujocos_share_counted():
 
 
 def test_rows_of_a_scene_and_the_figure():
-    rows = [*study._scene("sphere_plate", 5e-3, None), study._crossing(50.0, 5e-3, "plain", 1)]
+    rows = [*study._scene("sphere_plate", 5e-3, None, 20), study._crossing(50.0, 5e-3, "plain", 1)]
     assert [row.get("checker") for row in rows] == ["mujoco", "cloth", "rigid", None]
     rigid = rows[2]
     assert rigid["recall"]["value"] == rigid["precision"]["value"] == 1

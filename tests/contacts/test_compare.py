@@ -105,6 +105,17 @@ def test_recall_of_the_arm_between_boxes_is_one():
     assert rigid.precision == 1.0
 
 
+def test_a_finely_stepped_run_is_a_second_yardstick():
+    report = compare(bounce(2.001), ["mujoco", "rigid"], seconds=0.46, referee=False, fine=20)
+    impact = 0.9 / 2.001
+    assert impact <= report.first_contact <= impact + 1e-4
+    assert report["rigid"].first == pytest.approx(impact, abs=1e-6)
+    assert impact < report["mujoco"].first <= impact + 2e-3
+    never = compare(bounce(2.0), ["rigid"], seconds=0.1, referee=False, fine=2)
+    assert never.first_contact is None
+    assert never["rigid"].first is None
+
+
 def test_without_a_referee_there_is_cost_but_no_judgement():
     report = compare(bounce(2.0), ["rigid"], seconds=0.05, referee=False)
     assert report["rigid"].recall is None
@@ -120,5 +131,7 @@ def test_bad_input_is_named():
         compare(bounce(1.0), ["eye"])
     with pytest.raises(ValueError, match="seconds -1"):
         compare(bounce(1.0), seconds=-1)
+    with pytest.raises(ValueError, match="fine 0"):
+        compare(bounce(1.0), fine=0)
     with pytest.raises(KeyError, match="'cloth': there are rigid"):
         compare(bounce(1.0), ["rigid"], seconds=0.01)["cloth"]

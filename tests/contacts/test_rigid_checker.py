@@ -1,6 +1,7 @@
 """The rigid checker against closed forms and against MuJoCo's distances along the way."""
 
 import itertools
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -205,3 +206,64 @@ def test_what_cannot_be_handled_is_named_at_construction():
     assert len(checker("rigid", model, skip=("hfield",)).pairs) == 0
     with pytest.raises(ValueError, match="'far': there are"):
         checker("rigid", model, threshold="far", skip=("hfield",))
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e3, 1e6])
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e2])
+def test_far_away_small_and_large(offset, scale):
+    """The time's error grows with the distance from the origin, as doubles do, and no faster."""
+    size = f'size="{0.1 * scale} {0.1 * scale} {0.1 * scale}"'
+    for one, other in itertools.product(("box", "cylinder"), ("box", "ellipsoid", "capsule")):
+        model = scene((one, size), (other, size))
+        start = [offset, offset, offset + scale]
+        height = 0.2 if other == "capsule" else 0.1
+        end = [offset, offset, offset - 0.5 * scale]
+        found = checker("rigid", model).check(
+            *states(model, poses([offset] * 3, start), poses([offset] * 3, end))
+        )
+        way = (start[2] - offset, start[2] - end[2])
+        truth = (way[0] - (0.1 + height) * scale) / way[1]
+        rounding = 1e3 * 2.3e-16 * (offset / scale + 1)
+        assert found.time == pytest.approx([truth], abs=1e-9 + rounding)
+        assert abs(found.normal[0, 2]) == pytest.approx(1, abs=1e-6 + rounding)
+
+
+def test_no_motion_and_exact_touch_and_the_same_centre():
+    model = scene(("sphere", 'size=".5"'), ("box", 'size=".5 .5 .5"'))
+    check = checker("rigid", model)
+    for apart, touching in ((1.0, True), (1.0 + 1e-6, False), (0.0, True)):
+        state = states(model, poses([0, 0, 0], [0, 0, apart]), poses([0, 0, 0], [0, 0, apart]))
+        found = check.check(*state)
+        assert (len(found) == 1) is touching
+        if touching:
+            assert found.time[0] == 0
+            assert found.distance[0] == pytest.approx(apart - 1, abs=1e-9)
+            assert np.linalg.norm(found.normal[0]) == pytest.approx(1)
+
+
+def test_half_a_turn_in_one_step():
+    """A rod swings through a post that it touches at neither end of the step."""
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody>
+      <geom name="post" type="cylinder" size=".1 1" pos="0 .8 0"/>
+      <body><joint axis="0 0 1"/><geom name="rod" type="capsule" fromto=".1 0 0 1 0 0"
+      size=".05" mass="1"/></body></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    before = State.of(model, data)
+    data.qpos[0] = np.pi * (1 - 1e-9)
+    found = checker("rigid", model).check(before, State.of(model, data))
+    # The rod's side reaches the post's: sin(a) = (0.1 + 0.05) / 0.8 before the middle.
+    truth = (np.pi / 2 - np.arcsin(0.15 / 0.8)) / np.pi
+    assert found.time == pytest.approx([truth], abs=1e-8)
+    assert len(checker("mujoco", model).check(before, State.of(model, data))) == 0
+
+
+def test_a_state_that_does_not_fit_is_named():
+    model = scene(("sphere", 'size=".1"'), ("sphere", 'size=".1"'))
+    good = states(model, model.qpos0, model.qpos0)[0]
+    xpos = good.xpos.copy()
+    xpos[1, 2] = np.nan
+    check = checker("rigid", model)
+    with pytest.raises(ValueError, match=r"after.xpos: row 1 is .*not finite"):
+        check.check(good, replace(good, xpos=xpos))
+    with pytest.raises(ValueError, match=r"before.xmat: shape \(2, 9\), the model has \(3, 9\)"):
+        check.check(replace(good, xmat=good.xmat[:2]), good)
