@@ -4,39 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from tauguard.contacts.checker import Checker, Contacts, State, checker
+from tauguard.contacts.checker import Checker, State, checker
 from tauguard.contacts.mujoco_checker import MujocoChecker
-from tauguard.contacts.referee import Referee, Verdicts
+from tauguard.contacts.referee import Referee
 from tauguard.contacts.report import Report
+from tauguard.contacts.run import Run
 from tauguard.contacts.scenes import SCENES, ContactScene
 from tauguard.contacts.scoring import judge, score
-
-
-@dataclass
-class Run:
-    """What happened in a run, step by step; ``times`` has one entry more than the lists.
-
-    Attributes:
-        times: Of the states [s].
-        contacts: By checker, one :class:`Contacts` a step.
-        verdicts: Of the referee, one a step; empty without one.
-        seconds: By checker, what each call took [s].
-        step_seconds: What each ``mj_step`` took [s].
-        state_seconds: What copying each state took [s].
-    """
-
-    times: list[float]
-    contacts: dict[str, list[Contacts]]
-    verdicts: list[Verdicts] = field(default_factory=list)
-    seconds: dict[str, list[float]] = field(default_factory=dict)
-    step_seconds: list[float] = field(default_factory=list)
-    state_seconds: list[float] = field(default_factory=list)
 
 
 def compare(
@@ -47,6 +26,7 @@ def compare(
     options: Mapping[str, Mapping[str, Any]] | None = None,
     referee: bool = True,
     fine: int | None = None,
+    keep: bool = False,
 ) -> Report:
     """Run a scene in MuJoCo as it is and let every checker judge every step.
 
@@ -62,6 +42,7 @@ def compare(
         referee: Whether the referee judges (slow); without it there is no precision or recall.
         fine: A second yardstick: the scene is also run with steps this many times shorter, up to
             its first contact (from there on the two runs part); ``None``: it is not.
+        keep: Whether the report keeps the states, for a recording.
 
     Raises:
         ValueError: an unknown scene or checker, a geom that a checker or the referee cannot
@@ -84,7 +65,7 @@ def compare(
     yardstick = chosen.get("mujoco") or MujocoChecker(model)
     judging = Referee(model) if referee else None
     judged = judging.covers if judging is not None else None
-    run = _simulate(model, data, scene, duration, {**chosen, "mujoco": yardstick}, judging)
+    run = _simulate(model, data, scene, duration, {**chosen, "mujoco": yardstick}, judging, keep)
     outcomes = judge(model, run.times, run.verdicts, run.contacts["mujoco"])
     scores = tuple(score(model, name, one.covers, judged, run) for name, one in chosen.items())
     return Report(
@@ -97,6 +78,7 @@ def compare(
         disagreements=tuple(d for s in scores for d in s.disagreements),
         step_us=1e6 * float(np.median(run.step_seconds)),
         state_us=1e6 * float(np.median(run.state_seconds)),
+        run=run if keep else None,
     )
 
 
@@ -107,10 +89,11 @@ def _simulate(
     duration: float,
     checkers: Mapping[str, Checker],
     referee: Referee | None,
+    keep: bool,
 ) -> Run:
     scratch = mujoco.MjData(model)
     before = State.of(model, data, scratch)
-    run = Run([before.time], {name: [] for name in checkers})
+    run = Run(model, [before.time], {name: [] for name in checkers}, states=[before])
     run.seconds = {name: [] for name in checkers}
     for _ in range(max(1, round(duration / model.opt.timestep))):
         if scene.control is not None:
@@ -129,6 +112,8 @@ def _simulate(
         if referee is not None:
             run.verdicts.append(referee.judge(before, after))
         run.times.append(after.time)
+        if keep:
+            run.states.append(after)
         before = after
     return run
 

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 
 from tauguard.contacts.referee import Pair
+from tauguard.contacts.run import Run
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,10 @@ class Disagreement:
     time: float  #: [s]
     partners: tuple[str, str]
     depth: float  #: that the referee saw, or the checker claimed [m]
+
+    def __str__(self) -> str:
+        names = " and ".join(self.partners)
+        return f"{self.checker} {self.kind}: {names}, {1e3 * self.depth:.3g} mm"
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,7 @@ class Report:
         first_contact: The scene's first contact in a finely stepped run of MuJoCo [s].
         step_us: Of ``mj_step``, median [us].
         state_us: Of copying a state with its kinematics, which all checkers share, median [us].
+        run: States and contacts, where they were kept.
     """
 
     scene: str
@@ -110,6 +116,17 @@ class Report:
     disagreements: tuple[Disagreement, ...]
     step_us: float
     state_us: float
+    run: Run | None = None
+
+    def recording(self) -> dict[str, Any]:
+        """Keyword arguments of :func:`tauguard.replay.contacts.write_contacts_rrd`.
+
+        Raises:
+            ValueError: the states were not kept.
+        """
+        if self.run is None:
+            raise ValueError("the states were not kept: compare(..., keep=True)")
+        return {**self.run.recording(), "notes": [(d.time, str(d)) for d in self.disagreements]}
 
     def __getitem__(self, checker: str) -> Score:
         for score in self.scores:
@@ -149,9 +166,7 @@ class Report:
             f"{len(self.outcomes)} contacts, by MuJoCo {missed} not generated, {lost} not held; "
             f"mj_step {self.step_us:.0f} us"
         )
-        for d in self.disagreements[:20]:
-            names = " and ".join(d.partners)
-            lines.append(f"{d.time:8.4f} s  {d.checker} {d.kind}: {names}, {1e3 * d.depth:.3g} mm")
+        lines += [f"{one.time:8.4f} s  {one}" for one in self.disagreements[:20]]
         if len(self.disagreements) > 20:
             lines.append(f"... and {len(self.disagreements) - 20} more disagreements")
         return "\n".join(lines)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from tauguard.contacts.checker import Contacts, geom_kinds, pair_kind
 from tauguard.contacts.referee import TOLERANCE, Event, Pair, Verdicts, events, pair_of
 from tauguard.contacts.report import Disagreement, Outcome, Score, pair_names
-
-if TYPE_CHECKING:
-    from tauguard.contacts.compare import Run
+from tauguard.contacts.run import TOUCHING, Run
 
 Covers = frozenset[tuple[str, str]]
 #: By geoms, flexes and features: depth [m], inner radius [m], normal.
@@ -102,9 +100,7 @@ def judge(
 
 
 def _touching(contacts: Contacts) -> Contacts:
-    # Swept checkers stop within 1e-10 of the shapes' size of touching; 1e-8 m is far below the
-    # tolerance of the referee.
-    return contacts.where(contacts.distance <= 1e-8)
+    return contacts.where(contacts.distance <= TOUCHING)
 
 
 def _reports(

@@ -1,0 +1,66 @@
+"""A run of a scene under the eyes of several checkers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tauguard.contacts.checker import Array, Contacts, State
+from tauguard.contacts.referee import Verdicts
+
+#: Surfaces closer than this touch [m]: swept checkers stop within 1e-10 of the shapes' size, and
+#: the referee's tolerance is a thousand times larger.
+TOUCHING = 1e-8
+
+
+@dataclass
+class Run:
+    """What happened in a run, step by step; ``times`` has one entry more than the lists.
+
+    Attributes:
+        model: MjModel.
+        times: Of the states [s].
+        contacts: By checker, one :class:`Contacts` a step.
+        verdicts: Of the referee, one a step; empty without one.
+        seconds: By checker, what each call took [s].
+        step_seconds: What each ``mj_step`` took [s].
+        state_seconds: What copying each state took [s].
+        states: All of them where they were kept, else the first.
+    """
+
+    model: Any
+    times: list[float]
+    contacts: dict[str, list[Contacts]]
+    verdicts: list[Verdicts] = field(default_factory=list)
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+    step_seconds: list[float] = field(default_factory=list)
+    state_seconds: list[float] = field(default_factory=list)
+    states: list[State] = field(default_factory=list)
+
+    def recording(self) -> dict[str, Any]:
+        """What :func:`tauguard.replay.contacts.write_contacts_rrd` draws, but for the notes.
+
+        Raises:
+            ValueError: the states were not kept.
+        """
+        if len(self.states) != len(self.times):
+            raise ValueError("the states were not kept: compare(..., keep=True)")
+        count = len(self.times)
+        return {
+            "model": self.model,
+            "t": np.array(self.times),
+            "positions": np.array([state.xpos for state in self.states]),
+            "rotations": np.array([state.xmat for state in self.states]).reshape(count, -1, 3, 3),
+            "vertices": np.array([state.flexvert_xpos for state in self.states]),
+            "marks": {name: self._marks(found) for name, found in self.contacts.items()},
+        }
+
+    def _marks(self, found: list[Contacts]) -> tuple[Array, Array]:
+        """Times [s] and points of all contacts in which surfaces touch."""
+        begin, length = np.array(self.times[:-1]), np.diff(self.times)
+        when = [begin[k] + length[k] * one.time for k, one in enumerate(found)]
+        touching = np.concatenate([one.distance <= TOUCHING for one in found])
+        points = np.concatenate([one.point for one in found])
+        return np.concatenate(when)[touching], points[touching]

@@ -1,0 +1,138 @@
+"""A run of any MuJoCo scene with the contacts that checkers saw in it, as a rerun recording."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from tauguard.replay.robot import Motion, bodies, quats_wxyz
+from tauguard.replay.rrd import COLOURS, TIMELINE, drawn, entity, log_pose, times
+from tauguard.traces.trace import Array
+
+#: Contacts of one checker: their times [s], shape (K,), and points [m], shape (K, 3).
+Marks = tuple[Array, Array]
+POINT = 6e-3  # [m] radius of a drawn contact
+CLOTH = (170, 120, 90)
+
+
+def write_contacts_rrd(
+    path: str | Path,
+    *,
+    model: Any,
+    t: Array,
+    positions: Array,
+    rotations: Array,
+    vertices: Array | None = None,
+    marks: Mapping[str, Marks] | None = None,
+    notes: Sequence[tuple[float, str]] = (),
+) -> None:
+    """Write a recording that ``rerun FILE`` opens: bodies, cloth, contacts, and notes in time.
+
+    Args:
+        path: The ``.rrd`` file; it appears whole or not at all.
+        model: ``mujoco.MjModel``.
+        t: Rising [s]. Shape (T,).
+        positions: Of the bodies. Shape (T, nbody, 3), m.
+        rotations: Shape (T, nbody, 3, 3).
+        vertices: Of the flexes. Shape (T, nflexvert, 3), m.
+        marks: By checker, its contacts.
+        notes: Times [s] and texts, such as disagreements.
+
+    Raises:
+        ValueError: an empty run, or arrays that do not fit the model.
+        OSError: the folder cannot be written.
+    """
+    path = Path(path)
+    shapes = {
+        "positions": (positions, (len(t), model.nbody, 3)),
+        "rotations": (rotations, (len(t), model.nbody, 3, 3)),
+    }
+    if model.nflexvert:
+        given = np.zeros(0) if vertices is None else vertices
+        shapes["vertices"] = (given, (len(t), model.nflexvert, 3))
+    for name, (value, shape) in shapes.items():
+        if np.shape(value) != shape:
+            raise ValueError(f"{name}: shape {np.shape(value)}, expected {shape}")
+    if len(t) == 0:
+        raise ValueError("t: empty, nothing to show")
+    with TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        draft = Path(folder) / "draft.rrd"
+        recording = rr.RecordingStream("tauguard_contacts", recording_id=path.stem)
+        recording.save(draft)
+        recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        _log_bodies(recording, model, t, positions, rotations)
+        if vertices is not None:
+            _log_cloth(recording, model, t, vertices)
+        for number, (name, (when, points)) in enumerate((marks or {}).items()):
+            _log_marks(recording, name, COLOURS[number % len(COLOURS)], t, when, points)
+        for moment, text in notes:
+            recording.set_time(TIMELINE, duration=moment)
+            recording.log("notes", rr.TextLog(text))
+        recording.send_blueprint(
+            rrb.Blueprint(
+                rrb.Vertical(
+                    rrb.Spatial3DView(origin="/", name="scene"),
+                    rrb.TextLogView(origin="notes", name="disagreements"),
+                    row_shares=[4, 1],
+                )
+            )
+        )
+        recording.flush()
+        recording.disconnect()
+        os.replace(draft, path)
+
+
+def _log_bodies(recording: Any, model: Any, t: Array, positions: Array, rotations: Array) -> None:
+    quats = quats_wxyz(rotations.reshape(-1, 3, 3)).reshape(len(t), -1, 4)
+    moved = Motion(positions, quats)
+    for index, body in enumerate(bodies(model)):
+        if not body.shapes:
+            continue
+        place = entity("scene", body.name)
+        for number, piece in enumerate(body.shapes):
+            recording.log(f"{place}/shape_{number}", drawn(piece), static=True)
+        log_pose(recording, place, body, index, t, moved)
+
+
+def _log_cloth(recording: Any, model: Any, t: Array, vertices: Array) -> None:
+    for flex in range(model.nflex):
+        if model.flex_dim[flex] != 2:
+            continue
+        first, count = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
+        start = int(model.flex_elemdataadr[flex])
+        faces = model.flex_elem[start : start + 3 * int(model.flex_elemnum[flex])].reshape(-1, 3)
+        place = entity("scene", f"flex {flex}")
+        for row, when in enumerate(t):
+            recording.set_time(TIMELINE, duration=float(when))
+            mesh = rr.Mesh3D(
+                vertex_positions=vertices[row, first : first + count],
+                triangle_indices=faces,
+                albedo_factor=CLOTH,
+            )
+            recording.log(place, mesh)
+
+
+def _log_marks(
+    recording: Any, name: str, colour: NDArray[np.uint8], t: Array, when: Array, points: Array
+) -> None:
+    """The contacts of each interval between two states, shown at its end; none where none."""
+    place = entity("contacts", name)
+    styles = rr.Points3D.from_fields(radii=POINT, colors=[colour])
+    recording.log(place, styles, static=True)
+    row = np.searchsorted(t, when)
+    known = (row < len(t)) & np.isfinite(points).all(axis=1)
+    row, points = row[known], points[known]
+    order = np.argsort(row, kind="stable")
+    counts = np.bincount(row, minlength=len(t))
+    columns = rr.Points3D.columns(positions=points[order])
+    rr.send_columns(
+        place, times(t), [column.partition(counts) for column in columns], recording=recording
+    )
