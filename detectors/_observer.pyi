@@ -39,6 +39,8 @@ class FrictionBasis:
         stops: list[float],
         stribeck: list[float],
         slopes: list[float],
+        loaded: list[float],
+        saturation: bool,
         cycles: list[float],
         play: float,
         joints: int,

@@ -23,13 +23,16 @@ class FrictionModel:
 
     Columns: 1; qd; a Dahl bristle b for each settling length; a stop operator for each width;
     b exp(-(qd/w)^2) for each Stribeck velocity; tanh(qd/w) for each slope; |tau| b;
-    cos(c q) and sin(c q) for each ripple frequency c of the joint.
+    |tau| tanh(qd/w) for each loaded slope; cos(c q) and sin(c q) for each ripple frequency c of
+    the joint; tau |tau| where ``saturation`` says so.
     """
 
     bristles: tuple[float, ...] = (1.5e-3, 3e-3)  #: settling lengths [rad]
     stops: tuple[float, ...] = (1e-3,)  #: widths [rad]
     stribeck: tuple[float, ...] = (0.02, 0.05)  #: [rad/s]
     slopes: tuple[float, ...] = (0.05, 0.3)  #: [rad/s]
+    loaded: tuple[float, ...] = ()  #: slopes of load-dependent friction [rad/s]
+    saturation: bool = False  #: the torque per ampere changes with the current
     cycles: Array = field(default_factory=lambda: np.empty((0, 0)))
     """Ripple frequencies [1/rad at the joint], shape (n, h); empty: none."""
     play: float = 5e-6  #: dead zone of the bristles' position, a few quanta of the sensor [rad]
@@ -38,7 +41,7 @@ class FrictionModel:
 
     def __post_init__(self) -> None:
         """Check the widths: ``ValueError`` names what is not above 0."""
-        for name in ("bristles", "stops", "stribeck", "slopes"):
+        for name in ("bristles", "stops", "stribeck", "slopes", "loaded"):
             widths = tuple(float(w) for w in getattr(self, name))
             if not all(np.isfinite(w) and w > 0 for w in widths):
                 raise ValueError(f"FrictionModel.{name}: {widths}, expected widths above 0")
@@ -59,8 +62,8 @@ class FrictionModel:
     @property
     def columns(self) -> int:
         """How many weights a joint has."""
-        widths = len(self.bristles) + len(self.stops) + len(self.stribeck) + len(self.slopes)
-        return 3 + widths + 2 * int(self.cycles.shape[1])
+        groups = self.bristles, self.stops, self.stribeck, self.slopes, self.loaded
+        return 3 + sum(map(len, groups)) + 2 * int(self.cycles.shape[1]) + int(self.saturation)
 
     def basis(self, joints: int) -> _observer.FrictionBasis:
         """The native form."""
@@ -71,6 +74,8 @@ class FrictionModel:
             list(self.stops),
             list(self.stribeck),
             list(self.slopes),
+            list(self.loaded),
+            self.saturation,
             [float(c) for c in self.cycles.ravel()],
             self.play,
             joints,

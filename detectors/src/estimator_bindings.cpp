@@ -15,7 +15,8 @@ namespace {
 using Numbers = std::vector<double>;
 
 FrictionBasis make_basis(const Numbers& bristles, const Numbers& stops, const Numbers& stribeck,
-                         const Numbers& slopes, const Numbers& cycles, double play, std::size_t joints) {
+                         const Numbers& slopes, const Numbers& loaded, bool saturation,
+                         const Numbers& cycles, double play, std::size_t joints) {
   require(bristles.size() + stops.size() > 0 && joints > 0 && cycles.size() % joints == 0 && play >= 0,
           "friction: no bristle and no stop, cycles not per joint, or play below 0");
   FrictionBasis basis;
@@ -24,6 +25,8 @@ FrictionBasis make_basis(const Numbers& bristles, const Numbers& stops, const Nu
   basis.stops = stops;
   basis.stribeck = stribeck;
   basis.slopes = slopes;
+  basis.loaded = loaded;
+  basis.saturation = saturation;
   basis.cycles = cycles;
   basis.ripples = cycles.size() / joints;
   return basis;
@@ -72,8 +75,10 @@ void bind_estimator(nb::module_& m) {
   nb::class_<FrictionBasis>(m, "FrictionBasis")
       .def("__init__",
            [](FrictionBasis* self, const Numbers& bristles, const Numbers& stops, const Numbers& stribeck,
-              const Numbers& slopes, const Numbers& cycles, double play, std::size_t joints) {
-             new (self) FrictionBasis(make_basis(bristles, stops, stribeck, slopes, cycles, play, joints));
+              const Numbers& slopes, const Numbers& loaded, bool saturation, const Numbers& cycles,
+              double play, std::size_t joints) {
+             new (self) FrictionBasis(
+                 make_basis(bristles, stops, stribeck, slopes, loaded, saturation, cycles, play, joints));
            })
       .def_prop_ro("columns", &FrictionBasis::columns)
       .def("evaluate", &friction_columns, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());

@@ -7,7 +7,8 @@
 // left a dead zone of `play` around it. With b the first bristle (the first stop where there is none), the
 // columns of one joint are, in this order,
 //   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each width w,
-//   |tau| b, cos(c q), sin(c q) for each ripple frequency c
+//   |tau| b, |tau| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each ripple frequency c,
+//   tau |tau| where the drive's torque per ampere changes with the current
 #pragma once
 
 #include <algorithm>
@@ -23,6 +24,8 @@ class FrictionBasis {
   std::vector<double> stops;     // widths [rad]
   std::vector<double> stribeck;  // [rad/s]
   std::vector<double> slopes;    // tanh widths [rad/s]
+  std::vector<double> loaded;    // tanh widths of load-dependent friction [rad/s]
+  bool saturation = false;       // the column tau |tau|
   std::vector<double> cycles;    // per joint, `ripples` each [1/rad]
   std::size_t ripples = 0;
   double play = 0.0;             // [rad]
@@ -30,10 +33,12 @@ class FrictionBasis {
   static constexpr std::size_t kOffset = 0, kViscous = 1, kFirst = 2;
 
   std::size_t columns() const {
-    return kFirst + bristles.size() + stops.size() + stribeck.size() + slopes.size() + 1 + 2 * ripples;
+    return smooth() + 2 * ripples + (saturation ? 1 : 0);
   }
   // Columns [kFirst, smooth()) are Coulomb friction in its forms.
-  std::size_t smooth() const { return columns() - 2 * ripples; }
+  std::size_t smooth() const {
+    return kFirst + bristles.size() + stops.size() + stribeck.size() + slopes.size() + 1 + loaded.size();
+  }
 
   // Numbers of memory a joint: the followed position, the bristles, the stops' rests.
   std::size_t memory() const { return 1 + bristles.size() + stops.size(); }
@@ -66,11 +71,13 @@ class FrictionBasis {
     for (const double w : stribeck) *out++ = b * std::exp(-(qd / w) * (qd / w));
     for (const double w : slopes) *out++ = std::tanh(qd / w);
     *out++ = std::fabs(tau) * b;
+    for (const double w : loaded) *out++ = std::fabs(tau) * std::tanh(qd / w);
     for (std::size_t h = 0; h < ripples; ++h) {
       const double phase = cycles[joint * ripples + h] * q;
       *out++ = std::cos(phase);
       *out++ = std::sin(phase);
     }
+    if (saturation) *out++ = tau * std::fabs(tau);
   }
 };
 
