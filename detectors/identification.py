@@ -1,0 +1,365 @@
+"""Identification of a real arm from collision-free logs, and what fixes the scale of its torques.
+
+The residual of the nominal observer is linear in the errors of the inertial numbers and of the
+reflected rotor inertias, in the weights of the friction columns, in the drives' torque per ampere
+and in the payloads. All pass through the detector's own causal filter, so no acceleration is
+needed. The solution is restricted to bodies that can exist (:mod:`~tauguard.detectors.consistent`).
+
+Currents alone tell torques only up to a factor a joint: if every gain, mass and friction shrinks
+together, every current is explained as well. Something from outside has to fix the scale, and
+the regression has to predict currents from torques, not torques from currents, or a small scale
+looks like a good fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.calibrate import free_rows
+from tauguard.detectors.consistent import solve_consistent
+from tauguard.detectors.estimator import PAYLOAD, ArmModel
+from tauguard.detectors.filter import confirmed
+from tauguard.detectors.friction import FrictionModel
+from tauguard.detectors.numbers import (
+    INERTIAL,
+    RobotNumbers,
+    mass_matrix,
+    momentum_regressor,
+    momentum_terms,
+)
+from tauguard.detectors.observer import intervals, low_pass
+from tauguard.traces.trace import Bools, Trace
+
+Array = NDArray[np.float64]
+
+#: Columns that a real geared joint needs: presliding of several lengths, Stribeck, load-dependent
+#: friction, and a torque per ampere that changes with the current.
+REAL_FRICTION = FrictionModel(
+    bristles=(),
+    stops=(1e-3, 3e-3, 1e-2, 3e-2),
+    stribeck=(0.02, 0.05),
+    slopes=(0.01, 0.05, 0.1, 0.3),
+    loaded=(0.02, 0.1, 0.3),
+    saturation=True,
+)
+#: An axis slower than this in every sample of a log does not move in it [rad/s].
+MOVING = 0.01
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the arm carried, as far as it was told."""
+
+    mass: float = 0.0  #: [kg]
+    centre: tuple[float, float, float] | None = None
+    """In the last link's frame [m]; None: not told, identified with the rest."""
+
+    def __post_init__(self) -> None:
+        """``ValueError`` for a mass below 0 or numbers that are not finite."""
+        if not (np.isfinite(self.mass) and self.mass >= 0):
+            raise ValueError(f"load: {self.mass} kg, expected 0 or more")
+        if self.centre is not None and not (
+            len(self.centre) == 3 and np.isfinite(self.centre).all()
+        ):
+            raise ValueError(f"load: centre {self.centre}, expected three finite numbers [m]")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A collision-free log and the load in it."""
+
+    trace: Trace
+    load: Load | None = Load()  #: None: something unknown was carried
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """Standard deviations of what is identified around what is believed."""
+
+    mass: float = 0.1  #: relative
+    centre: float = 0.02  #: of the centre of mass, each axis [m]
+    inertia: float = 0.1  #: relative to the link's largest entry
+    armature: float = 1.0  #: relative to the largest entry of the mass matrix at the joint
+    gain: float = 0.5  #: relative, where gains are identified
+    friction: float = 30.0  #: of every friction weight [N m per unit]
+    payload: float = 5.0  #: of a load that was not told [kg]
+    moment: float = 0.5  #: of its first moment [kg m]
+    softness: float = 5.0  #: a sample counts 1/softness^2: model errors are not white
+    evenness: float = 0.15  #: a joint's level of error is at least this share of the largest
+    rest: float = 0.5  #: a joint that has stood still for longer counts no more [s]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """An identified arm and how it was found."""
+
+    arm: ArmModel
+    loads: Array  #: mass and first moment in each recording [kg, kg m], shape (recordings, 4)
+    rms: Array  #: of the residual on the recordings used [N m], shape (n,)
+    scale: str  #: "gains", "payload" or "masses": what fixed the scale of the torques
+    gain_error: Array  #: relative standard deviation of each gain, 0 where it was given, (n,)
+    notes: tuple[str, ...]  #: what a reader should know
+
+
+def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
+    """Rows from the first motion of any joint to the last one, shape (T,).
+
+    Before and after, static friction takes an unknown share of the torque.
+
+    Args:
+        trace: the log.
+        margin: seconds at the log's beginning that are left out in any case.
+
+    Raises:
+        ValueError: no joint ever moves.
+    """
+    moves = np.flatnonzero((np.abs(trace.qd) > MOVING).any(axis=1))
+    if not len(moves):
+        raise ValueError(f"no joint moves faster than {MOVING} rad/s")
+    rows = np.zeros(len(trace.t), dtype=np.bool_)
+    rows[moves[0] : moves[-1] + 1] = True
+    return np.asarray(rows & (trace.t >= trace.t[0] + margin))
+
+
+@dataclass
+class _Filtered:
+    """Everything that the regression needs of one recording, behind the observer's filter."""
+
+    torque: Array  #: nominal rigid-body torque less payload [N m], (R, n)
+    current: Array  #: gain times current [N m], (R, n)
+    inertial: Array  #: (R, n, 10 n)
+    armature: Array  #: (R, n)
+    friction: Array  #: (R, n, columns)
+    weight: Array  #: of each row and joint, (R, n)
+
+
+def _filtered(
+    recording: Recording, robot: RobotNumbers, gain: Array, model: FrictionModel, rate: float,
+    rest: float,
+) -> _Filtered:
+    trace = recording.trace
+    stride = max(1, round(4e-3 / trace.dt))
+    count = len(trace.t) // stride
+    rows = count * stride
+
+    def mean(x: Array) -> Array:
+        out: Array = x[:rows].reshape(count, stride, *x.shape[1:]).mean(axis=1)
+        return out
+
+    tau = trace.current * gain
+    columns, drive = mean(model.evaluate(trace.q, trace.qd, tau)), mean(tau)
+    q, qd, t = (x[:rows:stride] for x in (trace.q, trace.qd, trace.t))
+    dt = intervals(t, count)
+
+    def through(p: Array, beta: Array, held: Array | None = None) -> Array:
+        flat = (x.reshape(count, -1) for x in (p, beta))
+        driven = None if held is None else held.reshape(count, -1)
+        width = p[0].size
+        return low_pass(np.full(width, rate), dt, *flat, driven).reshape(p.shape)
+
+    nothing, no_columns = np.zeros_like(q), np.zeros_like(columns)
+    used = moving_span(trace) & free_rows(trace)
+    keep = np.flatnonzero(used[:rows:stride])[:: max(1, round(0.02 / (stride * trace.dt)))]
+    slow = np.abs(trace.qd) < MOVING
+    needed = max(1, round(rest / trace.dt))
+    still = np.column_stack([confirmed(column, needed) for column in slow.T])[:rows:stride]
+    return _Filtered(
+        through(*momentum_terms(robot, q, qd))[keep],
+        -through(nothing, nothing, drive)[keep],
+        through(*momentum_regressor(robot, q, qd))[keep],
+        through(np.ascontiguousarray(qd), nothing)[keep],
+        -through(no_columns, no_columns, columns)[keep],
+        np.where(still, 0.0, 1.0)[keep],
+    )
+
+
+class _System:
+    """Normal equations over errors of inertia and armature, friction, gains and payloads.
+
+    ``current = torque (1 + s) - inertial dphi - armature da + friction w + load``, and the gain of
+    a joint is that of the round divided by 1 + s.
+    """
+
+    def __init__(self, robot: RobotNumbers, columns: int, recordings: int) -> None:
+        self.n, self.c, self.count = robot.joints, columns, recordings
+        self.friction = (INERTIAL + 1) * self.n
+        self.gain = self.friction + self.n * columns
+        self.load = self.gain + self.n
+        self.size = self.load + PAYLOAD * recordings
+        self.matrix = np.zeros((self.size, self.size))
+        self.vector = np.zeros(self.size)
+
+    def places(self, joint: int, recording: int) -> NDArray[np.intp]:
+        own = np.arange(self.friction + joint * self.c, self.friction + (joint + 1) * self.c)
+        load = self.load + PAYLOAD * recording + np.arange(PAYLOAD)
+        body = np.arange(INERTIAL * self.n)
+        return np.concatenate([body, [INERTIAL * self.n + joint], own, [self.gain + joint], load])
+
+    def design(self, data: _Filtered, joint: int, known: Array) -> Array:
+        """Columns of one joint; ``known`` is the load that the torque scales with."""
+        last = slice(INERTIAL * (self.n - 1), INERTIAL * (self.n - 1) + PAYLOAD)
+        load = data.inertial[:, joint, last]
+        return np.column_stack(
+            [
+                -data.inertial[:, joint],
+                -data.armature[:, joint],
+                data.friction[:, joint],
+                data.torque[:, joint] + load @ known,
+                load,
+            ]
+        )
+
+    def target(self, data: _Filtered, joint: int) -> Array:
+        out: Array = data.current[:, joint] - data.torque[:, joint]
+        return out
+
+    def add(self, data: _Filtered, recording: int, weight: Array, known: Array) -> None:
+        for joint in range(self.n):
+            at, x = self.places(joint, recording), self.design(data, joint, known)
+            w = (weight[joint] * data.weight[:, joint])[:, None] ** 2
+            self.matrix[np.ix_(at, at)] += x.T @ (w * x)
+            self.vector[at] += x.T @ (w[:, 0] * self.target(data, joint))
+
+    def left(self, data: _Filtered, recording: int, solution: Array, known: Array) -> Array:
+        """What the solution does not explain [N m], shape (R, n)."""
+        out = np.empty_like(data.current)
+        for joint in range(self.n):
+            fit = self.design(data, joint, known) @ solution[self.places(joint, recording)]
+            out[:, joint] = self.target(data, joint) - fit
+        return out
+
+
+def _deviations(
+    system: _System, robot: RobotNumbers, recordings: Sequence[Recording], beliefs: Beliefs,
+    gain: Array, free_masses: bool,
+) -> tuple[Array, Array]:
+    """Standard deviations and means of all unknowns."""
+    spread = 4.0 if free_masses else 1.0
+    body = []
+    for numbers in robot.inertial:
+        mass, inertia = max(float(numbers[0]), 1e-3), float(np.abs(numbers[4:]).max()) + 1e-3
+        body += [spread * beliefs.mass * mass, *[spread * beliefs.centre * mass] * 3]
+        body += [spread * beliefs.inertia * inertia] * 6
+    poses = np.concatenate([r.trace.q[:: max(1, len(r.trace.q) // 20)] for r in recordings])
+    heaviest = np.diagonal(mass_matrix(robot, poses), axis1=1, axis2=2).max(axis=0)
+    loads, means = [], []
+    for recording in recordings:
+        load = recording.load
+        told = load is not None and (load.mass == 0 or load.centre is not None)
+        loads += [1e-6 if load is not None else beliefs.payload]
+        loads += [1e-6 if told else beliefs.moment] * 3
+        means.append(_known(recording))
+    deviations = np.concatenate(
+        [
+            body,
+            beliefs.armature * heaviest,
+            np.full(system.n * system.c, beliefs.friction),
+            np.maximum(gain, 1e-9),
+            loads,
+        ]
+    )
+    return deviations, np.concatenate([np.zeros(system.load), *means])
+
+
+def _known(recording: Recording) -> Array:
+    load = recording.load or Load()
+    return load.mass * np.array([1.0, *(load.centre or (0.0, 0.0, 0.0))])
+
+
+def identify(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    *,
+    scale: str = "gains",
+    friction: FrictionModel = REAL_FRICTION,
+    beliefs: Beliefs | None = None,
+    rate: float = 20.0,
+) -> Identified:
+    """Identify inertia, friction, and where something fixes their scale the drive gains.
+
+    Args:
+        arm: what is believed; the gains are a start, or hold (``scale="gains"``).
+        recordings: collision-free logs of this arm, at least 20 s of motion in all.
+        scale: what fixes the scale of the torques: "gains" (those of ``arm`` hold), "payload" (a
+            recording with a known load above 0 does) or "masses" (those of ``arm`` do).
+        friction: its columns.
+        beliefs: how far to trust what is believed.
+        rate: of the filter that everything passes through [1/s].
+
+    Raises:
+        ValueError: another scale, no load to take it from, too little motion, or another arm's log.
+    """
+    beliefs, robot = beliefs or Beliefs(), arm.robot
+    _check(recordings, robot, scale)
+    gain = arm.drive_gain.copy()
+    error = np.zeros(robot.joints)
+    level: Array = np.ones(robot.joints)
+    known = [_known(recording) for recording in recordings]
+    for turn in range(2 if scale == "gains" else 5):
+        data = [_filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
+        if sum(len(d.current) for d in data) < 500:
+            raise ValueError("fewer than 10 s of motion in all: give 20 s or more")
+        system = _System(robot, friction.columns, len(recordings))
+        loose = np.full(robot.joints, 0.0 if scale == "gains" else beliefs.gain)
+        deviations, means = _deviations(
+            system, robot, recordings, beliefs, loose, scale != "masses"
+        )
+        means[system.gain : system.load] = gain / arm.drive_gain - 1
+        if turn == 0:
+            level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
+        for k, filtered in enumerate(data):
+            system.add(filtered, k, 1 / (beliefs.softness * np.maximum(level, 1e-6)), known[k])
+        precision = deviations**-2.0
+        matrix = system.matrix + np.diag(precision)
+        solution = solve_consistent(
+            matrix, system.vector + precision * means, robot.inertial, robot.armature
+        )
+        left = np.concatenate(
+            [system.left(d, k, solution, known[k]) for k, d in enumerate(data)]
+        )
+        level = np.sqrt((left**2).mean(axis=0))
+        level = np.maximum(level, beliefs.evenness * level.max())
+        stretch = 1 + solution[system.gain : system.load]
+        if scale != "gains":
+            error = np.sqrt(np.diag(np.linalg.inv(matrix))[system.gain : system.load])
+            gain = gain / np.clip(stretch, 0.5, 2.0)
+    return _result(arm, system, solution, gain, level, error, scale, friction, beliefs)
+
+
+def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> None:
+    if scale not in ("gains", "payload", "masses"):
+        raise ValueError(f"scale {scale!r}: expected gains, payload or masses")
+    if not recordings:
+        raise ValueError("no recordings to identify from")
+    if scale == "payload" and not any(r.load and r.load.mass > 0 for r in recordings):
+        raise ValueError("scale payload: no recording has a known load above 0 kg")
+    for recording in recordings:
+        joints = len(recording.trace.joint_names)
+        if joints != robot.joints:
+            raise ValueError(f"a log of {joints} joints, the robot has {robot.joints}")
+
+
+def _result(
+    arm: ArmModel, system: _System, solution: Array, gain: Array, level: Array, error: Array,
+    scale: str, friction: FrictionModel, beliefs: Beliefs,
+) -> Identified:
+    robot, n = arm.robot, system.n
+    found = replace(
+        robot,
+        inertial=robot.inertial - solution[: INERTIAL * n].reshape(n, INERTIAL),
+        armature=robot.armature - solution[INERTIAL * n : system.friction],
+    )
+    weights: Array = solution[system.friction : system.gain].reshape(n, -1)
+    loads: NDArray[Any] = solution[system.load :].reshape(-1, PAYLOAD)
+    notes = tuple(
+        f"{robot.joint_names[j]}: nothing fixes the scale of its torques (gain known to "
+        f"{100 * error[j]:.0f} %); give its gain"
+        for j in np.flatnonzero(error > 0.5 * beliefs.gain)
+    )
+    identified = ArmModel(found, gain, replace(friction, weights=weights), np.maximum(level, 1e-6))
+    return Identified(identified, loads, level, scale, error, notes)
