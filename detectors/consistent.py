@@ -106,16 +106,27 @@ def solve_consistent(
         x, shape (N,): every ``inertial - x`` is consistent and every ``armature - x`` above 0.
     """
     n = len(inertial)
-    free: NDArray[Any] = np.linalg.solve(matrix, vector)
-    wanted = armature - free[10 * n : 11 * n]
+    body = 11 * n
+    # What stays free is eliminated: the minimum over it is linear in the rest.
+    own = matrix[body:, body:]
+    coupled = matrix[body:, :body]
+    follows: NDArray[Any] = np.linalg.solve(own, np.column_stack([coupled, vector[body:]]))
+    reduced = matrix[:body, :body] - coupled.T @ follows[:, :body]
+    target = vector[:body] - coupled.T @ follows[:, body]
+    x = _descend(0.5 * (reduced + reduced.T), target, inertial, armature, rounds)
+    return np.concatenate([x, follows[:, body] - follows[:, :body] @ x])
+
+
+def _descend(
+    matrix: Array, vector: Array, inertial: Array, armature: Array, rounds: int
+) -> Array:
+    """Levenberg-Marquardt over the free coordinates; x of the bodies and armatures alone."""
+    n = len(inertial)
+    start: NDArray[Any] = np.linalg.solve(matrix, vector)
+    wanted = armature - start[10 * n :]
     least = 1e-3 * max(float(np.abs(wanted).max()), 1e-9)
-    state = np.concatenate(
-        [
-            *(coordinates(body) for body in inertial - free[: 10 * n].reshape(n, 10)),
-            np.log(np.maximum(wanted, least)),
-            free[11 * n :],
-        ]
-    )
+    bodies = [coordinates(body) for body in inertial - start[: 10 * n].reshape(n, 10)]
+    state = np.concatenate([*bodies, np.log(np.maximum(wanted, least))])
     inside = np.zeros(len(state))
     inside[(10 * np.arange(n)[:, None] + _DIAGONAL).ravel()] = -2.0
     x, slope = _unknowns(state, inertial, armature)
@@ -124,13 +135,11 @@ def solve_consistent(
         gradient = slope.T @ (matrix @ x - vector) + inside
         hessian = slope.T @ matrix @ slope
         scaled = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
-        step = -np.linalg.solve(scaled, gradient)
-        step[: 11 * n] = np.clip(step[: 11 * n], -2.0, 2.0)
-        trial = state + step
+        trial = state - np.clip(np.linalg.solve(scaled, gradient), -2.0, 2.0)
         x_new, slope_new = _unknowns(trial, inertial, armature)
         cost_new = 0.5 * x_new @ matrix @ x_new - vector @ x_new + inside @ trial
         if cost_new < cost:
-            done = cost - cost_new < 1e-9 * max(abs(cost), 1.0)
+            done = cost - cost_new < 1e-7 * max(abs(cost), 1.0)
             state, x, slope, cost, damping = trial, x_new, slope_new, cost_new, damping / 3
             if done:
                 break
@@ -144,13 +153,13 @@ def solve_consistent(
 def _unknowns(state: Array, inertial: Array, armature: Array) -> tuple[Array, Array]:
     """x of the free coordinates, and its derivative by them."""
     n = len(inertial)
-    x, slope = state.copy(), np.eye(len(state))
+    x, slope = state.copy(), np.zeros((len(state), len(state)))
     for link in range(n):
         at = slice(10 * link, 10 * link + 10)
         body, derivative = from_coordinates(state[at])
         x[at] = inertial[link] - body
         slope[at, at] = -derivative
-    at = slice(10 * n, 11 * n)
+    at = slice(10 * n, None)
     reflected = np.exp(state[at])
     x[at] = armature - reflected
     slope[at, at] = -np.diag(reflected)

@@ -52,12 +52,12 @@ class FrictionModel:
         cycles = np.array(self.cycles, dtype=np.float64, ndmin=2)
         if not (np.isfinite(weights).all() and np.isfinite(cycles).all()):
             raise ValueError("FrictionModel: weights and cycles must be finite")
+        object.__setattr__(self, "cycles", cycles)
         if weights.size and weights.shape[1] != self.columns:
             raise ValueError(
                 f"FrictionModel.weights: {weights.shape[1]} columns, expected {self.columns}"
             )
         object.__setattr__(self, "weights", weights)
-        object.__setattr__(self, "cycles", cycles)
 
     @property
     def columns(self) -> int:

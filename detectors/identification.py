@@ -127,7 +127,7 @@ def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
 
 
 @dataclass
-class _Filtered:
+class Filtered:
     """Everything that the regression needs of one recording, behind the observer's filter."""
 
     torque: Array  #: nominal rigid-body torque less payload [N m], (R, n)
@@ -138,10 +138,11 @@ class _Filtered:
     weight: Array  #: of each row and joint, (R, n)
 
 
-def _filtered(
+def filtered(
     recording: Recording, robot: RobotNumbers, gain: Array, model: FrictionModel, rate: float,
     rest: float,
-) -> _Filtered:
+) -> Filtered:
+    """Everything that the regression needs of a recording at these gains."""
     trace = recording.trace
     stride = max(1, round(4e-3 / trace.dt))
     count = len(trace.t) // stride
@@ -168,7 +169,7 @@ def _filtered(
     slow = np.abs(trace.qd) < MOVING
     needed = max(1, round(rest / trace.dt))
     still = np.column_stack([confirmed(column, needed) for column in slow.T])[:rows:stride]
-    return _Filtered(
+    return Filtered(
         through(*momentum_terms(robot, q, qd))[keep],
         -through(nothing, nothing, drive)[keep],
         through(*momentum_regressor(robot, q, qd))[keep],
@@ -200,7 +201,7 @@ class _System:
         body = np.arange(INERTIAL * self.n)
         return np.concatenate([body, [INERTIAL * self.n + joint], own, [self.gain + joint], load])
 
-    def design(self, data: _Filtered, joint: int, known: Array) -> Array:
+    def design(self, data: Filtered, joint: int, known: Array) -> Array:
         """Columns of one joint; ``known`` is the load that the torque scales with."""
         last = slice(INERTIAL * (self.n - 1), INERTIAL * (self.n - 1) + PAYLOAD)
         load = data.inertial[:, joint, last]
@@ -214,18 +215,18 @@ class _System:
             ]
         )
 
-    def target(self, data: _Filtered, joint: int) -> Array:
+    def target(self, data: Filtered, joint: int) -> Array:
         out: Array = data.current[:, joint] - data.torque[:, joint]
         return out
 
-    def add(self, data: _Filtered, recording: int, weight: Array, known: Array) -> None:
+    def add(self, data: Filtered, recording: int, weight: Array, known: Array) -> None:
         for joint in range(self.n):
             at, x = self.places(joint, recording), self.design(data, joint, known)
             w = (weight[joint] * data.weight[:, joint])[:, None] ** 2
             self.matrix[np.ix_(at, at)] += x.T @ (w * x)
             self.vector[at] += x.T @ (w[:, 0] * self.target(data, joint))
 
-    def left(self, data: _Filtered, recording: int, solution: Array, known: Array) -> Array:
+    def left(self, data: Filtered, recording: int, solution: Array, known: Array) -> Array:
         """What the solution does not explain [N m], shape (R, n)."""
         out = np.empty_like(data.current)
         for joint in range(self.n):
@@ -279,6 +280,7 @@ def identify(
     friction: FrictionModel = REAL_FRICTION,
     beliefs: Beliefs | None = None,
     rate: float = 20.0,
+    data: Sequence[Filtered] | None = None,
 ) -> Identified:
     """Identify inertia, friction, and where something fixes their scale the drive gains.
 
@@ -290,6 +292,7 @@ def identify(
         friction: its columns.
         beliefs: how far to trust what is believed.
         rate: of the filter that everything passes through [1/s].
+        data: of each recording, from :func:`filtered` (default: made here); only for "gains".
 
     Raises:
         ValueError: another scale, no load to take it from, too little motion, or another arm's log.
@@ -301,7 +304,8 @@ def identify(
     level: Array = np.ones(robot.joints)
     known = [_known(recording) for recording in recordings]
     for turn in range(2 if scale == "gains" else 5):
-        data = [_filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
+        if data is None or scale != "gains":
+            data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
         if sum(len(d.current) for d in data) < 500:
             raise ValueError("fewer than 10 s of motion in all: give 20 s or more")
         system = _System(robot, friction.columns, len(recordings))
@@ -312,8 +316,8 @@ def identify(
         means[system.gain : system.load] = gain / arm.drive_gain - 1
         if turn == 0:
             level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
-        for k, filtered in enumerate(data):
-            system.add(filtered, k, 1 / (beliefs.softness * np.maximum(level, 1e-6)), known[k])
+        for k, one in enumerate(data):
+            system.add(one, k, 1 / (beliefs.softness * np.maximum(level, 1e-6)), known[k])
         precision = deviations**-2.0
         matrix = system.matrix + np.diag(precision)
         solution = solve_consistent(
@@ -322,13 +326,13 @@ def identify(
         left = np.concatenate(
             [system.left(d, k, solution, known[k]) for k, d in enumerate(data)]
         )
-        level = np.sqrt((left**2).mean(axis=0))
-        level = np.maximum(level, beliefs.evenness * level.max())
+        rms = np.sqrt((left**2).mean(axis=0))
+        level = np.maximum(rms, beliefs.evenness * rms.max())
         stretch = 1 + solution[system.gain : system.load]
         if scale != "gains":
             error = np.sqrt(np.diag(np.linalg.inv(matrix))[system.gain : system.load])
             gain = gain / np.clip(stretch, 0.5, 2.0)
-    return _result(arm, system, solution, gain, level, error, scale, friction, beliefs)
+    return _result(arm, system, solution, gain, rms, error, scale, friction, beliefs)
 
 
 def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 COMMANDS = {
     "demo": "simulate, strike, train, detect, and leave a recording to look at",
+    "calibrate": "friction, inertia and drive gains of a real arm from collision-free logs",
     "detect": "look for collisions in the log of a real arm",
     "simulate": "labelled episodes of the arm at work, as many as asked",
     "train": "a detector from labelled recordings",

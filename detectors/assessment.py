@@ -1,0 +1,106 @@
+"""How good a calibration is on logs that it has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
+from tauguard.detectors.identification import (
+    REAL_FRICTION,
+    Beliefs,
+    Recording,
+    identify,
+    moving_span,
+)
+from tauguard.detectors.friction import FrictionModel
+from tauguard.detectors.numbers import RobotNumbers, momentum_terms
+from tauguard.detectors.observer import intervals, low_pass
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+
+
+def residual_rms(
+    arm: ArmModel, trace: Trace, rate: float = 20.0, unknowns: Unknowns | None = None
+) -> Array:
+    """Root mean square of the observer's residual from the first motion to the last one.
+
+    Args:
+        arm: identified.
+        trace: collision-free.
+        rate: of the observer [1/s].
+        unknowns: what is tracked meanwhile (default: nothing, the plain observer).
+
+    Returns:
+        [N m], shape (n,).
+    """
+    estimator = Estimator(arm, rate, trace.dt, unknowns or Unknowns.none())
+    left = estimator.run(trace.t, trace.q, trace.qd, trace.current).left
+    level: Array = np.sqrt((left[moving_span(trace)] ** 2).mean(axis=0))
+    return level
+
+
+def left_out(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    *,
+    scale: str = "gains",
+    friction: FrictionModel = REAL_FRICTION,
+    beliefs: Beliefs | None = None,
+    rate: float = 20.0,
+) -> list[Array]:
+    """Residual RMS of each recording under the calibration from all the others [N m], (n,) each.
+
+    With gains that are identified, the gains of all recordings are used for all, so that the
+    figures are in the same newton metres.
+
+    Raises:
+        ValueError: fewer than two recordings, or what :func:`identify` raises.
+    """
+    if len(recordings) < 2:
+        raise ValueError("one log alone cannot be held out: give two or more")
+    if scale != "gains":
+        whole = identify(
+            arm, recordings, scale=scale, friction=friction, beliefs=beliefs, rate=rate
+        )
+        arm = ArmModel(arm.robot, whole.arm.drive_gain)
+    found = []
+    for k, recording in enumerate(recordings):
+        others = [*recordings[:k], *recordings[k + 1 :]]
+        part = identify(arm, others, friction=friction, beliefs=beliefs, rate=rate)
+        found.append(residual_rms(part.arm, recording.trace, rate))
+    return found
+
+
+def start_gains(robot: RobotNumbers, traces: Sequence[Trace]) -> Array:
+    """A first guess of torque per ampere from the robot file's inertial numbers, shape (n,).
+
+    Joints whose current does not follow the rigid-body torque get the median of the others.
+
+    Raises:
+        ValueError: no joint's current follows the torque: wrong joints, signs or units.
+    """
+    torque, current = [], []
+    for trace in traces:
+        dt, count = intervals(trace.t, len(trace.t)), robot.joints
+        p, beta = momentum_terms(robot, trace.q, trace.qd)
+        rate = np.full(count, 20.0)
+        rows = moving_span(trace)
+        nothing = np.zeros_like(p)
+        torque.append(low_pass(rate, dt, p, beta)[rows])
+        current.append(-low_pass(rate, dt, nothing, nothing, trace.current)[rows])
+    a, b = np.concatenate(torque), np.concatenate(current)
+    both = (a * b).sum(axis=0)
+    alike = both / np.sqrt((a**2).sum(axis=0) * (b**2).sum(axis=0) + 1e-12)
+    sure = np.abs(alike) > 0.5
+    if not sure.any():
+        raise ValueError(
+            "no joint's current follows the torque that its motion needs: check the order of the "
+            "joints, signs and units, or give --gains"
+        )
+    ratio = both / np.maximum((b**2).sum(axis=0), 1e-12)
+    gains: Array = np.where(sure, ratio, np.median(ratio[sure]))
+    return gains

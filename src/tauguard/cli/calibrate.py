@@ -1,0 +1,174 @@
+"""``tauguard calibrate LOGS --robot FILE``: a calibrated robot file from collision-free logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+if TYPE_CHECKING:
+    from tauguard.detectors import RobotNumbers
+    from tauguard.detectors.identification import Identified, Recording
+
+SOURCES = {
+    "gains": "the gains that were given",
+    "payload": "the known payload",
+    "masses": "the robot file's masses",
+}
+
+
+def command(
+    logs: Annotated[tuple[Path, ...], tyro.conf.Positional],
+    /,
+    robot: Path,
+    out: Path | None = None,
+    columns: str | None = None,
+    gains: tuple[float, ...] = (),
+    payload: tuple[str, ...] = (),
+    scale: Literal["auto", "gains", "payload", "masses"] = "auto",
+    json: Path | None = None,
+) -> None:
+    """Identify friction, inertia and drive gains from logs in which nothing touched the arm.
+
+    Currents tell torques only up to a factor a joint. Its scale comes from --gains (or a preset's)
+    if there are any, else from a log with a known --payload, else from the robot file's masses; the
+    output says which. Each log is also predicted by a calibration from the others.
+
+    Args:
+        logs: CSV or MCAP files, or a folder of them; 40 s of motion are good, 65 s are plenty.
+        robot: URDF or MJCF file of the arm alone.
+        out: the calibrated robot file (default: beside ROBOT, with .calibrated in its name).
+        columns: of CSV files: a preset (ur10e, ur_rtde) or a JSON file (see `tauguard detect`).
+        gains: N m per ampere, one a joint.
+        payload: loads that were carried, as LOG=KG, LOG=KG,X,Y,Z (centre in the last link's frame,
+            m) or LOG=unknown; LOG is a file's name. Other logs are taken as without a load.
+        scale: what fixes the scale of the torques.
+        json: write the figures here as JSON.
+    """
+    from tauguard.benchmarks.report import write_json
+    from tauguard.cli.real_logs import read_logs, robot_numbers
+    from tauguard.detectors.arm_file import save_arm
+    from tauguard.detectors.assessment import left_out
+    from tauguard.detectors.identification import identify
+
+    numbers = robot_numbers(robot)
+    traces = read_logs(logs, columns, numbers)
+    recordings = loaded(traces, payload)
+    arm, chosen = start(numbers, recordings, columns, gains, scale)
+    found = identify(arm, recordings, scale=chosen)
+    held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
+    target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
+    save_arm(found.arm, robot, target, scale=chosen, logs=list(traces))
+    result = summary(list(traces), found, held, target)
+    report(result, found)
+    if json is not None:
+        write_json(json, result)
+
+
+def loaded(traces: dict[str, Any], payload: tuple[str, ...]) -> list[Recording]:
+    """Traces with their loads.
+
+    Raises:
+        ValueError: a payload that cannot be read or belongs to no log.
+    """
+    from tauguard.detectors.identification import Load, Recording
+
+    loads: dict[str, Load | None] = {}
+    for text in payload:
+        name, _, value = text.partition("=")
+        if name not in traces:
+            raise ValueError(f"--payload {text}: no log {name!r}; there are {', '.join(traces)}")
+        if value == "unknown":
+            loads[name] = None
+            continue
+        try:
+            parts = [float(v) for v in value.split(",")]
+        except ValueError:
+            parts = []
+        if len(parts) not in (1, 4):
+            raise ValueError(f"--payload {text}: expected LOG=KG, LOG=KG,X,Y,Z or LOG=unknown")
+        centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
+        loads[name] = Load(parts[0], centre)
+    return [Recording(trace, loads.get(name, Load())) for name, trace in traces.items()]
+
+
+def start(
+    numbers: RobotNumbers,
+    recordings: list[Recording],
+    columns: str | None,
+    gains: tuple[float, ...],
+    scale: str,
+) -> tuple[Any, str]:
+    """The arm to begin with, and what fixes the scale.
+
+    Raises:
+        ValueError: not one gain a joint.
+    """
+    from tauguard.datasets.drives import DRIVES
+    from tauguard.detectors import ArmModel
+    from tauguard.detectors.assessment import start_gains
+
+    preset = DRIVES.get(columns or "")
+    known = any(r.load is not None and r.load.mass > 0 for r in recordings)
+    if scale == "auto":
+        if gains or (preset and not known):
+            scale = "gains"
+        else:
+            scale = "payload" if known else "masses"
+    if not gains and preset is not None:
+        gains = preset.gain
+    if gains and len(gains) != numbers.joints:
+        raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
+    if not gains and scale == "gains":
+        raise ValueError(f"--gains: give {numbers.joints} numbers, N m of torque per ampere")
+    import numpy as np
+
+    begin = np.array(gains) if gains else start_gains(numbers, [r.trace for r in recordings])
+    return ArmModel(numbers, begin), scale
+
+
+def summary(names: list[str], found: Identified, held: list[Any], target: Path) -> dict[str, Any]:
+    """The figures, ready for JSON."""
+    return {
+        "name": "calibrate",
+        "robot": str(target),
+        "joints": list(found.arm.robot.joint_names),
+        "scale": found.scale,
+        "drive_gain": found.arm.drive_gain.tolist(),
+        "gain_relative_sd": found.gain_error.tolist(),
+        "mass": found.arm.robot.inertial[:, 0].tolist(),
+        "armature": found.arm.robot.armature.tolist(),
+        "rms_nm": found.rms.tolist(),
+        "held_out_rms_nm": {n: r.tolist() for n, r in zip(names, held, strict=False)},
+        "loads_kg": dict(zip(names, found.loads[:, 0].tolist(), strict=True)),
+        "notes": list(found.notes),
+    }
+
+
+def report(result: dict[str, Any], found: Identified) -> None:
+    """The figures for a reader."""
+    from tauguard.benchmarks.report import table
+
+    print(f"scale of the torques: from {SOURCES[result['scale']]}")
+    rows = []
+    for k, name in enumerate(result["joints"]):
+        spread = result["gain_relative_sd"][k]
+        rows.append(
+            {
+                "joint": name,
+                "gain N m/A": f"{result['drive_gain'][k]:.2f}",
+                "+-": f"{100 * spread:.0f} %" if spread else "given",
+                "mass kg": f"{result['mass'][k]:.2f}",
+                "rotor kg m2": f"{result['armature'][k]:.3f}",
+                "rms N m": f"{result['rms_nm'][k]:.2f}",
+            }
+        )
+    print(table(rows))
+    for name, rms in result["held_out_rms_nm"].items():
+        load = result["loads_kg"][name]
+        carried = f" (load {load:.2f} kg)" if abs(load) > 0.01 else ""
+        print(f"held out {name}{carried}: " + " ".join(f"{v:.2f}" for v in rms) + " N m rms")
+    for note in found.notes:
+        print(f"note: {note}")
+    print(f"{result['robot']}: written")
