@@ -1,12 +1,13 @@
 """A detector that learns from collision-free motion alone.
 
 Estimator (friction, momentum observer, payload and slow offsets tracked), then per joint the
-residual that is left over its envelope: what collision-free motion leaves at that speed and
-acceleration, apart for joints that stand still. Static friction is indeterminate there: the
-torque of a joint at rest wanders with the others' motion, which the tracked offset follows.
+residual that is left over its allowance: what collision-free motion leaves at that speed and
+acceleration, apart for joints that stand still. Static friction is indeterminate there: the torque
+of a joint at rest wanders with the others' motion, which the tracked offset follows.
 
-Both envelope and threshold come from residuals of logs that the calibration in use did not see:
-every training log is judged by a calibration from the others, as new logs will be.
+Allowances come from residuals of logs that the calibration in use did not see: every training log
+is judged by a calibration from the others, as new logs will be. Each joint's allowance at rest and
+in motion is scaled to its own share of the false alarms to accept, so that 1 is the threshold.
 """
 
 from __future__ import annotations
@@ -17,16 +18,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.detectors.allowance import Allowance, terms, torque_change
 from tauguard.detectors.detector import check_interval, common_interval
 from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
-from tauguard.detectors.features import Envelope
+from tauguard.detectors.events import find_alarms
 from tauguard.detectors.filter import confirmation_samples, confirmed
-from tauguard.detectors.identification import REAL_FRICTION, Beliefs, Recording, filtered, identify
+from tauguard.detectors.identification import (
+    REAL_FRICTION,
+    Beliefs,
+    Recording,
+    filtered,
+    identify,
+)
 from tauguard.detectors.operating_point import sustained, threshold_for_rate
 from tauguard.detectors.thresholds import still
-from tauguard.traces.trace import Bools, Trace
+from tauguard.traces.trace import Bools, Detection, Trace
 
 Array = NDArray[np.float64]
+
+#: Travel after which a joint that stood still counts as moving [rad].
+RELEASE = 5e-3
 
 
 @dataclass(frozen=True)
@@ -36,26 +47,36 @@ class FreeMotionSettings:
     observer_gain: float = 20.0  #: [1/s]
     confirmation: float = 0.04  #: t_c [s]
     settle: float = 2.0  #: seconds at the beginning that are never an alarm
-    false_alarms_per_hour: float = 1.0  #: to accept when the threshold is chosen
+    false_alarms_per_hour: float = 1.0  #: to accept when the allowances are scaled
     spike: bool = True
     """Take the median of three successive currents: a controller's kick of one sample, as at a
     commanded stop, says nothing about contact. It costs one sample of delay."""
-    unknowns: Unknowns = Unknowns()
-    beliefs: Beliefs = Beliefs()
+    unknowns: Unknowns = field(default_factory=Unknowns)  #: what is tracked
+    beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What the detector sees of a trace; rows are samples."""
+
+    left: Array  #: residual that the tracked unknowns do not explain [N m], shape (T, n)
+    terms: Array  #: of the allowances, shape (T, n, 5)
+    rest: Bools  #: which joints stand still, shape (T, n)
 
 
 @dataclass
 class FreeMotionDetector:
-    """Calibration, envelopes and threshold from logs in which nothing touched the arm."""
+    """Calibration and allowances from logs in which nothing touched the arm."""
 
     settings: FreeMotionSettings = field(default_factory=FreeMotionSettings)
     name: str = "free-motion"
     model: ArmModel | None = None
-    resting: Envelope | None = None
-    moving: Envelope | None = None
-    threshold: float = 1.0
-    dt: float = 0.0
-    seconds: float = 0.0  #: of motion that the threshold rests on
+    resting: Allowance | None = None
+    moving: Allowance | None = None
+    dt: float = 0.0  #: sample interval of the training logs [s]
+    seconds: float = 0.0  #: of motion that the allowances rest on
+
+    threshold = 1.0  #: of the score
 
     @property
     def settle(self) -> float:
@@ -67,15 +88,15 @@ class FreeMotionDetector:
         """The calibrated arm."""
         return self._fitted()[0]
 
-    def _fitted(self) -> tuple[ArmModel, Envelope, Envelope]:
+    def _fitted(self) -> tuple[ArmModel, Allowance, Allowance]:
         if self.model is None or self.resting is None or self.moving is None:
             raise ValueError("this detector is not fitted: call fit or load first")
         return self.model, self.resting, self.moving
 
-    def fit(
-        self, traces: Sequence[Trace | Recording], robot: ArmModel
-    ) -> FreeMotionDetector:
-        """Calibrate, then learn envelopes and threshold from left-out logs.
+    # -- training ---------------------------------------------------------------------------------
+
+    def fit(self, traces: Sequence[Trace | Recording], robot: ArmModel) -> FreeMotionDetector:
+        """Calibrate, then learn allowances from left-out logs.
 
         Args:
             traces: collision-free logs, three or more; plain traces count as without a load.
@@ -88,17 +109,14 @@ class FreeMotionDetector:
         if len(recordings) < 3:
             raise ValueError(f"{len(recordings)} logs: give three or more, to leave each out once")
         self.dt = common_interval([r.trace for r in recordings], robot)
-        friction = robot.friction or REAL_FRICTION
-        bare = replace(friction, weights=np.empty((0, 0)))
+        bare = replace(robot.friction or REAL_FRICTION, weights=np.empty((0, 0)))
         gain, beliefs = self.settings.observer_gain, self.settings.beliefs
-        data = [
-            filtered(r, robot.robot, robot.drive_gain, bare, gain, beliefs.rest)
-            for r in recordings
-        ]
-        residuals = []
-        for k in range(-1, len(recordings)):
+        numbers, drive = robot.robot, robot.drive_gain
+        data = [filtered(r, numbers, drive, bare, gain, beliefs.rest) for r in recordings]
+
+        def without(k: int) -> ArmModel:
             use = [i for i in range(len(recordings)) if i != k]
-            model = identify(
+            return identify(
                 robot,
                 [recordings[i] for i in use],
                 friction=bare,
@@ -106,96 +124,109 @@ class FreeMotionDetector:
                 rate=gain,
                 data=[data[i] for i in use],
             ).arm
-            if k < 0:
-                self.model = model
-            else:
-                residuals.append(self._residual(model, recordings[k].trace))
-        self._learn([r.trace for r in recordings], residuals)
+
+        self.model = without(-1)
+        assert self.model.friction is not None
+        judged = [self._judged(without(k), r.trace) for k, r in enumerate(recordings)]
+        self._learn(judged, self.model.friction.coulomb())
         return self
 
-    def _learn(self, traces: Sequence[Trace], residuals: Sequence[tuple[Array, ...]]) -> None:
-        """Envelopes of the left-out residuals, and the threshold on their ratio."""
-        left, qd, acceleration, rest = (
-            np.concatenate([r[k][self._settled(t)] for r, t in zip(residuals, traces, strict=True)])
-            for k in range(4)
+    def _learn(self, judged: Sequence[Judged], coulomb: Array) -> None:
+        """Allowances of left-out residuals, scaled to the false alarms to accept."""
+        first = int(np.ceil(self.settings.settle / self.dt))
+        parts = [Judged(j.left[first:], j.terms[first:], j.rest[first:]) for j in judged]
+        left, columns, rest = (
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("left", "terms", "rest")
         )
-        self.resting, self.moving = (
-            _envelope(left, qd, acceleration, mask) for mask in (rest > 0.5, rest < 0.5)
+        self.seconds = len(left) * self.dt
+        at_rest = self._scaled(Allowance.fit(left, columns, rest), parts, True)
+        moving = self._scaled(Allowance.fit(left, columns, ~rest), parts, False)
+        self.resting, self.moving = at_rest.at_least(coulomb, 1.0), moving.at_least(coulomb, 0.5)
+
+    def _scaled(self, allowance: Allowance, parts: Sequence[Judged], resting: bool) -> Allowance:
+        """Each joint's allowance times its threshold for a share of the false alarms."""
+        joints = len(allowance.weights)
+        rate = self.settings.false_alarms_per_hour / (2 * joints)
+        levels: list[list[Array]] = [[] for _ in range(joints)]
+        for part in parts:
+            ratio = np.abs(part.left) / allowance.scale(part.terms)
+            ratio[part.rest != resting] = 0.0
+            for j in range(joints):
+                levels[j].append(sustained(ratio[:, j], self._samples()))
+        return allowance.times(
+            np.array([threshold_for_rate(own, self.dt, rate) for own in levels])
         )
-        self.seconds = sum(int(self._settled(t).sum()) for t in traces) * self.dt
-        self.resting = self._scaled(self.resting, traces, residuals, 1.0)
-        self.moving = self._scaled(self.moving, traces, residuals, 0.0)
 
-    def _scaled(
-        self,
-        envelope: Envelope,
-        traces: Sequence[Trace],
-        residuals: Sequence[tuple[Array, ...]],
-        regime: float,
-    ) -> Envelope:
-        """The envelope times each joint's own threshold, so that 1 is an alarm for every joint.
-
-        The false alarms to accept are shared among the joints and their two regimes.
-        """
-        rate = self.settings.false_alarms_per_hour / (2 * envelope.weights.shape[0])
-        factors = []
-        for j in range(envelope.weights.shape[0]):
-            levels = []
-            for trace, (left, qd, acceleration, rest) in zip(traces, residuals, strict=True):
-                ratio = np.abs(left[:, j]) / envelope.scale(qd, acceleration)[:, j]
-                level = sustained(np.where(rest[:, j] == regime, ratio, 0.0), self._samples())
-                levels.append(level[self._settled(trace)])
-            factors.append(threshold_for_rate(levels, self.dt, rate))
-        return Envelope(envelope.weights * np.array(factors)[:, None])
-
-    def _settled(self, trace: Trace) -> Bools:
-        return np.asarray(trace.t - trace.t[0] >= self.settings.settle)
+    # -- detection --------------------------------------------------------------------------------
 
     def _samples(self) -> int:
         return confirmation_samples(self.settings.confirmation, self.dt)
 
-    def _residual(self, model: ArmModel, trace: Trace) -> tuple[Array, Array, Array, Array]:
-        """Residual, speed, acceleration and whether a joint rests, each of shape (T, n)."""
-        q, qd, current = trace.q, trace.qd, trace.current
+    def _judged(self, model: ArmModel, trace: Trace) -> Judged:
+        t, q, qd, current = trace.t, trace.q, trace.qd, trace.current
         if self.settings.spike:
             q, qd, current = delayed(q), delayed(qd), median_of_three(current)
-        estimator = Estimator(model, self.settings.observer_gain, self.dt, self.settings.unknowns)
-        found = estimator.run(trace.t, q, qd, current)
-        return found.left, qd, found.acceleration, still(qd, self.dt).astype(np.float64)
+        gain = self.settings.observer_gain
+        found = Estimator(model, gain, self.dt, self.settings.unknowns).run(t, q, qd, current)
+        change = torque_change(model.robot, t, q, qd, gain)
+        return Judged(found.left, terms(qd, found.acceleration, change), resting(q, qd, self.dt))
 
-    def _ratio(self, left: Array, qd: Array, acceleration: Array, rest: Array) -> Array:
-        """The largest ratio of a residual to its envelope, shape (T,)."""
-        return self.ratios(left, qd, acceleration, rest).max(axis=1)
+    def ratios(self, trace: Trace) -> Array:
+        """Each joint's residual over its allowance, shape (T, n).
 
-    def ratios(self, left: Array, qd: Array, acceleration: Array, rest: Array) -> Array:
-        """Each joint's residual over its envelope, shape (T, n)."""
-        _, resting, moving = self._fitted()
-        calm, busy = resting.scale(qd, acceleration), moving.scale(qd, acceleration)
-        ratio: Array = np.abs(left) / np.where(rest > 0.5, calm, busy)
+        Raises:
+            ValueError: not fitted, other joints or another sample rate than the training's.
+        """
+        model, at_rest, moving = self._fitted()
+        if len(trace.joint_names) != model.robot.joints:
+            raise ValueError(
+                f"the trace has {len(trace.joint_names)} joints, this detector "
+                f"{model.robot.joints}: {', '.join(model.robot.joint_names)}"
+            )
+        check_interval("the trace", trace, self.dt)
+        judged = self._judged(model, trace)
+        return self._ratio(judged, at_rest, moving)
+
+    @staticmethod
+    def _ratio(judged: Judged, at_rest: Allowance, moving: Allowance) -> Array:
+        bound = np.where(judged.rest, at_rest.scale(judged.terms), moving.scale(judged.terms))
+        ratio: Array = np.abs(judged.left) / bound
         return ratio
 
     def scores(self, trace: Trace) -> Array:
-        """The largest ratio of a joint's residual to its envelope, shape (T,)."""
-        check_interval("the trace", trace, self.dt)
-        return self._ratio(*self._residual(self._fitted()[0], trace))
+        """The largest ratio of a joint's residual to its allowance, shape (T,)."""
+        return np.asarray(self.ratios(trace).max(axis=1))
 
-    def residual(self, trace: Trace) -> Array:
-        """What the estimator leaves [N m], shape (T, n)."""
-        return self._residual(self._fitted()[0], trace)[0]
+    def detect(self, trace: Trace) -> Detection:
+        """Judge a trace; no alarm within the first ``settle`` seconds."""
+        score = self.scores(trace)
+        settled = trace.t - trace.t[0] >= self.settings.settle
+        alarm = confirmed((score > self.threshold) & settled, self._samples())
+        left = self._judged(self._fitted()[0], trace).left
+        alarms = find_alarms(trace.t, alarm)
+        return Detection(self.name, trace.t, left, score, self.threshold, alarm, alarms)
 
-    def alarms(self, trace: Trace) -> Bools:
-        """Whether the alarm is up at each sample, shape (T,)."""
-        raw = (self.scores(trace) > self.threshold) & self._settled(trace)
-        return confirmed(raw, self._samples())
 
+def resting(q: Array, qd: Array, dt: float) -> Bools:
+    """Which joints are at rest at each sample, shape (T, n).
 
-def _envelope(left: Array, qd: Array, acceleration: Array, mask: Bools) -> Envelope:
-    """The envelope of each joint's rows in ``mask``; a joint without such rows takes all."""
-    parts = []
-    for j in range(left.shape[1]):
-        rows = mask[:, j] if mask[:, j].sum() >= 50 else np.ones(len(left), dtype=np.bool_)
-        parts.append(Envelope.fit(left[rows], qd[rows], acceleration[rows]).weights[j])
-    return Envelope(np.array(parts))
+    A joint comes to rest when it has stood still for a while (see
+    :mod:`~tauguard.detectors.thresholds`) and leaves it by ``RELEASE`` of travel: the twitch of a
+    joint that is shaken by the others is no motion.
+    """
+    stopped = still(qd, dt)
+    out = np.empty_like(stopped)
+    for j in range(q.shape[1]):
+        at_rest, anchor = True, float(q[0, j])
+        stops, angles = stopped[:, j].tolist(), q[:, j].tolist()
+        for k, (stop, angle) in enumerate(zip(stops, angles, strict=True)):
+            if at_rest:
+                at_rest = abs(angle - anchor) <= RELEASE
+            elif stop:
+                at_rest, anchor = True, angle
+            out[k, j] = at_rest
+    return out
 
 
 def delayed(x: Array) -> Array:
@@ -204,7 +235,6 @@ def delayed(x: Array) -> Array:
 
 
 def median_of_three(x: Array) -> Array:
-    """Median of a sample and the two before it: of the delayed series, shape (T, n)."""
+    """Median of the sample before and its neighbours, shape (T, n): causal, one sample late."""
     before = delayed(x)
-    stacked = np.stack([x, before, delayed(before)])
-    return np.ascontiguousarray(np.median(stacked, axis=0))
+    return np.ascontiguousarray(np.median(np.stack([x, before, delayed(before)]), axis=0))

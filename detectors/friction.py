@@ -109,6 +109,17 @@ class FrictionModel:
         torque: Array = np.einsum("tjc,jc->tj", columns, self.weights)
         return torque
 
+    def coulomb(self, speed: float = 0.1) -> Array:
+        """Half the difference between friction at ``speed`` [rad/s] and back, unloaded, (n,) [N m]."""
+        n = len(self.weights)
+        q = np.linspace(0.0, 0.5, 500)[:, None].repeat(n, axis=1)
+        there, back = (
+            self.torque(sign * q, np.full_like(q, sign * speed), np.zeros_like(q))[-1]
+            for sign in (1.0, -1.0)
+        )
+        level: Array = 0.5 * np.abs(there - back)
+        return level
+
     @classmethod
     def coulomb_viscous(
         cls, coulomb: ArrayLike, viscous: ArrayLike, load: ArrayLike = 0.0, width: float = 0.05
