@@ -47,11 +47,11 @@ class FreeMotionSettings:
     observer_gain: float = 20.0  #: [1/s]
     confirmation: float = 0.04  #: t_c [s]
     settle: float = 2.0  #: seconds at the beginning that are never an alarm
-    false_alarms_per_hour: float = 1.0  #: to accept when the allowances are scaled
+    false_alarms_per_hour: float = 2.0  #: to accept when the allowances are scaled
     spike: bool = True
     """Take the median of three successive currents: a controller's kick of one sample, as at a
     commanded stop, says nothing about contact. It costs one sample of delay."""
-    unknowns: Unknowns = field(default_factory=Unknowns)  #: what is tracked
+    unknowns: Unknowns = field(default_factory=lambda: Unknowns(offset=0.3))  #: what is tracked
     beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
 
 
@@ -141,7 +141,10 @@ class FreeMotionDetector:
         )
         self.seconds = len(left) * self.dt
         at_rest = self._scaled(Allowance.fit(left, columns, rest), parts, True)
-        moving = self._scaled(Allowance.fit(left, columns, ~rest), parts, False)
+        # In motion friction's share is known, and changes of torque allow nothing.
+        steady = columns.copy()
+        steady[..., -1] = 0.0
+        moving = self._scaled(Allowance.fit(left, steady, ~rest), parts, False)
         self.resting, self.moving = at_rest.at_least(coulomb, 1.0), moving.at_least(coulomb, 0.5)
 
     def _scaled(self, allowance: Allowance, parts: Sequence[Judged], resting: bool) -> Allowance:
