@@ -15,6 +15,7 @@ from tauguard.detectors import (
     observe,
 )
 from tauguard.detectors.filter import confirmation_samples
+from tauguard.detectors.free_motion import FreeMotionDetector
 from tauguard.traces.trace import Array, Detection, Trace
 
 GAIN = 20.0  # [1/s] of the observer: what 100 Hz and a real arm's friction allow
@@ -123,6 +124,22 @@ def watch_with(detector: CollisionDetector, trace: Trace) -> Watch:
     thresholds = np.where(used(detector.settings.joints, joints), noise, np.inf)
     settled = float(trace.t[0] + detector.settings.settle)
     return Watch(detection, thresholds, settled, detector.notes)
+
+
+def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
+    """Look for collisions with a detector that was trained on collision-free motion.
+
+    Raises:
+        ValueError: another number of joints or another sample rate than it was trained at.
+    """
+    detection = detector.detect(trace)
+    assert detector.moving is not None
+    note = (
+        f"trained on {detector.seconds:.0f} s of collision-free motion for "
+        f"{detector.settings.false_alarms_per_hour:g} false alarms per hour"
+    )
+    settled = float(trace.t[0] + detector.settle)
+    return Watch(detection, detector.moving.weights[:, 0], settled, (note,))
 
 
 def loudest_joint(found: Watch, start: float, end: float) -> int:

@@ -34,6 +34,7 @@ def save_arm(arm: ArmModel, source: str | Path, target: str | Path, **about: obj
     note = {
         "format": FORMAT,
         "joints": list(arm.robot.joint_names),
+        "inertial": arm.robot.inertial.tolist(),
         "armature": arm.robot.armature.tolist(),
         "drive_gain": arm.drive_gain.tolist(),
         "noise": arm.noise.tolist(),
@@ -65,7 +66,9 @@ def load_arm(path: str | Path) -> ArmModel | None:
         if tuple(note["joints"]) != robot.joint_names:
             raise ValueError(f"joints {', '.join(note['joints'])}")
         friction = None if note["friction"] is None else FrictionModel(**note["friction"])
-        robot = replace(robot, armature=np.array(note["armature"], dtype=np.float64))
+        # The file may hold fewer digits than the note.
+        inertial, armature = (np.array(note[k], np.float64) for k in ("inertial", "armature"))
+        robot = replace(robot, inertial=inertial, armature=armature)
         return ArmModel(robot, note["drive_gain"], friction, note["noise"])
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{path}: its calibration cannot be read ({error})") from None

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
+from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.identification import (
     REAL_FRICTION,
     Beliefs,
@@ -15,7 +16,6 @@ from tauguard.detectors.identification import (
     identify,
     moving_span,
 )
-from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.numbers import RobotNumbers, momentum_terms
 from tauguard.detectors.observer import intervals, low_pass
 from tauguard.traces.trace import Trace

@@ -92,8 +92,9 @@ def solve_consistent(
     """Minimise ``x @ matrix @ x / 2 - vector @ x - sum(log det)`` over bodies that can exist.
 
     The logarithm of each pseudo-inertia's determinant, a sum of coordinates, keeps flat bodies
-    away: where the data do not care, a body has some thickness. The unknowns x are errors of what is believed (believed less true) of all links' inertial
-    numbers, then of the armatures, then whatever else, which stays free.
+    away: where the data do not care, a body has some thickness. The unknowns x are errors of what
+    is believed (believed less true) of all links' inertial numbers, then of the armatures, then
+    whatever else, which stays free.
 
     Args:
         matrix: positive definite, priors included, shape (N, N), N >= 11 n.
@@ -117,9 +118,7 @@ def solve_consistent(
     return np.concatenate([x, follows[:, body] - follows[:, :body] @ x])
 
 
-def _descend(
-    matrix: Array, vector: Array, inertial: Array, armature: Array, rounds: int
-) -> Array:
+def _descend(matrix: Array, vector: Array, inertial: Array, armature: Array, rounds: int) -> Array:
     """Levenberg-Marquardt over the free coordinates; x of the bodies and armatures alone."""
     n = len(inertial)
     start: NDArray[Any] = np.linalg.solve(matrix, vector)

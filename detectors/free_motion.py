@@ -47,11 +47,11 @@ class FreeMotionSettings:
     observer_gain: float = 20.0  #: [1/s]
     confirmation: float = 0.04  #: t_c [s]
     settle: float = 2.0  #: seconds at the beginning that are never an alarm
-    false_alarms_per_hour: float = 2.0  #: to accept when the allowances are scaled
+    false_alarms_per_hour: float = 1.0  #: to accept when the allowances are scaled
     spike: bool = True
     """Take the median of three successive currents: a controller's kick of one sample, as at a
     commanded stop, says nothing about contact. It costs one sample of delay."""
-    unknowns: Unknowns = field(default_factory=lambda: Unknowns(offset=0.3))  #: what is tracked
+    unknowns: Unknowns = field(default_factory=Unknowns)  #: what is tracked
     beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
 
 
@@ -75,6 +75,9 @@ class FreeMotionDetector:
     moving: Allowance | None = None
     dt: float = 0.0  #: sample interval of the training logs [s]
     seconds: float = 0.0  #: of motion that the allowances rest on
+    left_out: list[int] = field(default_factory=list)
+    """Alarms in each training log under the calibration from the others; not a test, since the
+    allowances have seen its residual."""
 
     threshold = 1.0  #: of the score
 
@@ -129,6 +132,7 @@ class FreeMotionDetector:
         assert self.model.friction is not None
         judged = [self._judged(without(k), r.trace) for k, r in enumerate(recordings)]
         self._learn(judged, self.model.friction.coulomb())
+        self.left_out = [self._alarms(part) for part in judged]
         return self
 
     def _learn(self, judged: Sequence[Judged], coulomb: Array) -> None:
@@ -157,9 +161,7 @@ class FreeMotionDetector:
             ratio[part.rest != resting] = 0.0
             for j in range(joints):
                 levels[j].append(sustained(ratio[:, j], self._samples()))
-        return allowance.times(
-            np.array([threshold_for_rate(own, self.dt, rate) for own in levels])
-        )
+        return allowance.times(np.array([threshold_for_rate(own, self.dt, rate) for own in levels]))
 
     # -- detection --------------------------------------------------------------------------------
 
@@ -175,21 +177,27 @@ class FreeMotionDetector:
         change = torque_change(model.robot, t, q, qd, gain)
         return Judged(found.left, terms(qd, found.acceleration, change), resting(q, qd, self.dt))
 
-    def ratios(self, trace: Trace) -> Array:
-        """Each joint's residual over its allowance, shape (T, n).
-
-        Raises:
-            ValueError: not fitted, other joints or another sample rate than the training's.
-        """
-        model, at_rest, moving = self._fitted()
+    def _checked(self, trace: Trace) -> Judged:
+        model = self._fitted()[0]
         if len(trace.joint_names) != model.robot.joints:
             raise ValueError(
                 f"the trace has {len(trace.joint_names)} joints, this detector "
                 f"{model.robot.joints}: {', '.join(model.robot.joint_names)}"
             )
         check_interval("the trace", trace, self.dt)
-        judged = self._judged(model, trace)
-        return self._ratio(judged, at_rest, moving)
+        return self._judged(model, trace)
+
+    def ratios(self, trace: Trace) -> Array:
+        """Each joint's residual over its allowance, shape (T, n).
+
+        Raises:
+            ValueError: not fitted, other joints or another sample rate than the training's.
+        """
+        return self._ratio(self._checked(trace), *self._fitted()[1:])
+
+    def rests(self, trace: Trace) -> Bools:
+        """Which joints are at rest at each sample, shape (T, n)."""
+        return self._checked(trace).rest
 
     @staticmethod
     def _ratio(judged: Judged, at_rest: Allowance, moving: Allowance) -> Array:
@@ -197,18 +205,25 @@ class FreeMotionDetector:
         ratio: Array = np.abs(judged.left) / bound
         return ratio
 
+    def _alarms(self, judged: Judged) -> int:
+        _, at_rest, moving = self._fitted()
+        above = self._ratio(judged, at_rest, moving).max(axis=1) > self.threshold
+        t = np.arange(len(above)) * self.dt
+        alarm = confirmed(above & (t >= self.settings.settle), self._samples())
+        return len(find_alarms(t, alarm))
+
     def scores(self, trace: Trace) -> Array:
         """The largest ratio of a joint's residual to its allowance, shape (T,)."""
         return np.asarray(self.ratios(trace).max(axis=1))
 
     def detect(self, trace: Trace) -> Detection:
         """Judge a trace; no alarm within the first ``settle`` seconds."""
-        score = self.scores(trace)
+        judged = self._checked(trace)
+        score = self._ratio(judged, *self._fitted()[1:]).max(axis=1)
         settled = trace.t - trace.t[0] >= self.settings.settle
         alarm = confirmed((score > self.threshold) & settled, self._samples())
-        left = self._judged(self._fitted()[0], trace).left
         alarms = find_alarms(trace.t, alarm)
-        return Detection(self.name, trace.t, left, score, self.threshold, alarm, alarms)
+        return Detection(self.name, trace.t, judged.left, score, self.threshold, alarm, alarms)
 
 
 def resting(q: Array, qd: Array, dt: float) -> Bools:

@@ -95,9 +95,7 @@ def _rebuilt(content: dict[str, Any]) -> FreeMotionDetector:
     robot = {**content["robot"], "joint_names": tuple(content["robot"]["joint_names"])}
     friction = FrictionModel(**content["friction"]) if content["friction"] else None
     arm = ArmModel(RobotNumbers(**robot), content["drive_gain"], friction, content["noise"])
-    resting, moving = (
-        np.array(content[name], dtype=np.float64) for name in ("resting", "moving")
-    )
+    resting, moving = (np.array(content[name], dtype=np.float64) for name in ("resting", "moving"))
     for weights in (resting, moving):
         if weights.shape != (arm.robot.joints, TERMS) or not np.isfinite(weights).all():
             raise ValueError("allowances of another shape, or not finite")

@@ -110,14 +110,16 @@ class FrictionModel:
         return torque
 
     def coulomb(self, speed: float = 0.1) -> Array:
-        """Half the difference between friction at ``speed`` [rad/s] and back, unloaded, (n,) [N m]."""
+        """Friction at ``speed`` [rad/s] of joints that carry nothing but it [N m], shape (n,)."""
         n = len(self.weights)
         q = np.linspace(0.0, 0.5, 500)[:, None].repeat(n, axis=1)
-        there, back = (
-            self.torque(sign * q, np.full_like(q, sign * speed), np.zeros_like(q))[-1]
-            for sign in (1.0, -1.0)
-        )
-        level: Array = 0.5 * np.abs(there - back)
+        level: Array = np.zeros(n)
+        for _ in range(5):  # load-dependent friction counts the torque that overcomes friction
+            there, back = (
+                self.torque(sign * q, np.full_like(q, sign * speed), sign * level + 0 * q)[-1]
+                for sign in (1.0, -1.0)
+            )
+            level = 0.5 * np.abs(there - back)
         return level
 
     @classmethod

@@ -126,7 +126,7 @@ def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
     return np.asarray(rows & (trace.t >= trace.t[0] + margin))
 
 
-@dataclass
+@dataclass(frozen=True)
 class Filtered:
     """Everything that the regression needs of one recording, behind the observer's filter."""
 
@@ -139,7 +139,11 @@ class Filtered:
 
 
 def filtered(
-    recording: Recording, robot: RobotNumbers, gain: Array, model: FrictionModel, rate: float,
+    recording: Recording,
+    robot: RobotNumbers,
+    gain: Array,
+    model: FrictionModel,
+    rate: float,
     rest: float,
 ) -> Filtered:
     """Everything that the regression needs of a recording at these gains."""
@@ -158,10 +162,10 @@ def filtered(
     dt = intervals(t, count)
 
     def through(p: Array, beta: Array, held: Array | None = None) -> Array:
-        flat = (x.reshape(count, -1) for x in (p, beta))
+        flat, other = p.reshape(count, -1), beta.reshape(count, -1)
         driven = None if held is None else held.reshape(count, -1)
-        width = p[0].size
-        return low_pass(np.full(width, rate), dt, *flat, driven).reshape(p.shape)
+        rates = np.full(flat.shape[1], rate)
+        return low_pass(rates, dt, flat, other, driven).reshape(p.shape)
 
     nothing, no_columns = np.zeros_like(q), np.zeros_like(columns)
     used = moving_span(trace) & free_rows(trace)
@@ -236,8 +240,12 @@ class _System:
 
 
 def _deviations(
-    system: _System, robot: RobotNumbers, recordings: Sequence[Recording], beliefs: Beliefs,
-    gain: Array, free_masses: bool,
+    system: _System,
+    robot: RobotNumbers,
+    recordings: Sequence[Recording],
+    beliefs: Beliefs,
+    gain: Array,
+    free_masses: bool,
 ) -> tuple[Array, Array]:
     """Standard deviations and means of all unknowns."""
     spread = 4.0 if free_masses else 1.0
@@ -297,25 +305,54 @@ def identify(
     Raises:
         ValueError: another scale, no load to take it from, too little motion, or another arm's log.
     """
-    beliefs, robot = beliefs or Beliefs(), arm.robot
-    _check(recordings, robot, scale)
-    gain = arm.drive_gain.copy()
-    error = np.zeros(robot.joints)
+    beliefs = beliefs or Beliefs()
+    _check(recordings, arm.robot, scale)
+    if scale == "gains":
+        found, _ = _fit(arm, recordings, scale, friction, beliefs, rate, data, 2)
+        return found
+    # A torque per ampere that may change with the current takes up what a load does: it stays out
+    # while the scale is sought.
+    constant = replace(friction, saturation=False, weights=np.empty((0, 0)))
+    sought, error = _fit(arm, recordings, scale, constant, beliefs, rate, None, 6)
+    unsure = error > 0.5 * beliefs.gain
+    start = ArmModel(arm.robot, np.where(unsure, arm.drive_gain, sought.arm.drive_gain))
+    found, _ = _fit(start, recordings, "gains", friction, beliefs, rate, None, 2)
+    notes = tuple(
+        f"{arm.robot.joint_names[j]}: nothing fixes the scale of its torques (gain known to "
+        f"{100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept, give it with --gains"
+        for j in np.flatnonzero(unsure)
+    )
+    return replace(found, scale=scale, gain_error=error, notes=notes)
+
+
+def _fit(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    scale: str,
+    friction: FrictionModel,
+    beliefs: Beliefs,
+    rate: float,
+    data: Sequence[Filtered] | None,
+    rounds: int,
+) -> tuple[Identified, Array]:
+    """Rounds of least squares, each weighing joints by what the last left; gains' deviations."""
+    robot, held = arm.robot, scale == "gains"
+    gain, error = arm.drive_gain.copy(), np.zeros(robot.joints)
     level: Array = np.ones(robot.joints)
     known = [_known(recording) for recording in recordings]
-    for turn in range(2 if scale == "gains" else 5):
-        if data is None or scale != "gains":
+    for turn in range(rounds):
+        if data is None or not held:
             data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
-        if sum(len(d.current) for d in data) < 500:
-            raise ValueError("fewer than 10 s of motion in all: give 20 s or more")
+        if turn == 0:
+            if sum(len(d.current) for d in data) < 500:
+                raise ValueError("fewer than 10 s of motion in all: give 20 s or more")
+            level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
         system = _System(robot, friction.columns, len(recordings))
-        loose = np.full(robot.joints, 0.0 if scale == "gains" else beliefs.gain)
+        loose = np.full(robot.joints, 0.0 if held else beliefs.gain)
         deviations, means = _deviations(
             system, robot, recordings, beliefs, loose, scale != "masses"
         )
         means[system.gain : system.load] = gain / arm.drive_gain - 1
-        if turn == 0:
-            level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
         for k, one in enumerate(data):
             system.add(one, k, 1 / (beliefs.softness * np.maximum(level, 1e-6)), known[k])
         precision = deviations**-2.0
@@ -323,16 +360,13 @@ def identify(
         solution = solve_consistent(
             matrix, system.vector + precision * means, robot.inertial, robot.armature
         )
-        left = np.concatenate(
-            [system.left(d, k, solution, known[k]) for k, d in enumerate(data)]
-        )
+        left = np.concatenate([system.left(d, k, solution, known[k]) for k, d in enumerate(data)])
         rms = np.sqrt((left**2).mean(axis=0))
         level = np.maximum(rms, beliefs.evenness * rms.max())
-        stretch = 1 + solution[system.gain : system.load]
-        if scale != "gains":
+        if not held:
             error = np.sqrt(np.diag(np.linalg.inv(matrix))[system.gain : system.load])
-            gain = gain / np.clip(stretch, 0.5, 2.0)
-    return _result(arm, system, solution, gain, rms, error, scale, friction, beliefs)
+            gain = gain / np.clip(1 + solution[system.gain : system.load], 0.5, 2.0)
+    return _result(arm, system, solution, gain, rms, friction), error
 
 
 def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> None:
@@ -349,8 +383,12 @@ def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> 
 
 
 def _result(
-    arm: ArmModel, system: _System, solution: Array, gain: Array, level: Array, error: Array,
-    scale: str, friction: FrictionModel, beliefs: Beliefs,
+    arm: ArmModel,
+    system: _System,
+    solution: Array,
+    gain: Array,
+    rms: Array,
+    friction: FrictionModel,
 ) -> Identified:
     robot, n = arm.robot, system.n
     found = replace(
@@ -360,10 +398,5 @@ def _result(
     )
     weights: Array = solution[system.friction : system.gain].reshape(n, -1)
     loads: NDArray[Any] = solution[system.load :].reshape(-1, PAYLOAD)
-    notes = tuple(
-        f"{robot.joint_names[j]}: nothing fixes the scale of its torques (gain known to "
-        f"{100 * error[j]:.0f} %); give its gain"
-        for j in np.flatnonzero(error > 0.5 * beliefs.gain)
-    )
-    identified = ArmModel(found, gain, replace(friction, weights=weights), np.maximum(level, 1e-6))
-    return Identified(identified, loads, level, scale, error, notes)
+    identified = ArmModel(found, gain, replace(friction, weights=weights), np.maximum(rms, 1e-6))
+    return Identified(identified, loads, rms, "gains", np.zeros(n), ())

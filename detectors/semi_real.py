@@ -110,8 +110,10 @@ def smallest_found(
 
 
 def moments(moving: NDArray[np.bool_], t: Array, count: int, seed: int) -> list[float]:
-    """``count`` times at which ``moving``, shape (T,), holds, not within 3 s of the beginning or 1 s
-    of the end; fewer if there are not so many [s]."""
+    """``count`` times [s] at which ``moving``, shape (T,), holds; fewer if there are not so many.
+
+    None lies within 3 s of the beginning or 1 s of the end.
+    """
     rows = np.flatnonzero(moving & (t > t[0] + 3) & (t < t[-1] - 1))
     if not len(rows):
         return []

@@ -52,7 +52,7 @@ def read_note(source: str | Path) -> str | None:
         return root.findtext(TAG)
     for text in root.iterfind("custom/text"):
         if text.get("name") == TAG:
-            return text.get("data")
+            return text.get("data") or text.text
     return None
 
 
@@ -134,6 +134,7 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
         body.mass, body.explicitinertial = mass, True
         body.ipos = centre + joint.pos
         body.iquat = np.array([1.0, 0.0, 0.0, 0.0])
+        body.inertia = np.zeros(3)
         body.fullinertia = inertia[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
     for text in list(spec.texts):
         if text.name == TAG:

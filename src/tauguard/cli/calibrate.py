@@ -112,10 +112,8 @@ def start(
     preset = DRIVES.get(columns or "")
     known = any(r.load is not None and r.load.mass > 0 for r in recordings)
     if scale == "auto":
-        if gains or (preset and not known):
-            scale = "gains"
-        else:
-            scale = "payload" if known else "masses"
+        otherwise = "payload" if known else "masses"
+        scale = "gains" if gains or (preset and not known) else otherwise
     if not gains and preset is not None:
         gains = preset.gain
     if gains and len(gains) != numbers.joints:

@@ -57,8 +57,9 @@ def command(
     """
     from tauguard.benchmarks.report import write_json
     from tauguard.datasets import read_log
-    from tauguard.datasets.watch import watch, watch_with
+    from tauguard.datasets.watch import watch, watch_free, watch_with
     from tauguard.detectors import CollisionDetector, RobotNumbers
+    from tauguard.detectors.free_motion_file import is_free_motion, load_free_motion
     from tauguard.models import pin_model
 
     if out is not None and out.exists() and not out.is_dir():
@@ -67,7 +68,11 @@ def command(
     numbers = RobotNumbers.from_pin(pin_model(robot))
     trace = matched(read.trace, numbers.joint_names)
     if model is not None:
-        found = watch_with(CollisionDetector.load(model), trace)
+        found = (
+            watch_free(load_free_motion(model), trace)
+            if is_free_motion(model)
+            else watch_with(CollisionDetector.load(model), trace)
+        )
     else:
         drive = drive_numbers(columns, gains, viscous, coulomb, len(trace.joint_names))
         found = watch(
@@ -168,6 +173,7 @@ def summary(log: Path, trace: Trace, found: Watch) -> dict[str, Any]:
     import numpy as np
 
     from tauguard.datasets.watch import loudest_joint
+    from tauguard.detectors import poisson_rate
 
     watched = float(trace.t[-1] - found.quiet_until)
     events = []
@@ -186,6 +192,7 @@ def summary(log: Path, trace: Trace, found: Watch) -> dict[str, Any]:
         "thresholds_nm": [v if np.isfinite(v) else None for v in found.thresholds.tolist()],
         "alarms": len(events),
         "alarms_per_hour": 3600 * len(events) / watched,
+        "alarms_per_hour_high": poisson_rate(len(events), watched / 3600)["high"],
         "events": events,
     }
 
@@ -201,8 +208,9 @@ def report(result: dict[str, Any]) -> None:
     for event in result["events"]:
         print(f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}")
     print(
-        f"{result['alarms']} alarms in {result['watched_seconds']:.1f} s watched; "
-        "in a log without collisions each of them is a false one"
+        f"{result['alarms']} alarms in {result['watched_seconds']:.1f} s watched; in a log without "
+        "collisions each of them is a false one, at most "
+        f"{result['alarms_per_hour_high']:.0f} per hour (95 %)"
     )
 
 

@@ -37,9 +37,7 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
     return files
 
 
-def read_logs(
-    logs: Sequence[Path], columns: str | None, robot: RobotNumbers
-) -> dict[str, Trace]:
+def read_logs(logs: Sequence[Path], columns: str | None, robot: RobotNumbers) -> dict[str, Trace]:
     """Traces by file name, joints in the robot's order; prints a line for each repair."""
     from tauguard.cli.detect import column_map, matched
     from tauguard.datasets import read_log

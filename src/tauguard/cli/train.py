@@ -1,27 +1,65 @@
-"""``tauguard train``: a detector from labelled recordings."""
+"""``tauguard train``: a detector from labelled recordings, or from collision-free logs alone."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tauguard.detectors.free_motion import FreeMotionDetector
+    from tauguard.traces import Trace
 
 
 def command(
-    traces: Path, model: Path = Path("model.skops"), false_alarms_per_hour: float = 10.0
+    traces: Path | None = None,
+    model: Path | None = None,
+    false_alarms_per_hour: float | None = None,
+    free: tuple[Path, ...] = (),
+    robot: Path | None = None,
+    columns: str | None = None,
+    gains: tuple[float, ...] = (),
+    payload: tuple[str, ...] = (),
+    sensitivity: bool = False,
 ) -> None:
-    """Train the momentum-observer SVR detector on labelled recordings and write its model file.
+    """Train a detector and write its model file.
+
+    With --traces: the momentum-observer SVR detector on labelled recordings, some with collisions.
+    With --free and --robot: a detector of a real arm from logs in which nothing touched it; three
+    or more, with dwells and with moves of single joints among them, or those raise alarms later.
 
     Args:
-        traces: folder of MCAP recordings with truth (`tauguard simulate` writes such), with
-            collisions and collision-free ones.
-        model: the model file (skops: arrays and scikit-learn's own types only).
-        false_alarms_per_hour: what the threshold aims at on collision-free training motion.
+        traces: folder of MCAP recordings with truth (`tauguard simulate` writes such).
+        model: the model file (default: model.skops, or model.json with --free).
+        false_alarms_per_hour: what the threshold aims at on collision-free training motion
+            (default: 10, or 1 with --free).
+        free: collision-free logs of a real arm, files or a folder.
+        robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains.
+        columns: of CSV files, see `tauguard detect`.
+        gains: N m per ampere, one a joint (known for calibrated robot files and for ur10e).
+        payload: what the logs carried, see `tauguard calibrate`.
+        sensitivity: with --free, also print the smallest added blow that is found, for each joint.
     """
+    if (traces is None) == (not free):
+        raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
+    target = model or Path("model.json" if free else "model.skops")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
+    if traces is not None:
+        rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
+        labelled_motion(traces, target, rate)
+        return
+    if robot is None:
+        raise ValueError("--free needs --robot")
+    rate = 1.0 if false_alarms_per_hour is None else false_alarms_per_hour
+    free_motion(free, robot, target, rate, columns, gains, payload, sensitivity)
+
+
+def labelled_motion(traces: Path, model: Path, false_alarms_per_hour: float) -> None:
+    """Train on labelled recordings."""
     from tauguard.cli.fitting import trained
     from tauguard.cli.folder import labelled
 
     recordings = labelled(traces)
-    if not model.parent.is_dir():
-        raise FileNotFoundError(f"{model}: the folder {model.parent} does not exist")
     detector = trained(recordings, false_alarms_per_hour)
     detector.save(model)
     collisions = sum(len(t.truth.collisions) for t in recordings if t.truth)
@@ -29,3 +67,71 @@ def command(
         f"{model}: trained on {len(recordings)} recordings with {collisions} collisions, "
         f"threshold {detector.threshold:.3f}"
     )
+
+
+def free_motion(
+    free: tuple[Path, ...],
+    robot: Path,
+    model: Path,
+    rate: float,
+    columns: str | None,
+    gains: tuple[float, ...],
+    payload: tuple[str, ...],
+    sensitivity: bool,
+) -> None:
+    """Train on collision-free logs."""
+    from tauguard.cli.calibrate import loaded, start
+    from tauguard.cli.real_logs import read_logs, robot_numbers
+    from tauguard.detectors.arm_file import load_arm
+    from tauguard.detectors.free_motion import FreeMotionDetector, FreeMotionSettings
+    from tauguard.detectors.free_motion_file import save_free_motion
+
+    numbers = robot_numbers(robot)
+    traces = read_logs(free, columns, numbers)
+    recordings = loaded(traces, payload)
+    arm = load_arm(robot)
+    if arm is None or gains:
+        arm, _ = start(numbers, recordings, columns, gains, "gains")
+    settings = FreeMotionSettings(false_alarms_per_hour=rate)
+    detector = FreeMotionDetector(settings).fit(recordings, arm)
+    save_free_motion(detector, model)
+    report(detector, model, len(traces))
+    if sensitivity:
+        blows(detector, list(traces.values()))
+
+
+def report(detector: FreeMotionDetector, model: Path, logs: int) -> None:
+    """What was learned."""
+    assert detector.resting is not None
+    assert detector.moving is not None
+    print(
+        f"{model}: trained on {logs} collision-free logs, {detector.seconds:.0f} s; "
+        f"{sum(detector.left_out)} alarms in them, each under a calibration from the others"
+    )
+    names = detector.arm.robot.joint_names
+    pairs = zip(names, detector.moving.weights, detector.resting.weights, strict=True)
+    for name, moving, rest in pairs:
+        print(f"  {name}: allows {moving[0]:.1f} N m in slow motion, {rest[0]:.1f} N m at rest")
+
+
+def blows(detector: FreeMotionDetector, traces: list[Trace]) -> None:
+    """The smallest semi-real blow on each joint that is found in 95 % of trials."""
+    import numpy as np
+
+    from tauguard.detectors.semi_real import moments, smallest_found
+
+    quiet = [t for t in traces if not detector.detect(t).alarms]
+    for joint, name in enumerate(detector.arm.robot.joint_names):
+        found: list[float] = []
+        for k, trace in enumerate(quiet):
+            starts = moments(~detector.rests(trace)[:, joint], trace.t, 4, k)
+            gain = detector.arm.drive_gain
+            found += list(
+                smallest_found(lambda t: detector.detect(t).alarm, trace, gain, joint, starts)
+            )
+        if found:
+            peak = float(np.quantile(found, 0.95, method="higher"))
+            print(
+                f"  {name}: a semi-real blow of 0.1 s in motion is found from {peak:.1f} N m on "
+                f"(95 % of {len(found)} trials)"
+            )

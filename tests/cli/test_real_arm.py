@@ -1,0 +1,38 @@
+"""From a real arm's collision-free logs to a calibrated, working detector."""
+
+import json
+
+import pytest
+
+from tauguard.cli import main
+
+pytestmark = pytest.mark.data
+TEST = "ur-20_02_10-30sec_12harm.csv"
+
+
+@pytest.fixture(scope="module")
+def folder(data_dir):
+    folder = data_dir / "ur10e"
+    if not folder.is_dir():
+        pytest.skip("no ur10e folder in the real data")
+    return folder
+
+
+def test_calibrate_train_detect(folder, tmp_path, capsys):
+    names = ["20_01_31-unload", "20_02_06-20sec_10harm", "20_02_12-40sec_12harm"]
+    logs = [str(folder / "free" / f"ur-{name}.csv") for name in names]
+    logs.append(str(folder / "jointwise" / "ur-20_01_22-joint_3.csv"))
+    robot, model = tmp_path / "ur10e.calibrated.urdf", tmp_path / "model.json"
+    common = ["--columns", "ur10e"]
+    given = ["--robot", str(folder / "ur10e.urdf"), "--out", str(robot)]
+    main(["calibrate", *logs, *given, *common, "--json", str(tmp_path / "calibrate.json")])
+    figures = json.loads((tmp_path / "calibrate.json").read_text())
+    assert "from the gains that were given" in capsys.readouterr().out
+    excitation = [v for k, v in figures["held_out_rms_nm"].items() if "joint" not in k]
+    for rms in excitation:
+        assert all(a < b for a, b in zip(rms, [2.2, 2.6, 1.1, 0.5, 0.4, 0.3], strict=True))
+    main(["train", "--free", *logs, "--robot", str(robot), *common, "--model", str(model)])
+    assert "4 collision-free logs" in capsys.readouterr().out
+    log = str(folder / "free" / TEST)
+    main(["detect", log, "--robot", str(robot), *common, "--model", str(model)])
+    assert "0 alarms in 37." in capsys.readouterr().out

@@ -1,0 +1,133 @@
+"""A detector that never saw a collision: quiet on fresh motion and dwells, awake to contacts."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tauguard.detectors import ArmModel
+from tauguard.detectors.free_motion import (
+    RELEASE,
+    FreeMotionDetector,
+    FreeMotionSettings,
+    delayed,
+    median_of_three,
+    resting,
+)
+from tauguard.detectors.free_motion_file import load_free_motion, save_free_motion
+from tauguard.detectors.semi_real import Added, add_contact, moments, smallest_found
+from tests.detectors.synthetic_arm import GAIN, nominal, record
+
+
+@pytest.fixture(scope="module")
+def detector():
+    logs = [record(seed) for seed in range(4)]
+    return FreeMotionDetector().fit(logs, ArmModel(nominal(), GAIN))
+
+
+@pytest.fixture(scope="module")
+def fresh():
+    return record(11, seconds=20.0)
+
+
+def test_quiet_on_motion_it_has_not_seen(detector, fresh):
+    assert not detector.detect(fresh).alarms
+    assert not detector.detect(record(12, load=2.0)).alarms
+    assert detector.seconds == pytest.approx(4 * 23.0, abs=0.5)
+
+
+def test_finds_added_contacts_and_small_ones_not(detector, fresh):
+    start = float(fresh.t[0] + 13.0)
+    for joint in range(3):
+        torque = np.zeros(3)
+        torque[joint] = 40.0
+        struck = add_contact(fresh, GAIN, Added(start, 0.1, tuple(torque)))
+        alarms = detector.detect(struck).alarms
+        assert [a for a in alarms if start <= a.start <= start + 0.3], joint
+        tiny = add_contact(fresh, GAIN, Added(start, 0.1, tuple(1e-3 * torque)))
+        assert not detector.detect(tiny).alarms
+
+
+def test_smallest_found_is_a_threshold(detector, fresh):
+    starts = moments(~detector.rests(fresh)[:, 1], fresh.t, 3, 0)
+    found = smallest_found(lambda t: detector.detect(t).alarm, fresh, GAIN, 1, starts)
+    assert (np.isfinite(found) & (found < 60)).all()
+    for k, (start, peak) in enumerate(zip(starts, found, strict=True)):
+        sign = 1 if k % 2 == 0 else -1
+        for factor, expected in ((1.001, True), (0.9, False)):
+            contact = Added(start, 0.1, (0.0, sign * factor * peak, 0.0))
+            alarm = detector.detect(add_contact(fresh, GAIN, contact)).alarm
+            rows = (fresh.t >= start) & (fresh.t <= start + 0.5)
+            assert bool(alarm[rows].any()) is expected
+
+
+def test_one_sample_kick_of_the_controller_is_no_contact(detector, fresh):
+    row = 1400
+    current = fresh.current.copy()
+    current[row] += 20.0
+    assert not detector.detect(dataclasses.replace(fresh, current=current)).alarms
+    current[row : row + 12] += 8.0
+    assert detector.detect(dataclasses.replace(fresh, current=current)).alarms
+
+
+def test_causal(detector, fresh):
+    """What comes later changes nothing before."""
+    cut = 1500
+    shorter = dataclasses.replace(
+        fresh, t=fresh.t[:cut], q=fresh.q[:cut], qd=fresh.qd[:cut], current=fresh.current[:cut]
+    )
+    np.testing.assert_array_equal(detector.scores(shorter), detector.scores(fresh)[:cut])
+
+
+def test_at_rest_until_it_has_travelled():
+    q = np.concatenate([np.zeros(50), np.linspace(0, 0.8 * RELEASE, 50), np.linspace(0.1, 1, 50)])
+    qd = np.concatenate([np.zeros(50), np.full(50, 0.05), np.full(50, 0.5)])
+    rest = resting(q[:, None], qd[:, None], 0.01)[:, 0]
+    assert rest[:100].all()
+    assert not rest[100:].any()
+
+
+def test_median_takes_the_sample_before():
+    x = np.array([[0.0], [1], [9], [3], [4], [5]])
+    np.testing.assert_array_equal(delayed(x)[:, 0], [0, 0, 1, 9, 3, 4])
+    np.testing.assert_array_equal(median_of_three(x)[2:, 0], [1, 3, 4, 4])
+
+
+def test_file_and_back(tmp_path, detector, fresh):
+    save_free_motion(detector, tmp_path / "model.json")
+    again = load_free_motion(tmp_path / "model.json")
+    np.testing.assert_array_equal(again.scores(fresh), detector.scores(fresh))
+    text = (tmp_path / "model.json").read_text()
+    for bad, message in (
+        (text[: len(text) // 2], "damaged"),
+        (text.replace("free-motion detector 1", "free-motion detector 9"), "version"),
+        (text.replace('"moving"', '"gone"'), "a part missing"),
+    ):
+        (tmp_path / "bad.json").write_text(bad)
+        with pytest.raises(ValueError, match=message):
+            load_free_motion(tmp_path / "bad.json")
+    with pytest.raises(ValueError, match="cannot be read"):
+        load_free_motion(tmp_path / "none.json")
+
+
+def test_more_alarms_accepted_means_a_lower_bound():
+    logs = [record(seed) for seed in range(3)]
+    few, many = (
+        FreeMotionDetector(FreeMotionSettings(false_alarms_per_hour=rate)).fit(
+            logs, ArmModel(nominal(), GAIN)
+        )
+        for rate in (0.1, 100.0)
+    )
+    assert (many.moving.weights[:, 0] < few.moving.weights[:, 0]).all()
+
+
+def test_what_it_refuses(detector, fresh):
+    with pytest.raises(ValueError, match="2 logs: give three"):
+        FreeMotionDetector().fit([fresh, fresh], ArmModel(nominal(), GAIN))
+    with pytest.raises(ValueError, match="not fitted"):
+        FreeMotionDetector().scores(fresh)
+    slow = dataclasses.replace(fresh, t=2 * fresh.t)
+    with pytest.raises(ValueError, match="a sample every 20 ms"):
+        detector.scores(slow)
+    with pytest.raises(ValueError, match="expected blow or push"):
+        add_contact(fresh, GAIN, Added(1.0, 0.1, (1.0, 0.0, 0.0), "kick"))
