@@ -1,16 +1,16 @@
-"""Rigid bodies: convex pairs (table 2.1), meshes (table 2.2), time of impact."""
+"""Rigid bodies: convex pairs (table 2.1), meshes (table 2.2), volumes (figure 1.1), motion."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tauguard.benchmarks import rigid_convex, rigid_impact, rigid_mesh
+from tauguard.benchmarks import rigid_convex, rigid_impact, rigid_mesh, rigid_volumes
 from tauguard.benchmarks.report import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PARTS = (rigid_convex, rigid_mesh, rigid_impact)
+PARTS = (rigid_convex, rigid_mesh, rigid_volumes, rigid_impact)
 
 
 def run(quick: bool, seed: int) -> list[Row]:
@@ -20,7 +20,7 @@ def run(quick: bool, seed: int) -> list[Row]:
 
 def draw(rows: list[Row], figure: Figure) -> None:
     """Table 2.1 above, the other parts below."""
-    grid = figure.add_gridspec(2, 2)
-    panels = [grid[0, :], grid[1, 0], grid[1, 1]]
+    grid = figure.add_gridspec(2, 3)
+    panels = [grid[0, :], *(grid[1, k] for k in range(3))]
     for part, panel in zip(PARTS, panels, strict=True):
         part.draw(rows, figure.add_subplot(panel))

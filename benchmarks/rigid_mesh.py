@@ -284,9 +284,6 @@ def draw(rows: list[Row], axes: Any) -> None:
         (round(row["disagree"]["value"] * row["disagree"]["n"]) for row in cells), default=0
     )
     mesh = cells[0]["mesh"] if cells else ""
-    axes.set(
-        title=f"First hit, {mesh}; coal dashed; {wrong} disagreements",
-        ylabel="us a pose, mean",
-        yscale="log",
-    )
+    axes.set(ylabel="us a pose, mean", yscale="log")
+    axes.set_title(f"{mesh}, coal dashed; {wrong} disagree", fontsize="medium")
     axes.legend(fontsize="small")

@@ -105,7 +105,10 @@ void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear
 
 }  // namespace
 
+void bind_volumes(nb::module_& m);
+
 NB_MODULE(_rigid_mesh, m) {
+  bind_volumes(m);
   nb::class_<Mesh>(m, "Mesh")
       .def("__init__",
            [](Mesh* self, Vertices vertices, Faces faces, const std::string& volume) {

@@ -10,9 +10,17 @@ namespace tauguard::rigid {
 struct Frame {
   double r[3][3], t[3], pad;
   Frame(const Tree& a, const Tree& b, const Pose& pose);
+  // Both in one frame already.
+  static const Frame& same() {
+    static const Frame frame;
+    return frame;
+  }
   void apply(const double* x, double* out) const {
     for (int i = 0; i < 3; ++i) out[i] = r[i][0] * x[0] + r[i][1] * x[1] + r[i][2] * x[2] + t[i];
   }
+
+ private:
+  Frame() : r{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, t{0, 0, 0}, pad(0) {}
 };
 
 // A run of triangles whose corners a volume must hold, seen from the tree's centre.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tauguard.benchmarks import rigid_convex, rigid_impact, rigid_mesh
+from tauguard.benchmarks import rigid_convex, rigid_impact, rigid_mesh, rigid_volumes
 from tauguard.rigid import Boxes, Motion, overlap
 
 
@@ -99,3 +99,34 @@ def test_a_mesh_file_can_be_named(monkeypatch, tmp_path):
     monkeypatch.setenv("TAUGUARD_MESH", str(tmp_path / "none.obj"))
     with pytest.raises(ValueError, match=r"TAUGUARD_MESH: none\.obj"):
         rigid_mesh.load(quick=True)
+
+
+def test_volumes_hold_their_bodies_and_miss_no_pair_of_hulls(monkeypatch):
+    monkeypatch.delenv("TAUGUARD_DATA", raising=False)
+    monkeypatch.delenv("TAUGUARD_MESH", raising=False)
+    rng = np.random.default_rng(0)
+    bodies = rigid_volumes.pieces(rigid_mesh.load(quick=True), 64)
+    assert len(bodies.corners) == 7200
+    poses = rigid_volumes.near(bodies, rng)
+    pairs = rng.integers(0, len(bodies), (400, 2))
+    hulls = rigid_volumes.Hull(bodies)
+    hit = hulls.meet(poses, pairs)
+    assert 0.1 < hit.mean() < 0.9
+    for name, kind in rigid_volumes.NATIVE.items():
+        volume = kind(bodies.corners, bodies.offsets)
+        row = rigid_volumes.volume_row(name, volume, bodies, hulls, poses, pairs, hit, 1)
+        assert row["missed"]["value"] == 0
+        assert row["tightness"] > 1
+        assert 0 < row["false_hits"]["value"] < 0.5
+
+
+def test_the_size_of_a_volume_is_that_of_geometry():
+    cube = np.array(
+        [[[x, y, z] for z in (-1.0, 1.0)] + [[x, y, 0.0]] for x in (-1, 1) for y in (-1, 1)]
+    )
+    expected = {"sphere": 4 / 3 * np.pi * 3**1.5, "aabb": 8.0, "k_dop": 8.0}
+    for name, value in expected.items():
+        volume = rigid_volumes.NATIVE[name](cube, np.array([0, 4]))
+        numbers = np.empty((1, volume.numbers))
+        volume.write(numbers)
+        assert rigid_volumes.size(name, numbers[0]) == pytest.approx(value)
