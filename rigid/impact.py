@@ -59,8 +59,8 @@ def time_of_impact(
 
     Returns:
         ``hit``, ``toi``, ``point`` and ``normal`` (world frame, from a to b); meshes also tell
-        the ``faces``. Where two bodies overlap at t = 0 the toi is 0 and the normal NaN, the point
-        too; both may also be NaN at the hit of a flat hull.
+        the ``faces``. Where two bodies overlap at t = 0 the toi is 0 and the normal NaN; the point
+        is common to both then too.
 
     Raises:
         ValueError: lengths that do not match, or a body against a mesh.

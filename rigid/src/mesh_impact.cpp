@@ -3,13 +3,15 @@
 #include <queue>
 
 #include "convex_contact.hpp"
+#include "motion_gjk.hpp"
 
 namespace tauguard::rigid {
 namespace {
 
 constexpr FirstTouch no_touch = {INFINITY, {NAN, NAN, NAN}, {NAN, NAN, NAN}};
 
-// Point and normal of a hit; both undefined where the bodies were in each other from the start.
+// Point and normal of a hit. The normal is undefined where the bodies were in each other from the start; the
+// point comes from the features that touch along the normal, or from the nearest points.
 FirstTouch touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& origin) {
   if (!impact.hit) return no_touch;
   FirstTouch out = no_touch;
@@ -18,10 +20,15 @@ FirstTouch touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& 
   double top = -INFINITY, bottom = INFINITY;
   for (const Vec& p : a.now) top = std::max(top, dot(impact.normal, p));
   for (const Vec& p : b.now) bottom = std::min(bottom, dot(impact.normal, p));
-  const double tolerance = 1e-9 * (a.radius() + b.radius()) + 0x1p-40 * (a.magnitude() + b.magnitude());
-  if (norm(impact.normal) == 0 || bottom - top < -tolerance) return out;
-  contact_point(a.now, b.now, impact.normal.data(), tolerance, out.point);
-  for (int k = 0; k < 3; ++k) out.point[k] += origin[k], out.normal[k] = impact.normal[k];
+  const double tolerance = contact_tolerance(a, b);
+  const bool along = norm(impact.normal) > 0 && bottom - top >= -tolerance;
+  Vec point;
+  if (along) contact_point(a.now, b.now, impact.normal.data(), tolerance, point.data());
+  else point = middle_point(a.now, b.now);
+  for (int k = 0; k < 3; ++k) {
+    out.point[k] = point[k] + origin[k];
+    if (along) out.normal[k] = impact.normal[k];
+  }
   return out;
 }
 

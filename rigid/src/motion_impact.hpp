@@ -8,7 +8,7 @@ namespace tauguard::rigid {
 struct Impact {
   double t;     // the bodies are certainly apart on [start, t)
   bool hit;     // false: apart on all of [start, end]
-  Vec normal;   // unit, from a to b: the last separating direction
+  Vec normal;   // unit, from a to b; zero where the bodies meet at `start` and no axis tells
 };
 
 // Advances from `start` as long as the bodies are further apart than `gap` plus rounding; with gap = 0 the
@@ -16,13 +16,9 @@ struct Impact {
 // only prunes is glad of.
 Impact first_contact(MovingBody& a, MovingBody& b, double start, double end, double gap = 0);
 
-// Row `r` of a batch, placed by `motion`.
-MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& motion, const Vec& origin);
-// Any point set with its faces' normals and edges taken as a triangle's.
-MovingBody moving_triangle(const double v[3][3], const RigidMotion& motion, const Vec& origin);
-MovingBody moving_box(const Vec& centre, const Vec& extent, const RigidMotion& motion, const Vec& origin);
-
-// A direction that separates the point sets, found by GJK; false where they meet to rounding.
-bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, Vec* n, double* separation);
+// Bodies this close count as touching where a contact is described.
+inline double contact_tolerance(const MovingBody& a, const MovingBody& b) {
+  return 1e-9 * (a.radius() + b.radius()) + 0x1p-40 * (a.magnitude() + b.magnitude());
+}
 
 }  // namespace tauguard::rigid

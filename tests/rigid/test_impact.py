@@ -123,6 +123,60 @@ def test_meshes_give_the_time_of_their_hulls_and_of_sweeps():
     assert tree.sweep(tree, pose, [4.0, 0, 0]).faces.tolist() == [[-1, -1]]
 
 
+def inside(bodies, motion, t, point):
+    """How far each point lies inside its body at its time (negative: outside), by coordinates."""
+    pose = motion.at(t)
+    own = np.einsum("nji,nj->ni", pose[:, :3, :3], point - pose[:, :3, 3])
+    if isinstance(bodies, Boxes):
+        return (bodies.half_extents - np.abs(own - bodies.center)).min(axis=1)
+    edges = (bodies.vertices[:, 1:] - bodies.vertices[:, :1]).transpose(0, 2, 1)
+    weight = np.linalg.solve(edges, (own - bodies.vertices[:, 0])[:, :, None])[:, :, 0]
+    return np.minimum(weight.min(axis=1), 1 - weight.sum(axis=1))
+
+
+@pytest.mark.parametrize("kind", ["boxes", "tetrahedra"])
+def test_every_hit_has_a_point_of_both_bodies(kind):
+    rng = np.random.default_rng(6)
+    n = 300
+    a, b, ma, mb = bodies(kind, rng, n), bodies(kind, rng, n), motions(rng, n), motions(rng, n)
+    got = time_of_impact(a, b, ma, mb)
+    start = got.toi == 0
+    assert min(start.sum(), (got.hit & ~start).sum()) > 10
+    assert np.isnan(got.point[~got.hit]).all()
+    t = np.where(got.hit, got.toi, 0.0)
+    for body, motion in ((a, ma), (b, mb)):
+        assert inside(body, motion, t, got.point)[got.hit].min() > -1e-8
+
+
+@pytest.mark.parametrize(("k", "j"), [(1, 2), (2, 2), (3, 2), (4, 4)])
+def test_flat_hulls_that_meet_in_their_plane(k, j):
+    rng = np.random.default_rng(7)
+    n = 120
+    hulls = []
+    for corners in (k, j):
+        points = rng.uniform(-1, 1, (n, corners, 3)) * [1, 1, 0]
+        hulls.append(Hulls(points.reshape(-1, 3), np.arange(0, n * corners + 1, corners)))
+    pose = np.tile(np.eye(4), (n, 1, 1))
+    pose[:, :2, 3] = rng.uniform(-2, 2, (n, 2))
+    linear, angular = rng.uniform(-2, 2, (2, n, 3)) * [[[1, 1, 0]], [[0, 0, 1]]]
+    got = time_of_impact(*hulls, REST, Motion(pose, linear, angular))
+    later = np.flatnonzero(got.hit & (got.toi > 0))
+    assert len(later) > 3
+    np.testing.assert_array_equal(got.point[got.hit, 2], 0.0)
+    np.testing.assert_allclose(np.linalg.norm(got.normal[later, :2], axis=1), 1.0)
+
+    def touching(i, t):
+        moved = Motion(pose[i], linear[i], angular[i]).at(t)[0]
+        b = hulls[1].vertices[i * j : (i + 1) * j] @ moved[:3, :3].T + moved[:3, 3]
+        a = hulls[0].vertices[i * k : (i + 1) * k]
+        return overlap(Hulls(a, np.array([0, k])), Hulls(b, np.array([0, j]))).hit[0]
+
+    for i in later:
+        assert not touching(i, got.toi[i] - 1e-9)
+        # A point lies on a segment to the last bit only by chance.
+        assert k * j == 2 or touching(i, got.toi[i] + 1e-7)
+
+
 def test_thread_count_changes_nothing():
     rng = np.random.default_rng(3)
     a, b = (bodies("boxes", rng, 200) for _ in range(2))
