@@ -180,11 +180,14 @@ def test_flat_hulls_that_meet_in_their_plane(k, j):
 def test_thread_count_changes_nothing():
     rng = np.random.default_rng(3)
     a, b = (bodies("boxes", rng, 200) for _ in range(2))
+    tree = MeshTree(CUBE, CUBE_FACES)
     ma, mb = motions(rng, 200), motions(rng, 200)
-    first = time_of_impact(a, b, ma, mb)
-    again = time_of_impact(a, b, ma, mb, threads=2)
-    for name in ("toi", "point", "normal"):
-        assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
+    for x, y, extra in ((a, b, ()), (tree, tree, ("faces",))):
+        first = time_of_impact(x, y, ma, mb)
+        for threads in (2, 5, 0):
+            again = time_of_impact(x, y, ma, mb, threads=threads)
+            for name in ("hit", "toi", "point", "normal", *extra):
+                assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
 
 
 def test_bad_input_is_refused():
