@@ -18,6 +18,7 @@ TETRAHEDRON_EDGES = list(combinations(range(4), 2))
 Vector = tuple[Any, ...]  # three fractions or integers
 Vectors = list[Vector]
 
+ROWS = 4096  # a pass of the floating-point reference: its arrays stay in the cache
 CORNERS = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)])
 
 
@@ -162,24 +163,38 @@ def truth(a: Bodies, b: Bodies, sample: tuple[int, int] | None = None) -> NDArra
 
 def float_hit(a: Bodies, b: Bodies, n: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Answers and which of them are certain, from all cross products of edges."""
-    va, ea = float_bodies(a, n)
-    vb, eb = float_bodies(b, n)
+    sides = [*float_bodies(a, n), *float_bodies(b, n)]
+    parts = [float_rows(*(x[k : k + ROWS] for x in sides)) for k in range(0, n, ROWS)]
+    hit, certain = zip(*parts, strict=True) if parts else ([np.zeros(0, bool)], [np.zeros(0, bool)])
+    return np.concatenate(hit), np.concatenate(certain)
+
+
+def float_rows(
+    va: NDArray[np.float64], ea: NDArray[np.float64], vb: Any, eb: Any
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """The same for few rows: coordinates first, and separated rows dropped on the way."""
     origin = va[:, :1]
     va, vb = va - origin, vb - origin
     given = np.abs(origin).max(axis=(1, 2)) + np.abs(vb).max(axis=(1, 2))
     size = np.maximum(np.abs(va).max(axis=(1, 2)), np.abs(vb).max(axis=(1, 2)))
-    edges = np.concatenate([ea, eb], axis=1)
-    apart_ = np.zeros(n, dtype=bool)
     joined = np.isfinite(size) & (size < 1e90) & (size > 1e-90)
-    possible = joined.copy()
-    for j, k in combinations(range(edges.shape[1]), 2):
-        u, v = edges[:, j], edges[:, k]
-        axis = np.cross(u, v)
-        length = np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1)
-        pa = np.einsum("nvk,nk->nv", va, axis)
-        pb = np.einsum("nvk,nk->nv", vb, axis)
-        gap = np.maximum(pa.min(1) - pb.max(1), pb.min(1) - pa.max(1))
-        margin = 1e-12 * length * size + 1e-15 * length * given
-        apart_ |= possible & (gap > margin)
-        joined &= gap < -margin
+    apart_ = np.zeros(len(size), dtype=bool)
+    live = np.flatnonzero(joined)
+    edges = np.concatenate([ea, eb], axis=1)
+    va, vb, edges = (np.ascontiguousarray(x[live].transpose(2, 1, 0)) for x in (va, vb, edges))
+    length = np.sqrt(dot(edges, edges))
+    for j in range(edges.shape[1] - 1):
+        gone = np.zeros(len(live), dtype=bool)
+        for k in range(j + 1, edges.shape[1]):
+            axis = np.stack(cross(tuple(edges[:, j]), tuple(edges[:, k])))[:, None]
+            pa, pb = dot(va, axis), dot(vb, axis)
+            gap = np.maximum(pa.min(0) - pb.max(0), pb.min(0) - pa.max(0))
+            scale = length[j] * length[k]
+            margin = scale * (1e-12 * size[live] + 1e-15 * given[live])
+            gone |= gap > margin
+            joined[live] &= gap < -margin
+        apart_[live[gone]] = True
+        stay = ~gone
+        live, length = live[stay], length[:, stay]
+        va, vb, edges = (np.ascontiguousarray(x[..., stay]) for x in (va, vb, edges))
     return joined & ~apart_, joined | apart_
