@@ -13,7 +13,7 @@ from tauguard.rigid.mesh import MeshTree
 from tauguard.rigid.motion import Motion
 from tauguard.rigid.queries import native, rows, thread_count
 from tauguard.rigid.results import Impacts
-from tauguard.rigid.shapes import Bodies
+from tauguard.rigid.shapes import Bodies, Polygons
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +63,11 @@ def time_of_impact(
         is common to both then too.
 
     Raises:
-        ValueError: lengths that do not match, or a body against a mesh.
+        ValueError: lengths that do not match, a body against a mesh, polygons, or a coordinate
+            beyond 1e100, whose products would overflow.
     """
+    for name, motion in (("motion_a", motion_a), ("motion_b", motion_b)):
+        _bounded(name, motion.pose_t0[:, :3, 3], motion.linear)
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
         count = _lengths({"motion_a": len(motion_a), "motion_b": len(motion_b)})
         out, faces = np.empty((count, 7)), np.empty((count, 2), dtype=np.int32)
@@ -74,13 +77,25 @@ def time_of_impact(
         return MeshImpacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7], faces)
     if isinstance(a, MeshTree) or isinstance(b, MeshTree):
         raise ValueError("b: a mesh against convex bodies; give both as meshes")
+    if isinstance(a, Polygons) or isinstance(b, Polygons):
+        name = "a" if isinstance(a, Polygons) else "b"
+        raise ValueError(
+            f"{name}: Polygons, expected bodies in space; give them thickness as Hulls"
+        )
     bodies = rows(a, b)
+    for name, body in (("a", a), ("b", b)):
+        _bounded(name, body.packed)
     lengths = {"bodies": bodies, "motion_a": len(motion_a), "motion_b": len(motion_b)}
     out = np.empty((_lengths(lengths), 7))
     _rigid_mesh.time_of_impact(
         *native(a), *native(b), *_packed(motion_a), *_packed(motion_b), out, thread_count(threads)
     )
     return Impacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7])
+
+
+def _bounded(name: str, *values: NDArray[np.float64]) -> None:
+    if max(np.abs(value).max(initial=0.0) for value in values) > 1e100:
+        raise ValueError(f"{name}: a coordinate beyond 1e100; scale the scene down")
 
 
 def _packed(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

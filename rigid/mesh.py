@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.geometry import finite, indices
 from tauguard.rigid import _rigid_mesh
 from tauguard.rigid.motion import Motion, poses
+from tauguard.rigid.queries import thread_count
 
 if TYPE_CHECKING:
     from tauguard.rigid.impact import MeshImpacts
@@ -122,7 +123,7 @@ class MeshTree:
         self._check(other)
         batch = poses("pose", pose)
         faces = np.empty((len(batch), 2), dtype=np.int32)
-        self._mesh.overlap(other._mesh, batch, faces, threads)
+        self._mesh.overlap(other._mesh, batch, faces, thread_count(threads))
         return MeshOverlap(faces[:, 0] >= 0, faces)
 
     def contacts(self, other: MeshTree, pose: ArrayLike, threads: int = 1) -> MeshContacts:
@@ -132,7 +133,7 @@ class MeshTree:
         turned about, and moving both meshes together moves the contacts with them, to rounding.
         """
         self._check(other)
-        rows, values = self._mesh.contacts(other._mesh, poses("pose", pose), threads)
+        rows, values = self._mesh.contacts(other._mesh, poses("pose", pose), thread_count(threads))
         return MeshContacts(
             np.ascontiguousarray(rows[:, 0]),
             np.ascontiguousarray(rows[:, 1:]),

@@ -9,6 +9,7 @@ from tauguard.rigid import (
     Hulls,
     MeshTree,
     Motion,
+    Polygons,
     Tetrahedra,
     overlap,
     time_of_impact,
@@ -198,5 +199,13 @@ def test_bad_input_is_refused():
     tree = MeshTree(CUBE, CUBE_FACES)
     with pytest.raises(ValueError, match="a mesh against convex bodies"):
         time_of_impact(box, tree, REST, REST)  # type: ignore[call-overload]
+    polygon = Polygons(np.array([[0.0, 0], [1, 0], [0, 1]]), np.array([0, 3]))
+    with pytest.raises(ValueError, match="a: Polygons, expected bodies in space"):
+        time_of_impact(polygon, polygon, REST, REST)
+    with pytest.raises(ValueError, match="motion_b: a coordinate beyond 1e100"):
+        time_of_impact(box, box, REST, Motion(np.eye(4), [1e200, 0, 0], np.zeros(3)))
+    for query in (tree.overlap, tree.contacts):
+        with pytest.raises(ValueError, match="threads: -1"):
+            query(tree, np.eye(4), threads=-1)
     with pytest.raises(ValueError, match="displacement: shape"):
         tree.sweep(tree, np.eye(4), [1.0, 2.0])
