@@ -27,8 +27,8 @@ def cross(u: Vector, v: Vector) -> Vector:
     return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
 
 
-def dot(u: Vector, v: Vector) -> Any:
-    """Scalar product."""
+def dot(u: Any, v: Any) -> Any:
+    """Scalar product of vectors, or of arrays with the coordinates first."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
