@@ -306,6 +306,12 @@ class CollisionDetector:
         """The output at the last online sample."""
         return self._online.score if self._online else 0.0
 
+    @property
+    def residual(self) -> Array:
+        """What the model does not explain at the last online sample [N m], shape (n,)."""
+        arm, _, _ = self._fitted()
+        return self._online.left.copy() if self._online else np.zeros(arm.robot.joints)
+
     def reset(self) -> None:
         """Begin online detection anew."""
         self._online = None
@@ -352,6 +358,12 @@ class _Online:
         self._value = np.zeros(1)
         self._dt, self._time, self._first = detector.dt, 0.0, True
         self.score = 0.0
+
+    @property
+    def left(self) -> Array:
+        """Row of the estimator's output that the features see [N m], shape (n,)."""
+        row: Array = self._out[1]
+        return row
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None) -> bool:
         self._estimator.step(q, qd, current, self._out, dt)

@@ -4,6 +4,7 @@ from numpy.typing import NDArray
 _Array = NDArray[np.float64]
 
 FIGURES: int
+CONTACT_WIDTH: int
 
 class Plant:
     def __init__(

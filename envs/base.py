@@ -25,7 +25,8 @@ from tauguard.envs.cell import (
 )
 from tauguard.envs.rendering import Picture
 from tauguard.envs.settings import Settings, one_of
-from tauguard.envs.world import World, build_world
+from tauguard.envs.world import World, build_world, crossing
+from tauguard.models import BodyProxy, Scene
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,11 @@ class Task:
     def __init__(self, cell: Cell, **options: Any) -> None:
         """Keep the cell."""
         self.cell = cell
+
+    @classmethod
+    def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
+        """Where a body region goes that was asked for by name."""
+        return crossing(region, bare, reach)
 
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Begin an episode of copy ``i``; the last thing it does is :meth:`Cell.start`."""
@@ -170,7 +176,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "link": int(figure[LINK]),
             "reason": DIVERGED_REASON if figure[DIVERGED] else "",
         }
-        if cell.checkers:
+        if cell.watching:
             info["contacts"] = cell.contacts[0].copy()
         return info
 
@@ -199,7 +205,7 @@ def build(task_type: type[Task], keywords: dict[str, Any], rows: int) -> tuple[W
         if own and str(error).startswith("keyword "):
             raise ValueError(f"{error}, {', '.join(own)}") from None
         raise
-    world = build_world(settings, task_type.arms)
+    world = build_world(settings, task_type.arms, task_type.proxy)
     cell = Cell(world, rows)
     return world, cell, task_type(cell, **own)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +11,7 @@ from tauguard.envs.actions import Entry, action_scale, action_table, observation
 from tauguard.envs.loop import drive_numbers, function_address
 from tauguard.envs.sensing import Sensing, make_detector
 from tauguard.envs.settings import CONTROLS
+from tauguard.envs.watching import Watching
 from tauguard.envs.world import World
 
 Array = NDArray[np.float64]
@@ -49,10 +48,15 @@ class Cell:
         target: of the tools [m], shape (rows, arms, 3).
         residual: of the detector [N m], shape (rows, n); zero without one.
         alarm: of the detector, shape (rows,).
-        q, qd, current: at every physics step of the last action, shape (rows, substeps, n).
+        contacts: pairs that each checker reported during the last action, shape (rows, checkers).
+        q, qd, current, tau: positions, velocities, motor currents [A] and external torque [N m] at
+            every physics step of the last action, shape (rows, substeps, n).
+        contact: at every physics step the net force on the arm [N], and link (1-based, 0: none),
+            point [m] and force [N] of the largest force on a link, shape (rows, substeps, 8).
+        region: where the body regions were [m], shape (rows, substeps, regions, 3).
     """
 
-    def __init__(self, world: World, rows: int, checkers: Sequence[object] = ()) -> None:
+    def __init__(self, world: World, rows: int) -> None:
         """Allocate the data of every copy and bind the plants."""
         self.world, self.rows = world, rows
         self.observations: list[Entry] = observation_table(world)
@@ -63,13 +67,16 @@ class Cell:
         self.tau_ext, self.residual = np.zeros((rows, n)), np.zeros((rows, n))
         self.alarm = np.zeros(rows, dtype=np.bool_)
         self.target = np.zeros((rows, world.arms, 3))
-        self.q, self.qd, self.current = (np.zeros((rows, steps, n)) for _ in range(3))
+        self.q, self.qd, self.current, self.tau = (np.zeros((rows, steps, n)) for _ in range(4))
+        self.contact = np.zeros((rows, steps, _env.CONTACT_WIDTH))
+        self.region = np.zeros((rows, steps, len(world.regions), 3))
         self.datas = [mujoco.MjData(world.scene.model) for _ in range(rows)]
         self.plants = [self._plant(i) for i in range(rows)]
         self.sensing: list[Sensing] | None = None
         self.attach(world.settings.detector)
-        self.checkers = tuple(checkers)
-        self.contacts = np.zeros((rows, len(self.checkers)), dtype=np.int64)
+        names = world.settings.checkers
+        self.watching = [Watching(world, names) for _ in range(rows)] if names else []
+        self.contacts = np.zeros((rows, len(names)), dtype=np.int64)
 
     def attach(self, detector: object) -> None:
         """Put a detector into every copy's loop; ``None`` takes it out."""
@@ -91,13 +98,13 @@ class Cell:
         """Begin an episode of copy ``i`` from the state in its data."""
         mujoco.mj_forward(self.world.scene.model, self.datas[i])
         self.plants[i].reset()
-        self.residual[i], self.alarm[i] = 0.0, False
+        self.residual[i], self.alarm[i], self.contacts[i] = 0.0, False, 0
         if self.sensing is not None:
             self.sensing[i].reset()
 
     def step(self, i: int, action: Array, rng: np.random.Generator) -> None:
         """One action of copy ``i``, shape (m,)."""
-        if self.checkers:
+        if self.watching:
             self._watched(i, action)
         else:
             self.plants[i].step(action)
@@ -108,7 +115,7 @@ class Cell:
         self, actions: Array, mask: NDArray[np.bool_], rngs: list[np.random.Generator], threads: int
     ) -> None:
         """One action of every copy that ``mask`` chooses, shape (rows, m), on a thread pool."""
-        if self.checkers:
+        if self.watching:
             for i in np.flatnonzero(mask):
                 self._watched(int(i), actions[i])
         else:
@@ -129,14 +136,15 @@ class Cell:
 
     def _watched(self, i: int, action: Array) -> None:
         """A step with contact checkers: each sees every physics step."""
-        plant, data = self.plants[i], self.datas[i]
+        plant, data, watching = self.plants[i], self.datas[i], self.watching[i]
         plant.begin(action)
-        for checker in self.checkers:
-            checker.begin(i)  # type: ignore[attr-defined]
+        watching.begin(data)
         for _ in range(self.world.settings.substeps):
             plant.run(1)
-            for checker in self.checkers:
-                checker.see(i, data)  # type: ignore[attr-defined]
+            if not np.isfinite(data.qpos).all():
+                break
+            watching.see(data)
+        self.contacts[i] = watching.counts
         plant.finish()
 
     def _plant(self, i: int) -> _env.Plant:
@@ -149,7 +157,8 @@ class Cell:
         addresses |= {"model": model._address, "data": data._address}
         rows = {"observation", "figure", "tau_ext", "target"}
         addresses |= {name: getattr(self, name)[i].ctypes.data for name in rows}
-        addresses |= {f"row_{k}": getattr(self, k)[i].ctypes.data for k in ("q", "qd", "current")}
+        each = ("q", "qd", "current", "tau", "contact", "region")
+        addresses |= {f"row_{name}": getattr(self, name)[i].ctypes.data for name in each}
         constant = world.scene.drive.electrical_time_constant
         dt = float(model.opt.timestep)
         numbers = {

@@ -138,7 +138,13 @@ def _arms(world: World) -> list[tuple[RobotNumbers, Drive]]:
 
 
 class Sensing:
-    """The sensors of one copy of a world, and the detector that listens to them."""
+    """The sensors of one copy of a world, and the detector that listens to them.
+
+    Attributes:
+        measured: q, qd and current at every physics step of the last action, (substeps, n) each.
+        residuals: of the detector [N m], shape (substeps, n).
+        alarms: shape (substeps,).
+    """
 
     def __init__(self, world: World, detector: Detector | None) -> None:
         """Keep the parts."""
@@ -149,6 +155,10 @@ class Sensing:
         self._low = np.array([entry.low for entry in table])
         self._high = np.array([entry.high for entry in table])
         self._none = np.zeros(len(world.scene.joint_names))
+        steps = world.settings.substeps
+        self.residuals = np.zeros((steps, len(self._none)))
+        self.alarms = np.zeros(steps, dtype=np.bool_)
+        self.measured = (self.residuals, self.residuals, self.residuals)
 
     def reset(self) -> None:
         """A new episode."""
@@ -159,18 +169,21 @@ class Sensing:
         self, rng: np.random.Generator, q: Array, qd: Array, current: Array
     ) -> tuple[Array, Array, Array]:
         """What the sensors say of true signals, shape (substeps, n) each."""
-        if self._sensors is None:
-            return q, qd, current
-        return self._sensors.measure(rng, q, qd, current)
+        self.measured = (
+            (q, qd, current)
+            if self._sensors is None
+            else self._sensors.measure(rng, q, qd, current)
+        )
+        return self.measured
 
     def detect(self, q: Array, qd: Array, current: Array) -> tuple[Array, bool]:
         """Residual at the last sample [N m], and whether the alarm was up at any."""
         if self.detector is None:
             return self._none, False
-        alarm = False
         for row in range(len(q)):
-            alarm |= self.detector.step(q[row], qd[row], current[row])
-        return getattr(self.detector, "residual", self._none), alarm
+            self.alarms[row] = self.detector.step(q[row], qd[row], current[row])
+            self.residuals[row] = getattr(self.detector, "residual", self._none)
+        return self.residuals[-1], bool(self.alarms.any())
 
     def show(self, observation: Array, q: Array, qd: Array, current: Array) -> None:
         """Put the last measured sample into an observation."""

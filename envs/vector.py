@@ -201,7 +201,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "link": figure[:, LINK].astype(np.int64),
             "reason": reason,
         }
-        if cell.checkers:
+        if cell.watching:
             infos["contacts"] = cell.contacts.copy()
         for key in list(infos):
             infos[f"_{key}"] = mask.copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from tauguard.envs.loop import Gains
 from tauguard.envs.settings import Settings
+from tauguard.envs.two_arms_scene import add_second_arm
 from tauguard.models import (
     BodyProxy,
     Drive,
@@ -87,14 +89,21 @@ class World:
         return np.array([self.scene.model.joint(name).id for name in self.scene.joint_names])
 
 
-def build_world(settings: Settings, arms: int = 1) -> World:
+Placing = Callable[[str, Scene, float], BodyProxy]
+
+
+def build_world(settings: Settings, arms: int = 1, placing: Placing | None = None) -> World:
     """Compile what ``settings`` ask for, and nothing else.
+
+    Args:
+        settings: what is wanted.
+        arms: 1 or 2.
+        placing: where a body region goes that was asked for by name (default: :func:`crossing`),
+            from its name, the bare arm's scene and the arm's reach [m].
 
     Raises:
         ValueError, FileNotFoundError: a robot that cannot be used.
     """
-    from tauguard.envs.two_arms_scene import add_second_arm
-
     spec = SceneSpec(
         timestep=settings.timestep,
         integrator=settings.integrator,
@@ -107,7 +116,10 @@ def build_world(settings: Settings, arms: int = 1) -> World:
     )
     bare = compose(replace(spec, payload=False, labels=False, cloth=None, mismatch=None))
     reach = arm_reach(bare)
-    proxies = tuple(_proxy(item, reach) for item in settings.obstacles)
+    proxies = tuple(
+        item if isinstance(item, BodyProxy) else (placing or crossing)(item, bare, reach)
+        for item in settings.obstacles
+    )
     scene = compose(replace(spec, proxies=proxies))
     if arms == 2:
         scene = add_second_arm(scene, proxies)
@@ -154,7 +166,7 @@ def _known(
         joint_range=np.where(limited, model.jnt_range[joints], [-np.inf, np.inf]),
         torque_limit=np.tile(nominal.torque_limit, arms),
         max_speed=np.tile(speed, arms),
-        tools=_tools(scene, arms),
+        tools=find_tools(scene, arms),
         regions=tuple(_region(scene, proxy, reach) for proxy in proxies),
         reach=reach,
     )
@@ -178,12 +190,11 @@ def _repeat_drive(drive: Drive, arms: int) -> Drive:
     )
 
 
-def _proxy(item: str | BodyProxy, reach: float) -> BodyProxy:
-    if isinstance(item, BodyProxy):
-        return item
-    position, direction = LINES.get(item, OTHER_LINE)
+def crossing(region: str, bare: Scene, reach: float) -> BodyProxy:
+    """A body region on its line through the workspace."""
+    position, direction = LINES.get(region, OTHER_LINE)
     x, y, z = (reach * c for c in position)
-    return BodyProxy(item, position=(x, y, z), direction=direction)
+    return BodyProxy(region, position=(x, y, z), direction=direction)
 
 
 def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
@@ -201,7 +212,7 @@ def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
     )
 
 
-def _tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:
+def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:
     """The tool of each arm: the flange's site where its file has one, else the last link."""
     model, each = scene.model, len(scene.joint_names) // arms
     found = []

@@ -52,6 +52,9 @@ void bind_addresses(Plant& p, const Words& w) {
   p.rows.q = pointer<double>(w.at("row_q"));
   p.rows.qd = pointer<double>(w.at("row_qd"));
   p.rows.current = pointer<double>(w.at("row_current"));
+  p.rows.tau = pointer<double>(w.at("row_tau"));
+  p.rows.contact = pointer<double>(w.at("row_contact"));
+  p.rows.region = pointer<double>(w.at("row_region"));
 }
 
 void bind_layout(Plant& p, const Integers& i) {
@@ -175,5 +178,6 @@ NB_MODULE(_env, m) {
            },
            nb::arg("kind"), nb::arg("speed"));
   m.def("step_all", &step_all, nb::arg("plants"), nb::arg("actions"), nb::arg("mask"), nb::arg("threads"));
+  m.attr("CONTACT_WIDTH") = contact_width;
   m.attr("FIGURES") = static_cast<int>(figures);
 }

@@ -34,7 +34,8 @@ struct Addresses {
 // Where results go: rows of arrays that Python owns.
 struct Rows {
   double *observation = nullptr, *figure = nullptr, *tau_ext = nullptr, *target = nullptr;
-  double *q = nullptr, *qd = nullptr, *current = nullptr;  // substeps x joints
+  double *q = nullptr, *qd = nullptr, *current = nullptr, *tau = nullptr;  // substeps x joints
+  double *contact = nullptr, *region = nullptr;  // substeps x contact_width, substeps x regions x 3
 };
 
 class Plant {
@@ -93,6 +94,8 @@ class Plant {
       at.step(at.model, at.data);
       sound_ = finite();
       if (sound_) label();
+      double* place = rows.region + 3 * row_ * regions.size();
+      for (const Region& r : regions) place = std::copy(at.xpos + 3 * r.body, at.xpos + 3 * r.body + 3, place);
       ++count_;
     }
   }
@@ -148,7 +151,10 @@ class Plant {
 
   void label() {
     if (sensor_begin < 0) return;
-    read_links(chain, at.sensors + sensor_begin, static_cast<double>(count_) * dt, contact_, rows.tau_ext);
+    const std::size_t n = joints.size(), k = static_cast<std::size_t>(row_);
+    read_links(chain, at.sensors + sensor_begin, static_cast<double>(count_) * dt, contact_, rows.tau + k * n,
+               rows.contact + k * contact_width);
+    std::copy(rows.tau + k * n, rows.tau + (k + 1) * n, rows.tau_ext);
     read_regions(regions, at.sensors, dt, contact_);
   }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "chain.hpp"
@@ -41,10 +42,17 @@ constexpr double merge_gap = 0.5;       // contacts closer than this are one col
 constexpr double transient_time = 0.5;  // longer contacts are quasi-static [s]
 constexpr int sensor_width = 10;        // found, force (3), torque (3), position (3)
 
-// Reads the links' contact sensors at time t; tau receives tau_ext.
-inline void read_links(const Chain& chain, const double* sensor, double t, Contact& c, double* tau) {
+// What a physics step leaves in its row: net force on the arm [N]; link, point [m] and force [N] of the
+// largest force on a link, 0 and NaN where there is none.
+constexpr int contact_width = 8;
+
+// Reads the links' contact sensors at time t; tau receives tau_ext, row what touched.
+inline void read_links(const Chain& chain, const double* sensor, double t, Contact& c, double* tau, double* row) {
   std::fill(tau, tau + chain.size(), 0.0);
+  std::fill(row, row + contact_width, 0.0);
+  std::fill(row + 2, row + 5, std::numeric_limits<double>::quiet_NaN());
   double strongest = 0;
+  Vec3 net;
   for (std::size_t link = 0; link < chain.size(); ++link) {
     const double* s = sensor + sensor_width * link;
     if (s[0] == 0) continue;
@@ -52,12 +60,19 @@ inline void read_links(const Chain& chain, const double* sensor, double t, Conta
     const double size = norm(force);
     if (size == 0) continue;
     chain.push(link, load(s + 7), force, torque, tau);
-    strongest = std::max(strongest, size);
+    net = net + force;
+    if (size > strongest) {
+      strongest = size;
+      row[1] = static_cast<double>(link) + 1;
+      std::copy(s + 7, s + 10, row + 2);
+      row[5] = force.x, row[6] = force.y, row[7] = force.z;
+    }
     if (size > c.force) {
       c.force = size;
       c.link = static_cast<int>(link) + 1;
     }
   }
+  row[0] = norm(net);
   if (strongest > 0) {
     if (t - c.last >= merge_gap) {
       c.onset = true;

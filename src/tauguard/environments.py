@@ -7,6 +7,9 @@ from gymnasium.envs.registration import register, registry
 #: Name -> module and class prefix, and how many actions an episode has.
 ENVIRONMENTS = {
     "tauguard/Reach-v0": ("reach", "Reach", 1000),
+    "tauguard/React-v0": ("react", "React", 200),
+    "tauguard/ClothReach-v0": ("cloth_reach", "ClothReach", 1000),
+    "tauguard/TwoArms-v0": ("two_arms", "TwoArms", 1000),
 }
 
 

@@ -1,0 +1,168 @@
+"""React, ClothReach and TwoArms: what happens in them is what their names say."""
+
+import warnings
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from tauguard.models import BodyProxy
+
+from ..models.arms import SEVEN, TETRAHEDRON
+
+
+@pytest.fixture(scope="module")
+def seven(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("seven")
+    (folder / "seven.xml").write_text(SEVEN)
+    (folder / "tool.obj").write_text(TETRAHEDRON)
+    return str(folder / "seven.xml")
+
+
+@pytest.mark.parametrize("control", ["torque", "joint_velocity", "cartesian"])
+@pytest.mark.parametrize("name", ["Reach-v0", "React-v0"])
+def test_seven_joints_from_a_file(name, control, seven):
+    env = gym.make(f"tauguard/{name}", robot=seven, control=control, detector="observer")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+    assert env.action_space.shape == (6,) if control == "cartesian" else (7,)
+    assert len(env.reset(seed=0)[1]["tau_ext"]) == 7
+
+
+def tool_velocity(env):
+    model, data = env.world.scene.model, env.cell.datas[0]
+    velocity = np.zeros(6)
+    site = env.world.tools[0][0]
+    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_SITE, site, velocity, 0)
+    return velocity[3:]
+
+
+@pytest.mark.parametrize("speed", [0.25, 0.5, 1.0])
+def test_react_begins_at_the_first_touch_at_about_the_asked_speed(speed):
+    env = gym.make("tauguard/React-v0", speed=speed).unwrapped
+    for seed in range(3):
+        _, info = env.reset(seed=seed)
+        assert info["onset"]
+        assert info["force"] > 0
+        assert info["time"] - info["onset_time"] <= 0.01 + 1e-9
+        mujoco.mj_forward(env.world.scene.model, env.cell.datas[0])
+        reached = tool_velocity(env)
+        assert 0.6 * speed < reached[1] < 1.3 * speed
+        assert np.abs(reached[[0, 2]]).max() < 0.3 * speed
+
+
+def test_react_with_a_detector_begins_at_its_alarm():
+    env = gym.make("tauguard/React-v0", detector="observer", speed=0.5).unwrapped
+    for seed in range(3):
+        _, info = env.reset(seed=seed)
+        assert info["alarm"]
+        assert 0 < info["time"] - info["onset_time"] < 0.1
+
+
+def test_react_pays_for_a_stop_and_not_for_going_on():
+    returns = {}
+    for name, speed in (("stop", 0.0), ("on", 0.3)):
+        env = gym.make("tauguard/React-v0", speed=0.5)
+        env.reset(seed=0)
+        swing = np.diff(env.unwrapped.task.swing[0], axis=0)[-1]
+        action = speed * np.sign(swing)
+        returns[name], over = 0.0, False
+        while not over:
+            _, reward, terminated, truncated, info = env.step(action)
+            returns[name] += reward
+            over = terminated or truncated
+        assert terminated == (name == "stop")
+        assert info["success"] == (name == "stop")
+    assert returns["stop"] > returns["on"]
+
+
+def test_react_rejects_a_speed_that_cannot_be():
+    with pytest.raises(ValueError, match="above 0"):
+        gym.make("tauguard/React-v0", speed=0)
+    with pytest.raises(ValueError, match=r"payload_g.*approach"):
+        gym.make("tauguard/React-v0", velocity=1)
+
+
+def test_the_cloth_is_pushed_and_pushes_back():
+    env = gym.make("tauguard/ClothReach-v0", control="cartesian", checkers=("rigid",)).unwrapped
+    env.reset(seed=0)
+    data = env.cell.datas[0]
+    hanging = data.flexvert_xpos.copy()
+    forces = []
+    for step in range(110):
+        info = env.step(np.array([0, 0, -1.0, 0, 0, 0] if step < 40 else [1.0, 0, 0, 0, 0, 0]))[4]
+        forces.append(info["force"])
+        assert info["contacts"].shape == (1,)
+    assert max(forces[:30]) == 0
+    assert max(forces) > 0.5
+    assert data.flexvert_xpos[:, 0].max() > hanging[:, 0].max() + 0.1
+    assert info["reason"] == ""
+
+
+def test_unknown_checkers_are_named():
+    with pytest.raises(ValueError, match="rigid"):
+        gym.make("tauguard/Reach-v0", checkers=("psychic",))
+
+
+def test_a_checker_sees_the_blow_that_the_sensors_feel():
+    proxy = BodyProxy("hand", position=(0.0, 0.6, 0.45), direction=(0.0, -1.0, 0.0))
+    env = gym.make("tauguard/Reach-v0", obstacles=(proxy,), checkers=("rigid",)).unwrapped
+    env.reset(seed=0)
+    model, data = env.world.scene.model, env.cell.datas[0]
+    joint = model.joint("hand")
+    data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = 0.2, 0.5
+    touched, seen = [], []
+    for _ in range(80):
+        info = env.step(np.zeros(6))[4]
+        touched.append(info["force"] > 0)
+        seen.append(info["contacts"][0] > 0)
+    assert any(touched)
+    assert not any(t and not s for t, s in zip(touched, seen, strict=True))
+    assert sum(seen) <= sum(touched) + 2
+
+
+def test_two_arms_push_one_another_with_equal_and_opposite_forces():
+    env = gym.make("tauguard/TwoArms-v0", control="cartesian", control_rate=1000).unwrapped
+    env.reset(seed=0)
+    model, data = env.world.scene.model, env.cell.datas[0]
+    action = np.zeros(12)
+    action[[0, 1, 6]] = 1, -0.3, -1
+    checked = 0
+    for _ in range(1500):
+        info = env.step(action)[4]
+        if info["force"] == 0:
+            continue
+        tau = np.zeros(model.nv)
+        for c in range(data.ncon):
+            local, jac = np.zeros(6), np.zeros((3, model.nv))
+            mujoco.mj_contactForce(model, data, c, local)
+            world = data.contact[c].frame.reshape(3, 3).T @ local[:3]
+            for side, sign in ((0, -1), (1, 1)):
+                body = int(model.geom_bodyid[data.contact[c].geom[side]])
+                mujoco.mj_jac(model, data, jac, None, data.contact[c].pos, body)
+                tau += sign * jac.T @ world
+        expected = tau[env.world.scene.dof_adr]
+        scale = np.abs(expected).max()
+        assert info["tau_ext"] == pytest.approx(expected, abs=5e-3 * scale + 1e-9)
+        if np.abs(info["tau_ext"][:6]).max() > 1 and np.abs(info["tau_ext"][6:]).max() > 1:
+            checked += 1
+        if checked > 20:
+            break
+    assert checked > 20
+
+
+def test_two_arms_use_the_same_arm_twice():
+    env = gym.make("tauguard/TwoArms-v0").unwrapped
+    model = env.world.scene.model
+    for name in env.world.scene.joint_names[:6]:
+        other = model.joint("arm2_" + name)
+        assert model.joint(name).armature == other.armature
+        assert model.body(model.jnt_bodyid[model.joint(name).id]).mass == pytest.approx(
+            model.body(model.jnt_bodyid[other.id]).mass
+        )
+    observation, _ = env.reset(seed=0)
+    assert observation.shape == (48,)
+    assert np.abs(observation[36:39] - observation[39:42]).max() > 0.1
