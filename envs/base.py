@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium
@@ -50,6 +51,8 @@ class Task:
     def __init__(self, cell: Cell, **options: Any) -> None:
         """Keep the cell."""
         self.cell = cell
+        #: What :meth:`score` remembers from one step to the next, a number a copy.
+        self.memory = np.zeros(cell.rows)
 
     @classmethod
     def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
@@ -60,8 +63,14 @@ class Task:
         """Begin an episode of copy ``i``; the last thing it does is :meth:`Cell.start`."""
         raise NotImplementedError
 
-    def score(self) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Reward, whether the task is over, and success of the last step, shape (rows,) each."""
+    def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
+        """Reward, whether the task is over, success, and what to remember of a step.
+
+        Args:
+            figure: the columns of :data:`tauguard.envs.cell.FIGURES`, numbers of one copy or arrays
+                of all: the same arithmetic gives the same bits.
+            memory: what the last step, or :meth:`start`, left.
+        """
         raise NotImplementedError
 
     def after(self, i: int, rng: np.random.Generator) -> None:
@@ -126,7 +135,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._begun = True
         if self.render_mode == "human":
             self.render()
-        return self.cell.observation[0].copy(), self._info(False)
+        return self.cell.observation[0].copy(), self._info(self.cell.figure[0].tolist(), False)
 
     def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Act for one control step; entries beyond [-1, 1] count as -1 and 1.
@@ -144,20 +153,18 @@ class ArmEnv(gymnasium.Env[Array, Array]):
                 f"{', '.join(entry.name for entry in cell.actions)}"
             )
         cell.step(0, values, self.np_random)
-        rewards, overs, successes = self.task.score()
-        success = bool(successes[0])
-        diverged = bool(cell.figure[0, DIVERGED])
-        info = self._info(success)
+        task, figure = self.task, cell.figure[0].tolist()
+        reward, over, success, task.memory[0] = task.score(figure, task.memory.item(0))
+        diverged = figure[DIVERGED] != 0
+        info = self._info(figure, success)
         if success and not diverged:
-            self.task.after(0, self.np_random)
+            task.after(0, self.np_random)
         if self.render_mode == "human":
             self.render()
-        over = bool(overs[0]) and not diverged
-        return cell.observation[0].copy(), float(rewards[0]), over, diverged, info
+        return cell.observation[0].copy(), float(reward), over and not diverged, diverged, info
 
-    def _info(self, success: bool) -> dict[str, Any]:
+    def _info(self, figure: list[float], success: bool) -> dict[str, Any]:
         cell = self.cell
-        figure = cell.figure[0].tolist()
         area = self.world.settings.contact_area
         info = {
             "time": figure[TIME],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import mujoco
@@ -32,7 +33,6 @@ class Reach(Task):
         """Prepare drawing targets."""
         super().__init__(cell)
         self._scratch = mujoco.MjData(cell.world.scene.model)
-        self._distance = np.zeros(cell.rows)
         low, high = pose_box(cell.world.scene)
         each = len(low) // self.arms
         self._low, self._high, self._each = low, high, each
@@ -49,7 +49,7 @@ class Reach(Task):
         for arm in range(cell.world.arms):
             cell.target[i, arm] = self.draw(rng, arm, None)
         cell.start(i)
-        self._distance[i] = cell.figure[i, DISTANCE]
+        self.memory[i] = cell.figure[i, DISTANCE]
 
     def send_regions(self, i: int, rng: np.random.Generator) -> None:
         """Each at its speed towards the middle of its line, from its outer part."""
@@ -77,13 +77,11 @@ class Reach(Task):
                 break
         return place
 
-    def score(self) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Progress and bonus; never over by itself."""
-        distance = self.cell.figure[:, DISTANCE]
+    def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
+        """Progress and bonus; never over by itself. The memory is the last distance [m]."""
+        distance = figure[DISTANCE]
         reached = distance < TOLERANCE
-        reward = self._distance - distance + BONUS * reached
-        self._distance[:] = distance
-        return reward, np.zeros(len(reward), dtype=np.bool_), reached
+        return memory - distance + BONUS * reached, distance < 0, reached, distance
 
     def after(self, i: int, rng: np.random.Generator) -> None:
         """The next target."""
@@ -91,7 +89,7 @@ class Reach(Task):
         for arm in range(cell.world.arms):
             cell.target[i, arm] = self.draw(rng, arm, cell.target[i, arm].copy())
         cell.plants[i].refresh()
-        self._distance[i] = cell.figure[i, DISTANCE]
+        self.memory[i] = cell.figure[i, DISTANCE]
 
 
 class ReachEnv(ArmEnv):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import mujoco
@@ -52,7 +53,6 @@ class React(Task):
         positive("speed", self._speed)
         self._approach = bool(options["approach"])
         self._scratch = mujoco.MjData(cell.world.scene.model)
-        self._calm = np.zeros(cell.rows)
         self._meeting = home_tool(cell.world)
         self.swing = [np.zeros((0, 0))] * cell.rows
 
@@ -75,7 +75,7 @@ class React(Task):
         cell.place(i, self.swing[i][0])
         cell.target[i, 0] = begin + np.array([0.0, RUN_UP + BEYOND, 0.0])
         cell.start(i)
-        self._calm[i] = 0.0
+        self.memory[i] = 0.0
         if not self._approach:
             return
         still = np.zeros(len(cell.actions))
@@ -117,14 +117,14 @@ class React(Task):
             way = np.linalg.solve(part @ part.T + 1e-4 * np.eye(3), place - tool)
             data.qpos[world.scene.qpos_adr] += np.clip(part.T @ way, -0.2, 0.2)
 
-    def score(self) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Force and speed cost; rest without contact ends the episode."""
-        figure, period = self.cell.figure, 1 / self.cell.world.settings.control_rate
-        calm = (figure[:, FORCE] == 0) & (figure[:, SPEED] < REST_SPEED)
-        self._calm[:] = np.where(calm, self._calm + period, 0.0)
-        over = self._calm >= REST_TIME - 1e-9
-        price = FORCE_PRICE * figure[:, RATIO] + SPEED_PRICE * figure[:, SPEED]
-        return REST_PRIZE * over - period * price, over, over
+    def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
+        """Force and speed cost; rest without contact ends it. The memory is the time at rest [s]."""
+        period = 1 / self.cell.world.settings.control_rate
+        calm = (figure[FORCE] == 0) & (figure[SPEED] < REST_SPEED)
+        rested = (memory + period) * calm
+        over = rested >= REST_TIME - 1e-9
+        price = FORCE_PRICE * figure[RATIO] + SPEED_PRICE * figure[SPEED]
+        return REST_PRIZE * over - period * price, over, over, rested
 
 
 def home_tool(world: World) -> Array:

@@ -137,8 +137,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
                 f"copies {np.flatnonzero(self._over)} are over: reset them with a reset_mask"
             )
         cell.step_all(values, going, self._rngs, self._threads)
-        rewards, overs, successes = self.task.score()
-        diverged = cell.figure[:, DIVERGED] != 0
+        task, figure = self.task, cell.figure.T
+        rewards, overs, successes, task.memory[:] = task.score(figure, task.memory.copy())
+        diverged = figure[DIVERGED] != 0
         self._elapsed += going
         late = self._elapsed >= self._limit if self._limit else np.zeros_like(diverged)
         terminated = overs & ~diverged & going

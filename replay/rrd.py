@@ -1,4 +1,4 @@
-"""A trace as a rerun recording (``.rrd``). The only module that knows rerun's interface."""
+"""A trace as a rerun recording (``.rrd``). With :mod:`.live` the only one that knows rerun."""
 
 from __future__ import annotations
 

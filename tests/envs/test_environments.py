@@ -217,7 +217,7 @@ def struck():
     infos, forces = [], []
     for _ in range(1500):
         env.step(np.zeros(6))
-        infos.append(env._info(False))
+        infos.append(env._info(env.cell.figure[0].tolist(), False))
         # The engine's own account of the same step: J^T of every contact.
         tau = np.zeros(model.nv)
         for c in range(data.ncon):

@@ -19,6 +19,7 @@ COMMANDS = {
     "simulate": "labelled episodes of the arm at work, as many as asked",
     "train": "a detector from labelled recordings",
     "evaluate": "a detector's figures on labelled recordings",
+    "watch": "an environment live in the rerun viewer",
     "replay": "turn an MCAP recording into an .rrd for the rerun viewer",
     "bench": "run one study of speed against error: a table, a figure, --json",
 }

@@ -1,0 +1,321 @@
+"""What an environment costs beside its physics, many at once, and what reactions are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import mujoco
+import numpy as np
+from gymnasium.vector import SyncVectorEnv
+from mujoco import rollout
+from mujoco.batch import Batch
+
+from tauguard.benchmarks.report import Row, measure
+from tauguard.contacts import registered
+from tauguard.envs.base import ArmEnv
+from tauguard.envs.cell import DIVERGED
+from tauguard.envs.react import ReactEnv
+from tauguard.envs.reactions import REACTIONS, Reaction
+from tauguard.models import body_region
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+REACH, REACT = "tauguard:tauguard/Reach-v0", "tauguard:tauguard/React-v0"
+#: Copies in the vector study, and speeds of the reactions' swings [m/s].
+COPIES, SPEEDS = 16, (0.25, 0.5, 1.0)
+#: The peers of one environment: MuJoCo's own loop with the forces given, and with the drives.
+ROLLOUT, PHYSICS = "mujoco.rollout, forces given", "physics and drives, no environment"
+#: Below this tool speed [m/s] the arm stands.
+STANDING = 0.01
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """Rows of three studies: ``step``, ``vector`` and ``reaction``."""
+    actions, repeats = (150, 5) if quick else (500, 15)
+    rows = steps(actions, repeats, seed)
+    rows += vectors(actions // 3, repeats, seed)
+    return rows + reactions(2 if quick else 10, seed)
+
+
+# -- one environment -------------------------------------------------------------------------------
+
+
+def steps(count: int, repeats: int, seed: int) -> list[Row]:
+    """Microseconds an action at 100 Hz: the same motion as bare physics and with ever more."""
+    env = made(seed)
+    actions = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 6)).astype(np.float32)
+    forces, error = recorded(env, actions, seed)
+    calls: dict[str, Callable[[], object]] = {
+        ROLLOUT: bare(env, forces, seed),
+        PHYSICS: driven(env, actions, seed),
+        "the environment": acting(env, actions, seed),
+        "through gymnasium.make": acting(gymnasium.make(REACH), actions, seed),
+        "without labels": acting(made(seed, labels=False), actions, seed),
+        "with an ideal drive": acting(made(seed, ideal_drive=True), actions, seed),
+        "measured observations": acting(made(seed, noise=True), actions, seed),
+        "the observer as detector": acting(made(seed, detector="observer"), actions, seed),
+    }
+    for name in registered():
+        calls[f"checker {name}"] = acting(made(seed, checkers=(name,)), actions, seed)
+    taken = measure(calls, repeats)
+    rollout_time, base = taken[ROLLOUT]["median"], taken[PHYSICS]["median"]
+    whole = taken["the environment"]["median"]
+    return [
+        {
+            "study": "step",
+            "what": name,
+            "us_per_action": {k: 1e6 * v / count for k, v in figure.items()},
+            "ratio_to_physics": figure["median"] / base,
+            "ratio_to_rollout": figure["median"] / rollout_time,
+            "added_us": 1e6 * (figure["median"] - whole) / count,
+            "q_difference_rad": error if name == ROLLOUT else None,
+        }
+        for name, figure in taken.items()
+    ]
+
+
+def made(seed: int, **keywords: Any) -> ArmEnv:
+    """A Reach environment without Gymnasium's own wrappers."""
+    env = gymnasium.make(REACH, **keywords).unwrapped
+    assert isinstance(env, ArmEnv)
+    env.reset(seed=seed)
+    return env
+
+
+def acting(env: gymnasium.Env[Any, Any], actions: np.ndarray, seed: int) -> Callable[[], object]:
+    """An episode with the given actions."""
+
+    def call() -> None:
+        env.reset(seed=seed)
+        for action in actions:
+            env.step(action)
+
+    return call
+
+
+def driven(env: ArmEnv, actions: np.ndarray, seed: int) -> Callable[[], object]:
+    """The bare physics loop: mj_step and the drives, natively; no observation, no reward."""
+    plant, steps = env.cell.plants[0], env.world.settings.substeps
+    rows = actions.astype(np.float64)
+
+    def call() -> None:
+        env.reset(seed=seed)
+        for action in rows:
+            plant.begin(action)
+            plant.run(steps)
+
+    return call
+
+
+def recorded(env: ArmEnv, actions: np.ndarray, seed: int) -> tuple[np.ndarray, float]:
+    """The forces that the drives apply at every physics step, and how far a replay strays [rad]."""
+    env.reset(seed=seed)
+    plant, data, found = env.cell.plants[0], env.cell.datas[0], []
+    for action in actions.astype(np.float64):
+        plant.begin(action)
+        for _ in range(env.world.settings.substeps):
+            plant.run(1)
+            found.append(data.qfrc_applied.copy())
+        plant.finish()
+    assert not env.cell.figure[0, DIVERGED]
+    last = data.qpos[env.world.scene.qpos_adr].copy()
+    forces = np.array(found)
+    states, _ = bare(env, forces, seed)()
+    model, adr = env.world.scene.model, env.world.scene.qpos_adr
+    return forces, float(np.abs(states[0, -1, 1 : 1 + model.nq][adr] - last).max())
+
+
+def bare(env: ArmEnv, forces: np.ndarray, seed: int) -> Callable[[], Any]:
+    """MuJoCo's own compiled loop over the same scene, start and forces."""
+    model = env.world.scene.model
+    env.reset(seed=seed)
+    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    state = np.empty(mujoco.mj_stateSize(model, kind))
+    mujoco.mj_getState(model, env.cell.datas[0], state, kind)
+    data = mujoco.MjData(model)
+    applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+    return lambda: rollout.rollout(
+        model, data, initial_state=state, control=forces[None], control_spec=applied
+    )
+
+
+# -- many environments -----------------------------------------------------------------------------
+
+
+def vectors(count: int, repeats: int, seed: int) -> list[Row]:
+    """Actions a second of :data:`COPIES` environments, beside Gymnasium's and MuJoCo's own form."""
+    sync = SyncVectorEnv([lambda: gymnasium.make(REACH)] * COPIES)
+    native = {
+        threads: gymnasium.make_vec(REACH, num_envs=COPIES, threads=threads) for threads in (1, 2)
+    }
+    actions = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, COPIES, 6))
+    rows = actions.astype(np.float32)
+
+    def vector(env: gymnasium.vector.VectorEnv[Any, Any, Any]) -> Callable[[], object]:
+        def call() -> None:
+            env.reset(seed=seed)
+            for action in rows:
+                env.step(action)
+
+        return call
+
+    calls: dict[str, Callable[[], object]] = {"SyncVectorEnv": vector(sync)}
+    for threads, env in native.items():
+        calls[f"make_vec, {threads} threads"] = vector(env)
+    for threads in (1, 2):
+        calls[f"mujoco.batch alone, {threads} threads"] = batched(seed, count, threads)
+    last = {}
+    for name in ("SyncVectorEnv", "make_vec, 1 threads", "make_vec, 2 threads"):
+        calls[name]()
+    for name, env in (
+        ("SyncVectorEnv", sync),
+        *((f"make_vec, {t} threads", e) for t, e in native.items()),
+    ):
+        last[name] = env.step(rows[0])[0]
+    taken = measure(calls, repeats)
+    base = taken["SyncVectorEnv"]["median"]
+    return [
+        {
+            "study": "vector",
+            "what": name,
+            "copies": COPIES,
+            "actions_per_second": COPIES * count / figure["median"],
+            "ratio_to_sync": base / figure["median"],
+            "same_bits_as_sync": bool(np.array_equal(last[name], last["SyncVectorEnv"]))
+            if name in last
+            else None,
+        }
+        for name, figure in taken.items()
+    ]
+
+
+def batched(seed: int, count: int, threads: int) -> Callable[[], object]:
+    """Physics alone: every copy of the scene holds the arm with constant forces."""
+    env = made(seed)
+    model, data = env.world.scene.model, env.cell.datas[0]
+    env.step(np.zeros(6))
+    batch = Batch(model, COPIES, threads)
+    start, force = data.qpos.copy(), data.qfrc_applied.copy()
+    substeps = env.world.settings.substeps
+
+    def call() -> None:
+        batch.qpos[:], batch.qvel[:], batch.qfrc_applied[:] = start, 0.0, force
+        for _ in range(count):
+            batch.step(nstep=substeps)
+
+    return call
+
+
+# -- reactions -------------------------------------------------------------------------------------
+
+
+def reactions(count: int, seed: int) -> list[Row]:
+    """Each reaction at three speeds, known from the contact itself and from the detector."""
+    rows: list[Row] = []
+    for speed in SPEEDS:
+        for detector in (None, "observer"):
+            for reaction in REACTIONS:
+                runs = [swing(speed, detector, reaction, seed + k) for k in range(count)]
+                rows.append(
+                    {
+                        "study": "reaction",
+                        "speed_m_s": speed,
+                        "known_from": "contact" if detector is None else "detector",
+                        "reaction": reaction,
+                        **{key: spread([run[key] for run in runs]) for key in runs[0]},
+                    }
+                )
+    return rows
+
+
+def spread(values: list[float]) -> dict[str, float | None]:
+    """Median, smallest and largest of those that are finite."""
+    known = [v for v in values if np.isfinite(v)]
+    if not known:
+        return {"median": None, "low": None, "high": None}
+    return {"median": float(np.median(known)), "low": min(known), "high": max(known)}
+
+
+def swing(speed: float, detector: str | None, reaction: str, seed: int) -> dict[str, float]:
+    """One swing into the chest: peak force, energy, and how long and far the tool went on."""
+    made = gymnasium.make(
+        REACT, speed=speed, detector=detector, approach=False, max_episode_steps=10**6
+    )
+    env = Reaction(made, reaction, "contact" if detector is None else "alarm")
+    env.reset(seed=seed)
+    inner = env.unwrapped
+    assert isinstance(inner, ReactEnv)
+    way = np.diff(inner.task.swing[0], axis=0) * 100 / inner.world.max_speed  # type: ignore[attr-defined]
+    n = len(inner.world.scene.joint_names)
+    tools, times, force, onset, begun = [], [], 0.0, -1.0, -1.0
+    for step in range(len(way) + 150):
+        action = way[step] if step < len(way) else np.zeros(n)
+        observation, _, _, _, info = env.step(action)
+        tools.append(observation[3 * n : 3 * n + 3].copy())
+        times.append(info["time"])
+        force, onset = max(force, info["force"]), max(onset, info["onset_time"])
+        if begun < 0 and info["reacting"]:
+            begun = info["time"]
+    return judged(np.array(tools), np.array(times), force, onset, begun)
+
+
+def judged(
+    tools: np.ndarray, times: np.ndarray, force: float, onset: float, begun: float
+) -> dict[str, float]:
+    """The figures of one swing; the stop is the tool's first standstill after the touch."""
+    touch = int(np.searchsorted(times, onset))
+    speed = np.linalg.norm(np.diff(tools, axis=0), axis=1) / np.diff(times)
+    still = np.flatnonzero(speed[touch + 1 :] < STANDING)
+    stop = touch + 1 + int(still[0]) if len(still) else -1
+    region = body_region("chest")
+    return {
+        "peak_force_N": force,
+        "energy_J": force**2 / (2 * region.stiffness),
+        "delay_s": begun - onset if begun >= 0 else np.nan,
+        "stopping_time_s": float(times[stop] - onset) if len(still) else np.nan,
+        "stopping_distance_m": float(np.linalg.norm(tools[stop] - tools[touch]))
+        if len(still)
+        else np.nan,
+        "farthest_m": float((tools[touch:, 1] - tools[touch, 1]).max()),
+        "force_over_limit": force / region.transient_force,
+    }
+
+
+# -- the figure ------------------------------------------------------------------------------------
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """What a step costs, what many cost, and force over speed for each reaction."""
+    top, vector, plain, detected = figure.subplots(2, 2).ravel()
+    for axes, study, key, label in (
+        (top, "step", "us_per_action", "microseconds an action"),
+        (vector, "vector", "actions_per_second", "actions a second"),
+    ):
+        chosen = [row for row in rows if row["study"] == study]
+        values = [row[key]["median"] if isinstance(row[key], dict) else row[key] for row in chosen]
+        axes.barh([row["what"] for row in chosen], values, color="#2a788e")
+        axes.invert_yaxis()
+        axes.set(xlabel=label)
+    limit = body_region("chest").transient_force
+    for axes, known in ((plain, "contact"), (detected, "detector")):
+        for reaction in REACTIONS:
+            line = [
+                row
+                for row in rows
+                if row["study"] == "reaction"
+                and row["known_from"] == known
+                and row["reaction"] == reaction
+            ]
+            axes.plot(
+                [row["speed_m_s"] for row in line],
+                [row["peak_force_N"]["median"] for row in line],
+                "o-",
+                label=reaction,
+            )
+        axes.axhline(limit, color="black", lw=0.8, ls="--")
+        axes.set(xlabel="tool speed [m/s]", ylabel="peak force on the chest [N]")
+        axes.set_title(f"Reaction known from the {known}")
+        axes.legend(fontsize=8)

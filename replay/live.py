@@ -1,0 +1,144 @@
+"""A running simulation in the rerun viewer, or in a file: what is there is shown as it happens."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.replay.robot import bodies
+from tauguard.replay.rrd import ARROW, COLOURS, GREEN, LONGEST_ARROW, RED, TIMELINE, drawn, entity
+
+#: The viewer listens here only, and is waited for this long [s].
+HOST, PATIENCE = "127.0.0.1", 20.0
+#: Radius of a target's mark [m].
+MARK = 0.03
+#: Grey-blue of a cloth.
+CLOTH = (90, 130, 190)
+
+
+class LiveView:
+    """Sends a scene, and then one instant after the other, to a viewer or a file."""
+
+    def __init__(self, model: Any, save: Path | None = None, port: int = 9876) -> None:
+        """Open the viewer on 127.0.0.1, or the file.
+
+        Args:
+            model: ``mujoco.MjModel`` of the scene.
+            save: a ``.rrd`` file instead of a viewer.
+            port: of the viewer.
+
+        Raises:
+            OSError: the viewer did not come up, or the file cannot be written.
+        """
+        self._model, self._bodies = model, bodies(model)
+        self._recording = rr.RecordingStream("tauguard_watch")
+        self._viewer: subprocess.Popen[bytes] | None = None
+        if save is not None:
+            self._recording.save(save)
+        else:
+            self._viewer = open_viewer(port)
+            self._recording.connect_grpc(f"rerun+http://{HOST}:{port}/proxy")
+        self._recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for body in self._bodies:
+            for number, piece in enumerate(body.shapes):
+                place = f"{entity('scene', body.name)}/shape_{number}"
+                self._recording.log(place, drawn(piece), static=True)
+        self._named: set[str] = set()
+
+    def layout(self, charts: Mapping[str, str]) -> None:
+        """3D left, the named charts (origin -> title) right."""
+        views = [rrb.TimeSeriesView(origin=origin, name=name) for origin, name in charts.items()]
+        scene = rrb.Spatial3DView(origin="scene", name="The scene")
+        self._recording.send_blueprint(
+            rrb.Blueprint(
+                rrb.Horizontal(scene, rrb.Vertical(*views), column_shares=[3, 2]),
+                rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+                collapse_panels=True,
+            )
+        )
+
+    def show(self, data: Any, seconds: float, targets: ArrayLike) -> None:
+        """Where everything is at ``seconds``, and a ball at each target, shape (k, 3) [m]."""
+        self._recording.set_time(TIMELINE, duration=seconds)
+        for index, body in enumerate(self._bodies):
+            if body.shapes and (body.moves or seconds == 0):
+                pose = rr.Transform3D(
+                    translation=data.xpos[index], quaternion=np.roll(data.xquat[index], -1)
+                )
+                self._recording.log(entity("scene", body.name), pose)
+        marks = np.asarray(targets, dtype=float).reshape(-1, 3)
+        balls = rr.Points3D(marks, radii=MARK, colors=[GREEN] * len(marks))
+        self._recording.log("scene/targets", balls)
+        for flex in range(self._model.nflex):
+            self._cloth(data, flex)
+
+    def _cloth(self, data: Any, flex: int) -> None:
+        model = self._model
+        if model.flex_dim[flex] != 2:
+            return
+        first, count = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
+        element, elements = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
+        triangles = model.flex_elem[element : element + 3 * elements].reshape(-1, 3)
+        sheet = rr.Mesh3D(
+            vertex_positions=data.flexvert_xpos[first : first + count].astype(np.float32),
+            triangle_indices=triangles,
+            albedo_factor=CLOTH,
+        )
+        self._recording.log(f"scene/cloth_{flex}", sheet)
+
+    def contact(self, point: NDArray[np.float64], force: NDArray[np.float64]) -> None:
+        """An arrow at ``point`` [m] along ``force`` [N]; a zero force takes it away."""
+        size = float(np.linalg.norm(force))
+        if size == 0:
+            self._recording.log("scene/contact", rr.Clear(recursive=False))
+            return
+        arrow = force / size * min(ARROW * size, LONGEST_ARROW)
+        self._recording.log(
+            "scene/contact", rr.Arrows3D(origins=[point - arrow], vectors=[arrow], colors=[RED])
+        )
+
+    def chart(self, origin: str, names: list[str], values: ArrayLike) -> None:
+        """One sample of a chart: a line a name."""
+        if origin not in self._named:
+            colours = [COLOURS[i % len(COLOURS)] for i in range(len(names))]
+            lines = rr.SeriesLines(names=names, colors=colours)
+            self._recording.log(origin, lines, static=True)
+            self._named.add(origin)
+        self._recording.log(origin, rr.Scalars(np.asarray(values, dtype=float).ravel()))
+
+    def close(self) -> None:
+        """Send what is left; the viewer stays open."""
+        self._recording.flush()
+        self._recording.disconnect()
+
+
+def open_viewer(port: int) -> subprocess.Popen[bytes]:
+    """The rerun viewer, listening on 127.0.0.1 only.
+
+    Raises:
+        OSError: it cannot be started, ended, or did not listen in time.
+    """
+    program = Path(sys.executable).with_name("rerun")
+    viewer = subprocess.Popen([program, "--bind", HOST, "--port", str(port)])
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        if viewer.poll() is not None:
+            break
+        with socket.socket() as probe:
+            probe.settimeout(0.2)
+            if probe.connect_ex((HOST, port)) == 0:
+                return viewer
+        time.sleep(0.1)
+    raise OSError(
+        f"the rerun viewer did not come up on {HOST}:{port}; without a display use --save FILE.rrd"
+    )

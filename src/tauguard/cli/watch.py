@@ -1,0 +1,142 @@
+"""``tauguard watch ENVIRONMENT``: an environment live in the rerun viewer."""
+
+from __future__ import annotations
+
+import ast
+import time
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+
+def command(
+    environment: Annotated[str, tyro.conf.Positional],
+    /,
+    policy: Literal["target", "random", "still"] = "target",
+    seconds: float = 30.0,
+    seed: int = 0,
+    set: tuple[str, ...] = (),
+    reaction: str | None = None,
+    save: Path | None = None,
+    port: int = 9876,
+) -> None:
+    """Run an environment and show it as it happens: the scene, forces, limits, the detector.
+
+    Args:
+        environment: such as Reach-v0, React-v0, ClothReach-v0 or TwoArms-v0.
+        policy: go straight to the target (Cartesian control), random actions, or none.
+        seconds: how long, in simulated time; episodes follow one another.
+        seed: of the first episode.
+        set: keywords of the environment, each NAME=VALUE, as in --set detector=observer.
+        reaction: what to do at an alarm or, without a detector, at a touch: stop0, stop1, stop2,
+            retract, admittance.
+        save: write an .rrd file instead of opening the viewer.
+        port: of the viewer, which listens on 127.0.0.1 only.
+    """
+    import gymnasium
+
+    from tauguard.environments import ENVIRONMENTS
+
+    name = environment if environment.startswith("tauguard/") else f"tauguard/{environment}"
+    if name not in ENVIRONMENTS:
+        known = ", ".join(one.removeprefix("tauguard/") for one in ENVIRONMENTS)
+        raise ValueError(f"environment {environment!r}: expected one of {known}")
+    if not seconds > 0:
+        raise ValueError(f"seconds {seconds}: expected above 0")
+    keywords = parsed(set)
+    if policy == "target":
+        if keywords.get("control", "cartesian") != "cartesian":
+            raise ValueError("policy target needs control=cartesian; use --policy random or still")
+        keywords["control"] = "cartesian"
+    env = gymnasium.make(name, **keywords)
+    if reaction is not None:
+        from tauguard.envs.wrappers import Reaction
+
+        trigger = "alarm" if keywords.get("detector") else "contact"
+        env = Reaction(env, reaction, trigger)
+    run(env, policy, seconds, seed, save, port)
+
+
+def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
+    """NAME=VALUE pairs; a value that is no Python literal is text."""
+    found: dict[str, Any] = {}
+    for item in settings:
+        name, sign, text = item.partition("=")
+        if not sign:
+            raise ValueError(f"--set {item}: expected NAME=VALUE, as in detector=observer")
+        try:
+            found[name] = ast.literal_eval(text)
+        except (ValueError, SyntaxError):
+            found[name] = text
+    return found
+
+
+def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, port: int) -> None:
+    """Episodes until the time is over, in real time unless they go into a file."""
+    from tauguard.replay.live import LiveView
+
+    inner = env.unwrapped
+    view = LiveView(inner.world.scene.model, save, port)
+    view.layout(
+        {
+            "force": "Contact force and limit [N, of the limit]",
+            "tau_ext": "External torque, truth [N m]",
+            "residual": "Residual of the detector [N m]",
+            "tool": "Distance to the target [m]",
+        }
+    )
+    env.action_space.seed(seed)
+    period, now, episodes, worst = 1 / inner.world.settings.control_rate, 0.0, 0, 0.0
+    _, info = env.reset(seed=seed)
+    began = time.perf_counter()
+    while now < seconds:
+        send(view, inner, info, now)
+        action = chosen(env, inner, policy)
+        _, _, terminated, truncated, info = env.step(action)
+        now += period
+        worst = max(worst, info["limit_ratio"])
+        if terminated or truncated:
+            episodes += 1
+            _, info = env.reset()
+        if save is None:
+            time.sleep(max(0.0, began + now - time.perf_counter()))
+    view.close()
+    env.close()
+    where = f"; show it with: rerun {save}" if save else ""
+    print(
+        f"{now:.1f} s, {episodes} episodes ended, "
+        f"largest force {100 * worst:.0f} % of its limit{where}"
+    )
+
+
+def chosen(env: Any, inner: Any, policy: str) -> Any:
+    """The policy's action."""
+    import numpy as np
+
+    if policy == "random":
+        return env.action_space.sample()
+    if policy == "still":
+        return np.zeros(env.action_space.shape)
+    cell = inner.cell
+    n, arms = len(inner.world.scene.joint_names), inner.world.arms
+    at = 3 * n + 3 * arms
+    ways = cell.observation[0, at : at + 3 * arms].reshape(arms, 3)
+    action = np.zeros((arms, 6))
+    largest = np.array([entry.high for entry in cell.actions]).reshape(arms, 6)[:, :3]
+    # A tenth of the way a step, so that the tool slows down before it arrives.
+    action[:, :3] = np.clip(0.1 * ways / largest, -1, 1)
+    return action.ravel()
+
+
+def send(view: Any, inner: Any, info: dict[str, Any], now: float) -> None:
+    """One instant: the scene and the charts."""
+    cell, names = inner.cell, list(inner.world.scene.joint_names)
+    view.show(cell.datas[0], now, cell.target[0])
+    contact = cell.contact[0]
+    strongest = contact[contact[:, 0].argmax()]
+    view.contact(strongest[2:5], strongest[5:8] if info["force"] else 0 * strongest[5:8])
+    view.chart("force", ["force [N]", "limit ratio"], [info["force"], info["limit_ratio"]])
+    view.chart("tau_ext", names, info["tau_ext"])
+    view.chart("residual", [*names, "alarm"], [*info["residual"], float(info["alarm"])])
+    view.chart("tool", ["distance"], [info["distance"]])
