@@ -167,13 +167,10 @@ def vectors(count: int, repeats: int, seed: int) -> list[Row]:
         calls[f"make_vec, {threads} threads"] = vector(env)
     for threads in (1, 2):
         calls[f"mujoco.batch alone, {threads} threads"] = batched(seed, count, threads)
+    forms = {"SyncVectorEnv": sync} | {f"make_vec, {t} threads": e for t, e in native.items()}
     last = {}
-    for name in ("SyncVectorEnv", "make_vec, 1 threads", "make_vec, 2 threads"):
+    for name, env in forms.items():
         calls[name]()
-    for name, env in (
-        ("SyncVectorEnv", sync),
-        *((f"make_vec, {t} threads", e) for t, e in native.items()),
-    ):
         last[name] = env.step(rows[0])[0]
     taken = measure(calls, repeats)
     base = taken["SyncVectorEnv"]["median"]

@@ -118,7 +118,7 @@ class React(Task):
             data.qpos[world.scene.qpos_adr] += np.clip(part.T @ way, -0.2, 0.2)
 
     def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
-        """Force and speed cost; rest without contact ends it. The memory is the time at rest [s]."""
+        """Force and speed cost; rest without contact ends it. It remembers the time at rest [s]."""
         period = 1 / self.cell.world.settings.control_rate
         calm = (figure[FORCE] == 0) & (figure[SPEED] < REST_SPEED)
         rested = (memory + period) * calm

@@ -137,7 +137,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
                 f"copies {np.flatnonzero(self._over)} are over: reset them with a reset_mask"
             )
         cell.step_all(values, going, self._rngs, self._threads)
-        task, figure = self.task, cell.figure.T
+        task, figure = self.task, list(cell.figure.T)
         rewards, overs, successes, task.memory[:] = task.score(figure, task.memory.copy())
         diverged = figure[DIVERGED] != 0
         self._elapsed += going
