@@ -110,11 +110,14 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
         mismatch=settings.mismatch if isinstance(settings.mismatch, Mismatch) else None,
         payload=settings.payload_g > 0,
         labels=settings.labels,
+        region_labels=settings.labels,
         arm=settings.robot,
         table=settings.table,
         cloth=settings.cloth,
     )
-    bare = compose(replace(spec, payload=False, labels=False, cloth=None, mismatch=None))
+    bare = compose(
+        replace(spec, payload=False, labels=False, region_labels=False, cloth=None, mismatch=None)
+    )
     reach = arm_reach(bare)
     proxies = tuple(
         item if isinstance(item, BodyProxy) else (placing or crossing)(item, bare, reach)

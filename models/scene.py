@@ -46,12 +46,13 @@ class SceneSpec:
     payload: bool = False  #: a body at the flange whose mass ``set_payload`` changes
     striker: Striker | None = None
     clamp: Clamp | None = None
-    labels: bool = True  #: a contact sensor on every link and every body region
+    labels: bool = True  #: a contact sensor on every link
     floor: bool = False  #: a plane at height 0
     arm: str = "cura6"  #: or an MJCF or URDF file with one serial arm in it
     base_pose: tuple[tuple[float, ...], ...] | None = None  #: of the arm's world, (4, 4)
     integrator: str = "implicitfast"  #: one of :data:`INTEGRATORS`
     proxies: tuple[BodyProxy, ...] = ()  #: body regions of a person
+    region_labels: bool = False  #: a contact sensor on every body region, after the links'
     table: Table | None = None
     cloth: Cloth | None = None
     drive: Drive | None = field(default=None, compare=False)
@@ -157,6 +158,7 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     if spec.labels:
         for i, link in enumerate(arm.links, start=1):
             _add_label(whole, link, f"contact_link{i}")
+    if spec.region_labels:
         for proxy in spec.proxies:
             _add_label(whole, proxy.region, f"contact_{proxy.region}")
     if obstacles:
