@@ -52,7 +52,7 @@ class SceneSpec:
     base_pose: tuple[tuple[float, ...], ...] | None = None  #: of the arm's world, (4, 4)
     integrator: str = "implicitfast"  #: one of :data:`INTEGRATORS`
     proxies: tuple[BodyProxy, ...] = ()  #: body regions of a person
-    region_labels: bool = False  #: a contact sensor on every body region, after the links'
+    region_labels: bool = False  #: a contact sensor on every body region, after the links
     table: Table | None = None
     cloth: Cloth | None = None
     drive: Drive | None = field(default=None, compare=False)
