@@ -28,6 +28,8 @@ class CollisionPlan:
         strength: first guess: strike speed [m/s], clamp depth [m, from 0.03 m], pulse force [N].
         duration: of a pulse or of a clamp [s]; a strike lasts as long as it lasts.
         at_rest: a pulse or strike while the arm dwells, where one is near ``time``.
+        force: wanted peak contact force (low, high) [N]; targets whose lever arms cannot give
+            ``severity`` at such a force are passed over.
     """
 
     kind: str
@@ -37,6 +39,7 @@ class CollisionPlan:
     strength: float | None = None
     duration: float = 0.1
     at_rest: bool = False
+    force: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names what is wrong and what would work."""
@@ -46,8 +49,10 @@ class CollisionPlan:
             raise ValueError(f"link {self.link}: links are counted from 1")
         if self.duration <= 0:
             raise ValueError(f"duration {self.duration}: expected seconds above 0")
-        if self.severity is not None and not 0 < self.severity[0] < self.severity[1]:
-            raise ValueError(f"severity {self.severity}: expected 0 < low < high [N m]")
+        for name, unit in (("severity", "N m"), ("force", "N")):
+            span = getattr(self, name)
+            if span is not None and not 0 < span[0] < span[1]:
+                raise ValueError(f"{name} {span}: expected 0 < low < high [{unit}]")
 
 
 @dataclass(frozen=True)
@@ -105,7 +110,9 @@ class Episode:
         if unknown := sorted(values.keys() - known):
             raise ValueError(f"episode: unknown keys {unknown}; known: {sorted(known)}")
         values["collisions"] = tuple(
-            CollisionPlan(**{**c, "severity": c["severity"] and tuple(c["severity"])})
+            CollisionPlan(
+                **{**c, **{k: tuple(c[k]) for k in ("severity", "force") if c.get(k) is not None}}
+            )
             for c in values.get("collisions", ())
         )
         values["picks"] = tuple(PayloadPick(**p) for p in values.get("picks", ()))

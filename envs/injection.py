@@ -87,9 +87,21 @@ class Aim:
         if distance < 0 or scene.model.geom_bodyid[geom[0]] != body:
             return None
         point = origin + distance * push
+        if not self._reaches(plan, body, point, push):
+            return None
         if plan.kind == "clamp" and not self._stops_soon(plan, row, body, point, push):
             return None
         return Target(row, body, point, push, self._velocity(body, point))
+
+    def _reaches(self, plan: CollisionPlan, body: int, point: Array, push: Array) -> bool:
+        """Whether some force of the plan's range gives a torque of its severity here."""
+        if plan.severity is None or plan.force is None:
+            return True
+        model, jac = self._scene.model, np.zeros((3, self._scene.model.nv))
+        mujoco.mj_jac(model, self._data, jac, None, point, body)
+        lever = float(np.abs(push @ jac[:, self._scene.dof_adr[:4]]).max())
+        low, high = plan.severity
+        return low < lever * plan.force[1] and lever * plan.force[0] < high
 
     def _stops_soon(
         self, plan: CollisionPlan, row: int, body: int, point: Array, push: Array

@@ -141,7 +141,8 @@ class Striking:
             if window is None or window.peak_force > FORCE_LIMIT:
                 return None
             if plan.severity is None or plan.severity[0] <= window.peak_tau < plan.severity[1]:
-                return window
+                low, high = plan.force or (0.0, FORCE_LIMIT)
+                return window if low <= window.peak_force <= high else None
             bracket[int(window.peak_tau >= plan.severity[1])] = strength
             if bracket[0] is not None and bracket[1] is not None:
                 wanted = float(np.sqrt(bracket[0] * bracket[1]))

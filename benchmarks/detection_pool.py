@@ -1,0 +1,182 @@
+"""The judged collisions and the collision-free motion of the detection study, episode by episode.
+
+Severity is fixed: every speed has as many collisions in each stratum of achieved peak |tau_ext|
+over joints 1-4, so that hard blows cannot flatter a detector. Plans that found no target, or whose
+collision fell into another stratum, are drawn again with another seed until the strata are full.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauguard.datasets.plans import (
+    BEGIN,
+    KIND_CYCLE,
+    collision_plans,
+    episode_seconds,
+    free_episodes,
+)
+from tauguard.detectors.events import detection_window
+from tauguard.envs import STRATA, CollisionPlan, Episode, simulate
+from tauguard.models import Mismatch
+from tauguard.traces import Collision, Trace
+
+#: Percent of the joints' maximum speed that detectors are judged at.
+SPEEDS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
+#: Payloads of the judged motions, none of them a training payload, never told [g].
+PAYLOADS = (0.0, 500.0, 1500.0, 2000.0, 3000.0, 3500.0)
+#: Contact force of a judged collision [N].
+FORCES = (20.0, 200.0)
+#: Below the judged strata, for the smallest torque that is found [N m], and forces [N].
+FAINT, FAINT_FORCES = ((0.5, 1.0), (1.0, 2.0), (2.0, 4.0)), (2.0, 200.0)
+#: Collisions of one judged episode, and rounds of drawing again.
+GROUP, ROUNDS = 5, 8
+
+Stratum = tuple[float, float]
+Wish = tuple[str, Stratum]
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which a pool is simulated; the defaults are those of the study's first table."""
+
+    payloads: tuple[float, ...] = PAYLOADS  #: gone through in turn [g]
+    temperature: float | None = None  #: of the gears [degC]; None: drawn between 25 and 45
+    scale: float = 1.0  #: of the mismatch between the arm and what is believed of it
+    timestep: float = 1e-3  #: [s]
+
+    def arm(self, seed: int) -> Mismatch:
+        """The arm ``seed`` under these conditions."""
+        plain = Mismatch(seed=seed)
+        names = ("mass", "com", "inertia", "gain", "coulomb", "viscous", "ripple")
+        return replace(plain, **{n: self.scale * getattr(plain, n) for n in names})
+
+    def applied(self, episode: Episode) -> Episode:
+        """``episode`` at this temperature and time step."""
+        if self.temperature is not None:
+            episode = replace(episode, temperature=self.temperature)
+        return replace(episode, timestep=self.timestep)
+
+
+@dataclass(frozen=True)
+class Struck:
+    """One judged episode with collisions."""
+
+    arm: int  #: mismatch seed
+    payload_g: float
+    trace: Trace
+    kept: tuple[bool, ...]  #: which of the trace's collisions count, in their order
+
+
+def wishes(per_stratum: int, strata: Sequence[Stratum] = STRATA) -> list[Wish]:
+    """Kind and stratum of every collision wanted: half strikes, quarter pulses, quarter clamps."""
+    count = per_stratum * len(strata)
+    return [(KIND_CYCLE[i % len(KIND_CYCLE)], strata[i % len(strata)]) for i in range(count)]
+
+
+def struck_pool(
+    seed: int,
+    speed: float,
+    arms: Sequence[int],
+    per_stratum: int,
+    strata: Sequence[Stratum] = STRATA,
+    forces: tuple[float, float] = FORCES,
+    conditions: Conditions | None = None,
+) -> Iterator[Struck]:
+    """Episodes until every stratum holds ``per_stratum`` collisions, or the rounds are used up.
+
+    Args:
+        seed: of the pool; the arm's seeds are apart from it.
+        speed: percent of the maximum.
+        arms: mismatch seeds, gone through in turn.
+        per_stratum: collisions wanted in each.
+        strata: [low, high) of the achieved peak |tau_ext| over joints 1-4 [N m].
+        forces: lowest and highest peak contact force [N].
+        conditions: payloads, temperature, mismatch.
+    """
+    under = conditions or Conditions()
+    missing = Counter(wishes(per_stratum, strata))
+    number = 0
+    for round_ in range(ROUNDS):
+        rng = np.random.default_rng([seed, round(100 * speed), 3, round_])
+        wanted = [wish for wish in sorted(missing.elements())]
+        wanted = [wanted[i] for i in rng.permutation(len(wanted))]
+        for first in range(0, len(wanted), GROUP):
+            group = wanted[first : first + GROUP]
+            arm = arms[number % len(arms)]
+            payload = under.payloads[(number // len(arms)) % len(under.payloads)]
+            number += 1
+            plans = _plans(rng, group, forces)
+            episode = Episode(
+                seed=int(rng.integers(2**62)),
+                seconds=episode_seconds(len(plans)),
+                speed=speed,
+                payload_g=payload,
+                collisions=plans,
+                mismatch=under.arm(arm),
+                temperature=float(rng.uniform(25, 45)),
+            )
+            trace = simulate(under.applied(episode))
+            assert trace.truth is not None
+            kept = []
+            for collision in trace.truth.collisions:
+                wish = (collision.kind, _stratum(collision, strata))
+                good = missing[wish] > 0 and _counts(collision, trace, forces)
+                missing[wish] -= int(good)
+                kept.append(good)
+            yield Struck(arm, payload, trace, tuple(kept))
+        if not sum(missing.values()):
+            return
+
+
+def _plans(
+    rng: np.random.Generator, group: Sequence[Wish], forces: tuple[float, float]
+) -> tuple[CollisionPlan, ...]:
+    """The usual plans with these kinds and severities instead."""
+    changed = []
+    for plan, (kind, stratum) in zip(collision_plans(rng, len(group)), group, strict=True):
+        long = float(rng.uniform(0.4, 0.8) if kind == "clamp" else rng.uniform(0.03, 0.2))
+        rest = kind != "clamp" and bool(rng.random() < 0.2)
+        changed.append(
+            replace(plan, kind=kind, severity=stratum, duration=long, at_rest=rest, force=forces)
+        )
+    return tuple(changed)
+
+
+def _stratum(collision: Collision, strata: Sequence[Stratum]) -> Stratum:
+    found = [s for s in strata if s[0] <= collision.peak_tau < s[1]]
+    return found[0] if found else (0.0, 0.0)
+
+
+def _counts(collision: Collision, trace: Trace, forces: tuple[float, float]) -> bool:
+    """Whether its force is in range and its detection window lies in the settled part."""
+    force = float(np.linalg.norm(collision.force))
+    low, high = detection_window(collision)
+    return forces[0] <= force <= forces[1] and low >= BEGIN and high <= trace.t[-1]
+
+
+def free_pool(
+    seed: int,
+    speed: float,
+    arms: Sequence[int],
+    hours: float,
+    conditions: Conditions | None = None,
+    seconds: float = 60.0,
+) -> list[tuple[int, Episode]]:
+    """Arm and episode of at least ``hours`` of judged collision-free motion at one speed.
+
+    The first seconds of an episode, in which detectors settle, come on top.
+    """
+    under = conditions or Conditions()
+    count = max(len(arms), int(np.ceil(hours * 3600 / (seconds - BEGIN) - 1e-9)))
+    pool = []
+    for k, arm in enumerate(arms):
+        share = len(range(k, count, len(arms)))
+        own = np.random.SeedSequence([seed, round(100 * speed), arm]).generate_state(1)[0]
+        episodes = free_episodes(int(own), share, seconds, (speed,), under.payloads, under.arm(arm))
+        pool += [(arm, under.applied(episode)) for episode in episodes]
+    return pool
