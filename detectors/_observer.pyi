@@ -62,6 +62,7 @@ class Estimator:
         noise: list[float],
         clip: float,
         every: int,
+        fusion: list[float],
     ) -> None: ...
     @property
     def started(self) -> bool: ...

@@ -26,6 +26,7 @@ from tauguard.detectors.numbers import (
     momentum_terms,
 )
 from tauguard.detectors.observer import intervals, low_pass
+from tauguard.detectors.velocity import SLOWEST, SensorNoise
 from tauguard.traces.trace import Bools, Trace
 
 Array = NDArray[np.float64]
@@ -35,10 +36,10 @@ Array = NDArray[np.float64]
 class Priors:
     """Standard deviations of what is identified around what is believed."""
 
-    mass: float = 0.1  #: relative
-    centre: float = 0.02  #: of the centre of mass, each axis [m]
-    inertia: float = 0.1  #: relative to the link's largest entry
-    drive_gain: float = 0.05  #: relative; 0 keeps the gains
+    mass: float = 0.04  #: relative
+    centre: float = 4e-3  #: of the centre of mass, each axis [m]
+    inertia: float = 0.08  #: relative to the link's largest entry
+    drive_gain: float = 0.03  #: relative; 0 keeps the gains
     friction: float = 20.0  #: of every friction weight [N m per unit]
     payload: float = 3.0  #: [kg]
     moment: float = 0.3  #: of the payload [kg m]
@@ -206,8 +207,8 @@ def calibrate(
     priors = priors or Priors()
     model = friction or arm.friction or FrictionModel()
     robot = arm.robot
-    data = []
-    for trace in traces:
+    data, kept = [], list(traces)
+    for trace in kept:
         if len(trace.joint_names) != robot.joints:
             raise ValueError(f"a trace of {len(trace.joint_names)} joints, arm of {robot.joints}")
         data.append(_columns(trace, robot, arm.drive_gain, model, rate, 4e-3))
@@ -228,11 +229,13 @@ def calibrate(
         level = np.maximum(normal.rms(data, solution), 1e-6)
     inertial = solution[: normal.friction].reshape(-1, INERTIAL)
     weights: Array = solution[normal.friction : normal.gain].reshape(robot.joints, -1)
+    fast = bool(data) and max(trace.dt for trace in kept) <= SLOWEST
     found = ArmModel(
         robot.with_inertial(robot.inertial - inertial),
         arm.drive_gain * (1 + solution[normal.gain : normal.load]),
         replace(model, weights=weights),
         level,
+        SensorNoise.measured(kept) if fast else None,
     )
     payloads: Array = -solution[normal.load :].reshape(-1, PAYLOAD)
     return Calibration(found, payloads, level)

@@ -17,6 +17,7 @@ from tauguard.detectors import _observer
 from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.numbers import RobotNumbers, same_rows
 from tauguard.detectors.observer import intervals, per_joint
+from tauguard.detectors.velocity import SensorNoise
 
 Array = NDArray[np.float64]
 
@@ -67,6 +68,7 @@ class ArmModel:
     drive_gain: Array  #: N m per ampere at the joint, shape (n,)
     friction: FrictionModel | None = None  #: None: no friction model
     noise: Array | None = None  #: standard deviation of the residual without collision [N m], (n,)
+    sensors: SensorNoise | None = None  #: fuses position and velocity; None: as measured
 
     def __post_init__(self) -> None:
         """Check shapes: ``ValueError`` names the field."""
@@ -80,6 +82,10 @@ class ArmModel:
         if self.friction is not None and len(self.friction.weights) != joints:
             raise ValueError(
                 f"friction: weights of {len(self.friction.weights)} joints, the robot has {joints}"
+            )
+        if self.sensors is not None and len(self.sensors.position) != joints:
+            raise ValueError(
+                f"sensors: noise of {len(self.sensors.position)} joints, the robot has {joints}"
             )
 
 
@@ -128,6 +134,7 @@ class Estimator:
             [float(s) for s in arm.noise],
             self.unknowns.clip,
             max(1, round(self.unknowns.every / self.dt)),
+            arm.sensors.fusion_gains(self.dt) if arm.sensors else [],
         )
 
     def run(

@@ -31,7 +31,7 @@ class FrontEnd:
     at full speed.
     """
 
-    gain: float = 100.0  #: of the observer [1/s]
+    gain: float = 200.0  #: of the observer [1/s]
     adapt: bool = True  #: track payload, offsets and friction errors
     settle: float = 3.0  #: until the payload is found [s]
     joints: int = 4  #: the first so many joints are looked at (all, if there are fewer)

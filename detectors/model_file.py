@@ -19,6 +19,7 @@ from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.numbers import RobotNumbers
 from tauguard.detectors.pipeline import CollisionDetector, DetectorSettings
 from tauguard.detectors.svr import SrqSVR
+from tauguard.detectors.velocity import SensorNoise
 
 FORMAT = "tauguard detector 1"
 #: What reading a damaged archive may raise, by where it is damaged.
@@ -55,6 +56,7 @@ def save_detector(detector: CollisionDetector, path: str | os.PathLike[str]) -> 
         "drive_gain": arm.drive_gain,
         "noise": arm.noise,
         "friction": _plain(arm.friction) if arm.friction else None,
+        "sensors": _plain(arm.sensors) if arm.sensors else None,
         "features": _plain(features)
         | {
             "shape": _plain(features.shape),
@@ -114,6 +116,7 @@ def _rebuilt(content: dict[str, Any]) -> CollisionDetector:
         content["drive_gain"],
         FrictionModel(**friction) if friction else None,
         content["noise"],
+        SensorNoise(**content["sensors"]) if content.get("sensors") else None,
     )
     parts = content["features"]
     envelope = parts["envelope"]

@@ -8,6 +8,7 @@ from typing import Any
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.numbers import RobotNumbers
+from tauguard.detectors.velocity import SensorNoise
 
 
 def plain(value: object) -> dict[str, Any]:
@@ -22,6 +23,7 @@ def arm_parts(arm: ArmModel) -> dict[str, Any]:
         "drive_gain": arm.drive_gain,
         "noise": arm.noise,
         "friction": plain(arm.friction) if arm.friction else None,
+        "sensors": plain(arm.sensors) if arm.sensors else None,
     }
 
 
@@ -34,4 +36,5 @@ def arm_from_parts(parts: dict[str, Any]) -> ArmModel:
         parts["drive_gain"],
         FrictionModel(**friction) if friction else None,
         parts["noise"],
+        SensorNoise(**parts["sensors"]) if parts.get("sensors") else None,
     )

@@ -35,7 +35,7 @@ class DetectorSettings:
     """What can be chosen about a detector; the defaults are what worked, the plain form below."""
 
     joints: tuple[int, ...] = (1, 2, 3, 4)  #: whose residuals feed the features, 1-based
-    observer_gain: float = 100.0  #: [1/s]
+    observer_gain: float = 200.0  #: [1/s]
     window: float = 80e-3  #: t_W [s]
     interval: float = 8e-3  #: t_I [s]
     confirmation: float = CONFIRMATION  #: t_c [s]

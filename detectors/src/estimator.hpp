@@ -17,6 +17,7 @@
 #include "chain.hpp"
 #include "friction.hpp"
 #include "observer.hpp"
+#include "velocity.hpp"
 
 namespace tauguard::detectors {
 
@@ -33,6 +34,7 @@ struct EstimatorSettings {
   std::vector<double> noise;         // standard deviation of the residual [N m], n
   double clip = 3.0;
   int every = 10;                    // samples between two corrections
+  std::vector<double> fusion;        // of position and velocity, 6 n; empty: velocity as measured
 };
 
 class Estimator {
@@ -46,6 +48,7 @@ class Estimator {
         work_(n_),
         memory_(n_ * basis_.memory()),
         column_(basis_.columns()),
+        fusion_(set_.fusion, n_),
         theta_(m_),
         covariance_(m_ * m_),
         gathered_(m_),
@@ -72,6 +75,7 @@ class Estimator {
   void step(const double* q, const double* qd, const double* current, double dt, double* residual,
             double* left, double* acceleration) {
     if (!started_) begin(q, qd);
+    if (fusion_.active()) qd = started_ ? fusion_.step(q, qd, dt) : fusion_.last();
     drive(q, qd, current);
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
     if (adapts_)
@@ -93,6 +97,7 @@ class Estimator {
  private:
   void begin(const double* q, const double* qd) {
     smooth_.assign(qd, qd + n_);
+    fusion_.reset(q, qd);
     for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
     for (auto* v : {&residual_, &load_, &own_, &theta_, &covariance_}) std::fill(v->begin(), v->end(), 0.0);
     for (std::size_t a = 0; a < m_; ++a) covariance_[a * m_ + a] = set_.deviation[a] * set_.deviation[a];
@@ -195,7 +200,9 @@ class Estimator {
   EstimatorSettings set_;
   std::size_t n_, m_;
   Workspace work_;
-  std::vector<double> memory_, column_, theta_, covariance_, gathered_, row_;
+  std::vector<double> memory_, column_;
+  VelocityFusion fusion_;
+  std::vector<double> theta_, covariance_, gathered_, row_;
   std::vector<double> p_, beta_, p_before_, beta_before_, tau_, tau_before_, residual_, decay_;
   std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_;
   std::vector<double> own_now_, own_before_, own_, smooth_;

@@ -1,0 +1,89 @@
+"""How well positions and velocities are measured, and the joint velocity that both give together.
+
+At a kilohertz the noise of the velocity, times the inertia and the observer's rate, is most of what
+a residual shows without a collision. Positions are measured far better than velocities: fused by a
+Kalman filter they give a velocity with a fraction of the noise and, for a steady acceleration, no
+lag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_are
+
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: How fast an acceleration may wander: (rad/s^2) per root second. Higher follows a blow sooner,
+#: lower passes less noise.
+AGILITY = 4.0
+#: Slower sampled velocities are taken as they are [s].
+SLOWEST = 2.5e-3
+
+
+@dataclass(frozen=True, eq=False)
+class SensorNoise:
+    """Standard deviations of what is measured, one a joint."""
+
+    position: Array  #: [rad], shape (n,)
+    velocity: Array  #: [rad/s], shape (n,)
+
+    def __post_init__(self) -> None:
+        """Check: ``ValueError`` names what is not above 0 or differs in length."""
+        for name in ("position", "velocity"):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            if value.ndim != 1 or not (np.isfinite(value).all() and (value > 0).all()):
+                raise ValueError(f"SensorNoise.{name}: expected one number above 0 a joint")
+            object.__setattr__(self, name, value)
+        if len(self.position) != len(self.velocity):
+            raise ValueError("SensorNoise: position and velocity of different numbers of joints")
+
+    @classmethod
+    def measured(cls, traces: Sequence[Trace]) -> SensorNoise:
+        """From third differences, which smooth motion leaves almost nothing in.
+
+        Args:
+            traces: of one arm at one rate; each of 4 samples or more.
+        """
+
+        def level(name: str, floor: float) -> Array:
+            squares = [np.diff(getattr(t, name), 3, axis=0) ** 2 for t in traces]
+            # Medians of a trace's pieces: blows and steps in some pieces do not count.
+            pieces = np.concatenate(
+                [
+                    [p.mean(axis=0) for p in np.array_split(s, max(1, len(s) // 500))]
+                    for s in squares
+                ]
+            )
+            found: Array = np.sqrt(np.median(pieces, axis=0) / 20)
+            return np.maximum(found, floor)
+
+        return cls(level("q", 1e-9), level("qd", 1e-6))
+
+    def fusion_gains(self, dt: float, agility: float = AGILITY) -> list[float]:
+        """Steady Kalman gains, six a joint: of q, qd and qdd by each of the two innovations.
+
+        Args:
+            dt: sample interval [s].
+            agility: see :data:`AGILITY`.
+        """
+        move = np.array([[1, dt, dt * dt / 2], [0, 1, dt], [0, 0, 1]])
+        see = np.array([[1.0, 0, 0], [0, 1.0, 0]])
+        push = agility * np.sqrt(dt) * np.array([dt * dt / 6, dt / 2, 1.0])
+        wander = np.outer(push, push)
+        gains: list[float] = []
+        for position, velocity in zip(self.position, self.velocity, strict=True):
+            # In units of the noise, so that the equation is well scaled.
+            scale = np.diag([1 / position, 1 / velocity, dt / velocity])
+            back = np.linalg.inv(scale)
+            a, c = scale @ move @ back, see @ back
+            noise = np.diag([position**2, velocity**2])
+            p = solve_discrete_are(a.T, c.T, scale @ wander @ scale, noise)
+            gain = back @ (p @ c.T @ np.linalg.inv(c @ p @ c.T + noise))
+            gains += [float(g) for g in gain.ravel()]
+        return gains
