@@ -98,6 +98,8 @@ def cell(value: object) -> str:
             return "-"
         return f"{value['value']:.3f} [{value['low']:.3f}, {value['high']:.3f}]"
     if isinstance(value, Mapping) and "median" in value:
+        if value["median"] is None:
+            return "-"
         return f"{value['median']:.3g} [{value['low']:.3g}, {value['high']:.3g}]"
     if isinstance(value, bool):
         return "yes" if value else "no"

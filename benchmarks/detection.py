@@ -1,0 +1,156 @@
+"""The dissertation's experiment on simulated arms: detectors, speeds, operating points.
+
+Every arm differs from the nominal one within the measured magnitudes; its detectors are trained on
+its own 15 slices with the dissertation's payloads, and judged on motions with payloads that no
+slice had and nobody tells.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tauguard.benchmarks import detection_report as report
+from tauguard.benchmarks.detection_fleet import (
+    TEST,
+    Fleet,
+    Training,
+    common_thresholds,
+    stream,
+    train,
+)
+from tauguard.benchmarks.detection_judge import (
+    Tallies,
+    Thresholds,
+    judge_free,
+    judge_struck,
+    merged,
+)
+from tauguard.benchmarks.detection_pool import (
+    FAINT,
+    FAINT_FORCES,
+    FORCES,
+    SPEEDS,
+    free_pool,
+    struck_pool,
+)
+from tauguard.benchmarks.report import Row
+from tauguard.envs import STRATA, simulate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is simulated."""
+
+    arms: int  #: judged, each with its own detectors
+    detectors: tuple[str, ...]
+    training: Training
+    calibration_hours: float  #: collision-free, for the thresholds, of each arm
+    hours: float  #: collision-free, judged, all speeds and arms together
+    per_stratum: int  #: judged collisions of a stratum at one speed
+    faint: int  #: the same below the judged strata
+    target: float = 0.5  #: false alarms per hour that the third threshold aims at
+
+
+ALL = (
+    "srq-svr",
+    "srq-svr-plain",
+    "current-network",
+    "current-threshold",
+    "residual-thresholds",
+    "moving-thresholds",
+    "cusum",
+    "one-class",
+    "window-network",
+    "boosting",
+)
+FULL = Size(3, ALL, Training(), 1.0, 10.0, 13, 13)
+QUICK = Size(
+    1,
+    ("srq-svr", "srq-svr-plain", "current-network", "residual-thresholds"),
+    Training(slices=10, collisions=4, free=6, free_seconds=30.0),
+    0.05,
+    0.1,
+    2,
+    0,
+)
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """Rows of all studies; see :mod:`tauguard.benchmarks.detection_report` for their fields."""
+    return study(QUICK if quick else FULL, seed)
+
+
+def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
+    """Train, judge, report; the result does not depend on the number of ``workers``."""
+    arms = [1000 * (seed + 1) + k for k in range(size.arms)]
+    with _pool(workers) as each:
+        fleets = list(each(_train, [(size, seed, arm) for arm in arms]))
+        thresholds = common_thresholds(fleets, size.target)
+        jobs = [(size, seed, speed, arm) for speed in SPEEDS for arm in (*arms, 0)]
+        tallies = dict(
+            zip(
+                [(job[2], job[3]) for job in jobs],
+                each(_judge, [(job, fleets, thresholds) for job in jobs]),
+                strict=True,
+            )
+        )
+    by_speed = {
+        speed: merged(t for (own, _), t in tallies.items() if own == speed) for speed in SPEEDS
+    }
+    return report.rows(by_speed, thresholds)
+
+
+def _train(job: tuple[Size, int, int]) -> Fleet:
+    size, seed, arm = job
+    return train(seed, arm, size.detectors, size.training, size.calibration_hours)
+
+
+def _judge(job: tuple[tuple[Size, int, float, int], Sequence[Fleet], Thresholds]) -> Tallies:
+    """One speed: an arm's free motion, or (arm 0) the collisions of all arms."""
+    (size, seed, speed, arm), fleets, thresholds = job
+    test = stream(seed, TEST)
+    by_arm = {fleet.arm: fleet.detectors for fleet in fleets}
+    if arm:
+        hours = size.hours / len(SPEEDS) / size.arms
+        return merged(
+            judge_free(by_arm[arm], thresholds, simulate(episode))
+            for _, episode in free_pool(test, speed, (arm,), hours)
+        )
+    pools = [(STRATA, size.per_stratum, FORCES), (FAINT, size.faint, FAINT_FORCES)]
+    return merged(
+        judge_struck(by_arm[struck.arm], thresholds, struck)
+        for k, (strata, count, forces) in enumerate(pools)
+        if count
+        for struck in struck_pool(test + k, speed, list(by_arm), count, strata, forces)
+    )
+
+
+class _pool:
+    """A map over processes; in this process where one worker is asked for."""
+
+    def __init__(self, workers: int | None) -> None:
+        self._count = workers or os.cpu_count() or 1
+        self._processes: Any = None
+
+    def __enter__(self) -> Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]:
+        if self._count == 1:
+            return lambda call, jobs: map(call, jobs)
+        self._processes = multiprocessing.get_context("spawn").Pool(self._count)
+        imap: Callable[..., Iterator[Any]] = self._processes.imap
+        return imap
+
+    def __exit__(self, *_: object) -> None:
+        if self._processes is not None:
+            self._processes.terminate()
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """See :func:`tauguard.benchmarks.detection_report.draw`."""
+    report.draw(rows, figure)

@@ -1,0 +1,104 @@
+"""The detectors of one arm: its training set, their training, their thresholds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauguard.benchmarks.detection_judge import Peaks, Thresholds, free_peaks, set_thresholds
+from tauguard.benchmarks.detection_pool import SPEEDS, Conditions, free_pool
+from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
+from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
+from tauguard.detectors.detector import Detector
+from tauguard.detectors.zoo import make_detector
+from tauguard.envs import simulate
+from tauguard.models import SceneSpec, compose, cura6_drive, pin_model
+from tauguard.traces import Trace
+
+#: Percent of the maximum speed in the training slices.
+TRAINING_SPEEDS = (10.0, 30.0, 60.0, 20.0, 45.0)
+#: The current-predicting network, whose specificity sets everybody's first two thresholds.
+NETWORK = "current-network"
+#: Streams of seeds: training, thresholds, judged motions.
+TRAIN, CALIBRATE, TEST = 11, 12, 13
+
+
+def stream(seed: int, *key: int) -> int:
+    """A seed of its own for every purpose, so that judged motions are never trained on."""
+    return int(np.random.SeedSequence([seed, *key]).generate_state(1)[0])
+
+
+@dataclass(frozen=True)
+class Training:
+    """How much one arm's detectors are trained with."""
+
+    slices: int = 15  #: with collisions, through the dissertation's payloads
+    collisions: int = 5  #: a slice
+    free: int = 20  #: collision-free slices
+    free_seconds: float = 40.0  #: of each
+
+    def traces(self, seed: int, arm: int, conditions: Conditions | None = None) -> list[Trace]:
+        """The slices of one arm."""
+        under = conditions or Conditions()
+        own, mismatch = stream(seed, TRAIN, arm), under.arm(arm)
+        payloads = TRAINING_PAYLOADS
+        struck = struck_episodes(
+            own, self.slices, self.collisions, TRAINING_SPEEDS, payloads, mismatch
+        )
+        free = free_episodes(
+            own, self.free, self.free_seconds, TRAINING_SPEEDS, payloads[::2], mismatch
+        )
+        return [simulate(under.applied(episode)) for episode in [*struck, *free]]
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """Trained detectors of one arm by name, and their collision-free peaks."""
+
+    arm: int
+    detectors: dict[str, Detector]
+    peaks: dict[str, Peaks]
+
+
+def nominal() -> ArmModel:
+    """What is believed of every arm before training: nominal numbers, friction of weight 0.
+
+    The gear's ripple frequencies are known from its data sheet, their heights and phases are not.
+    """
+    scene, drive = compose(SceneSpec()), cura6_drive()
+    cycles = drive.ripple.cycles if drive.ripple is not None else np.empty(0)
+    columns = FrictionModel(cycles=np.outer(drive.gear, cycles))
+    robot = RobotNumbers.from_pin(pin_model(scene.arm_xml))
+    friction = replace(columns, weights=np.zeros((robot.joints, columns.columns)))
+    return ArmModel(robot, drive.gain, friction)
+
+
+def train(seed: int, arm: int, names: Sequence[str], training: Training, hours: float) -> Fleet:
+    """Train on the arm's slices, then look at ``hours`` of other collision-free motion of it."""
+    traces = training.traces(seed, arm)
+    robot = nominal()
+    detectors: dict[str, Detector] = {
+        name: make_detector(name).fit(traces, robot) for name in names
+    }
+    return Fleet(arm, detectors, calibration_peaks(seed, arm, detectors, hours))
+
+
+def calibration_peaks(
+    seed: int, arm: int, detectors: dict[str, Detector], hours: float
+) -> dict[str, Peaks]:
+    """Peaks over collision-free motion at all speeds with the training payloads."""
+    under = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
+    found = []
+    for speed in SPEEDS:
+        pool = free_pool(stream(seed, CALIBRATE), speed, (arm,), hours / len(SPEEDS), under)
+        found += [free_peaks(detectors, simulate(episode)) for _, episode in pool]
+    return {name: Peaks.joined([f[name] for f in found]) for name in detectors}
+
+
+def common_thresholds(fleets: Sequence[Fleet], per_hour: float) -> Thresholds:
+    """One threshold for all arms: their detectors' peaks are put together."""
+    names = fleets[0].detectors
+    joined = {name: Peaks.joined([fleet.peaks[name] for fleet in fleets]) for name in names}
+    return set_thresholds(joined, NETWORK, per_hour)
