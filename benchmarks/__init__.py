@@ -15,4 +15,5 @@ STUDIES: dict[str, str] = {
     "rigid": "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
     "contacts": "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
+    "detection": "the dissertation's experiment: detectors, speeds, operating points, false alarms",
 }

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.benchmarks.detection_pool import BEGIN, Struck
+from tauguard.benchmarks.detection_pool import Struck
+from tauguard.datasets.plans import BEGIN
 from tauguard.detectors import find_alarms, match
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.events import CASE_SECONDS, MERGE_GAP
