@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from tauguard.benchmarks import detection_report as report
+from tauguard.benchmarks import detection_variations as variations
 from tauguard.benchmarks.detection_fleet import (
     TEST,
     Fleet,
@@ -53,9 +54,11 @@ class Size:
     training: Training
     calibration_hours: float  #: collision-free, for the thresholds, of each arm
     hours: float  #: collision-free, judged, all speeds and arms together
+    short: float  #: of them, those that all detectors judge; the rest only the first one
     per_stratum: int  #: judged collisions of a stratum at one speed
     faint: int  #: the same below the judged strata
     target: float = 0.5  #: false alarms per hour that the third threshold aims at
+    variations: bool = False  #: also training size, sigma, conditions, sample rate
 
 
 ALL = (
@@ -70,12 +73,16 @@ ALL = (
     "window-network",
     "boosting",
 )
-FULL = Size(3, ALL, Training(), 1.0, 10.0, 13, 13)
+#: Those whose need for collisions is compared.
+LEARNERS = ("srq-svr", "window-network", "boosting")
+PARTS = ("conditions", "training_size", "sigma", "sample_rate")
+FULL = Size(3, ALL, Training(), 0.5, 10.0, 1.0, 13, 5, variations=True)
 QUICK = Size(
     1,
     ("srq-svr", "srq-svr-plain", "current-network", "residual-thresholds"),
-    Training(slices=10, collisions=4, free=6, free_seconds=30.0),
+    Training(free=8, free_seconds=30.0),
     0.05,
+    0.1,
     0.1,
     2,
     0,
@@ -101,15 +108,31 @@ def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
                 strict=True,
             )
         )
-    by_speed = {
-        speed: merged(t for (own, _), t in tallies.items() if own == speed) for speed in SPEEDS
-    }
-    return report.rows(by_speed, thresholds)
+        by_speed = {
+            speed: merged(t for (own, _), t in tallies.items() if own == speed) for speed in SPEEDS
+        }
+        rows = report.rows(by_speed, thresholds)
+        if size.variations:
+            jobs_more = [(part, fleets, thresholds, seed) for part in PARTS]
+            for more in each(_vary, jobs_more):
+                rows += more
+    return rows
 
 
 def _train(job: tuple[Size, int, int]) -> Fleet:
     size, seed, arm = job
     return train(seed, arm, size.detectors, size.training, size.calibration_hours)
+
+
+def _vary(job: tuple[str, Sequence[Fleet], Thresholds, int]) -> list[Row]:
+    part, fleets, thresholds, seed = job
+    extent = variations.Extent()
+    if part == "conditions":
+        return variations.conditions(fleets, thresholds, seed, extent)
+    bench = variations.Bench(seed, fleets[0].arm, extent)
+    if part == "training_size":
+        return variations.training_size(bench, LEARNERS)
+    return {"sigma": variations.sigmas, "sample_rate": variations.sample_rate}[part](bench)
 
 
 def _judge(job: tuple[tuple[Size, int, float, int], Sequence[Fleet], Thresholds]) -> Tallies:
@@ -118,10 +141,13 @@ def _judge(job: tuple[tuple[Size, int, float, int], Sequence[Fleet], Thresholds]
     test = stream(seed, TEST)
     by_arm = {fleet.arm: fleet.detectors for fleet in fleets}
     if arm:
-        hours = size.hours / len(SPEEDS) / size.arms
+        share = 1 / len(SPEEDS) / size.arms
+        pool = free_pool(test, speed, (arm,), share * size.hours)
+        early = len(free_pool(test, speed, (arm,), share * size.short))
+        first = {name: d for name, d in list(by_arm[arm].items())[:1]}
         return merged(
-            judge_free(by_arm[arm], thresholds, simulate(episode))
-            for _, episode in free_pool(test, speed, (arm,), hours)
+            judge_free(by_arm[arm] if k < early else first, thresholds, simulate(episode))
+            for k, (_, episode) in enumerate(pool)
         )
     pools = [(STRATA, size.per_stratum, FORCES), (FAINT, size.faint, FAINT_FORCES)]
     return merged(

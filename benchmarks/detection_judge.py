@@ -16,7 +16,7 @@ from tauguard.benchmarks.detection_pool import Struck
 from tauguard.datasets.plans import BEGIN
 from tauguard.detectors import find_alarms, match
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.events import CASE_SECONDS, MERGE_GAP
+from tauguard.detectors.events import CASE_SECONDS, MERGE_GAP, detection_window
 from tauguard.detectors.filter import CONFIRMATION, confirmation_samples
 from tauguard.detectors.operating_point import block_peaks, sustained
 from tauguard.traces import Collision, Trace
@@ -42,6 +42,7 @@ class Outcome:
     payload_g: float
     collision: Collision
     delay: float | None  #: [s], None where it was missed
+    peak: float = 0.0  #: highest level of the score while it could be detected
 
 
 @dataclass
@@ -168,13 +169,20 @@ def judge_struck(fleet: Fleet, thresholds: Thresholds, struck: Struck) -> Tallie
     span = (float(trace.t[0]) + BEGIN, float(trace.t[-1]))
     inside = [span[0] <= c.onset <= span[1] for c in trace.truth.collisions]
     kept = [k for k, within in zip(struck.kept, inside, strict=True) if within]
+    windows = [
+        detection_window(c) for c, w in zip(trace.truth.collisions, inside, strict=True) if w
+    ]
     found: Tallies = {}
     for name, detector in fleet.items():
         level = levels(detector, trace)
+        peaks = [float(level[(trace.t >= a) & (trace.t <= b)].max()) for a, b in windows]
         for point, threshold in thresholds[name].items():
             m = match(find_alarms(trace.t, level > threshold), trace.truth.collisions, span)
-            pairs = zip(m.collisions, m.delays, kept, strict=True)
-            outcomes = [Outcome(struck.arm, struck.payload_g, c, d) for c, d, k in pairs if k]
+            outcomes = [
+                Outcome(struck.arm, struck.payload_g, c, d, peak)
+                for c, d, k, peak in zip(m.collisions, m.delays, kept, peaks, strict=True)
+                if k
+            ]
             found[name, point] = Tally(outcomes)
     return found
 

@@ -42,7 +42,7 @@ BySpeed = Mapping[float, Tallies]
 
 
 def rows(by_speed: BySpeed, thresholds: Thresholds) -> list[Row]:
-    """All rows: ``speed``, ``hourly``, ``strata``, ``dissertation``, ``mcnemar``."""
+    """All rows: ``speed``, ``hourly``, ``strata``, ``dissertation``, ``mcnemar``, ``output``."""
     names = list(thresholds)
     return [
         *cells(by_speed, thresholds, names),
@@ -50,6 +50,7 @@ def rows(by_speed: BySpeed, thresholds: Thresholds) -> list[Row]:
         *strata(by_speed, names),
         *dissertation(by_speed, names),
         *mcnemar(by_speed, names),
+        *outputs(by_speed, names),
     ]
 
 
@@ -105,6 +106,17 @@ def _figures(tally: Tally) -> Row:
         "fn_all": sum(o.delay is None for o in own),
         "sensitivity_all": found(own),
         "tau98": tau98(tally.outcomes),
+    }
+
+
+def headline(tally: Tally) -> Row:
+    """Sensitivity and delay from 16 N m up, and false alarms per hour."""
+    own = [o for o in tally.outcomes if o.collision.peak_tau >= HEADLINE]
+    return {
+        "sensitivity": found(own),
+        "sensitivity_all": found(judged(tally)),
+        "delay_ms": delays(own),
+        "false_alarms_per_hour": poisson_rate(tally.false_alarms, tally.free_seconds / 3600),
     }
 
 
@@ -233,15 +245,41 @@ def _paired(first: Sequence[Outcome], second: Sequence[Outcome]) -> list[tuple[O
     return pairs
 
 
+def outputs(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
+    """``output``: how a detector's output grows with the torque, and each collision's pair.
+
+    ``correlation`` is Spearman's between the achieved torque and the highest output.
+    """
+    found_rows: list[Row] = []
+    for name in names:
+        for speed, tallies in by_speed.items():
+            own = tallies[name, HOURLY].outcomes
+            torque, peak = [o.collision.peak_tau for o in own], [o.peak for o in own]
+            steady = len(set(peak)) > 1
+            found_rows.append(
+                {
+                    "study": "output",
+                    "detector": name,
+                    "speed": speed,
+                    "correlation": float(stats.spearmanr(torque, peak)[0]) if steady else None,
+                    "torque_nm": " ".join(f"{x:.3g}" for x in torque),
+                    "output": " ".join(f"{x:.4g}" for x in peak),
+                }
+            )
+    return found_rows
+
+
 def draw(rows: list[Row], figure: Figure) -> None:
     """Sensitivity over the torque, false alarms, delay, and the cells beside the dissertation's."""
-    axes = figure.subplots(2, 2)
+    axes = figure.subplots(2, 3)
     names = list(dict.fromkeys(r["detector"] for r in rows if r["study"] == "hourly"))
     colours = {name: f"C{k}" for k, name in enumerate(names)}
     _draw_strata(rows, axes[0, 0], colours)
     _draw_hourly(rows, axes[0, 1], colours)
     _draw_delay(rows, axes[1, 0], colours)
     _draw_cells(rows, axes[1, 1])
+    _draw_output(rows, axes[0, 2])
+    _draw_sigma(rows, axes[1, 2])
 
 
 def _draw_strata(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None:
@@ -318,4 +356,42 @@ def _draw_cells(rows: list[Row], axis: Any) -> None:
         title="The twelve cells of 1.6 and 2.0 A",
     )
     axis.legend(fontsize=7)
+    axis.grid(alpha=0.3)
+
+
+def _draw_output(rows: list[Row], axis: Any) -> None:
+    for row in rows:
+        if row["study"] == "output" and row["detector"] == "srq-svr":
+            torque = [float(x) for x in row["torque_nm"].split()]
+            output = [float(x) for x in row["output"].split()]
+            axis.plot(torque, output, ".", ms=4, label=f"{row['speed']:g} %")
+    axis.set_xscale("log")
+    axis.set(
+        xlabel="achieved peak |tau_ext| [N m]",
+        ylabel="highest output of the SVR",
+        title="SVR output over collision torque",
+    )
+    axis.legend(fontsize=7)
+    axis.grid(alpha=0.3)
+
+
+def _draw_sigma(rows: list[Row], axis: Any) -> None:
+    own = [r for r in rows if r["study"] == "sigma"]
+    sigma = [r["sigma"] for r in own]
+    for key, label in (("sensitivity", "from 16 N m up"), ("sensitivity_all", "from 4 N m up")):
+        rates = [r[key] for r in own]
+        low = [r["value"] - r["low"] for r in rates]
+        high = [r["high"] - r["value"] for r in rates]
+        axis.errorbar(
+            sigma, [r["value"] for r in rates], yerr=[low, high], fmt="o-", ms=3, label=label
+        )
+    if own:
+        axis.set_xscale("log")
+        axis.legend(fontsize=7)
+    axis.set(
+        xlabel="sigma of the SRQ kernel",
+        ylabel="sensitivity",
+        title="Length of the kernel" if own else "Length of the kernel: full run only",
+        ylim=(0, 1.03),
+    )
     axis.grid(alpha=0.3)
