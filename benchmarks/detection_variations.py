@@ -202,8 +202,8 @@ def every(trace: Trace, stride: int) -> Trace:
     thin = slice(None, None, stride)
     truth = trace.truth
     if truth is not None:
-        names = ("tau_ext", "contact_force", "payload", "contact_link", "contact_point")
-        names += ("contact_vector", "obstacle_poses")
+        names = ["tau_ext", "contact_force", "payload", "contact_link", "contact_point"]
+        names += ["contact_vector", "obstacle_poses"]
         truth = replace(truth, **{name: getattr(truth, name)[thin] for name in names})
     signals = {name: getattr(trace, name)[thin] for name in ("t", "q", "qd", "current")}
     return replace(trace, **signals, q_des=None, qd_des=None, qdd_des=None, truth=truth)
