@@ -30,7 +30,7 @@ HOURLY = "hourly"
 #: Names of the operating points, in the order of the tables.
 POINTS = ("1.6", "2.0", HOURLY)
 
-Fleet = Mapping[str, Detector]
+Detectors = Mapping[str, Detector]
 Thresholds = Mapping[str, Mapping[str, float]]
 
 
@@ -126,7 +126,7 @@ def levels(detector: Detector, trace: Trace) -> Array:
     return level
 
 
-def free_peaks(fleet: Fleet, trace: Trace) -> dict[str, Peaks]:
+def free_peaks(fleet: Detectors, trace: Trace) -> dict[str, Peaks]:
     """Peaks of every detector over a collision-free trace."""
     settled = trace.t - trace.t[0] >= BEGIN
     return {name: Peaks.of(levels(d, trace)[settled], trace.dt) for name, d in fleet.items()}
@@ -148,7 +148,7 @@ def set_thresholds(peaks: Mapping[str, Peaks], network: str, per_hour: float) ->
     return found
 
 
-def judge_free(fleet: Fleet, thresholds: Thresholds, trace: Trace) -> Tallies:
+def judge_free(fleet: Detectors, thresholds: Thresholds, trace: Trace) -> Tallies:
     """False alarms and false cases of every detector at every point over a free trace."""
     span = (float(trace.t[0]) + BEGIN, float(trace.t[-1]))
     found: Tallies = {}
@@ -162,7 +162,7 @@ def judge_free(fleet: Fleet, thresholds: Thresholds, trace: Trace) -> Tallies:
     return found
 
 
-def judge_struck(fleet: Fleet, thresholds: Thresholds, struck: Struck) -> Tallies:
+def judge_struck(fleet: Detectors, thresholds: Thresholds, struck: Struck) -> Tallies:
     """Delays of the collisions that count; alarms elsewhere are judged on free motion alone."""
     trace = struck.trace
     assert trace.truth is not None

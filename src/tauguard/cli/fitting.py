@@ -16,7 +16,9 @@ def trained(traces: Sequence[Trace], false_alarms_per_hour: float) -> CollisionD
     Raises:
         ValueError: no nominal arm is attached to the recordings, or they cannot be trained on.
     """
-    from tauguard.detectors import CollisionDetector, DetectorSettings, RobotNumbers
+    import numpy as np
+
+    from tauguard.detectors import CollisionDetector, DetectorSettings, FrictionModel, RobotNumbers
     from tauguard.models import cura6_drive, pin_model
 
     arm = traces[0].attachments.get("arm.xml")
@@ -26,4 +28,8 @@ def trained(traces: Sequence[Trace], false_alarms_per_hour: float) -> CollisionD
         windows=1500, mined=200, false_alarms_per_hour=false_alarms_per_hour
     )
     robot = RobotNumbers.from_pin(pin_model(arm))
-    return CollisionDetector(settings).fit(traces, robot, cura6_drive().gain)
+    drive = cura6_drive()
+    # The ripple's frequencies follow from the gear; its heights and phases are identified.
+    cycles = np.outer(drive.gear, drive.ripple.cycles) if drive.ripple else np.empty((0, 0))
+    friction = FrictionModel(cycles=cycles)
+    return CollisionDetector(settings).fit(traces, robot, drive.gain, friction=friction)
