@@ -195,9 +195,13 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
     if (!vf) extent = max(extent, size(p + r - q));
     extent += 0x1p-30 * k.big;
     const Wide margin = 0x1p-23 * k.big * (extent * extent * extent);
-    const unsigned inside = bits(bracket & (least > margin)), outside = bits(bracket & (least < -margin));
+    const unsigned inside = bits(bracket & (least > margin)), outside = bits(bracket & (least < -margin)),
+                   rooted = bits(bracket);
     for (int i = 0; i < width && first + i < n; ++i) {
-      outcome[first + i] = inside >> i & 1 ? Outcome::contact : outside >> i & 1 ? Outcome::clear : Outcome::unknown;
+      outcome[first + i] = inside >> i & 1    ? Outcome::contact
+                           : outside >> i & 1 ? Outcome::clear
+                           : rooted >> i & 1  ? Outcome::edge
+                                              : Outcome::unknown;
       toi[first + i] = lo[i];
     }
   }

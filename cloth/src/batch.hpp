@@ -22,7 +22,8 @@ struct Piece {
   double start, length, cubic[4];
   std::int32_t query;
 };
-enum class Outcome : std::uint8_t { clear, contact, unknown };
+// edge: so close to the boundary of a feature that rounding hides the side; unknown: so is the root itself.
+enum class Outcome : std::uint8_t { clear, contact, edge, unknown };
 
 struct BatchKernels {
   // (n + width - 1) / width groups of n queries; the last is filled up with copies of the last query.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
 
 #include "exact_polynomial.hpp"
 
@@ -21,13 +22,19 @@ Polynomial cross(const Vector& a, const Vector& b, int k) {
   const int i = (k + 1) % 3, j = (k + 2) % 3;
   return a[i] * b[j] - a[j] * b[i];
 }
-Vector cross(const Vector& a, const Vector& b) { return {cross(a, b, 0), cross(a, b, 1), cross(a, b, 2)}; }
 
 // The hull's corners in order around it.
 struct Hull {
   std::array<Vector, 4> corner;
   int corners;
   const Vector& after(int i) const { return corner[(i + 1) % corners]; }
+  // Component k of corner i x the corner after it: on which side of that edge the origin is.
+  const Polynomial& side(int i, int k) const {
+    auto& known = sides[i][k];
+    if (!known) known = cross(corner[i], after(i), k);
+    return *known;
+  }
+  mutable std::array<std::array<std::optional<Polynomial>, 3>, 4> sides{};
 };
 
 // The motion of vertex a as seen from vertex b.
@@ -43,8 +50,8 @@ Vector motion(const double* x0, const double* x1, std::int32_t a, std::int32_t b
 
 Hull hull_of(bool vf, const double* x0, const double* x1, const std::int32_t* row) {
   const auto g = [&](int i, int j) { return motion(x0, x1, row[i], row[j]); };
-  if (vf) return {{g(0, 1), g(0, 2), g(0, 3)}, 3};
-  return {{g(2, 0), g(3, 0), g(3, 1), g(2, 1)}, 4};
+  if (vf) return {{g(0, 1), g(0, 2), g(0, 3)}, 3, {}};
+  return {{g(2, 0), g(3, 0), g(3, 1), g(2, 1)}, 4, {}};
 }
 
 // Is the origin between a and b?
@@ -59,11 +66,11 @@ bool contains_origin(const Hull& hull, const Root& t) {
   // Seen along an axis on which the hull has area, the origin is on the same side of every edge.
   for (int k = 0; k < 3; ++k) {
     Polynomial area;
-    for (int i = 0; i < hull.corners; ++i) area = area + cross(hull.corner[i], hull.after(i), k);
+    for (int i = 0; i < hull.corners; ++i) area = area + hull.side(i, k);
     const int side = sign_at(t, area);
     if (side == 0) continue;
     for (int i = 0; i < hull.corners; ++i)
-      if (sign_at(t, cross(hull.corner[i], hull.after(i), k)) == -side) return false;
+      if (sign_at(t, hull.side(i, k)) == -side) return false;
     return true;
   }
   for (int i = 0; i < hull.corners; ++i)
@@ -82,13 +89,16 @@ bool add_roots(const Vector& v, std::vector<Root>& times) {
   return false;
 }
 
+const Root start{Dyadic(), Dyadic(), {}};
+
 std::vector<Root> candidate_times(const Hull& hull) {
   const auto& g = hull.corner;
-  const Polynomial cubic = dot(g[0], cross(g[1], g[2]));
+  const Polynomial cubic = dot(g[0], {hull.side(1, 0), hull.side(1, 1), hull.side(1, 2)});
   if (!cubic.empty()) return roots_of(cubic);
-  std::vector<Root> times{{Dyadic(), Dyadic(), {}}};
+  std::vector<Root> times{start};
+  if (contains_origin(hull, start)) return times;
   for (int i = 0; i < hull.corners; ++i)
-    if (!add_roots(cross(g[i], hull.after(i)), times)) {
+    if (!add_roots({hull.side(i, 0), hull.side(i, 1), hull.side(i, 2)}, times)) {
       add_roots(g[i], times);
       add_roots(hull.after(i), times);
     }

@@ -121,13 +121,13 @@ double estimate(const Root& root) {
   return lo;
 }
 
-// Bisects to 2^-70, starting from a guess where it is good.
+// Bisects to 2^-60, starting from a guess where it is good.
 void refine(Root& root) {
   const int below = value(root.of, root.lo).sign();
   const double guess = estimate(root);
-  for (double off : {-0x1p-44, 0x1p-44, 0.0})
+  for (double off : {-0x1p-51, 0x1p-51, -0x1p-44, 0x1p-44})
     if (guess + off > 0 && narrow(root, Dyadic(guess + off), below)) return;
-  while (!(root.hi - root.lo < one.scaled(-70)))
+  while (!(root.hi - root.lo < one.scaled(-60)))
     if (narrow(root, (root.lo + root.hi).scaled(-1), below)) return;
 }
 

@@ -27,11 +27,11 @@ struct Root {
   Dyadic lo, hi;
   Polynomial of;
   bool exact() const { return of.empty(); }
-  // The largest double below the interval: at most 2^-70 before the root, or it.
+  // The largest double below the interval: at most 2^-60 before the root, or it.
   double floor() const { return lo.to_double(); }
 };
 
-// Every root of p in [0, 1], ascending, within 2^-70. p must not be the zero polynomial.
+// Every root of p in [0, 1], ascending, within 2^-60. p must not be the zero polynomial.
 std::vector<Root> roots_of(const Polynomial& p);
 
 // The sign of g at a root.

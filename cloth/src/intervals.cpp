@@ -82,10 +82,12 @@ bool certain(const Query& k, double a, double b, bool vf) {
 double first_contact(const Query& k, bool vf, Stats& stats) {
   struct Piece { double a, b; Cubic c; };
   const double error = k.cubic_error();
-  const int most = k.distance > 0 ? 4000 : 40;
   Piece stack[128];
   int top = 0;
   stack[top++] = {0, 1, cubic(k)};
+  const double* c = stack[0].c.b;
+  const bool flat = std::max({std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2]), std::fabs(c[3])}) < error;
+  const int most = k.distance > 0 ? 4000 : flat ? 6 : 40;
   for (int count = 0; top > 0; ++count) {
     const Piece piece = stack[--top];
     ++stats.intervals;

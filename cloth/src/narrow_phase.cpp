@@ -98,14 +98,18 @@ int split(const double* b, double error, std::int32_t query, Piece* pieces) {
   return count;
 }
 
+template <bool vf>
+double exactly(const double* x0, const double* x1, const std::int32_t* row, Stats& stats) {
+  ++stats.exact;
+  return exact_contact(vf, x0, x1, row);
+}
+
 // The rest, one by one: by intervals, then exactly.
 template <bool vf>
 double resolve(const double* x0, const double* x1, const std::int32_t* row, double distance, Stats& stats) {
   ++stats.resolved;
   const double t = first_contact(make<vf>(x0, x1, row, distance), vf, stats);
-  if (!std::isnan(t)) return t;
-  ++stats.exact;
-  return exact_contact(vf, x0, x1, row);
+  return std::isnan(t) ? exactly<vf>(x0, x1, row, stats) : t;
 }
 
 // A batch on its way through the stages.
@@ -165,6 +169,7 @@ void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, 
   for (int i = 0; i < single; ++i) {
     toi[b.pieces[i].query] = b.outcome[i] == Outcome::contact ? b.at[i] : never;
     stats.roots += b.outcome[i] == Outcome::clear;
+    if (b.outcome[i] == Outcome::edge) toi[b.pieces[i].query] = exactly<vf>(x0, x1, rows + 4 * b.pieces[i].query, stats);
     if (b.outcome[i] == Outcome::unknown) b.open[b.left++] = b.pieces[i].query;
   }
   for (int i = single; i < b.count;) {
@@ -175,6 +180,8 @@ void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, 
       ++stats.roots;
     } else if (b.outcome[first] == Outcome::contact) {
       toi[query] = b.at[first];
+    } else if (b.outcome[first] == Outcome::edge) {
+      toi[query] = exactly<vf>(x0, x1, rows + 4 * query, stats);
     } else {
       b.open[b.left++] = query;
     }
@@ -191,8 +198,7 @@ void one_by_one(const double* x0, const double* x1, const std::int32_t* rows, in
     if (method == Method::ab2pf) {
       toi[i] = resolve<vf>(x0, x1, row, distance, stats);
     } else {
-      ++stats.exact;
-      toi[i] = exact_contact(vf, x0, x1, row);
+      toi[i] = exactly<vf>(x0, x1, row, stats);
     }
   }
 }

@@ -52,16 +52,16 @@ class Dyadic {
     if (a.is_zero()) return b;
     if (b.is_zero()) return a;
     const std::int64_t exponent = std::min(a.exponent_, b.exponent_);
-    const Limbs x = shifted(a, exponent), y = shifted(b, exponent);
+    const Shifted x(a, exponent), y(b, exponent);
     Dyadic r;
     r.exponent_ = exponent;
     if (a.sign_ == b.sign_) {
-      r.limbs_ = sum(x, y);
+      add(x, y, r.limbs_);
       r.sign_ = a.sign_;
     } else {
       const int order = compare_magnitude(x, y);
       if (order == 0) return Dyadic();
-      r.limbs_ = order > 0 ? difference(x, y) : difference(y, x);
+      subtract(order > 0 ? x : y, order > 0 ? y : x, r.limbs_);
       r.sign_ = order > 0 ? a.sign_ : b.sign_;
     }
     r.normalize();
@@ -157,52 +157,55 @@ class Dyadic {
     }
   }
 
-  static Limbs shifted(const Dyadic& a, std::int64_t exponent) {
-    const std::int64_t by = a.exponent_ - exponent;
-    Limbs r(static_cast<std::size_t>(by / 32), 0);
-    const int bits = static_cast<int>(by % 32);
-    std::uint64_t carry = 0;
-    for (std::uint32_t limb : a.limbs_) {
-      const std::uint64_t t = (static_cast<std::uint64_t>(limb) << bits) | carry;
-      r.push_back(static_cast<std::uint32_t>(t));
-      carry = t >> 32;
+  // The digits of a number in units of 2^exponent (at most its own), read without being moved.
+  class Shifted {
+   public:
+    Shifted(const Dyadic& a, std::int64_t exponent)
+        : limbs_(a.limbs_.data()),
+          count_(a.limbs_.size()),
+          zeros_(static_cast<std::size_t>((a.exponent_ - exponent) / 32)),
+          bits_(static_cast<int>((a.exponent_ - exponent) % 32)) {}
+    std::size_t size() const { return zeros_ + count_ + (bits_ != 0); }
+    std::uint32_t operator[](std::size_t i) const {
+      if (i < zeros_) return 0;
+      i -= zeros_;
+      const std::uint64_t high = i < count_ ? limbs_[i] : 0, low = i > 0 && i <= count_ ? limbs_[i - 1] : 0;
+      return static_cast<std::uint32_t>((high << 32 | low) << bits_ >> 32);
     }
-    if (carry) r.push_back(static_cast<std::uint32_t>(carry));
-    return r;
-  }
 
-  static Limbs sum(const Limbs& x, const Limbs& y) {
-    Limbs r;
-    r.reserve(std::max(x.size(), y.size()) + 1);
+   private:
+    const std::uint32_t* limbs_;
+    std::size_t count_, zeros_;
+    int bits_;
+  };
+
+  static void add(const Shifted& x, const Shifted& y, Limbs& r) {
+    const std::size_t n = std::max(x.size(), y.size()) + 1;
+    r.assign(n, 0);
+    std::uint32_t* out = r.data();
     std::uint64_t carry = 0;
-    for (std::size_t i = 0; i < std::max(x.size(), y.size()); ++i) {
-      carry += (i < x.size() ? x[i] : 0ull) + (i < y.size() ? y[i] : 0ull);
-      r.push_back(static_cast<std::uint32_t>(carry));
+    for (std::size_t i = 0; i < n; ++i) {
+      carry += std::uint64_t{x[i]} + y[i];
+      out[i] = static_cast<std::uint32_t>(carry);
       carry >>= 32;
     }
-    if (carry) r.push_back(static_cast<std::uint32_t>(carry));
-    return r;
   }
 
   // x - y for x >= y.
-  static Limbs difference(const Limbs& x, const Limbs& y) {
-    Limbs r(x.size());
+  static void subtract(const Shifted& x, const Shifted& y, Limbs& r) {
+    const std::size_t n = x.size();
+    r.assign(n, 0);
+    std::uint32_t* out = r.data();
     std::int64_t borrow = 0;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      std::int64_t t = static_cast<std::int64_t>(x[i]) - (i < y.size() ? y[i] : 0) - borrow;
-      borrow = t < 0;
-      if (t < 0) t += std::int64_t{1} << 32;
-      r[i] = static_cast<std::uint32_t>(t);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::int64_t t = std::int64_t{x[i]} - y[i] + borrow;
+      out[i] = static_cast<std::uint32_t>(t);
+      borrow = t >> 32;  // 0 or -1
     }
-    return r;
   }
 
-  static int compare_magnitude(const Limbs& x, const Limbs& y) {
-    std::size_t nx = x.size(), ny = y.size();
-    while (nx && x[nx - 1] == 0) --nx;
-    while (ny && y[ny - 1] == 0) --ny;
-    if (nx != ny) return nx > ny ? 1 : -1;
-    for (std::size_t i = nx; i-- > 0;)
+  static int compare_magnitude(const Shifted& x, const Shifted& y) {
+    for (std::size_t i = std::max(x.size(), y.size()); i-- > 0;)
       if (x[i] != y[i]) return x[i] > y[i] ? 1 : -1;
     return 0;
   }
