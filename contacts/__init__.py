@@ -1,5 +1,6 @@
 """Plug-in contact checkers, their comparison and the guarded stepper."""
 
+from tauguard.contacts.balance import Balance
 from tauguard.contacts.checker import (
     KINDS,
     Checker,
@@ -13,6 +14,7 @@ from tauguard.contacts.checker import (
 )
 from tauguard.contacts.cloth_checker import ClothChecker
 from tauguard.contacts.compare import compare
+from tauguard.contacts.guarded import Cut, GuardedStepper, StepReport
 from tauguard.contacts.mujoco_checker import MujocoChecker, contacts_of
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
 from tauguard.contacts.report import Disagreement, Outcome, Report, Score
@@ -24,10 +26,13 @@ register("rigid", RigidChecker)
 
 __all__ = [
     "KINDS",
+    "Balance",
     "Checker",
     "ClothChecker",
     "Contacts",
+    "Cut",
     "Disagreement",
+    "GuardedStepper",
     "MujocoChecker",
     "Outcome",
     "Pairs",
@@ -35,6 +40,7 @@ __all__ = [
     "RigidChecker",
     "Score",
     "State",
+    "StepReport",
     "checker",
     "compare",
     "contacts_of",
