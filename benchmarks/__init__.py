@@ -14,6 +14,7 @@ STUDIES: dict[str, str] = {
     "environments": "what an environment costs beside its physics, many at once, and reactions",
     "rigid": "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
     "contacts": "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",
+    "guard": "fast things against thin ones: fixed steps, MuJoCo's modes, guarded steps",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
     "detection": "the dissertation's experiment: detectors, speeds, operating points, false alarms",
 }

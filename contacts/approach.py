@@ -21,16 +21,11 @@ class Approach:
     """
 
     def __init__(self, model: Any) -> None:
-        """Note each geom's inner radius and which triangles meet at each flex vertex."""
+        """Note each geom's inner radius and which elements meet at each flex vertex."""
         self._body = model.geom_bodyid
         self._inner = _inner_radii(model)
         self._flex_radius = model.flex_radius
-        self._triangles: list[NDArray[np.int32]] = []
-        for flex in range(model.nflex):
-            begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
-            corners = int(model.flex_dim[flex]) + 1
-            elements = model.flex_elem[begin : begin + corners * count].reshape(-1, corners)
-            self._triangles.append(elements + int(model.flex_vertadr[flex]))
+        self._sheets = [_Sheet(model, flex) for flex in range(model.nflex)]
 
     def core(self, contacts: Contacts) -> Array:
         """Depth at which the middles meet and a contact's normal turns over. Shape (K,), m."""
@@ -50,21 +45,19 @@ class Approach:
         The distance at its time less the way that both material points make towards each other
         along the normal from then on.
         """
-        rows = range(len(contacts))
-        towards = [self._towards(contacts, k, contacts.time[k], before, after) for k in rows]
-        return np.array(towards, dtype=np.float64) - contacts.distance
+        if not len(contacts):
+            return np.zeros(0)
+        return self._towards(contacts, contacts.time, before, after) - contacts.distance
 
-    def speed(self, contacts: Contacts, k: int, before: State, after: State) -> float:
-        """How fast both points of row ``k`` approach each other over the whole step [m/step]."""
-        towards = self._towards(contacts, k, 0.0, before, after)
-        return max(towards, float(-contacts.distance[k]))
+    def speed(self, contacts: Contacts, before: State, after: State) -> Array:
+        """How far both points of each row approach each other over the whole step. (K,), m."""
+        towards = self._towards(contacts, np.zeros(len(contacts)), before, after)
+        return np.maximum(towards, -contacts.distance)
 
     def bound(self, contacts: Contacts, before: State, after: State) -> Array:
         """How far the partners can approach each other in the whole step. Shape (K,), m."""
-        flex = np.zeros(max(len(self._triangles), 1))
         travel = np.linalg.norm(after.flexvert_xpos - before.flexvert_xpos, axis=1)
-        for number, triangles in enumerate(self._triangles):
-            flex[number] = travel[triangles].max(initial=0.0)
+        flex = np.array([travel[sheet.vertices].max() for sheet in self._sheets] or [0.0])
         shift = np.linalg.norm(after.xpos - before.xpos, axis=1)
         start, end = before.xmat.reshape(-1, 3, 3), after.xmat.reshape(-1, 3, 3)
         turn = np.linalg.norm(
@@ -79,49 +72,82 @@ class Approach:
             out += np.where(geom >= 0, rigid, flex[contacts.flex[:, side]])
         return out
 
-    def _towards(self, contacts: Contacts, k: int, s: float, before: State, after: State) -> float:
-        """How far the points of row ``k`` approach along its normal from time ``s`` to the end."""
-        point = contacts.point[k]
-        ways = [
-            self._rigid_way(int(contacts.geom[k, side]), point, float(s), before, after)
-            if contacts.geom[k, side] >= 0
-            else self._flex_way(int(contacts.flex[k, side]), point, float(s), before, after)
-            for side in (0, 1)
-        ]
-        return float((ways[0] - ways[1]) @ contacts.normal[k])
+    def _towards(self, contacts: Contacts, s: Array, before: State, after: State) -> Array:
+        """How far both points of each row approach along its normal from ``s`` (K,) to the end."""
+        ways = []
+        for side in (0, 1):
+            geom, flex = contacts.geom[:, side], contacts.flex[:, side]
+            way = np.zeros((len(contacts), 3))
+            rigid = geom >= 0
+            way[rigid] = self._rigid_way(
+                geom[rigid], contacts.point[rigid], s[rigid], before, after
+            )
+            for number in set(flex[~rigid].tolist()):
+                rows = flex == number
+                way[rows] = self._flex_way(number, contacts.point[rows], s[rows], before, after)
+            ways.append(way)
+        return np.asarray(((ways[0] - ways[1]) * contacts.normal).sum(axis=1))
 
-    def _rigid_way(self, geom: int, point: Array, s: float, before: State, after: State) -> Array:
+    def _rigid_way(
+        self, geom: NDArray[np.int32], point: Array, s: Array, before: State, after: State
+    ) -> Array:
         """The way from time ``s`` to 1 of what is at ``point`` then and moves with ``geom``."""
         body = self._body[geom]
-        start, end = before.xmat[body].reshape(3, 3), after.xmat[body].reshape(3, 3)
-        origin = before.xpos[body] + s * (after.xpos[body] - before.xpos[body])
-        turn = Rotation.from_matrix(end @ start.T).as_rotvec()
-        rest = Rotation.from_rotvec((1 - s) * turn)
-        return np.asarray(after.xpos[body] + rest.apply(point - origin) - point)
+        start, end = before.xmat[body].reshape(-1, 3, 3), after.xmat[body].reshape(-1, 3, 3)
+        shift = after.xpos[body] - before.xpos[body]
+        arm = point - before.xpos[body] - s[:, None] * shift
+        if (start == end).all():
+            return np.asarray((1 - s)[:, None] * shift)
+        turn = Rotation.from_matrix(end @ start.transpose(0, 2, 1)).as_rotvec()
+        rest = Rotation.from_rotvec((1 - s)[:, None] * turn)
+        return np.asarray((1 - s)[:, None] * shift + rest.apply(arm) - arm)
 
-    def _flex_way(self, flex: int, point: Array, s: float, before: State, after: State) -> Array:
+    def _flex_way(self, flex: int, point: Array, s: Array, before: State, after: State) -> Array:
         """The same for the point of the flex that is nearest to ``point``."""
-        triangles = self._triangles[flex]
-        travel = after.flexvert_xpos - before.flexvert_xpos
-        now = before.flexvert_xpos + s * travel
-        used = np.unique(triangles)
-        nearest = used[np.argmin(np.linalg.norm(now[used] - point, axis=1))]
-        around = triangles[(triangles == nearest).any(axis=1)]
-        best, way = np.inf, travel[nearest]
-        for corners in around:
-            weights = _weights(now[corners], point)
-            apart = float(np.linalg.norm(weights @ now[corners] - point))
-            if apart < best:
-                best, way = apart, weights @ travel[corners]
-        return np.asarray((1 - s) * way)
+        sheet = self._sheets[flex]
+        start = before.flexvert_xpos[sheet.vertices]
+        travel = after.flexvert_xpos[sheet.vertices] - start
+        rows = np.arange(len(point))
+        now = start + s[:, None, None] * travel
+        nearest = ((now - point[:, None]) ** 2).sum(axis=2).argmin(axis=1)
+        around = sheet.elements[sheet.around[nearest]]  # (K, at most so many, corners)
+        corners = now[rows[:, None, None], around]
+        weights = _weights(corners, point)
+        apart = (weights[..., None] * corners).sum(axis=2) - point[:, None]
+        best = (apart**2).sum(axis=2).argmin(axis=1)
+        way = travel[around[rows, best]] * weights[rows, best][..., None]
+        return np.asarray((1 - s)[:, None] * way.sum(axis=1))
+
+
+class _Sheet:
+    """One flex: its vertices, its elements, and the elements around each vertex."""
+
+    def __init__(self, model: Any, flex: int) -> None:
+        begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
+        corners = int(model.flex_dim[flex]) + 1
+        first, number = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
+        self.vertices = np.arange(first, first + number)
+        self.elements = model.flex_elem[begin : begin + corners * count].reshape(-1, corners)
+        lists: list[list[int]] = [[] for _ in range(number)]
+        for element, ends in enumerate(self.elements.tolist()):
+            for vertex in ends:
+                lists[vertex].append(element)
+        most = max(len(one) for one in lists)
+        # Rows are filled up by repeating; a vertex without elements gets those of vertex 0.
+        self.around = np.array([(one or lists[0]) * most for one in lists], dtype=object)
+        self.around = np.array([row[:most] for row in self.around], dtype=np.int64)
 
 
 def _weights(corners: Array, point: Array) -> Array:
-    """Weights of the corners (n, 3) whose mean comes near ``point``: projected, then clamped."""
-    edges = (corners[1:] - corners[0]).T
-    inner = np.linalg.lstsq(edges, point - corners[0], rcond=None)[0]
-    weights = np.maximum(np.array([1 - inner.sum(), *inner]), 0.0)
-    return np.asarray(weights / weights.sum())
+    """Weights (K, M, n) of corners (K, M, n, 3) that come near points (K, 3): clamped, sum 1."""
+    edges = corners[:, :, 1:] - corners[:, :, :1]
+    square = edges @ edges.swapaxes(2, 3)
+    square += 1e-12 * np.trace(square, axis1=2, axis2=3)[..., None, None] * np.eye(edges.shape[2])
+    side = edges @ (point[:, None] - corners[:, :, 0])[..., None]
+    inner = np.linalg.solve(square, side)[..., 0]
+    weights = np.concatenate([1 - inner.sum(axis=2, keepdims=True), inner], axis=2)
+    weights = np.maximum(weights, 0.0)
+    return np.asarray(weights / weights.sum(axis=2, keepdims=True))
 
 
 def _inner_radii(model: Any) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
@@ -69,11 +69,14 @@ class GuardedStepper:
         data: what is stepped.
         checkers: names of registered checkers, or checkers.
         stiff: whether the contacts of pairs that were cut are made stiff.
-        most: calls of ``mj_step`` that one step may cost.
+        most: calls of ``mj_step`` that one step may cost, beside those that ``fine`` asks for.
+        fine: pieces into which a step is split while a pair that had to be cut still touches. The
+            guard holds a contact at any step; what the contact then does is as coarse as the step.
 
     Raises:
         ValueError: an unknown checker, a model with ``ipc``, ``speculative`` or ``sleep`` (their
-            state or distances cannot be taken back), the integrator RK4, ``most`` below 2.
+            state or distances cannot be taken back), the integrator RK4, ``most`` below 2 or
+            ``fine`` below 1.
     """
 
     def __init__(
@@ -83,18 +86,23 @@ class GuardedStepper:
         checkers: Sequence[str | Checker] = ("cloth", "rigid"),
         stiff: bool = True,
         most: int = 24,
+        fine: int = 1,
     ) -> None:
         """Make the checkers and room for one saved state."""
         _refuse(model)
         if most < 2:
             raise ValueError(f"most {most}: expected 2 or more steps")
-        self.model, self.data, self.most = model, data, most
+        if fine < 1:
+            raise ValueError(f"fine {fine}: expected 1 or more pieces")
+        self.model, self.data, self.most, self.fine = model, data, most + fine, fine
         self.checkers = [checker(c, model) if isinstance(c, str) else c for c in checkers]
         self._scratch = mujoco.MjData(model)
         self._approach = Approach(model)
         self._books = Books(model)
         self._stiffening = Stiffening(model)
         self._stiff = stiff
+        self._guarded: set[Pair] = set()
+        self._last: State | None = None
         self._kind = mujoco.mjtState.mjSTATE_INTEGRATION
         self._saved = np.empty(mujoco.mj_stateSize(model, self._kind))
 
@@ -106,9 +114,9 @@ class GuardedStepper:
     def step(self) -> StepReport:
         """Advance by one ``model.opt.timestep``."""
         whole, end = float(self.model.opt.timestep), self.data.time + self.model.opt.timestep
-        rest = length = whole
+        rest, length = whole, self._piece(whole, whole)
         steps, exhausted, cuts, first = 0, False, list[Cut](), None
-        before = State.of(self.model, self.data, self._scratch)
+        before = self._now()
         try:
             while rest > 0:
                 self._save()
@@ -118,29 +126,36 @@ class GuardedStepper:
                 after = State.of(self.model, self.data, self._scratch)
                 cut = self._cut(before, after)
                 if cut is not None and steps < self.most and length > SMALLEST * whole:
-                    if first is None:
-                        first = self._saved.copy()
+                    first = self._saved.copy() if first is None else first
                     self._restore()
                     share, pair, depth = cut
                     length = max(share * length, SMALLEST**2 * whole)
+                    self._guarded.add(pair)
                     stiffened = self._stiff and self._stiffening.stiffen(pair)
                     cuts.append(Cut(self.data.time + length, pair, depth, stiffened))
                     continue
                 exhausted |= cut is not None
-                rest -= length
-                length, before = rest, after
+                rest = rest - length if length < rest else 0.0
+                length, before = self._piece(rest, whole), after
         finally:
             self.model.opt.timestep = whole
-        if cuts:
+        if steps > 1:
             self.data.time = end
-        return StepReport(
-            steps, tuple(cuts), self._soften(), exhausted, self._balance(first) if cuts else None
-        )
+            before = replace(before, time=end)
+        self._last = before
+        balance = None if first is None else self._balance(first)
+        return StepReport(steps, tuple(cuts), self._release(), exhausted, balance)
+
+    def _piece(self, rest: float, whole: float) -> float:
+        """How far to go next: all the rest, or a piece of the step while guarded pairs touch."""
+        piece = whole / self.fine
+        return piece if self._guarded and rest > 1.000001 * piece else rest
 
     def close(self) -> None:
         """Put every contact parameter back."""
         for pair in self._stiffening.pairs():
             self._stiffening.restore(pair)
+        self._guarded.clear()
 
     def __enter__(self) -> GuardedStepper:
         """Itself; leaving the block calls :meth:`close`."""
@@ -155,6 +170,19 @@ class GuardedStepper:
         """Put every contact parameter back."""
         self.close()
 
+    def _now(self) -> State:
+        """The state of the data: the last step's end, unless somebody has changed it since."""
+        last, data = self._last, self.data
+        if (
+            last is not None
+            and not self.model.nmocap
+            and last.time == data.time
+            and np.array_equal(last.qpos, data.qpos)
+            and np.array_equal(last.qvel, data.qvel)
+        ):
+            return last
+        return State.of(self.model, data, self._scratch)
+
     def _save(self) -> None:
         mujoco.mj_getState(self.model, self.data, self._saved, self._kind)
 
@@ -163,16 +191,14 @@ class GuardedStepper:
 
     def _cut(self, before: State, after: State) -> tuple[float, Pair, float] | None:
         """Where the step should be cut (share of it), for which pair, how deep it would be."""
+        found = [c.check(before, after) for c in self.checkers]
         held = _touching(self.data)
-        found = Contacts.concatenate([c.check(before, after) for c in self.checkers])
-        found = found.where(np.asarray(np.isfinite(found.normal).all(axis=1)))
         best = None
-        for share, pair, depth in self._new(found, held, before, after):
-            if best is None or share < best[0]:
-                best = (share, pair, depth)
-        if best is None:
-            best = self._sinking(held, before, after)
-        return best
+        for contacts in found:
+            for share, pair, depth in self._new(contacts, held, before, after):
+                if best is None or share < best[0]:
+                    best = (share, pair, depth)
+        return best or self._sinking(held, before, after)
 
     def _new(
         self, found: Contacts, held: Contacts, before: State, after: State
@@ -180,40 +206,46 @@ class GuardedStepper:
         """Contacts within the step that it would pass by."""
         if not len(found):
             return []
-        known = {pair_of(held, k) for k in range(len(held))}
-        fresh = np.array([pair_of(found, k) not in known for k in range(len(found))])
+        pairs = pairs_of(found)
+        known = set(pairs_of(held))
+        fresh = np.array([pair not in known for pair in pairs])
         fast = self._approach.bound(found, before, after) > DEEP * self._approach.core(found)
-        matter = np.asarray(fresh | (fast & (found.time > 0)))
-        found, fresh = found.where(matter), fresh[matter]
+        matter = (fresh | (fast & (found.time > 0))) & np.isfinite(found.normal).all(axis=1)
+        if not matter.any():
+            return []
+        found, fresh = found.where(np.asarray(matter)), fresh[matter]
+        pairs = [pair for pair, here in zip(pairs, matter, strict=True) if here]
         depth = self._approach.depth(found, before, after)
-        deep = depth > DEEP * self._approach.core(found)
+        passed = depth > DEEP * self._approach.core(found)
         parting = fresh & (depth <= 0)
         if parting.any():
-            ends = {pair_of(c, k) for c in [self._ends(after)] for k in range(len(c))}
-            parting &= np.array([pair_of(found, k) not in ends for k in range(len(found))])
-        length = float(self.model.opt.timestep)
-        rows = []
-        for k in np.flatnonzero(deep | parting):
-            speed = max(self._approach.speed(found, int(k), before, after) / length, 1e-9)
-            share = float(found.time[k]) + BEYOND / speed / length
-            if share < 1:  # what touches at the very end is there when the next step starts
-                rows.append((share, pair_of(found, int(k)), float(depth[k])))
-        return rows
+            ends = set(pairs_of(self._ends(after)))
+            passed |= parting & np.array([pair not in ends for pair in pairs])
+        if not passed.any():
+            return []
+        way = np.maximum(self._approach.speed(found, before, after), 1e-12)
+        share = found.time + BEYOND / way
+        # What touches at the very end is there when the next step starts.
+        chosen = np.flatnonzero(passed & (share < 1))
+        return [(float(share[k]), pairs[k], float(depth[k])) for k in chosen]
 
     def _sinking(
         self, held: Contacts, before: State, after: State
     ) -> tuple[float, Pair, float] | None:
         """A contact that was there before and becomes too deep: halve the step."""
+        if not len(held):
+            return None
         core = self._approach.core(held)
         near = self._approach.bound(held, before, after) - held.distance > DEEP * core
-        held = held.where(np.asarray(near))
-        core = self._approach.core(held)
+        if not near.any():
+            return None
+        held, core = held.where(np.asarray(near)), core[near]
         depth = self._approach.depth(held, before, after)
         sinks = (depth > DEEP * core) & (depth + held.distance > GROWTH * core)
         if not sinks.any():
             return None
         k = int(np.argmax(np.where(sinks, depth, -np.inf)))
-        return 0.5, pair_of(held, k), float(depth[k])
+        return 0.5, pairs_of(held)[k], float(depth[k])
 
     def _ends(self, after: State) -> Contacts:
         """MuJoCo's contacts at the end of the step."""
@@ -223,17 +255,15 @@ class GuardedStepper:
         mujoco.mj_collision(self.model, scratch)
         return _touching(scratch)
 
-    def _soften(self) -> tuple[Pair, ...]:
-        """Put back the parameters of pairs that have parted."""
-        stiff = self._stiffening.pairs()
-        if not stiff:
+    def _release(self) -> tuple[Pair, ...]:
+        """Let go of the pairs that have parted; those whose parameters are as before again."""
+        if not self._guarded:
             return ()
-        touching = _touching(self.data)
-        pairs = {pair_of(touching, k) for k in range(len(touching))}
-        return tuple(p for p in stiff if p not in pairs and self._stiffening.restore(p))
+        parted = self._guarded - set(pairs_of(_touching(self.data)))
+        self._guarded -= parted
+        return tuple(pair for pair in sorted(parted) if self._stiffening.restore(pair))
 
-    def _balance(self, first: Array | None) -> Balance:
-        assert first is not None
+    def _balance(self, first: Array) -> Balance:
         last = np.empty_like(first)
         mujoco.mj_getState(self.model, self.data, last, self._kind)
         return self._books.between(first, last)
@@ -241,6 +271,8 @@ class GuardedStepper:
 
 def _touching(data: Any) -> Contacts:
     """The contacts in ``data``, at time 0 of the step that follows them."""
+    if not data.ncon:
+        return Contacts.empty()
     contact = data.contact
     return Contacts(
         time=np.zeros(len(contact.dist)),
@@ -253,13 +285,17 @@ def _touching(data: Any) -> Contacts:
     )
 
 
-def pair_of(contacts: Contacts, k: int) -> Pair:
-    """The partners of row ``k``, sorted."""
-    first, second = sorted(
-        ("geom", int(g)) if g >= 0 else ("flex", int(f))
-        for g, f in zip(contacts.geom[k], contacts.flex[k], strict=True)
+def pairs_of(contacts: Contacts) -> list[Pair]:
+    """The partners of each row, sorted."""
+    rows = zip(contacts.geom.tolist(), contacts.flex.tolist(), strict=True)
+    return [_pair(geom, flex) for geom, flex in rows]
+
+
+def _pair(geom: list[int], flex: list[int]) -> Pair:
+    first, second = (
+        ("geom", g) if g >= 0 else ("flex", f) for g, f in zip(geom, flex, strict=True)
     )
-    return first, second
+    return (first, second) if first <= second else (second, first)
 
 
 def _refuse(model: Any) -> None:

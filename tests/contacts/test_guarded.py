@@ -185,6 +185,37 @@ def test_the_work_of_a_step_is_bounded_and_the_shortfall_is_told():
     assert data.time == 1e-3
 
 
+def test_finer_pieces_after_a_cut_come_nearer_to_a_fine_reference():
+    """The ball's velocity 30 ms after the touch, against fixed steps of 0.05 ms."""
+
+    def velocity(timestep, **options):
+        scene = ball_cloth(20.0, 0.01)
+        model, data = scene.start(timestep)
+        guard = GuardedStepper(model, data, **options) if options else None
+        most = 0
+        for _ in range(round(0.03 / timestep)):
+            if guard is None:
+                mujoco.mj_step(model, data)
+            else:
+                most = max(most, guard.step().steps)
+        return data.qvel[model.body("ball").dofadr[0] + 2], most
+
+    reference, _ = velocity(5e-5)
+    coarse, few = velocity(5e-3, fine=1)
+    fine, many = velocity(5e-3, fine=10)
+    assert many >= 10 > few
+    assert abs(fine - reference) < 0.7 * abs(coarse - reference)
+
+
+def test_a_state_that_somebody_changes_is_seen():
+    """The guard keeps the last step's end; a ball that is put elsewhere starts from there."""
+    model, data = ball_cloth(50.0, offset=1.0).start(1e-3)
+    guard = GuardedStepper(model, data, ["cloth"])
+    assert not guard.step().cuts
+    data.qpos[-5] = 0.02
+    assert guard.step().cuts
+
+
 def test_a_checker_that_fails_leaves_the_timestep_alone():
     class Failing(Crying):
         def check(self, before, after):
@@ -220,6 +251,8 @@ def test_bad_input_is_named():
         GuardedStepper(model, data, ["cloths"])
     with pytest.raises(ValueError, match="most 1"):
         GuardedStepper(model, data, most=1)
+    with pytest.raises(ValueError, match="fine 0"):
+        GuardedStepper(model, data, fine=0)
 
 
 def test_a_contact_pair_or_a_geom_is_stiffened_where_there_is_no_flex():
