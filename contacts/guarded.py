@@ -27,6 +27,9 @@ DEEP = 0.8
 #: A contact that was there before and becomes deeper than that is cut in halves, but only where
 #: this step alone adds that share.
 GROWTH = 0.1
+#: From this share on, a step that adds even as little as the second one is cut, so that a soft
+#: contact cannot creep through in many small steps.
+LAST, CREEP = 0.9, 1e-3
 #: A step is never cut into pieces shorter than this share of it.
 SMALLEST = 1 / 64
 
@@ -241,7 +244,9 @@ class GuardedStepper:
             return None
         held, core = held.where(np.asarray(near)), core[near]
         depth = self._approach.depth(held, before, after)
-        sinks = (depth > DEEP * core) & (depth + held.distance > GROWTH * core)
+        growth = depth + held.distance
+        sinks = (depth > DEEP * core) & (growth > GROWTH * core)
+        sinks |= (depth > LAST * core) & (growth > CREEP * core)
         if not sinks.any():
             return None
         k = int(np.argmax(np.where(sinks, depth, -np.inf)))

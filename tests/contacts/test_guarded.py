@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tauguard.contacts import Contacts, GuardedStepper, State
@@ -73,6 +73,7 @@ def test_plain_steps_let_the_same_ball_through():
 
 
 @given(st.floats(0.5, 80), st.floats(0, 1), st.sampled_from([1e-3, 2e-3, 5e-3]), st.booleans())
+@example(2.0, 0.0, 1e-3, False)  # creeps in: every step adds less than a tenth of the thickness
 @settings(max_examples=40, deadline=None)
 def test_a_sphere_is_held_by_a_thin_plate(speed, offset, timestep, stiff):
     scene = sphere_plate(speed, offset * speed * timestep, stiff)
