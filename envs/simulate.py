@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+from collections.abc import Sequence
 from dataclasses import replace
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.contacts import Checker, registered
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import labels
+from tauguard.envs.checking import checked
 from tauguard.envs.episode import CollisionPlan, Episode, PayloadPick
 from tauguard.envs.loop import Recording, SimulationLoop
 from tauguard.envs.motions import Workspace, random_motion
@@ -84,13 +87,20 @@ def scene_for(episode: Episode) -> Scene:
 class Simulation:
     """An episode while it runs."""
 
-    def __init__(self, episode: Episode, nominal: Drive | None = None) -> None:
+    def __init__(
+        self,
+        episode: Episode,
+        nominal: Drive | None = None,
+        checkers: Sequence[str | Checker] = (),
+    ) -> None:
         """Compose the scene, plan the motion and the feed-forward torques.
 
         Args:
             episode: what to simulate.
             nominal: what the controller believes about the drive (default: the arm's nominal one).
+            checkers: contact checkers whose answers go into the trace.
         """
+        self._checkers = [_known(c) for c in checkers]
         self.episode = episode
         self.scene = scene_for(episode)
         self.nominal = nominal or cura6_drive()
@@ -183,6 +193,7 @@ class Simulation:
             qd_des=motion.qd,
             qdd_des=motion.qdd,
             truth=truth,
+            contacts=checked(scene, motion.t, recording, self._checkers),
             meta={
                 "seed": str(episode.seed),
                 "config_sha256": episode.config_hash,
@@ -257,14 +268,26 @@ def _matrices(poses: Array) -> Array:
     return out
 
 
-def simulate(episode: Episode, nominal: Drive | None = None) -> Trace:
+def simulate(
+    episode: Episode, nominal: Drive | None = None, checkers: Sequence[str | Checker] = ()
+) -> Trace:
     """Simulate ``episode``: the same episode gives the same bytes.
 
     Args:
         episode: what to simulate.
         nominal: what the controller believes about the drive (default: the arm's nominal one).
+        checkers: contact checkers, by name or made, whose answers go into ``Trace.contacts``; they
+            change nothing else.
 
     Raises:
         SimulationDiverged: the simulation left every sensible range.
+        ValueError: an unknown checker.
     """
-    return Simulation(episode, nominal).run()
+    return Simulation(episode, nominal, checkers).run()
+
+
+def _known(name: str | Checker) -> str | Checker:
+    """``name``, or ``ValueError`` before anything is simulated."""
+    if isinstance(name, str) and name not in registered():
+        raise ValueError(f"checker {name!r}: there are {', '.join(registered())}")
+    return name

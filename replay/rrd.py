@@ -23,6 +23,7 @@ MOST_FRAMES = 30_000  # a long recording is thinned to this, so that the file st
 MOST_POINTS = 60_000
 ARROW = 2e-3  # [m/N]: 100 N is drawn 0.2 m long
 LONGEST_ARROW = 0.5  # [m]
+NORMAL = 0.06  # [m], length of a checked contact's normal
 COLOURS = np.array(
     [
         [66, 135, 245],
@@ -80,6 +81,7 @@ def write_rrd(
         if not whole:
             trace, detection = cut(trace, detection, first_moment(trace, detection))
         center = log_scene(recording, trace, scene)
+        log_checked(recording, trace)
         log_series(recording, trace, detection)
         log_states(recording, trace, detection)
         page_text = rr.TextDocument(text, media_type="text/markdown")
@@ -222,6 +224,28 @@ def log_contacts(recording: Any, trace: Trace, starts: NDArray[np.int64]) -> Non
     )
     parted = [c.partition(lengths) for c in rr.Points3D.columns(positions=points)]
     rr.send_columns("scene/contact_point", when, parted, recording=recording)
+
+
+def log_checked(recording: Any, trace: Trace) -> None:
+    """What each contact checker reported, as dots with a normal, for the length of a frame."""
+    frames = trace.t[thin(trace.t, FRAME_RATE, MOST_FRAMES)]
+    for number, contacts in enumerate(trace.contacts):
+        place = f"scene/{entity('checked', contacts.checker)}"
+        colour = COLOURS[number % len(COLOURS)]
+        known = np.isfinite(contacts.point).all(axis=1)
+        frame = np.searchsorted(frames, contacts.t[known], side="right") - 1
+        lengths = np.bincount(np.maximum(frame, 0), minlength=len(frames))
+        points, normals = contacts.point[known], np.nan_to_num(contacts.normal[known])
+        names = [" - ".join(contacts.partners[i] for i in pair) for pair in contacts.pair[known]]
+        dots = rr.Points3D.columns(positions=points, labels=names)
+        arrows = rr.Arrows3D.columns(vectors=NORMAL * normals, origins=points)
+        for part, columns, style in (
+            ("point", dots, rr.Points3D.from_fields(radii=0.01, colors=colour, show_labels=False)),
+            ("normal", arrows, rr.Arrows3D.from_fields(radii=0.003, colors=colour)),
+        ):
+            recording.log(f"{place}/{part}", style, static=True)
+            parted = [column.partition(lengths) for column in columns]
+            rr.send_columns(f"{place}/{part}", times(frames), parted, recording=recording)
 
 
 def log_series(recording: Any, trace: Trace, detection: Detection | None) -> None:

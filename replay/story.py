@@ -46,7 +46,8 @@ def cut(trace: Trace, detection: Detection | None, start: float) -> tuple[Trace,
         truth = replace(truth, collisions=kept, **arrays)
     commands = rest(trace, "q_des", "qd_des", "qdd_des")
     signals = rest(trace, "t", "q", "qd", "current")
-    trace = replace(trace, truth=truth, **signals, **commands)
+    contacts = tuple(one.between(start, np.inf) for one in trace.contacts)
+    trace = replace(trace, truth=truth, contacts=contacts, **signals, **commands)
     if detection is not None:
         alarms = tuple(a for a in detection.alarms if a.end >= start)
         said = rest(detection, "t", "residual", "score", "alarm")
@@ -64,6 +65,9 @@ def page(trace: Trace, detection: Detection | None) -> str:
             "- **3D**: the arm in its real geometry. A red arrow is the contact force on the arm, "
             "at the point of contact.",
         ]
+    if trace.contacts:
+        names = ", ".join(one.checker for one in trace.contacts)
+        lines += [f"- **3D**: a dot is a contact that a checker reported ({names})."]
     if detection is not None:
         lines += [
             "- **Residual**: what the observer believes acts on each joint from outside.",

@@ -1,11 +1,13 @@
 """The typed values that flow through tauguard, and their MCAP form."""
 
+from tauguard.traces.contacts import CheckedContacts
 from tauguard.traces.mcap import read_mcap, write_mcap
 from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
 
 __all__ = [
     "KINDS",
     "Alarm",
+    "CheckedContacts",
     "Collision",
     "Detection",
     "Trace",

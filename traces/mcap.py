@@ -1,8 +1,8 @@
 """A trace as an MCAP file of ROS 2 messages, and back, bit by bit.
 
 Topics: ``/joint_states`` (``sensor_msgs/msg/JointState``), ``/motor_currents``, ``/joint_command``,
-``/truth/contact``, ``/truth/obstacles``, ``/truth/collisions``, ``/detection`` and
-``/detection/alarms`` (package ``tauguard_msgs``). Log times are the trace's own times, nothing else
+``/truth/contact``, ``/truth/obstacles``, ``/truth/collisions``, ``/detection``,
+``/detection/alarms`` and ``/contacts/CHECKER`` (package ``tauguard_msgs``). Log times are the trace's own times, nothing else
 in the file depends on when or where it was written: equal traces are equal bytes. The metadata
 record ``tauguard.meta`` holds :attr:`Trace.meta`, the attachments :attr:`Trace.attachments`.
 """
@@ -19,9 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.traces import mcap_contacts
 from tauguard.traces.mcap_cdr import Anything, Layout
 from tauguard.traces.mcap_container import Contents, Group, Topic, Writer
 from tauguard.traces.mcap_schemas import SCHEMAS
+from tauguard.traces.mcap_time import nanoseconds, stamp
 from tauguard.traces.trace import KINDS, Alarm, Array, Collision, Detection, Trace, Truth
 
 FORMAT = "1"
@@ -45,6 +47,7 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
         groups.append(collision_group(trace.truth.collisions))
     if detection is not None and detection.alarms:
         groups.append(alarm_group(detection.alarms))
+    groups += [mcap_contacts.group(one) for one in trace.contacts if len(one)]
     with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
         try:
             writer = Writer(stream, LIBRARY, SCHEMAS)
@@ -86,27 +89,6 @@ def read_mcap(path: str | Path) -> tuple[Trace, Detection | None]:
         ) from error
 
 
-def nanoseconds(t: Array) -> NDArray[np.uint64]:
-    """Log times [ns] of times ``t`` [s].
-
-    Raises:
-        ValueError: a time below 0 or past the year 2262.
-    """
-    bad = np.flatnonzero(~((t >= 0) & (t < 2**63 / 1e9)))
-    if bad.size:
-        raise ValueError(
-            f"t: {t[bad[0]]} s in row {bad[0]}: MCAP times count from 0; shift the time"
-        )
-    whole = np.floor(t)
-    return whole.astype(np.uint64) * np.uint64(10**9) + np.rint((t - whole) * 1e9).astype(np.uint64)
-
-
-def stamp(t: Array) -> dict[str, Anything]:
-    """The header's fields at times ``t`` [s]."""
-    ns = nanoseconds(t)
-    return {"sec": (ns // 10**9).astype(np.int32), "nanosec": (ns % 10**9).astype(np.uint32)}
-
-
 def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
     """What the reader must know before it looks at the messages."""
     form: dict[str, Any] = {
@@ -119,6 +101,8 @@ def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:
     }
     if detection is not None:
         form |= {"detector": detection.detector, "threshold": float(detection.threshold).hex()}
+    if trace.contacts:
+        form["checkers"] = mcap_contacts.describe(trace.contacts)
     return {name: json.dumps(value) for name, value in form.items()}
 
 
@@ -260,7 +244,7 @@ def decode(contents: Contents) -> tuple[Trace, Detection | None]:
     sampled = layouts(form)
     known = {topic.name: topic.layout for topic in sampled}
     events = {"/truth/collisions": collision_layout(), "/detection/alarms": alarm_layout()}
-    tables = collect(contents, known | events)
+    tables = collect(contents, known | events | mcap_contacts.layouts(form))
     values: dict[str, Any] = {}
     for topic in sampled:
         table = tables[topic.name]
@@ -281,6 +265,7 @@ def decode(contents: Contents) -> tuple[Trace, Detection | None]:
         current=values["current"],
         **{name: values[name] for name in form["commanded"]},
         truth=truth,
+        contacts=mcap_contacts.decode(form, tables),
         meta=contents.metadata.get("tauguard.meta", {}),
         attachments={name: data.decode() for name, data in contents.attachments.items()},
     )

@@ -74,6 +74,16 @@ std_msgs/Header header
 float64 start  # [s]
 float64 end    # [s]
 """
+CHECKED_CONTACT = """\
+std_msgs/Header header
+string[] partners              # bodies and flexes
+float64 time                   # exact time of contact [s]
+int64 first                    # both partners, counted from 0
+int64 second
+geometry_msgs/Point point      # world frame [m], NaN where it is not known
+geometry_msgs/Vector3 normal   # from the first to the second
+float64 distance               # between the surfaces, negative in penetration [m]
+"""
 
 
 def complete(text: str, *parts: str) -> str:
@@ -91,4 +101,5 @@ SCHEMAS = {
     "tauguard_msgs/msg/Collision": complete(COLLISION, HEADER, TIME, POINT, VECTOR),
     "tauguard_msgs/msg/Detection": complete(DETECTION, HEADER, TIME),
     "tauguard_msgs/msg/Alarm": complete(ALARM, HEADER, TIME),
+    "tauguard_msgs/msg/CheckedContact": complete(CHECKED_CONTACT, HEADER, TIME, POINT, VECTOR),
 }

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.traces.contacts import CheckedContacts
+
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
@@ -60,6 +62,7 @@ class Trace:
     qd_des: Array | None = None  #: commanded velocities [rad/s], shape (T, n)
     qdd_des: Array | None = None  #: commanded accelerations [rad/s^2], shape (T, n)
     truth: Truth | None = None
+    contacts: tuple[CheckedContacts, ...] = ()  #: what contact checkers saw, one entry a checker
     meta: Mapping[str, str] = field(default_factory=dict)
     """Seed, versions, configuration hash, model hash and whatever else describes the run."""
     attachments: Mapping[str, str] = field(default_factory=dict)

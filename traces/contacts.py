@@ -1,0 +1,54 @@
+"""What contact checkers saw during a run: typed values that go with a trace."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CheckedContacts:
+    """The contacts that one checker reported, one a row, by time.
+
+    They are answers about geometry: what acts on the arm is in :class:`tauguard.traces.Truth`.
+    """
+
+    checker: str  #: its name
+    partners: tuple[str, ...]  #: bodies and flexes, by name
+    t: Array  #: when, not decreasing [s], shape (K,)
+    pair: NDArray[np.int64]  #: both partners, rows of ``partners``, shape (K, 2)
+    point: Array  #: world frame [m], NaN where it is not known, shape (K, 3)
+    normal: Array  #: unit vector from the first partner to the second, shape (K, 3)
+    distance: Array  #: between both surfaces then, negative in penetration [m], shape (K,)
+
+    def __post_init__(self) -> None:
+        """Check shapes, order and indices: ``ValueError`` names the field that does not fit."""
+        rows = len(self.t)
+        for name, tail in (("t", ()), ("pair", (2,)), ("point", (3,)), ("normal", (3,))):
+            shape = getattr(self, name).shape
+            if shape != (rows, *tail):
+                raise ValueError(f"{name}: shape {shape}, expected {(rows, *tail)}")
+        if self.distance.shape != (rows,):
+            raise ValueError(f"distance: shape {self.distance.shape}, expected {(rows,)}")
+        if (np.diff(self.t) < 0).any():
+            raise ValueError(f"t: decreasing at row {int(np.argmax(np.diff(self.t) < 0)) + 1}")
+        bad = (self.pair < 0) | (self.pair >= len(self.partners))
+        if bad.any():
+            row = int(np.argmax(bad.any(axis=1)))
+            raise ValueError(
+                f"pair: row {row} is {self.pair[row].tolist()}, but there are "
+                f"{len(self.partners)} partners"
+            )
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def between(self, start: float, stop: float) -> CheckedContacts:
+        """Those with ``start`` <= t < ``stop`` [s]."""
+        rows = slice(*np.searchsorted(self.t, [start, stop]).tolist())
+        columns = (self.t, self.pair, self.point, self.normal, self.distance)
+        return CheckedContacts(self.checker, self.partners, *(column[rows] for column in columns))

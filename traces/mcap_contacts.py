@@ -1,0 +1,89 @@
+"""Checked contacts as MCAP messages, a topic ``/contacts/NAME`` a checker."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tauguard.traces.contacts import CheckedContacts
+from tauguard.traces.mcap_cdr import Anything, Layout
+from tauguard.traces.mcap_container import Group, Topic
+from tauguard.traces.mcap_time import nanoseconds, stamp
+
+COLUMNS = ("point", "normal", "distance")
+
+
+def topic_name(checker: str) -> str:
+    """Where a checker's contacts go."""
+    return f"/contacts/{checker}"
+
+
+def describe(contacts: Sequence[CheckedContacts]) -> list[dict[str, Any]]:
+    """What the reader must know before it looks at the messages.
+
+    Raises:
+        ValueError: two entries of one checker.
+    """
+    names = [one.checker for one in contacts]
+    if len(set(names)) < len(names):
+        raise ValueError(f"contacts: a checker twice: {', '.join(names)}")
+    return [
+        {"name": one.checker, "partners": list(one.partners), "rows": len(one)} for one in contacts
+    ]
+
+
+def layout(partners: Sequence[str]) -> Layout:
+    """``tauguard_msgs/msg/CheckedContact``."""
+    contact = Layout().header().strings(list(partners)).number("time", "f8")
+    contact.number("pair", "i8", 2).number("point", "f8", 3).number("normal", "f8", 3)
+    return contact.number("distance", "f8")
+
+
+def layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
+    """The layout of each checker's topic."""
+    return {
+        topic_name(one["name"]): layout(one["partners"]) for one in form.get("checkers", [])
+    }
+
+
+def group(contacts: CheckedContacts) -> Group:
+    """One checker's contacts, logged at their times."""
+    values: dict[str, Anything] = stamp(contacts.t) | {"time": contacts.t, "pair": contacts.pair}
+    values |= {name: getattr(contacts, name) for name in COLUMNS}
+    topic = Topic(
+        topic_name(contacts.checker),
+        "tauguard_msgs/msg/CheckedContact",
+        layout(contacts.partners),
+        values,
+    )
+    return Group(nanoseconds(contacts.t), [topic])
+
+
+def decode(form: Mapping[str, Any], tables: Mapping[str, Any]) -> tuple[CheckedContacts, ...]:
+    """The contacts in the messages of a file.
+
+    Raises:
+        ValueError: messages are missing.
+    """
+    found = []
+    for one in form.get("checkers", []):
+        topic = topic_name(one["name"])
+        table = tables[topic]
+        if len(table["time"]) != one["rows"]:
+            raise ValueError(
+                f"{topic}: {len(table['time'])} messages, expected {one['rows']}: "
+                "some were filtered out"
+            )
+        columns = {name: np.asarray(table[name]) for name in COLUMNS}
+        found.append(
+            CheckedContacts(
+                checker=one["name"],
+                partners=tuple(one["partners"]),
+                t=table["time"],
+                pair=table["pair"],
+                **columns,
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,30 @@
+"""Times of a trace as MCAP and ROS 2 count them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.traces.mcap_cdr import Anything
+from tauguard.traces.trace import Array
+
+
+def nanoseconds(t: Array) -> NDArray[np.uint64]:
+    """Log times [ns] of times ``t`` [s].
+
+    Raises:
+        ValueError: a time below 0 or past the year 2262.
+    """
+    bad = np.flatnonzero(~((t >= 0) & (t < 2**63 / 1e9)))
+    if bad.size:
+        raise ValueError(
+            f"t: {t[bad[0]]} s in row {bad[0]}: MCAP times count from 0; shift the time"
+        )
+    whole = np.floor(t)
+    return whole.astype(np.uint64) * np.uint64(10**9) + np.rint((t - whole) * 1e9).astype(np.uint64)
+
+
+def stamp(t: Array) -> dict[str, Anything]:
+    """The header's fields at times ``t`` [s]."""
+    ns = nanoseconds(t)
+    return {"sec": (ns // 10**9).astype(np.int32), "nanosec": (ns % 10**9).astype(np.uint32)}
