@@ -19,6 +19,7 @@ from tauguard.contacts.mujoco_checker import MujocoChecker, contacts_of
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
 from tauguard.contacts.report import Disagreement, Outcome, Report, Score
 from tauguard.contacts.rigid_checker import RigidChecker
+from tauguard.contacts.watching import watch
 
 register("mujoco", MujocoChecker)
 register("cloth", ClothChecker)
@@ -51,4 +52,5 @@ __all__ = [
     "pair_kind",
     "register",
     "registered",
+    "watch",
 ]

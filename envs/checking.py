@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.contacts import Checker, State
-from tauguard.contacts.watching import watch
+from tauguard.contacts import Checker, State, watch
 from tauguard.envs.loop import Recording
 from tauguard.models import Scene
 from tauguard.traces import CheckedContacts

@@ -17,14 +17,13 @@ from tempfile import NamedTemporaryFile
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.traces import mcap_contacts
 from tauguard.traces.mcap_cdr import Anything, Layout
 from tauguard.traces.mcap_container import Contents, Group, Topic, Writer
 from tauguard.traces.mcap_schemas import SCHEMAS
 from tauguard.traces.mcap_time import nanoseconds, stamp
-from tauguard.traces.trace import KINDS, Alarm, Array, Collision, Detection, Trace, Truth
+from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
 
 FORMAT = "1"
 LIBRARY = f"tauguard traces {FORMAT}"

@@ -43,9 +43,7 @@ def layout(partners: Sequence[str]) -> Layout:
 
 def layouts(form: Mapping[str, Any]) -> dict[str, Layout]:
     """The layout of each checker's topic."""
-    return {
-        topic_name(one["name"]): layout(one["partners"]) for one in form.get("checkers", [])
-    }
+    return {topic_name(one["name"]): layout(one["partners"]) for one in form.get("checkers", [])}
 
 
 def group(contacts: CheckedContacts) -> Group:

@@ -6,9 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from tauguard.contacts import Contacts, State, checker
+from tauguard.contacts import Contacts, State, checker, watch
 from tauguard.contacts.scenes import arm_boxes
-from tauguard.contacts.watching import watch
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.replay import write_rrd
 from tauguard.replay.story import cut, page
@@ -17,7 +16,10 @@ from tauguard.traces import CheckedContacts, read_mcap, write_mcap
 EPISODE = Episode(
     seed=4,
     seconds=3,
-    collisions=(CollisionPlan("strike", time=1.2, link=3), CollisionPlan("clamp", time=2.2, link=4)),
+    collisions=(
+        CollisionPlan("strike", time=1.2, link=3),
+        CollisionPlan("clamp", time=2.2, link=4),
+    ),
 )
 
 
