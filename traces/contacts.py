@@ -50,5 +50,12 @@ class CheckedContacts:
     def between(self, start: float, stop: float) -> CheckedContacts:
         """Those with ``start`` <= t < ``stop`` [s]."""
         rows = slice(*np.searchsorted(self.t, [start, stop]).tolist())
-        columns = (self.t, self.pair, self.point, self.normal, self.distance)
-        return CheckedContacts(self.checker, self.partners, *(column[rows] for column in columns))
+        return CheckedContacts(
+            self.checker,
+            self.partners,
+            self.t[rows],
+            self.pair[rows],
+            self.point[rows],
+            self.normal[rows],
+            self.distance[rows],
+        )
