@@ -27,6 +27,7 @@ from tauguard.detectors.svr import SrqSVR, srq_kernel
 from tauguard.detectors.thresholded import Thresholded
 from tauguard.detectors.thresholds import QuietDetector, QuietThresholds
 from tauguard.detectors.zoo import DETECTORS, make_detector
+from tauguard.detectors.zoo_file import load_model, save_model
 
 __all__ = [
     "DETECTORS",
@@ -58,6 +59,7 @@ __all__ = [
     "gravity_torque",
     "inverse_dynamics",
     "judge",
+    "load_model",
     "make_detector",
     "mass_matrix",
     "match",
@@ -66,6 +68,7 @@ __all__ = [
     "observe",
     "poisson_rate",
     "promised",
+    "save_model",
     "srq_kernel",
     "wilson",
 ]

@@ -109,6 +109,7 @@ class CurrentNetwork:
 
     def parts(self) -> dict[str, Any]:
         """What a model file keeps."""
+        arm = arm_parts(self.arm)
         assert self.network is not None
         return {
             "lags": list(self.lags),
@@ -117,7 +118,7 @@ class CurrentNetwork:
             "settle": self.settle,
             "dt": self.dt,
             "network": self.network.parts(),
-            "arm": arm_parts(self.arm),
+            "arm": arm,
         }
 
     @classmethod

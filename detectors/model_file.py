@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import zipfile
 import zlib
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,10 @@ import numpy as np
 import skops.io
 from sklearn.svm import SVR
 
-from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.features import Envelope, Features, WindowShape
-from tauguard.detectors.friction import FrictionModel
-from tauguard.detectors.numbers import RobotNumbers
+from tauguard.detectors.model_parts import arm_from_parts, arm_parts, plain
 from tauguard.detectors.pipeline import CollisionDetector, DetectorSettings
 from tauguard.detectors.svr import SrqSVR
-from tauguard.detectors.velocity import SensorNoise
 
 FORMAT = "tauguard detector 1"
 #: What reading a damaged archive may raise, by where it is damaged.
@@ -35,36 +32,40 @@ _DAMAGE = (
 )
 
 
-def _plain(value: object) -> dict[str, Any]:
-    """The fields of a dataclass as they are."""
-    return {field.name: getattr(value, field.name) for field in fields(value)}  # type: ignore[arg-type]
-
-
 def save_detector(detector: CollisionDetector, path: str | os.PathLike[str]) -> None:
     """Write a fitted detector; whole or not at all.
 
     Raises:
         ValueError: it is not fitted, or the folder cannot be written.
     """
+    write_archive(path, detector_parts(detector))
+
+
+def detector_parts(detector: CollisionDetector) -> dict[str, Any]:
+    """A fitted detector as a dictionary of arrays, plain values and an SVR."""
     arm, features, regressor = detector._fitted()
-    content = {
+    return {
         "format": FORMAT,
         "settings": asdict(detector.settings),
         "threshold": float(detector.threshold),
         "dt": float(detector.dt),
-        "robot": _plain(arm.robot),
-        "drive_gain": arm.drive_gain,
-        "noise": arm.noise,
-        "friction": _plain(arm.friction) if arm.friction else None,
-        "sensors": _plain(arm.sensors) if arm.sensors else None,
-        "features": _plain(features)
+        **arm_parts(arm),
+        "features": plain(features)
         | {
-            "shape": _plain(features.shape),
+            "shape": plain(features.shape),
             "envelope": features.envelope.weights if features.envelope else None,
         },
         "svr": regressor.svr_,
         "vectors": regressor.support_vectors_,
     }
+
+
+def write_archive(path: str | os.PathLike[str], content: dict[str, Any]) -> None:
+    """Write ``content`` by skops; whole or not at all.
+
+    Raises:
+        ValueError: the folder cannot be written.
+    """
     target = Path(path)
     part = target.with_name(target.name + ".part")
     try:
@@ -76,12 +77,12 @@ def save_detector(detector: CollisionDetector, path: str | os.PathLike[str]) -> 
         raise ValueError(f"{target}: cannot be written ({error.strerror})") from None
 
 
-def load_detector(path: str | os.PathLike[str]) -> CollisionDetector:
-    """Read what :func:`save_detector` wrote.
+def read_archive(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """What :func:`write_archive` wrote, its ``format`` not looked at.
 
     Raises:
-        ValueError: missing, truncated or of another kind, or holding types that a detector does
-            not need (nothing of them is built).
+        ValueError: missing, truncated or no dictionary, or holding types that a detector does not
+            need (nothing of them is built).
     """
     target = Path(path)
     try:
@@ -97,27 +98,34 @@ def load_detector(path: str | os.PathLike[str]) -> CollisionDetector:
         ) from None
     if strangers:
         raise ValueError(f"{target}: holds types not to be trusted: {', '.join(strangers)}")
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
+    if not isinstance(content, dict):
         raise ValueError(f"{target}: not a detector file of this version ({FORMAT!r})")
+    return content
+
+
+def load_detector(path: str | os.PathLike[str]) -> CollisionDetector:
+    """Read what :func:`save_detector` wrote.
+
+    Raises:
+        ValueError: missing, truncated or of another kind, or holding types that a detector does
+            not need (nothing of them is built).
+    """
+    content = read_archive(path)
+    if content.get("format") != FORMAT:
+        raise ValueError(f"{path}: not a detector file of this version ({FORMAT!r})")
     try:
-        return _rebuilt(content)
+        return rebuilt(content)
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
-        raise ValueError(f"{target}: a detector file with a part missing ({error})") from None
+        raise ValueError(f"{path}: a detector file with a part missing ({error})") from None
 
 
-def _rebuilt(content: dict[str, Any]) -> CollisionDetector:
+def rebuilt(content: dict[str, Any]) -> CollisionDetector:
+    """The detector again from :func:`detector_parts`."""
     settings = content["settings"]
     for name in ("joints", "reference"):
         settings[name] = tuple(settings[name])
     detector = CollisionDetector(DetectorSettings(**settings))
-    friction = content["friction"]
-    detector.arm = ArmModel(
-        RobotNumbers(**{**content["robot"], "joint_names": tuple(content["robot"]["joint_names"])}),
-        content["drive_gain"],
-        FrictionModel(**friction) if friction else None,
-        content["noise"],
-        SensorNoise(**content["sensors"]) if content.get("sensors") else None,
-    )
+    detector.arm = arm_from_parts(content)
     parts = content["features"]
     envelope = parts["envelope"]
     detector.features = Features(

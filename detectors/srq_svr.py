@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,19 @@ class SvrDetector:
         common_interval(traces, robot)
         self.chain.fit(traces, robot.robot, robot.drive_gain, friction=robot.friction)
         return self
+
+    def parts(self) -> dict[str, Any]:
+        """What a model file keeps."""
+        from tauguard.detectors.model_file import detector_parts
+
+        return {"chain": detector_parts(self.chain), "name": self.name}
+
+    @classmethod
+    def from_parts(cls, parts: dict[str, Any]) -> SvrDetector:
+        """The detector again from :meth:`parts`."""
+        from tauguard.detectors.model_file import rebuilt
+
+        return cls(rebuilt(parts["chain"]), str(parts["name"]))
 
     def scores(self, trace: Trace) -> Array:
         """Output of the regressor, shape (T,)."""

@@ -4,11 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+import skops.io
 
 from tauguard.detectors import ArmModel, CollisionDetector, calibrate, front_end, pipeline
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.thresholded import Thresholded
 from tauguard.detectors.zoo import DETECTORS, make_detector
+from tauguard.detectors.zoo_file import FORMAT, load_model, save_model
 from tauguard.traces import Trace
 
 
@@ -20,8 +22,8 @@ def arm(robot, drive_gain):
 SMALLER = {
     "windows": 2000,
     "mined": 200,
-    "epochs": 25,
-    "rows": 10_000,
+    "epochs": 15,
+    "rows": 6000,
     "trees": 20,
 }
 
@@ -40,17 +42,23 @@ def small(name):
 
 
 @pytest.fixture(scope="module")
-def identified(training, arm):
+def some(training):
+    """A free trace at each speed, and two with collisions."""
+    return [*training[:3], *training[9:11]]
+
+
+@pytest.fixture(scope="module")
+def identified(some, arm):
     """One identification for all: what it finds is tested where it belongs."""
-    return calibrate(arm, training[::2])
+    return calibrate(arm, some)
 
 
 @pytest.fixture(scope="module", params=list(DETECTORS))
-def fitted(request, training, arm, identified):
+def fitted(request, some, arm, identified):
     with pytest.MonkeyPatch.context() as patch:
         for module in (front_end, pipeline):
             patch.setattr(module, "calibrate", lambda *_, **__: identified)
-        return small(request.param).fit(training[::2], arm)
+        return small(request.param).fit(some, arm)
 
 
 def first(trace, rows):
@@ -68,11 +76,11 @@ def test_the_table_names_its_detectors():
 
 
 def test_scores_are_finite_and_causal(fitted, unseen):
-    trace = first(unseen[0], 12_000)
+    trace = first(unseen[0], 6_000)
     score = fitted.scores(trace)
     assert score.shape == trace.t.shape
     assert np.isfinite(score).all()
-    rows = 9_000
+    rows = 4_500
     np.testing.assert_allclose(fitted.scores(first(trace, rows)), score[:rows], rtol=0, atol=1e-9)
 
 
@@ -93,7 +101,7 @@ def test_hard_collisions_score_above_free_motion(fitted, unseen):
 
 
 def test_no_alarm_before_it_has_settled_and_levels_say_when(fitted, unseen):
-    trace = first(unseen[0], 8_000)
+    trace = first(unseen[0], 4_500)
     watched = Thresholded(fitted, -np.inf)
     found = watched.detect(trace)
     begin = fitted.settle + 0.002
@@ -122,3 +130,49 @@ def test_an_unfitted_detector_says_so(unseen, training, arm):
             make_detector(name).scores(unseen[0])
         with pytest.raises(ValueError, match="no traces"):
             make_detector(name).fit([], arm)
+
+
+def test_a_file_gives_equal_scores_and_holds_nothing_to_distrust(fitted, unseen, tmp_path):
+    path = tmp_path / "model.skops"
+    save_model(Thresholded(fitted, 0.25, 0.005), path)
+    assert skops.io.get_untrusted_types(file=path) == []
+    again = load_model(path)
+    assert (again.threshold, again.confirmation) == (0.25, 0.005)
+    assert again.detector.name == fitted.name
+    assert again.detector.settle == fitted.settle
+    trace = first(unseen[0], 4_000)
+    assert again.detector.scores(trace).tobytes() == fitted.scores(trace).tobytes()
+    np.testing.assert_array_equal(
+        again.detect(trace).residual, Thresholded(fitted, 0.25).detect(trace).residual
+    )
+
+
+def test_damaged_and_foreign_files_are_named(tmp_path):
+    bad = tmp_path / "bad.skops"
+    for content, message in (
+        ({"format": "other"}, "not a detector file of this version"),
+        ({"format": FORMAT, "detector": "none"}, "with a part missing"),
+        ({"format": FORMAT, "detector": "cusum", "parts": {}}, "with a part missing"),
+        ([1], "not a detector file"),
+    ):
+        skops.io.dump(content, bad)
+        with pytest.raises(ValueError, match=message):
+            load_model(bad)
+    bad.write_bytes(b"hello")
+    with pytest.raises(ValueError, match=r"bad\.skops: not a detector file"):
+        load_model(bad)
+
+
+def test_the_chain_s_own_file_is_read_too(detector, unseen, tmp_path):
+    path = tmp_path / "model.skops"
+    detector.save(path)
+    trace = first(unseen[0], 12_000)
+    watched = load_model(path)
+    np.testing.assert_array_equal(watched.detect(trace).alarm, detector.detect(trace).alarm)
+
+
+def test_an_unfitted_detector_cannot_be_saved(tmp_path):
+    for name in DETECTORS:
+        with pytest.raises(ValueError, match="not fitted"):
+            save_model(Thresholded(make_detector(name), 0.0), tmp_path / "model.skops")
+    assert not list(tmp_path.iterdir())
