@@ -9,7 +9,6 @@ from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.numbers import RobotNumbers
 from tauguard.detectors.velocity import SensorNoise
-from tauguard.detectors.velocity import SensorNoise
 
 
 def plain(value: object) -> dict[str, Any]:
@@ -30,13 +29,12 @@ def arm_parts(arm: ArmModel) -> dict[str, Any]:
 
 def arm_from_parts(parts: dict[str, Any]) -> ArmModel:
     """The arm model that :func:`arm_parts` took apart."""
-    friction, sensors = parts["friction"], parts.get("sensors")
+    friction = parts["friction"]
     robot = {**parts["robot"], "joint_names": tuple(parts["robot"]["joint_names"])}
     return ArmModel(
         RobotNumbers(**robot),
         parts["drive_gain"],
         FrictionModel(**friction) if friction else None,
         parts["noise"],
-        SensorNoise(**sensors) if sensors else None,
         SensorNoise(**parts["sensors"]) if parts.get("sensors") else None,
     )
