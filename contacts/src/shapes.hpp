@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "motion_body.hpp"
+#include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::contacts {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "motion_impact.hpp"
+#include "tauguard/rigid/first_contact.hpp"
 
 namespace tauguard::contacts {
 namespace {

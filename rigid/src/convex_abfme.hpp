@@ -23,7 +23,7 @@
 
 #include <algorithm>
 
-#include "convex_bodies.hpp"
+#include "tauguard/rigid/bodies.hpp"
 #include "convex_lanes.hpp"
 
 namespace tauguard::rigid {

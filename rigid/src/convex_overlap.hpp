@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "convex_bodies.hpp"
+#include "tauguard/rigid/bodies.hpp"
 
 namespace tauguard::rigid {
 

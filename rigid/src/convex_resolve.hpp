@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "convex_abfme.hpp"
-#include "convex_bodies.hpp"
+#include "tauguard/rigid/bodies.hpp"
 
 namespace tauguard::rigid {
 

@@ -3,7 +3,7 @@
 // arithmetic without error bounds: the comparator of the study, wrong where rounding makes it so.
 #pragma once
 
-#include "convex_bodies.hpp"
+#include "tauguard/rigid/bodies.hpp"
 #include "convex_lanes.hpp"
 
 namespace tauguard::rigid {

@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "convex_bodies.hpp"
+#include "tauguard/rigid/bodies.hpp"
 
 namespace tauguard::rigid {
 

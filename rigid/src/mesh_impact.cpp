@@ -3,7 +3,7 @@
 #include <queue>
 
 #include "convex_contact.hpp"
-#include "motion_gjk.hpp"
+#include "nearest.hpp"
 
 namespace tauguard::rigid {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "mesh_query.hpp"
-#include "motion_impact.hpp"
+#include "tauguard/rigid/first_contact.hpp"
 
 namespace tauguard::rigid {
 

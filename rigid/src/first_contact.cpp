@@ -9,11 +9,11 @@
 // own rate of turning: then all vertices of the touching features keep one tangent, and the steps converge
 // quadratically, as Newton's do, but from below. (With r = 0 a turning face tilts away from n and convergence
 // is linear.)
-#include "motion_impact.hpp"
+#include "tauguard/rigid/first_contact.hpp"
 
 #include <algorithm>
 
-#include "motion_gjk.hpp"
+#include "nearest.hpp"
 
 namespace tauguard::rigid {
 namespace {

@@ -1,5 +1,5 @@
 // Gilbert, Johnson and Keerthi 1988 on the differences b - a of two point sets.
-#include "motion_gjk.hpp"
+#include "nearest.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "motion_body.hpp"
+#include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::rigid {
 

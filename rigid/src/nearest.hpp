@@ -1,7 +1,7 @@
 // Directions and points between two convex hulls of points, to rounding.
 #pragma once
 
-#include "motion_body.hpp"
+#include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::rigid {
 

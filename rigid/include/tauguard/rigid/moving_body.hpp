@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "convex_bodies.hpp"
+#include "tauguard/rigid/bodies.hpp"
 
 namespace tauguard::rigid {
 

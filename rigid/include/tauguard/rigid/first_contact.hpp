@@ -1,7 +1,7 @@
 // First contact of two moving convex bodies, from below.
 #pragma once
 
-#include "motion_body.hpp"
+#include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::rigid {
 
