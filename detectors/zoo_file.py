@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from typing import Any, Protocol
 
@@ -32,6 +33,9 @@ def save_model(watched: Thresholded, path: str | os.PathLike[str]) -> None:
     Raises:
         ValueError: it is not fitted, or the folder cannot be written.
     """
+    if _is_chain(watched):
+        _save_chain(watched, path)
+        return
     detector: Storable = watched.detector  # type: ignore[assignment]
     content = {
         "format": FORMAT,
@@ -41,6 +45,23 @@ def save_model(watched: Thresholded, path: str | os.PathLike[str]) -> None:
         "parts": detector.parts(),
     }
     write_archive(path, content)
+
+
+def _is_chain(watched: Thresholded) -> bool:
+    """Whether the file of ``CollisionDetector.save``, which all commands read, can hold it."""
+    detector = watched.detector
+    return (
+        isinstance(detector, SvrDetector)
+        and detector.name == "srq-svr"
+        and detector.chain.settings.confirmation == watched.confirmation
+    )
+
+
+def _save_chain(watched: Thresholded, path: str | os.PathLike[str]) -> None:
+    assert isinstance(watched.detector, SvrDetector)
+    chain = copy.copy(watched.detector.chain)
+    chain.threshold = float(watched.threshold)
+    chain.save(path)
 
 
 def load_model(path: str | os.PathLike[str]) -> Thresholded:

@@ -81,6 +81,29 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     assert "sensitivity from 16 N m up" in capsys.readouterr().out
 
 
+def test_train_any_detector_with_a_promise(tmp_path, capsys):
+    """Few recordings promise little; the message says how many more would do."""
+    struck, free = tmp_path / "struck", tmp_path / "free"
+    common = ("--workers", "1", "--payloads-g", "0", "--speeds", "30")
+    run("simulate", "--out", str(struck), "--episodes", "1", "--collisions", "5", *common)
+    more = ("--episodes", "6", "--collisions", "0", "--seconds", "8", *common)
+    run("simulate", "--out", str(free), *more)
+    for path in sorted(free.glob("*.mcap"))[:3]:
+        path.rename(struck / f"free-{path.name}")
+    model = str(tmp_path / "model.skops")
+    train = ("train", "--traces", str(struck), "--model", model)
+    assert "--calibration" in fails(capsys, *train, "--detector", "cusum")
+    assert "did you mean 'cusum'" in fails(capsys, *train, "--detector", "cusom")
+    flags = ("--detector", "cusum", "--calibration", str(free))
+    line = fails(capsys, *train, *flags, "--false-alarms-per-hour", "1")
+    assert "cannot promise 1 false alarms per hour" in line
+    assert "give " in line
+    run(*train, *flags, "--false-alarms-per-hour", "600")
+    assert "at most 600 false alarms per hour" in capsys.readouterr().out
+    run("evaluate", "--traces", str(struck), "--model", model)
+    assert "sensitivity from 16 N m up" in capsys.readouterr().out
+
+
 def test_detect_with_a_trained_model(tmp_path, capsys):
     """The model of a simulated arm watches a recording of it; a log at another rate is refused."""
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset

@@ -22,12 +22,12 @@ def command(
     from tauguard.benchmarks.report import machine, versions, write_json
     from tauguard.cli.folder import labelled
     from tauguard.cli.summary import draw, text
-    from tauguard.detectors import CollisionDetector, figures, judge
+    from tauguard.detectors import figures, judge, load_model
 
-    detector = CollisionDetector.load(model)
+    watched = load_model(model)
     recordings = labelled(traces)
     matchings = [
-        judge(detector.detect(trace), trace, detector.settings.settle) for trace in recordings
+        judge(watched.detect(trace), trace, watched.detector.settle) for trace in recordings
     ]
     summary = figures(matchings)
     print(text(summary))

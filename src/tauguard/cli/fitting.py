@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tauguard.detectors import CollisionDetector
+    from tauguard.detectors import ArmModel, CollisionDetector, Thresholded
     from tauguard.traces import Trace
 
 
@@ -16,20 +17,48 @@ def trained(traces: Sequence[Trace], false_alarms_per_hour: float) -> CollisionD
     Raises:
         ValueError: no nominal arm is attached to the recordings, or they cannot be trained on.
     """
+    from tauguard.detectors import CollisionDetector, DetectorSettings
+
+    settings = DetectorSettings(
+        windows=1500, mined=200, false_alarms_per_hour=false_alarms_per_hour
+    )
+    arm = nominal(traces)
+    return CollisionDetector(settings).fit(traces, arm.robot, arm.drive_gain, friction=arm.friction)
+
+
+def fitted(name: str, traces: Sequence[Trace], false_alarms_per_hour: float) -> Thresholded:
+    """A detector of the table, fitted to ``traces``; only the SVR brings a threshold of its own.
+
+    Raises:
+        ValueError: as :func:`trained`.
+    """
+    from tauguard.detectors import Thresholded, make_detector
+    from tauguard.detectors.srq_svr import SvrDetector
+
+    if name == "srq-svr":
+        chain = trained(traces, false_alarms_per_hour)
+        return Thresholded(SvrDetector(chain), chain.threshold, chain.settings.confirmation)
+    return Thresholded(make_detector(name).fit(traces, nominal(traces)), float("inf"))
+
+
+def nominal(traces: Sequence[Trace]) -> ArmModel:
+    """What is believed of the recordings' arm before training.
+
+    Raises:
+        ValueError: no nominal arm is attached to the recordings.
+    """
     import numpy as np
 
-    from tauguard.detectors import CollisionDetector, DetectorSettings, FrictionModel, RobotNumbers
+    from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
     from tauguard.models import cura6_drive, pin_model
 
     arm = traces[0].attachments.get("arm.xml")
     if arm is None:
         raise ValueError("no arm.xml attached: train on recordings that tauguard simulated")
-    settings = DetectorSettings(
-        windows=1500, mined=200, false_alarms_per_hour=false_alarms_per_hour
-    )
-    robot = RobotNumbers.from_pin(pin_model(arm))
     drive = cura6_drive()
     # The ripple's frequencies follow from the gear; its heights and phases are identified.
     cycles = np.outer(drive.gear, drive.ripple.cycles) if drive.ripple else np.empty((0, 0))
-    friction = FrictionModel(cycles=cycles)
-    return CollisionDetector(settings).fit(traces, robot, drive.gain, friction=friction)
+    robot = RobotNumbers.from_pin(pin_model(arm))
+    columns = FrictionModel(cycles=cycles)
+    weights = np.zeros((robot.joints, columns.columns))
+    return ArmModel(robot, drive.gain, replace(columns, weights=weights))

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 def command(
     traces: Path | None = None,
     model: Path | None = None,
+    detector: str = "srq-svr",
+    calibration: Path | None = None,
     false_alarms_per_hour: float | None = None,
     free: tuple[Path, ...] = (),
     robot: Path | None = None,
@@ -23,15 +25,19 @@ def command(
 ) -> None:
     """Train a detector and write its model file.
 
-    With --traces: the momentum-observer SVR detector on labelled recordings, some with collisions.
+    With --traces: on labelled recordings, some with collisions. With --calibration the threshold
+    keeps a promise: no more than the false alarms per hour that you name, on motion like that.
     With --free and --robot: a detector of a real arm from logs in which nothing touched it; three
     or more, with dwells and with moves of single joints among them, or those raise alarms later.
 
     Args:
         traces: folder of MCAP recordings with truth (`tauguard simulate` writes such).
         model: the model file (default: model.skops, or model.json with --free).
+        detector: with --traces, one of tauguard.detectors.DETECTORS; all but the momentum-observer
+            SVR need --calibration.
+        calibration: folder of collision-free recordings that are not in --traces.
         false_alarms_per_hour: what the threshold aims at on collision-free training motion
-            (default: 10, or 1 with --free).
+            (default: 10, or 1 with --free), or promises with --calibration.
         free: collision-free logs of a real arm, files or a folder.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains.
         columns: of CSV files, see `tauguard detect`.
@@ -46,27 +52,49 @@ def command(
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
     if traces is not None:
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
-        labelled_motion(traces, target, rate)
+        labelled_motion(traces, target, detector, calibration, rate)
         return
+    if calibration is not None or detector != "srq-svr":
+        raise ValueError("--detector and --calibration go with --traces, not with --free")
     if robot is None:
         raise ValueError("--free needs --robot")
     rate = 1.0 if false_alarms_per_hour is None else false_alarms_per_hour
     free_motion(free, robot, target, rate, columns, gains, payload, sensitivity)
 
 
-def labelled_motion(traces: Path, model: Path, false_alarms_per_hour: float) -> None:
+def labelled_motion(
+    traces: Path, model: Path, name: str, calibration: Path | None, rate: float
+) -> None:
     """Train on labelled recordings."""
-    from tauguard.cli.fitting import trained
+    from tauguard.cli.fitting import fitted
     from tauguard.cli.folder import labelled
+    from tauguard.detectors import DETECTORS, make_detector, promised, save_model
 
+    if name not in DETECTORS:
+        make_detector(name)  # says which there are
+    if calibration is None and name != "srq-svr":
+        raise ValueError(
+            f"--detector {name} needs --calibration, a folder of collision-free recordings "
+            "(`tauguard simulate --collisions 0` writes some)"
+        )
+    # Read first: a folder that cannot be used is better named before training than after.
+    free = labelled(calibration) if calibration is not None else []
     recordings = labelled(traces)
-    detector = trained(recordings, false_alarms_per_hour)
-    detector.save(model)
+    watched = fitted(name, recordings, rate)
+    if free:
+        watched, promise = promised(watched, free, rate)
+    save_model(watched, model)
     collisions = sum(len(t.truth.collisions) for t in recordings if t.truth)
     print(
-        f"{model}: trained on {len(recordings)} recordings with {collisions} collisions, "
-        f"threshold {detector.threshold:.3f}"
+        f"{model}: {name} trained on {len(recordings)} recordings with {collisions} collisions, "
+        f"threshold {watched.threshold:.3g}"
     )
+    if free:
+        print(
+            f"promised: at most {rate:g} false alarms per hour on motion like that of "
+            f"{calibration} ({promise.episodes} episodes, {promise.hours:.2g} h), with a "
+            f"confidence of {promise.confidence:.0%}"
+        )
 
 
 def free_motion(
