@@ -122,6 +122,21 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._begun = False
 
     @property
+    def scene(self) -> Scene:
+        """What is simulated: the compiled model, joint names, home pose, the arm's MJCF."""
+        return self.world.scene
+
+    @property
+    def model(self) -> Any:
+        """The compiled ``mujoco.MjModel``."""
+        return self.world.scene.model
+
+    @property
+    def data(self) -> Any:
+        """The ``mujoco.MjData`` that is stepped; to look at, not to write to."""
+        return self.cell.datas[0]
+
+    @property
     def regions(self) -> tuple[Any, ...]:
         """The body regions in the scene: names, limits, and which values are unconfirmed."""
         return self.world.regions

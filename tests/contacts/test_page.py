@@ -1,0 +1,28 @@
+"""What the page on contact checkers shows is what it says."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+TEXT = (Path(__file__).resolve().parents[2] / "docs" / "contacts.md").read_text()
+BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=["compare", "own_checker", "guard"])
+def test_the_blocks_run(block, capsys):
+    exec(compile(block, "contacts.md", "exec"), {"__name__": "page"})
+    out = capsys.readouterr().out
+    if "BoundingSpheres" in block:
+        assert "spheres false" in out
+        lines = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
+        assert lines["rigid"][1:3] == ["1", "1"]
+        assert float(lines["spheres"][1]) < 0.5
+    elif "GuardedStepper" in block:
+        lines = out.splitlines()
+        assert len(lines) >= 2
+        assert lines[-1] == "True"
+        assert "('flex', 0), ('geom', 0)" in lines[0]
+    else:
+        assert "mujoco missed: body ball and flex cloth_sheet" in out
+        assert out.splitlines()[-1].startswith("1.0 [")

@@ -1,0 +1,58 @@
+"""Every Python block of the README and of the pages runs as it stands, in the order of its page."""
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+# Shown and judged by tests/contacts/test_page.py.
+ELSEWHERE = {"contacts"}
+
+
+def blocks(page):
+    return re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if p.stem not in ELSEWHERE], ids=lambda page: page.stem
+)
+def test_the_blocks_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shared = {"__name__": "page"}
+    for block in blocks(page):
+        exec(compile(block, page.name, "exec"), shared)
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=lambda page: page.stem)
+def test_links_lead_somewhere(page):
+    prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+    for link in re.findall(r"\]\(([^)#:]+)\)", prose):
+        assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_exist(page):
+    """What follows `tauguard` in shell blocks is a command, and its flags are its own."""
+    from tauguard.benchmarks import STUDIES
+    from tauguard.cli import COMMANDS
+
+    shell = "\n".join(re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL))
+    told = shell + "\n".join(re.findall(r"`(tauguard [^`]+)`", page.read_text()))
+    for command, rest in re.findall(r"tauguard ([a-z]+)([^\n]*)", told):
+        if command == "bench":
+            assert rest.split()[0] in {"NAME", "list", *STUDIES}, rest
+            continue
+        assert command in COMMANDS, command
+        source = (ROOT / "src" / "tauguard" / "cli" / f"{command}.py").read_text()
+        for flag in re.findall(r"--([a-z-]+)", rest):
+            assert re.search(rf"\b{flag.replace('-', '_')}:", source), f"{command} --{flag}"
+
+
+def test_no_page_is_lost():
+    """Every page can be reached from the README."""
+    told = (ROOT / "README.md").read_text()
+    lost = [page.name for page in PAGES[1:] if os.path.relpath(page, ROOT) not in told]
+    assert not lost
