@@ -39,6 +39,28 @@ class Scene:
         skip: NDArray[np.uint8],
     ) -> Answer: ...
 
+class Travel:
+    def bound(
+        self,
+        geom: Ints,
+        flex: Ints,
+        point: Doubles,
+        xpos_t0: Doubles,
+        xmat_t0: Doubles,
+        xpos_t1: Doubles,
+        xmat_t1: Doubles,
+        x_t0: Doubles,
+        x_t1: Doubles,
+    ) -> Doubles: ...
+
+def travel(
+    body_of_geom: Ints,
+    inner: Doubles,
+    vertex_begin: Ints,
+    vertex_end: Ints,
+    flex_radius: Doubles,
+) -> Travel: ...
+def all_finite(a: Doubles, b: Doubles, c: Doubles) -> bool: ...
 def simplices(
     x_t0: Doubles, x_t1: Doubles, a: Ints, b: Ints, pairs: Ints, distance: float
 ) -> Answer: ...

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tauguard.contacts._contacts import travel
 from tauguard.contacts.checker import Contacts, State, geom_kinds
 
 Array = NDArray[np.float64]
@@ -23,21 +24,34 @@ class Approach:
     def __init__(self, model: Any) -> None:
         """Note each geom's inner radius and which elements meet at each flex vertex."""
         self._body = model.geom_bodyid
-        self._inner = _inner_radii(model)
-        self._flex_radius = model.flex_radius
+        self._travel = travel(
+            model.geom_bodyid,
+            _inner_radii(model),
+            model.flex_vertadr,
+            model.flex_vertadr + model.flex_vertnum,
+            model.flex_radius,
+        )
         self._sheets = [_Sheet(model, flex) for flex in range(model.nflex)]
 
-    def core(self, contacts: Contacts) -> Array:
-        """Depth at which the middles meet and a contact's normal turns over. Shape (K,), m."""
-        return self._radius(contacts, 0) + self._radius(contacts, 1)
+    def bound(self, contacts: Contacts, before: State, after: State) -> tuple[Array, Array]:
+        """How far the partners can approach each other in the whole step, and their core.
 
-    def _radius(self, contacts: Contacts, side: int) -> Array:
-        geom, flex = contacts.geom[:, side], contacts.flex[:, side]
-        out = np.empty(len(contacts))
-        rigid = geom >= 0
-        out[rigid] = self._inner[geom[rigid]]
-        out[~rigid] = self._flex_radius[flex[~rigid]]
-        return out
+        Returns:
+            The way and the core, both of shape (K,) [m]. The core is the depth at which the middles
+            of both partners meet and a contact's normal turns over.
+        """
+        way, core = self._travel.bound(
+            contacts.geom,
+            contacts.flex,
+            contacts.point,
+            before.xpos,
+            before.xmat,
+            after.xpos,
+            after.xmat,
+            before.flexvert_xpos,
+            after.flexvert_xpos,
+        )
+        return way, core
 
     def depth(self, contacts: Contacts, before: State, after: State) -> Array:
         """Depth of each contact at the end of the step, had nothing resisted. Shape (K,), m.
@@ -53,24 +67,6 @@ class Approach:
         """How far both points of each row approach each other over the whole step. (K,), m."""
         towards = self._towards(contacts, np.zeros(len(contacts)), before, after)
         return np.maximum(towards, -contacts.distance)
-
-    def bound(self, contacts: Contacts, before: State, after: State) -> Array:
-        """How far the partners can approach each other in the whole step. Shape (K,), m."""
-        travel = np.linalg.norm(after.flexvert_xpos - before.flexvert_xpos, axis=1)
-        flex = np.array([travel[sheet.vertices].max() for sheet in self._sheets] or [0.0])
-        shift = np.linalg.norm(after.xpos - before.xpos, axis=1)
-        start, end = before.xmat.reshape(-1, 3, 3), after.xmat.reshape(-1, 3, 3)
-        turn = np.linalg.norm(
-            end - start, axis=(1, 2)
-        )  # at least the chord that a point at 1 m makes
-        out = np.zeros(len(contacts))
-        for side in (0, 1):
-            geom = contacts.geom[:, side]
-            body = self._body[geom]
-            lever = np.linalg.norm(contacts.point - before.xpos[body], axis=1)
-            rigid = shift[body] + turn[body] * (lever + shift[body])
-            out += np.where(geom >= 0, rigid, flex[contacts.flex[:, side]])
-        return out
 
     def _towards(self, contacts: Contacts, s: Array, before: State, after: State) -> Array:
         """How far both points of each row approach along its normal from ``s`` (K,) to the end."""

@@ -10,6 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.contacts._contacts import all_finite
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
@@ -25,6 +27,14 @@ KINDS = (
     "mesh",
     "sdf",
     "flex",
+)
+
+
+#: What the kinematics of a state follow from, beside the model.
+_POSE = int(
+    mujoco.mjtState.mjSTATE_QPOS
+    | mujoco.mjtState.mjSTATE_MOCAP_POS
+    | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 )
 
 
@@ -70,12 +80,12 @@ class State:
             scratch: Another MjData of the model, overwritten; ``None`` makes one (slow in a loop).
         """
         scratch = mujoco.MjData(model) if scratch is None else scratch
-        scratch.qpos[:] = data.qpos
-        scratch.mocap_pos[:] = data.mocap_pos
-        scratch.mocap_quat[:] = data.mocap_quat
+        mujoco.mj_copyState(model, data, scratch, _POSE)
         mujoco.mj_kinematics(model, scratch)
-        if model.flex_centered.all() and not model.flex_interp.any():
-            vertices = scratch.xpos[model.flex_vertbodyid]
+        if not model.nflex:
+            vertices = np.zeros((0, 3))
+        elif model.flex_centered.all() and not model.flex_interp.any():
+            vertices = scratch.xpos.take(model.flex_vertbodyid, axis=0)
         else:
             mujoco.mj_comPos(model, scratch)
             mujoco.mj_flex(model, scratch)
@@ -98,11 +108,19 @@ def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:
     Raises:
         ValueError: another shape, or an entry that is not finite (the field and first bad row).
     """
-    shapes = {"xpos": (bodies, 3), "xmat": (bodies, 9), "flexvert_xpos": (vertices, 3)}
+    xpos, xmat, x = state.xpos, state.xmat, state.flexvert_xpos
+    if (
+        xpos.shape == (bodies, 3)
+        and xmat.shape == (bodies, 9)
+        and (not vertices or x.shape == (vertices, 3))
+        and all_finite(xpos, xmat, x if vertices else xpos)
+    ):
+        return state
+    shapes = {"xpos": (bodies, 3), "xmat": (bodies, 9)}
+    if vertices:
+        shapes["flexvert_xpos"] = (vertices, 3)
     for field_name, shape in shapes.items():
         value = getattr(state, field_name)
-        if not vertices and field_name == "flexvert_xpos":
-            continue
         if value.shape != shape:
             raise ValueError(f"{name}.{field_name}: shape {value.shape}, the model has {shape}")
         if not np.isfinite(value).all():
@@ -138,24 +156,29 @@ class Contacts:
         """Check the shapes: ``ValueError`` names the field that does not fit."""
         count = np.shape(self.time)[0] if np.ndim(self.time) == 1 else -1
         for name, dtype, tail in _COLUMNS:
-            value = np.asarray(getattr(self, name), dtype=dtype)
+            given = getattr(self, name)
+            value = np.asarray(given, dtype=dtype)
             if value.shape != (count, *tail):
                 raise ValueError(f"{name}: shape {value.shape}, expected {('K', *tail)}")
-            object.__setattr__(self, name, value)
+            if value is not given:
+                object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return len(self.time)
 
     @classmethod
     def empty(cls) -> Contacts:
-        """No contact at all."""
-        return cls(*(np.zeros((0, *tail), dtype=dtype) for _, dtype, tail in _COLUMNS))
+        """No contact at all; the same object every time."""
+        return _EMPTY
 
     @classmethod
     def concatenate(cls, parts: Sequence[Contacts]) -> Contacts:
         """The rows of all ``parts`` in their order."""
+        parts = [part for part in parts if len(part)]
         if not parts:
             return cls.empty()
+        if len(parts) == 1:
+            return parts[0]
         names = [field.name for field in fields(cls)]
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -173,6 +196,7 @@ _COLUMNS: tuple[tuple[str, type[np.generic], tuple[int, ...]], ...] = (
     ("normal", np.float64, (3,)),
     ("distance", np.float64, ()),
 )
+_EMPTY = Contacts(*(np.zeros((0, *tail), dtype=dtype) for _, dtype, tail in _COLUMNS))
 
 
 @runtime_checkable

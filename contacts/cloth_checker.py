@@ -78,6 +78,8 @@ class ClothChecker:
         Raises:
             ValueError: a state of another model, or that is not finite.
         """
+        if not self._against and self._cloths is None:
+            return Contacts.empty()
         before, after = (
             checked(name, state, *self._size)
             for name, state in (("before", before), ("after", after))
@@ -99,6 +101,8 @@ class ClothChecker:
                 reach,
                 skip,
             )
+            if not len(ids):
+                continue
             none = np.full(len(ids), -1, dtype=np.int32)
             geom = np.stack([self._geoms[ids[:, 0]], none], axis=1)
             number = np.stack([none, np.full(len(ids), flex.number, dtype=np.int32)], axis=1)

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 #: How far beyond the touch a cut step goes, so that MuJoCo finds the contact [m]. Less than the
 #: error of a shortened step would leave a gap; more is depth that the contact then pushes out.
 BEYOND = 1e-5
-#: Share of the depth at which a contact's normal turns over (:meth:`Approach.core`) that a step may
+#: Share of the depth at which a contact's normal turns over (:meth:`Approach.bound`) that a step may
 #: end with; a new contact that would be deeper is cut at its first touch.
 DEEP = 0.8
 #: A contact that was there before and becomes deeper than that is cut in halves, but only where
@@ -180,8 +180,8 @@ class GuardedStepper:
             last is not None
             and not self.model.nmocap
             and last.time == data.time
-            and np.array_equal(last.qpos, data.qpos)
-            and np.array_equal(last.qvel, data.qvel)
+            and last.qpos.tobytes() == data.qpos.tobytes()
+            and last.qvel.tobytes() == data.qvel.tobytes()
         ):
             return last
         return State.of(self.model, data, self._scratch)
@@ -194,14 +194,13 @@ class GuardedStepper:
 
     def _cut(self, before: State, after: State) -> tuple[float, Pair, float] | None:
         """Where the step should be cut (share of it), for which pair, how deep it would be."""
-        found = [c.check(before, after) for c in self.checkers]
         held = _touching(self.data)
-        best = None
-        for contacts in found:
-            for share, pair, depth in self._new(contacts, held, before, after):
-                if best is None or share < best[0]:
-                    best = (share, pair, depth)
-        return best or self._sinking(held, before, after)
+        new = [
+            one
+            for checker in self.checkers
+            for one in self._new(checker.check(before, after), held, before, after)
+        ]
+        return min(new) if new else self._sinking(held, before, after)
 
     def _new(
         self, found: Contacts, held: Contacts, before: State, after: State
@@ -209,28 +208,28 @@ class GuardedStepper:
         """Contacts within the step that it would pass by."""
         if not len(found):
             return []
-        pairs = pairs_of(found)
-        known = set(pairs_of(held))
-        fresh = np.array([pair not in known for pair in pairs])
-        fast = self._approach.bound(found, before, after) > DEEP * self._approach.core(found)
-        matter = (fresh | (fast & (found.time > 0))) & np.isfinite(found.normal).all(axis=1)
+        way, core = self._approach.bound(found, before, after)
+        known = self._keys(held)
+        fresh = np.array([key not in known for key in self._rows(found)])
+        matter = fresh | ((way > DEEP * core) & (found.time > 0))
         if not matter.any():
             return []
-        found, fresh = found.where(np.asarray(matter)), fresh[matter]
-        pairs = [pair for pair, here in zip(pairs, matter, strict=True) if here]
+        matter &= np.isfinite(found.normal).all(axis=1)
+        found, fresh, core = found.where(matter), fresh[matter], core[matter]
         depth = self._approach.depth(found, before, after)
-        passed = depth > DEEP * self._approach.core(found)
+        passed = depth > DEEP * core
         parting = fresh & (depth <= 0)
         if parting.any():
-            ends = set(pairs_of(self._ends(after)))
-            passed |= parting & np.array([pair not in ends for pair in pairs])
+            ends = self._keys(self._ends(after))
+            passed |= parting & np.array([key not in ends for key in self._rows(found)])
         if not passed.any():
             return []
-        way = np.maximum(self._approach.speed(found, before, after), 1e-12)
-        share = found.time + BEYOND / way
+        speed = np.maximum(self._approach.speed(found, before, after), 1e-12)
+        share = found.time + BEYOND / speed
         # What touches at the very end is there when the next step starts.
         chosen = np.flatnonzero(passed & (share < 1))
-        return [(float(share[k]), pairs[k], float(depth[k])) for k in chosen]
+        pairs = pairs_of(found.where(chosen))
+        return [(float(share[k]), p, float(depth[k])) for k, p in zip(chosen, pairs, strict=True)]
 
     def _sinking(
         self, held: Contacts, before: State, after: State
@@ -238,11 +237,11 @@ class GuardedStepper:
         """A contact that was there before and becomes too deep: halve the step."""
         if not len(held):
             return None
-        core = self._approach.core(held)
-        near = self._approach.bound(held, before, after) - held.distance > DEEP * core
+        way, core = self._approach.bound(held, before, after)
+        near = way - held.distance > DEEP * core
         if not near.any():
             return None
-        held, core = held.where(np.asarray(near)), core[near]
+        held, core = held.where(near), core[near]
         depth = self._approach.depth(held, before, after)
         growth = depth + held.distance
         sinks = (depth > DEEP * core) & (growth > GROWTH * core)
@@ -251,6 +250,16 @@ class GuardedStepper:
             return None
         k = int(np.argmax(np.where(sinks, depth, -np.inf)))
         return 0.5, pairs_of(held)[k], float(depth[k])
+
+    def _rows(self, contacts: Contacts) -> list[int]:
+        """A number for the two partners of each row."""
+        ids = np.where(contacts.geom >= 0, contacts.geom, self.model.ngeom + contacts.flex)
+        count = self.model.ngeom + self.model.nflex
+        rows: list[int] = (ids.max(axis=1).astype(np.int64) * count + ids.min(axis=1)).tolist()
+        return rows
+
+    def _keys(self, contacts: Contacts) -> set[int]:
+        return set(self._rows(contacts)) if len(contacts) else set()
 
     def _ends(self, after: State) -> Contacts:
         """MuJoCo's contacts at the end of the step."""

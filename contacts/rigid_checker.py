@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.contacts.checker import Contacts, State, checked, geom_kinds, pair_kind
+from tauguard.contacts.checker import Array, Contacts, Index, State, checked, geom_kinds, pair_kind
 from tauguard.contacts.geoms import CONVEX, native_scene
 from tauguard.contacts.pairs import geom_pairs
 from tauguard.contacts.surface_pairs import SurfacePairs
@@ -90,22 +90,29 @@ class RigidChecker:
         Raises:
             ValueError: a state of another model, or that is not finite.
         """
+        if not len(self.pairs):
+            return Contacts.empty()
         before, after = (
             checked(name, state, self._bodies)
             for name, state in (("before", before), ("after", after))
         )
         ids, values, work = self._scene.find(before.xpos, before.xmat, after.xpos, after.xmat)
         self.work = Work(*work)
+        found = self._rows(ids, values) if len(ids) else Contacts.empty()
+        if self._surfaces is None:
+            return found
+        return Contacts.concatenate([found, self._surfaces.check(before, after)])
+
+    def _rows(self, ids: Index, values: Array) -> Contacts:
         none = np.full((len(ids), 2), -1, dtype=np.int32)
-        found = Contacts(
+        feature = none.copy()
+        feature[:, 1] = ids[:, 2]
+        return Contacts(
             time=values[:, 0],
             geom=self._geoms[ids[:, :2]],
             flex=none,
-            feature=np.stack([none[:, 0], ids[:, 2]], axis=1),
+            feature=feature,
             point=values[:, 2:5],
             normal=values[:, 5:8],
             distance=values[:, 1],
         )
-        if self._surfaces is None:
-            return found
-        return Contacts.concatenate([found, self._surfaces.check(before, after)])

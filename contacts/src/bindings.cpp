@@ -6,11 +6,13 @@
 
 #include "sweep.hpp"
 #include "tauguard/geometry/rounding.hpp"
+#include "travel.hpp"
 
 namespace nb = nanobind;
 using namespace tauguard::contacts;
 
 using Doubles = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Anything = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 using Rows3 = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Rows9 = nb::ndarray<const double, nb::shape<-1, 9>, nb::c_contig, nb::device::cpu>;
 using Ints = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
@@ -130,6 +132,38 @@ class Scene {
   std::mutex busy_;
 };
 
+template <class T, class Array>
+std::vector<T> list(const Array& values) {
+  return std::vector<T>(values.data(), values.data() + values.size());
+}
+
+Travel travel(Ints body_of_geom, Doubles inner, Ints vertex_begin, Ints vertex_end, Doubles flex_radius) {
+  return Travel(list<std::int32_t>(body_of_geom), list<double>(inner), list<std::int32_t>(vertex_begin),
+                list<std::int32_t>(vertex_end), list<double>(flex_radius));
+}
+
+// Rows (way, core) of contacts, see Travel::bound.
+auto bound(const Travel& travel, IntRows geom, IntRows flex, Rows3 point, Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1,
+           Rows9 xmat_t1, Rows3 x_t0, Rows3 x_t1) {
+  const std::size_t count = geom.shape(0);
+  std::vector<double> out(2 * count);
+  travel.bound(geom.data(), flex.data(), point.data(), count, poses_of(xpos_t0, xmat_t0, xpos_t1, xmat_t1), x_t0.data(),
+               x_t1.data(), out.data(), out.data() + count);
+  return owned(std::move(out), std::array<std::size_t, 2>{2, count});
+}
+
+// Whether every number of a state is finite.
+bool all_finite(Anything a, Anything b, Anything c) {
+  for (const Anything* values : {&a, &b, &c}) {
+    const double* x = values->data();
+    // x - x is 0, or NaN where x is not finite; a sum of them needs no branch.
+    double sum = 0;
+    for (std::size_t i = 0; i < values->size(); ++i) sum += x[i] - x[i];
+    if (sum != 0) return false;
+  }
+  return true;
+}
+
 // Rows (simplex, simplex), of two lists, that come within `distance` of one another.
 nb::tuple simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs, double distance) {
   std::vector<Row> rows;
@@ -158,5 +192,8 @@ NB_MODULE(_contacts, m) {
       .def("pairs", &Scene::pairs)
       .def("find", &Scene::find)
       .def("find_flex", &Scene::find_flex);
+  nb::class_<Travel>(m, "Travel").def("bound", &bound);
+  m.def("travel", &travel);
   m.def("simplices", &simplices);
+  m.def("all_finite", &all_finite);
 }
