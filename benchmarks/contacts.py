@@ -17,7 +17,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tauguard.benchmarks.report import Row, rate
+from tauguard.benchmarks.report import Row, answer, rate
 from tauguard.contacts import Report, Score, State, checker, compare, contacts_of
 from tauguard.contacts.scenes import SCENES, arm_cloth, ball_cloth
 
@@ -41,7 +41,8 @@ def run(quick: bool, seed: int) -> list[Row]:
     offsets = 5 if quick else 20
     for mode, timestep, speed in itertools.product(modes, timesteps, speeds):
         rows.append(_crossing(speed, timestep, mode, offsets))
-    return rows + _cost(0.45 if quick else 0.6)
+    rows += _cost(0.45 if quick else 0.6)
+    return rows + _summary(rows)
 
 
 def _scene(name: str, timestep: float, seconds: float | None, fine: int) -> list[Row]:
@@ -168,6 +169,44 @@ def _cost(seconds: float) -> list[Row]:
         }
         for score in report.scores
     ]
+
+
+def _summary(rows: list[Row]) -> list[Row]:
+    """What the tables say, beside what was asked."""
+    out = []
+    for name in CHECKERS:
+        mine = [r for r in rows if r["study"] == "scenes" and r["checker"] == name]
+        for kind in ("recall", "steps_recall", "precision"):
+            told = [r for r in mine if r[kind]["n"]]
+            count = sum(round(r[kind]["value"] * r[kind]["n"]) for r in told)
+            runs = sum(r[kind]["n"] for r in told)
+            worst = min(told, key=lambda r: r[kind]["value"])
+            text = f"{count} of {runs}, lowest {worst[kind]['value']:.4f} in {worst['scene']}"
+            bar = kind == "recall" and name != "mujoco"
+            met = count == runs if bar else None
+            out.append(answer(f"{name}: {kind}", "1.0" if bar else "figure", text, met))
+        if name != "mujoco":
+            leads = {r["scene"]: r["lead_ms"] for r in mine if r["lead_ms"] is not None}
+            text = ", ".join(f"{scene} {lead:.2g}" for scene, lead in leads.items())
+            longest = max(r["timestep_ms"] for r in mine)
+            out.append(answer(f"{name}: lead at {longest:g} ms [ms]", "figure", text))
+    flights = [r for r in rows if r["study"] == "crossing"]
+    seen = min(r["cloth_recall"]["value"] for r in flights)
+    off = max(r["cloth_time_error"] for r in flights)
+    out.append(answer("ball: crossings seen by cloth", "1.0", f"{seen:.3f}", seen == 1))
+    out.append(answer("ball: error of its time [s]", "below 1e-6", f"{off:.2g}", off < 1e-6))
+    for mode in dict.fromkeys(r["mode"] for r in flights):
+        mine = [r for r in flights if r["mode"] == mode]
+        shares = [
+            f"{kind} {np.mean([r[f'mujoco_{kind}']['value'] for r in mine]):.3f}"
+            for kind in ("generates", "holds")
+        ]
+        out.append(answer(f"ball: MuJoCo alone, {mode}", "share", ", ".join(shares)))
+    for row in (r for r in rows if r["study"] == "cost" and r["checker"] != "mujoco"):
+        text = f"{row['share']:.3f}, {row['share_with_state']:.3f} with the state's copy"
+        what = f"{row['checker']}: share of mj_step, arm and 40x40 cloth"
+        out.append(answer(what, "below 0.25", text, row["share_with_state"] < 0.25))
+    return out
 
 
 def draw(rows: list[Row], figure: Any) -> None:

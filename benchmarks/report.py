@@ -44,6 +44,17 @@ def rate(successes: int, trials: int) -> dict[str, float | int | None]:
     return {"value": p, "low": low, "high": high, "n": trials}
 
 
+def answer(question: str, asked: str, measured: str, met: bool | None = None) -> Row:
+    """A line of a study's closing summary; ``met`` is ``None`` where a figure has no bar."""
+    return {
+        "study": "summary",
+        "question": question,
+        "asked": asked,
+        "measured": measured,
+        "met": met,
+    }
+
+
 def measure(
     calls: Mapping[str, Callable[[], object]], repeats: int = 5
 ) -> dict[str, dict[str, float]]:

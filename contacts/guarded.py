@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 #: How far beyond the touch a cut step goes, so that MuJoCo finds the contact [m]. Less than the
 #: error of a shortened step would leave a gap; more is depth that the contact then pushes out.
 BEYOND = 1e-5
-#: Share of the depth at which a contact's normal turns over (:meth:`Approach.bound`) that a step may
+#: Share of the depth at which a normal turns over (:meth:`Approach.bound`) that a step may
 #: end with; a new contact that would be deeper is cut at its first touch.
 DEEP = 0.8
 #: A contact that was there before and becomes deeper than that is cut in halves, but only where
@@ -49,6 +49,7 @@ class StepReport:
     """What one guarded step did."""
 
     steps: int  #: calls of ``mj_step``, those that were taken back included
+    contacts: int  #: that MuJoCo listed, the most in any piece of the step that stood
     cuts: tuple[Cut, ...] = ()
     restored: tuple[Pair, ...] = ()  #: pairs whose contact parameters are as before again
     exhausted: bool = False  #: the work ran out with a cut still due: a miss is possible
@@ -118,7 +119,7 @@ class GuardedStepper:
         """Advance by one ``model.opt.timestep``."""
         whole, end = float(self.model.opt.timestep), self.data.time + self.model.opt.timestep
         rest, length = whole, self._piece(whole, whole)
-        steps, exhausted, cuts, first = 0, False, list[Cut](), None
+        steps, contacts, exhausted, cuts, first = 0, 0, False, list[Cut](), None
         before = self._now()
         try:
             while rest > 0:
@@ -138,6 +139,7 @@ class GuardedStepper:
                     cuts.append(Cut(self.data.time + length, pair, depth, stiffened))
                     continue
                 exhausted |= cut is not None
+                contacts = max(contacts, self.data.ncon)
                 rest = rest - length if length < rest else 0.0
                 length, before = self._piece(rest, whole), after
         finally:
@@ -147,7 +149,7 @@ class GuardedStepper:
             before = replace(before, time=end)
         self._last = before
         balance = None if first is None else self._balance(first)
-        return StepReport(steps, tuple(cuts), self._release(), exhausted, balance)
+        return StepReport(steps, contacts, tuple(cuts), self._release(), exhausted, balance)
 
     def _piece(self, rest: float, whole: float) -> float:
         """How far to go next: all the rest, or a piece of the step while guarded pairs touch."""
