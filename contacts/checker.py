@@ -82,14 +82,12 @@ class State:
         scratch = mujoco.MjData(model) if scratch is None else scratch
         mujoco.mj_copyState(model, data, scratch, _POSE)
         mujoco.mj_kinematics(model, scratch)
-        if not model.nflex:
-            vertices = np.zeros((0, 3))
-        elif model.flex_centered.all() and not model.flex_interp.any():
-            vertices = scratch.xpos.take(model.flex_vertbodyid, axis=0)
-        else:
+        if model.flex_interp.any():
             mujoco.mj_comPos(model, scratch)
             mujoco.mj_flex(model, scratch)
             vertices = scratch.flexvert_xpos.copy()
+        else:
+            vertices = _carried(model, scratch)
         return cls(
             time=float(data.time),
             qpos=data.qpos.copy(),
@@ -100,6 +98,18 @@ class State:
             geom_xmat=scratch.geom_xmat.copy(),
             flexvert_xpos=vertices,
         )
+
+
+def _carried(model: Any, data: Any) -> Array:
+    """Positions of flex vertices that their bodies carry, with the bits of ``mj_flex``. (V, 3)."""
+    body, local = model.flex_vertbodyid, model.flex_vert
+    vertices: Array = data.xpos.take(body, axis=0)
+    rows = np.flatnonzero(local.any(axis=1))  # the others lie at their body's origin
+    if len(rows):
+        turn = data.xmat.take(body[rows], axis=0).reshape(-1, 3, 3)
+        x, y, z = local[rows].T[:, :, None]
+        vertices[rows] += turn[:, :, 0] * x + turn[:, :, 1] * y + turn[:, :, 2] * z
+    return vertices
 
 
 def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:

@@ -40,6 +40,29 @@ def test_state_is_that_of_qpos_and_leaves_data_alone():
     assert state.time == 0.002
 
 
+def test_vertices_that_a_turning_body_carries_have_the_bits_of_mujoco():
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody>
+      <body name="b" euler="10 20 30"><joint type="ball"/><geom size=".1"/>
+        <flexcomp name="sheet" type="grid" dim="2" count="4 4 1" spacing=".1 .1 .1" pos=".3 .1 .2"
+          radius=".001" mass=".1"><edge equality="true"/><pin id="0 1 2 3 9"/></flexcomp>
+      </body></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    data.qvel[:3] = 3, -5, 7
+    for _ in range(20):
+        mujoco.mj_step(model, data)
+    state = State.of(model, data)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_array_equal(state.flexvert_xpos, data.flexvert_xpos)
+    assert np.abs(data.flexvert_xpos - data.xpos[model.flex_vertbodyid]).max() > 0.1
+
+
+@pytest.mark.parametrize("name", ["cloth", "rigid"])
+def test_a_checker_without_a_pair_reports_nothing(name):
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    state = State.of(model, mujoco.MjData(model))
+    assert len(checker(name, model).check(state, state)) == 0
+
+
 def test_contacts_check_their_shapes_and_join():
     assert len(Contacts.empty()) == len(Contacts.concatenate([])) == 0
     one = Contacts([0.5], [[0, -1]], [[-1, 0]], [[-1, 3]], [[0, 0, 1]], [[0, 0, 1]], [0.0])

@@ -217,6 +217,19 @@ def test_a_state_that_somebody_changes_is_seen():
     assert guard.step().cuts
 
 
+def test_the_report_tells_what_mujoco_listed():
+    """At 50 m/s and 5 ms plain steps list nothing; guarded ones do, from the first cut on."""
+    scene = ball_cloth(50.0, offset=0.5)
+    model, data = scene.start(5e-3)
+    for _ in range(4):
+        mujoco.mj_step(model, data)
+        assert data.ncon == 0
+    guard = GuardedStepper(*scene.start(5e-3), ["cloth"])
+    reports = [guard.step() for _ in range(4)]
+    assert [r.contacts > 0 for r in reports] == [False, False, True, True]
+    assert [len(r.cuts) > 0 for r in reports[:3]] == [False, False, True]
+
+
 def test_a_checker_that_fails_leaves_the_timestep_alone():
     class Failing(Crying):
         def check(self, before, after):
