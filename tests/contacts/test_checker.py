@@ -58,7 +58,9 @@ def test_vertices_that_a_turning_body_carries_have_the_bits_of_mujoco():
 
 @pytest.mark.parametrize("name", ["cloth", "rigid"])
 def test_a_checker_without_a_pair_reports_nothing(name):
-    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
+    )
     state = State.of(model, mujoco.MjData(model))
     assert len(checker(name, model).check(state, state)) == 0
 
