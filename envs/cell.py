@@ -90,8 +90,8 @@ class Cell:
 
     def place(self, i: int, q: Array) -> None:
         """Put copy ``i`` at rest at ``q`` [rad], shape (n,), everything else where it began."""
-        model, data = self.world.scene.model, self.datas[i]
-        mujoco.mj_resetData(model, data)
+        data = self.datas[i]
+        mujoco.mj_resetData(self.world.scene.model, data)
         data.qpos[self.world.scene.qpos_adr] = q
 
     def start(self, i: int) -> None:

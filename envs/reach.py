@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -35,10 +36,20 @@ class Reach(Task):
         self._scratch = mujoco.MjData(cell.world.scene.model)
         low, high = pose_box(cell.world.scene)
         each = len(low) // self.arms
-        self._low, self._high, self._each = low, high, each
+        parts = [slice(arm * each, (arm + 1) * each) for arm in range(self.arms)]
+        #: An arm each: where its joints are in qpos, and the box of poses to draw from.
+        self._poses = [(cell.world.scene.qpos_adr[p], low[p], high[p]) for p in parts]
+        model = cell.world.scene.model
+        #: A moving region each: addresses in qpos and qvel, span [m], speed [m/s].
+        self._ways = [
+            (int(model.jnt_qposadr[r.joint]), int(model.jnt_dofadr[r.joint]), r.span, r.speed)
+            if r.joint >= 0
+            else None
+            for r in cell.world.regions
+        ]
         base = cell.world.scene.model.joint(cell.world.scene.joint_names[0]).id
         mujoco.mj_forward(cell.world.scene.model, self._scratch)
-        self._base = self._scratch.xanchor[base].copy()
+        self._base: list[float] = self._scratch.xanchor[base].tolist()
 
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Near home, regions anywhere on their lines, a new target."""
@@ -53,27 +64,27 @@ class Reach(Task):
 
     def send_regions(self, i: int, rng: np.random.Generator) -> None:
         """Each at its speed towards the middle of its line, from its outer part."""
-        model, data = self.cell.world.scene.model, self.cell.datas[i]
-        for region in self.cell.world.regions:
-            side, place = rng.choice((-1.0, 1.0)), rng.uniform(0.5, 1.0)
-            if region.joint >= 0:
-                data.qpos[model.jnt_qposadr[region.joint]] = side * place * region.span
-                data.qvel[model.jnt_dofadr[region.joint]] = -side * region.speed
+        data = self.cell.datas[i]
+        qpos, qvel = data.qpos, data.qvel
+        for way in self._ways:
+            side, place = 2.0 * int(rng.integers(2)) - 1.0, rng.uniform(0.5, 1.0)
+            if way is not None:
+                at, moves, span, speed = way
+                qpos[at], qvel[moves] = side * place * span, -side * speed
 
     def draw(self, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
         """A place [m] that the tool can reach, at least :data:`APART` from ``apart``."""
         world, scratch = self.cell.world, self._scratch
-        part = slice(arm * self._each, (arm + 1) * self._each)
+        (adr, low, high), (bx, by, _) = self._poses[arm], self._base
         place = np.zeros(3)
         for _ in range(100):
-            scratch.qpos[world.scene.qpos_adr[part]] = rng.uniform(
-                self._low[part], self._high[part]
-            )
+            scratch.qpos[adr] = rng.uniform(low, high)
             mujoco.mj_kinematics(world.scene.model, scratch)
             place = tool_position(world, scratch, arm)
-            near = arm == 0 and np.hypot(*(place - self._base)[:2]) < NEAREST
+            x, y, z = place.tolist()
+            near = arm == 0 and math.hypot(x - bx, y - by) < NEAREST
             still = apart is not None and np.linalg.norm(place - apart) < APART
-            if place[2] >= LOWEST and not near and not still:
+            if z >= LOWEST and not near and not still:
                 break
         return place
 

@@ -45,9 +45,11 @@ class Picture:
             RuntimeError: there is nothing to draw with; the message says what would help.
         """
         self._world, self._data, self._mode = world, data, mode
+        #: The scene as it is shown, and its own state, which follows the simulated one.
+        self._model, self._drawn = world.shown, mujoco.MjData(world.shown)
         self._window: Any = None
         self._renderer: Any = None
-        model = world.scene.model
+        model = self._model
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)
         model.vis.global_.offheight = max(model.vis.global_.offheight, HEIGHT)
         model.vis.headlight.ambient[:] = AMBIENT
@@ -63,7 +65,7 @@ class Picture:
                 from mujoco import viewer
 
                 self._window = viewer.launch_passive(
-                    model, data, show_left_ui=False, show_right_ui=False
+                    model, self._drawn, show_left_ui=False, show_right_ui=False
                 )
                 self._look(self._window.cam)
             else:
@@ -83,18 +85,26 @@ class Picture:
         """Draw the state and a ball at each target, shape (arms, 3)."""
         if self._window is not None:
             with self._window.lock():
+                self._follow()
                 scene = self._window.user_scn
                 scene.ngeom = 0
                 self._mark(scene, targets)
             self._window.sync()
             return None
-        model, data = self._world.scene.model, self._data
-        mujoco.mj_camlight(model, data)
-        self._renderer.update_scene(data, self._camera, self._options)
+        self._follow()
+        self._renderer.update_scene(self._drawn, self._camera, self._options)
         self._mark(self._renderer.scene, targets)
         pixels: NDArray[np.uint8] = self._renderer.render()
         pixels[(pixels == 0).all(axis=2)] = BACKGROUND
         return pixels
+
+    def _follow(self) -> None:
+        model, drawn = self._model, self._drawn
+        for name in ("qpos", "qvel", "mocap_pos", "mocap_quat"):
+            getattr(drawn, name)[:] = getattr(self._data, name)
+        drawn.time = self._data.time
+        for place in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex):
+            place(model, drawn)
 
     def _mark(self, scene: Any, targets: NDArray[np.float64]) -> None:
         """The floor and a ball at each target."""

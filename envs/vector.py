@@ -181,25 +181,25 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         } | infos
 
     def _infos(self, success: Bools, mask: Bools) -> dict[str, Any]:
-        cell, figure = self.cell, self.cell.figure
-        area = self.world.settings.contact_area
+        cell, area = self.cell, self.world.settings.contact_area
+        figure = self.cell.figure.T.copy()  # a row a figure: no view of what the next step writes
         reason = np.full(self.num_envs, "", dtype=object)
-        reason[figure[:, DIVERGED] != 0] = DIVERGED_REASON
+        reason[figure[DIVERGED] != 0] = DIVERGED_REASON
         infos: dict[str, Any] = {
-            "time": figure[:, TIME].copy(),
-            "distance": figure[:, DISTANCE].copy(),
+            "time": figure[TIME],
+            "distance": figure[DISTANCE],
             "success": success.copy(),
-            "force": figure[:, FORCE].copy(),
-            "cost": figure[:, COST].copy(),
-            "pressure": figure[:, REGION_FORCE] / area if area else np.zeros(self.num_envs),
-            "limit_ratio": figure[:, RATIO].copy(),
-            "region": figure[:, REGION].astype(np.int64),
+            "force": figure[FORCE],
+            "cost": figure[COST],
+            "pressure": figure[REGION_FORCE] / area if area else np.zeros(self.num_envs),
+            "limit_ratio": figure[RATIO],
+            "region": figure[REGION].astype(np.int64),
             "tau_ext": cell.tau_ext.copy(),
             "residual": cell.residual.copy(),
             "alarm": cell.alarm.copy(),
-            "onset": figure[:, ONSET] != 0,
-            "onset_time": figure[:, ONSET_TIME].copy(),
-            "link": figure[:, LINK].astype(np.int64),
+            "onset": figure[ONSET] != 0,
+            "onset_time": figure[ONSET_TIME],
+            "link": figure[LINK].astype(np.int64),
             "reason": reason,
         }
         if cell.watching:

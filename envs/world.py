@@ -22,6 +22,7 @@ from tauguard.models import (
     cura6,
     cura6_drive,
     set_payload,
+    without_visuals,
 )
 
 Array = NDArray[np.float64]
@@ -67,7 +68,8 @@ class World:
     """A scene, and what the controller and the observation need to know about it."""
 
     settings: Settings
-    scene: Scene
+    scene: Scene  #: without the shapes that only show
+    shown: mujoco.MjModel  #: the same with them: bodies, joints and flexes have the same ids
     nominal: Drive  #: what the controller believes about the drive
     gains: Gains
     nominal_mass: Array  #: of the links [kg], shape (n,)
@@ -126,6 +128,8 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
     scene = compose(replace(spec, proxies=proxies))
     if arms == 2:
         scene = add_second_arm(scene, proxies)
+    shown = scene.model
+    scene = without_visuals(scene)
     if settings.ideal_drive:
         ideal = replace(
             scene.drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None
@@ -136,7 +140,7 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
     # A diverged state must stay visible instead of starting again at the origin by itself.
     scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return _known(settings, scene, bare, proxies, reach, arms)
+    return replace(_known(settings, scene, bare, proxies, reach, arms), shown=shown)
 
 
 def _known(
@@ -162,6 +166,7 @@ def _known(
     return World(
         settings=settings,
         scene=scene,
+        shown=scene.model,
         nominal=_repeat_drive(nominal, arms),
         gains=Gains(np.tile(gains.kp, arms), np.tile(gains.kd, arms)),
         nominal_mass=np.tile(bare.model.body_mass[bodies], arms),

@@ -206,3 +206,22 @@ def _add_label(spec: mujoco.MjSpec, link: str, name: str) -> None:
 def with_drive(scene: Scene, drive: Drive) -> Scene:
     """The same scene with other drives."""
     return replace(scene, drive=drive)
+
+
+def without_visuals(scene: Scene) -> Scene:
+    """The same scene without the shapes that only show, which every physics step would place.
+
+    Bodies, joints and sensors keep their ids; masses and motion keep their bits. ``xml`` stays that
+    of the whole scene. Returns ``scene`` itself where a shape that only shows has mass.
+    """
+    whole = mujoco.MjSpec.from_string(scene.xml)
+    touching = {name for pair in whole.pairs for name in (pair.geomname1, pair.geomname2)}
+    for geom in list(whole.geoms):
+        if not (geom.contype or geom.conaffinity or geom.name in touching):
+            whole.delete(geom)
+    lean = whole.compile()
+    same = all(
+        np.array_equal(getattr(lean, name), getattr(scene.model, name))
+        for name in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_pos", "jnt_pos")
+    )
+    return replace(scene, model=lean) if same else scene
