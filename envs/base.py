@@ -118,6 +118,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self.world, self.cell, self.task = build(self.task_type, keywords, 1)
         self.metadata = frame_rate(self.world)
         self.action_space, self.observation_space = make_spaces(self.cell)
+        self._shape, self._area = self.action_space.shape, self.world.settings.contact_area
+        #: The only copy's rows, views.
+        self._seen, self._figure = self.cell.observation[0], self.cell.figure[0]
+        self._tau_ext, self._residual = self.cell.tau_ext[0], self.cell.residual[0]
         self._picture: Picture | None = None
         self._begun = False
 
@@ -150,7 +154,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._begun = True
         if self.render_mode == "human":
             self.render()
-        return self.cell.observation[0].copy(), self._info(self.cell.figure[0].tolist(), False)
+        return self._seen.copy(), self._info(self._figure.tolist(), False)
 
     def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Act for one control step; entries beyond [-1, 1] count as -1 and 1.
@@ -160,15 +164,15 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         """
         if not self._begun:
             raise gymnasium.error.ResetNeeded("call reset before step")
-        cell = self.cell
+        cell, task = self.cell, self.task
         values = np.ascontiguousarray(action, dtype=np.float64)
-        if values.shape != self.action_space.shape:
+        if values.shape != self._shape:
             raise ValueError(
-                f"action: shape {values.shape}, expected {self.action_space.shape}: "
+                f"action: shape {values.shape}, expected {self._shape}: "
                 f"{', '.join(entry.name for entry in cell.actions)}"
             )
         cell.step(0, values, self.np_random)
-        task, figure = self.task, cell.figure[0].tolist()
+        figure = self._figure.tolist()
         reward, over, success, task.memory[0] = task.score(figure, task.memory.item(0))
         diverged = figure[DIVERGED] != 0
         info = self._info(figure, success)
@@ -176,11 +180,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             task.after(0, self.np_random)
         if self.render_mode == "human":
             self.render()
-        return cell.observation[0].copy(), float(reward), over and not diverged, diverged, info
+        return self._seen.copy(), float(reward), over and not diverged, diverged, info
 
     def _info(self, figure: list[float], success: bool) -> dict[str, Any]:
-        cell = self.cell
-        area = self.world.settings.contact_area
+        cell, area = self.cell, self._area
         info = {
             "time": figure[TIME],
             "distance": figure[DISTANCE],
@@ -190,9 +193,9 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "pressure": figure[REGION_FORCE] / area if area else 0.0,
             "limit_ratio": figure[RATIO],
             "region": int(figure[REGION]),
-            "tau_ext": cell.tau_ext[0].copy(),
-            "residual": cell.residual[0].copy(),
-            "alarm": bool(cell.alarm[0]),
+            "tau_ext": self._tau_ext.copy(),
+            "residual": self._residual.copy(),
+            "alarm": cell.alarm.item(0),
             "onset": bool(figure[ONSET]),
             "onset_time": figure[ONSET_TIME],
             "link": int(figure[LINK]),

@@ -46,7 +46,8 @@ class Picture:
         """
         self._world, self._data, self._mode = world, data, mode
         #: The scene as it is shown, and its own state, which follows the simulated one.
-        self._model, self._drawn = world.shown, mujoco.MjData(world.shown)
+        self._model = world.shown()
+        self._drawn = mujoco.MjData(self._model)
         self._window: Any = None
         self._renderer: Any = None
         model = self._model

@@ -11,7 +11,7 @@ from tauguard.models import BodyProxy, Drive, Scene
 from tauguard.models.arm import ARM_BITS, OBSTACLE_BITS
 from tauguard.models.mjcf import xml_text
 from tauguard.models.obstacles import Obstacle, add_pairs
-from tauguard.models.scene import _add_label
+from tauguard.models.scene import _add_label, without_visuals
 
 #: Names of the second arm's parts begin with this.
 PREFIX = "arm2_"
@@ -22,7 +22,8 @@ PLACE = (1.1, 0.0, 0.0)
 def add_second_arm(scene: Scene, proxies: tuple[BodyProxy, ...]) -> Scene:
     """The scene with a second, nominal arm of the same kind; joints and links of both in a row.
 
-    The two arms can touch one another, and both can touch what stands around.
+    The two arms can touch one another, and both can touch what stands around. The model is without
+    the shapes that only show; ``xml`` has them.
     """
     whole = mujoco.MjSpec.from_string(scene.xml)
     other = mujoco.MjSpec.from_string(scene.arm_xml)
@@ -76,14 +77,15 @@ def _of_second(body: mujoco.MjsBody) -> bool:
 
 
 def _located(scene: Scene, whole: mujoco.MjSpec, links: list[str]) -> Scene:
-    model = whole.compile()
+    shown, xml = whole.compile(), xml_text(whole)
+    model = without_visuals(whole, shown)
     names = (*scene.joint_names, *(PREFIX + name for name in scene.joint_names))
     joints = [model.joint(name) for name in names]
     bodies = [scene.model.body(int(b)).name for b in scene.link_bodies] + links
     return replace(
         scene,
         model=model,
-        xml=xml_text(whole),
+        xml=xml,
         joint_names=names,
         link_bodies=np.array([model.body(name).id for name in bodies]),
         qpos_adr=np.array([joint.qposadr[0] for joint in joints]),

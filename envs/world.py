@@ -22,7 +22,6 @@ from tauguard.models import (
     cura6,
     cura6_drive,
     set_payload,
-    without_visuals,
 )
 
 Array = NDArray[np.float64]
@@ -69,7 +68,6 @@ class World:
 
     settings: Settings
     scene: Scene  #: without the shapes that only show
-    shown: mujoco.MjModel  #: the same with them: bodies, joints and flexes have the same ids
     nominal: Drive  #: what the controller believes about the drive
     gains: Gains
     nominal_mass: Array  #: of the links [kg], shape (n,)
@@ -85,6 +83,10 @@ class World:
     def arms(self) -> int:
         """How many arms there are."""
         return len(self.tools)
+
+    def shown(self) -> mujoco.MjModel:
+        """The scene with the shapes that only show; bodies, joints and flexes have the same ids."""
+        return mujoco.MjModel.from_xml_string(self.scene.xml)
 
     def ids(self) -> NDArray[np.int64]:
         """MuJoCo ids of the arm's joints, shape (n,)."""
@@ -125,11 +127,9 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
         item if isinstance(item, BodyProxy) else (placing or crossing)(item, bare, reach)
         for item in settings.obstacles
     )
-    scene = compose(replace(spec, proxies=proxies))
+    scene = compose(replace(spec, proxies=proxies), visuals=False)
     if arms == 2:
         scene = add_second_arm(scene, proxies)
-    shown = scene.model
-    scene = without_visuals(scene)
     if settings.ideal_drive:
         ideal = replace(
             scene.drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None
@@ -140,7 +140,7 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
     # A diverged state must stay visible instead of starting again at the origin by itself.
     scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return replace(_known(settings, scene, bare, proxies, reach, arms), shown=shown)
+    return _known(settings, scene, bare, proxies, reach, arms)
 
 
 def _known(
@@ -166,7 +166,6 @@ def _known(
     return World(
         settings=settings,
         scene=scene,
-        shown=scene.model,
         nominal=_repeat_drive(nominal, arms),
         gains=Gains(np.tile(gains.kp, arms), np.tile(gains.kd, arms)),
         nominal_mass=np.tile(bare.model.body_mass[bodies], arms),

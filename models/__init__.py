@@ -10,7 +10,7 @@ from tauguard.models.mismatch import Mismatch
 from tauguard.models.nominal import add_payload, compiled, pin_model
 from tauguard.models.obstacles import BodyProxy, Clamp, Striker, Table
 from tauguard.models.payload import set_payload
-from tauguard.models.scene import Scene, SceneSpec, compose, with_drive, without_visuals
+from tauguard.models.scene import Scene, SceneSpec, compose, with_drive
 
 __all__ = [
     "BODY_REGIONS",
@@ -41,5 +41,4 @@ __all__ = [
     "set_payload",
     "standard_mass",
     "with_drive",
-    "without_visuals",
 ]

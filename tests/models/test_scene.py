@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.models import (
+    BodyProxy,
     Clamp,
     Friction,
     Mismatch,
@@ -117,3 +118,28 @@ def test_sensors_quantise_after_noise():
     np.testing.assert_allclose(q / 1e-3, np.round(q / 1e-3), atol=1e-9)
     assert np.isfinite(qd).all()
     assert cura6_drive().sensors is not None
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        SceneSpec(proxies=(BodyProxy("chest", (0.25, 0.3, 0.45), (0, -1, 0)),)),
+        SceneSpec(striker=Striker(), clamp=Clamp(), payload=True, mismatch=Mismatch(4)),
+    ],
+)
+def test_shapes_that_only_show_do_not_move_anything(spec):
+    scenes = compose(spec), compose(spec, visuals=False)
+    assert scenes[1].model.ngeom < scenes[0].model.ngeom
+    assert scenes[1].xml == scenes[0].xml
+    ends = []
+    for scene in scenes:
+        data = mujoco.MjData(scene.model)
+        data.qpos[scene.qpos_adr] = scene.home
+        for name in {"chest", "striker"} & names(scene):  # thrown at the falling arm
+            data.qvel[scene.model.jnt_dofadr[scene.model.body(name).jntadr[0]] :][:1] = 1.0
+        touched = 0
+        for _ in range(1500):
+            mujoco.mj_step(scene.model, data)
+            touched += data.ncon
+        ends.append(np.concatenate([data.qpos, data.qvel, data.sensordata, [touched]]))
+    assert np.array_equal(*ends)

@@ -77,7 +77,7 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
     from tauguard.replay.live import LiveView
 
     inner = env.unwrapped
-    view = LiveView(inner.world.shown, save, port)
+    view = LiveView(inner.world.shown(), save, port)
     view.layout(
         {
             "force": "Contact force and limit [N, of the limit]",
