@@ -19,8 +19,9 @@ class FrameStats:
             ``front`` (entries kept for the next frame), ``leaf_pairs``; pairs of features left out
             as ``adjacent`` or ``kept_apart`` (by groups); ``candidates``; how many of them the
             cubic cleared (``cubic_sign``: no root) and its roots (``roots``: no contact at any);
-            how many were ``resolved`` one by one, cut into how many ``intervals`` of time, and how
-            many of them ``exact`` arithmetic decided; ``hits``.
+            how many were ``resolved`` one by one, cut into how many ``intervals`` of time; how
+            many ``exact`` arithmetic decided, and of these with integers of any length
+            (``long_exact``), the others with integers of fixed width; ``hits``.
         ee: The same of the edge-edge side.
         seconds: Wall time of each phase: ``project`` (positions onto the axes), ``build``,
             ``refit``, ``traverse``, ``vf`` and ``ee`` (candidates and narrow phase of each side),

@@ -129,6 +129,7 @@ void refine(Root& root) {
     if (guess + off > 0 && narrow(root, Dyadic(guess + off), below)) return;
   while (!(root.hi - root.lo < one.scaled(-60)))
     if (narrow(root, (root.lo + root.hi).scaled(-1), below)) return;
+  narrow(root, Dyadic(root.hi.to_double()), below);  // a root that is a double is exact
 }
 
 // Intervals with one root each of p, which has no double roots and none at 0 or 1. Where a midpoint is a

@@ -120,6 +120,7 @@ void add_counts(nb::dict& d, const Stats& s) {
   d["resolved"] = s.resolved;
   d["intervals"] = s.intervals;
   d["exact"] = s.exact;
+  d["long_exact"] = s.long_exact;
 }
 
 // {"pairs", "toi", "point", "normal", "weights"} and, under "counts", what led to them.

@@ -11,6 +11,7 @@
 #include "batch.hpp"
 #include "comparators.hpp"
 #include "exact.hpp"
+#include "integer_contact.hpp"
 #include "intervals.hpp"
 #include "query.hpp"
 
@@ -101,6 +102,9 @@ int split(const double* b, double error, std::int32_t query, Piece* pieces) {
 template <bool vf>
 double exactly(const double* x0, const double* x1, const std::int32_t* row, Stats& stats) {
   ++stats.exact;
+  const double t = integer_contact(vf, x0, x1, row);
+  if (!std::isnan(t)) return t;
+  ++stats.long_exact;
   return exact_contact(vf, x0, x1, row);
 }
 
@@ -198,7 +202,9 @@ void one_by_one(const double* x0, const double* x1, const std::int32_t* rows, in
     if (method == Method::ab2pf) {
       toi[i] = resolve<vf>(x0, x1, row, distance, stats);
     } else {
-      toi[i] = exactly<vf>(x0, x1, row, stats);
+      ++stats.exact;
+      ++stats.long_exact;
+      toi[i] = exact_contact(vf, x0, x1, row);
     }
   }
 }

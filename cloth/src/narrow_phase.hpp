@@ -17,15 +17,17 @@ struct ImpactArrays {
 };
 
 // How many queries each filter removed (no root of the cubic; no contact at its roots); how many were resolved
-// one by one and cut into how many intervals of time; how many of them exact arithmetic decided.
+// one by one and cut into how many intervals of time; how many exact arithmetic decided, and of these with numbers of
+// any length.
 struct Stats {
-  std::uint64_t cubic_sign = 0, roots = 0, resolved = 0, intervals = 0, exact = 0;
+  std::uint64_t cubic_sign = 0, roots = 0, resolved = 0, intervals = 0, exact = 0, long_exact = 0;
   Stats& operator+=(const Stats& o) {
     cubic_sign += o.cubic_sign;
     roots += o.roots;
     resolved += o.resolved;
     intervals += o.intervals;
     exact += o.exact;
+    long_exact += o.long_exact;
     return *this;
   }
 };

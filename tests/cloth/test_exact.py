@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from tauguard.benchmarks.cloth_queries import Queries, solver
 from tauguard.cloth import edge_edge, vertex_face
 from tests.cloth.rational import first_contact
 
@@ -18,7 +19,18 @@ flat = hnp.arrays(np.float64, (2, 4, 3), elements=st.integers(-3, 3).map(float))
 line = hnp.arrays(np.float64, (2, 4, 1), elements=st.integers(-3, 3).map(float)).map(
     lambda x: x * np.array([1, 2, -1])
 )
+apart = hnp.arrays(
+    np.float64,
+    (2, 4, 3),
+    elements=st.tuples(st.integers(-3, 3), st.integers(-70, 5)).map(lambda m: m[0] * 2.0 ** m[1]),
+)
 thirds = lattice.map(lambda x: x / 3)  # rounded: nearly degenerate, not quite
+
+
+def answered(kind, x, method):
+    start, end = (np.ascontiguousarray(x[:, i]).reshape(-1, 3) for i in (0, 1))
+    rows = np.arange(4 * len(x), dtype=np.int32).reshape(-1, 4)
+    return solver(Queries(kind == "vf", start, end, rows), method)()
 
 
 def assert_right(kind, x):
@@ -34,7 +46,7 @@ def assert_right(kind, x):
 
 
 @pytest.mark.parametrize("kind", QUERIES)
-@pytest.mark.parametrize("positions", [lattice, flat, line, thirds])
+@pytest.mark.parametrize("positions", [lattice, flat, line, thirds, apart])
 def test_any_query_is_answered_as_integers_do(kind, positions):
     @settings(deadline=None, max_examples=60)
     @given(positions)
@@ -50,6 +62,25 @@ def test_random_queries(kind, offset):
     rng = np.random.default_rng(0)
     for x in rng.normal(size=(40, 2, 4, 3)) + offset:
         assert_right(kind, x)
+
+
+@pytest.mark.parametrize("kind", QUERIES)
+def test_integers_of_fixed_width_decide_most_and_as_those_of_any_width(kind):
+    """Made to touch in a corner or on an edge, flat, on a lattice: with exponents far apart too."""
+    rng = np.random.default_rng(5)
+    x = rng.normal(size=(3_000, 2, 4, 3))
+    x[:1000, 1, 0] = 2 * (x[:1000, :, 1] + x[:1000, :, 2]).sum(axis=1) / 4 - x[:1000, 0, 0]
+    x[1000:2000, :, :, 2] = 0
+    x[2000:] = rng.integers(-2, 3, size=(1000, 2, 4, 3)) / 3
+    x[::10] *= 10.0 ** rng.integers(-9, 9, size=(300, 1, 1, 3))  # an axis each
+    x[5::10] *= 10.0 ** rng.integers(-40, 1, size=(300, 2, 4, 3))  # a coordinate each
+    ours, exact = (answered(kind, x, method) for method in ("ab2pf", "exact"))
+    assert np.array_equal(ours.hit, exact.hit)
+    early = exact.toi[exact.hit] - ours.toi[exact.hit]
+    assert early.min() >= 0
+    assert early.max() <= 1e-9
+    assert ours.counts["exact"] > 500
+    assert 0 < ours.counts["long_exact"] < 0.5 * ours.counts["exact"]
 
 
 @pytest.mark.parametrize("kind", QUERIES)

@@ -1,0 +1,168 @@
+// The same steps as in exact.cpp; the words are explained there.
+#include "integer_contact.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+#include <optional>
+
+#include "forms.hpp"
+
+namespace tauguard::cloth {
+namespace {
+
+using Vector = std::array<Form<1>, 3>;
+
+constexpr int coordinate_bits = 116;
+
+// A finite double as mantissa 2^exponent; the mantissa is odd or zero.
+struct Binary {
+  std::int64_t mantissa;
+  int exponent;
+  explicit Binary(double x) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    const int field = static_cast<int>(bits >> 52 & 0x7ff);
+    mantissa = static_cast<std::int64_t>((bits & ((std::uint64_t{1} << 52) - 1)) | std::uint64_t{field != 0} << 52);
+    const int zeros = mantissa ? __builtin_ctzll(mantissa) : 0;
+    mantissa >>= zeros;
+    exponent = std::max(field, 1) - 1075 + zeros;
+    if (bits >> 63) mantissa = -mantissa;
+  }
+  int bits() const { return 64 - __builtin_clzll(mantissa < 0 ? -mantissa : mantissa); }
+};
+
+// Coordinates k of four vertices at both ends, [vertex][end], in units of a power of two (each axis its own, which
+// changes neither contact nor its time); false where they do not fit.
+bool on_axis(const double* x0, const double* x1, const std::int32_t* row, int k, FixedInt<2> (*out)[2]) {
+  int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
+  for (int v = 0; v < 4; ++v)
+    for (const double* x : {x0, x1}) {
+      const Binary b(x[3 * std::ptrdiff_t(row[v]) + k]);
+      if (b.mantissa == 0) continue;
+      least = std::min(least, b.exponent);
+      most = std::max(most, b.exponent + b.bits());
+    }
+  if (least < most && most - least > coordinate_bits) return false;
+  for (int v = 0; v < 4; ++v)
+    for (int e = 0; e < 2; ++e) {
+      const Binary b((e ? x1 : x0)[3 * std::ptrdiff_t(row[v]) + k]);
+      out[v][e] = FixedInt<2>(b.mantissa).shifted(b.mantissa ? b.exponent - least : 0);
+    }
+  return true;
+}
+
+Form<2> cross(const Vector& a, const Vector& b, int k) {
+  const int i = (k + 1) % 3, j = (k + 2) % 3;
+  return a[i] * b[j] - a[j] * b[i];
+}
+
+class Hull {
+ public:
+  // The vertices' coordinates as [axis][vertex][end].
+  Hull(bool vf, const FixedInt<2> (&x)[3][4][2]) : corners_(vf ? 3 : 4) {
+    constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}}, of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
+    for (int i = 0; i < corners_; ++i) {
+      const int* pair = vf ? of_vf[i] : of_ee[i];
+      for (int k = 0; k < 3; ++k)
+        for (int e = 0; e < 2; ++e) corner_[i][k].c[e] = x[k][pair[0]][e] - x[k][pair[1]][e];
+    }
+  }
+
+  double first_contact() {
+    const Form<3> cubic = corner_[0][0] * side(1, 0) + corner_[0][1] * side(1, 1) + corner_[0][2] * side(1, 2);
+    if (cubic.zero()) return first_contact_in_plane();
+    const auto roots = roots_of(cubic);
+    return first_of(roots.all.data(), roots.count, roots.complete);
+  }
+
+ private:
+  static constexpr double never = std::numeric_limits<double>::infinity(),
+                          silent = std::numeric_limits<double>::quiet_NaN();
+
+  const Vector& after(int i) const { return corner_[(i + 1) % corners_]; }
+  const Form<2>& side(int i, int k) {
+    auto& known = sides_[i][k];
+    if (!known) known = cross(corner_[i], after(i), k);
+    return *known;
+  }
+
+  // Sets open_ where a sign is unknown; what is returned then is of no use.
+  template <class Time>
+  int sign(const Form<2>& q, const Time& t) {
+    const int s = sign_at(q, t);
+    open_ = open_ || s == unknown_sign;
+    return s;
+  }
+
+  template <class Time>
+  bool between(const Time& t, const Vector& a, const Vector& b) {
+    for (int k = 0; k < 3; ++k)
+      if (sign(cross(a, b, k), t) != 0) return false;
+    return sign(a[0] * b[0], t) <= 0 && sign(a[1] * b[1], t) <= 0 && sign(a[2] * b[2], t) <= 0;
+  }
+
+  template <class Time>
+  bool contains_origin(const Time& t) {
+    for (int k = 0; k < 3; ++k) {
+      Form<2> area = side(0, k);
+      for (int i = 1; i < corners_; ++i) area = area + side(i, k);
+      const int s = sign(area, t);
+      if (s == 0) continue;
+      for (int i = 0; i < corners_; ++i)
+        if (sign(side(i, k), t) == -s) return false;
+      return true;
+    }
+    for (int i = 0; i < corners_; ++i)
+      for (int j = i + 1; j < corners_; ++j)
+        if (between(t, corner_[i], corner_[j])) return true;
+    return false;
+  }
+
+  template <class Time>
+  double first_of(const Time* times, int count, bool complete) {
+    for (int i = 0; i < count; ++i) {
+      const bool contact = contains_origin(times[i]);
+      if (open_) return silent;
+      if (contact && (complete || times[i].lo == 0)) return static_cast<double>(times[i].lo) * 0x1p-52;
+    }
+    return complete ? never : silent;
+  }
+
+  double first_contact_in_plane() {
+    const FormRoot<2> start{0, 0};
+    const bool touching = contains_origin(start);
+    if (open_ || touching) return touching && !open_ ? 0 : silent;
+    std::array<FormRoot<2>, 16> times;
+    int count = 0;
+    bool complete = true;
+    for (int i = 0; i < corners_; ++i) {
+      int k = 0;
+      while (k < 3 && side(i, k).zero()) ++k;
+      if (k == 3) return silent;  // on a line
+      const auto roots = roots_of(side(i, k));
+      std::copy_n(roots.all.begin(), roots.count, times.begin() + count);
+      count += roots.count;
+      complete = complete && roots.complete;
+    }
+    std::sort(times.begin(), times.begin() + count, [](const auto& a, const auto& b) { return a.lo < b.lo; });
+    return first_of(times.data(), count, complete);
+  }
+
+  int corners_;
+  std::array<Vector, 4> corner_;
+  std::array<std::array<std::optional<Form<2>>, 3>, 4> sides_{};
+  bool open_ = false;
+};
+
+}  // namespace
+
+double integer_contact(bool vf, const double* x_t0, const double* x_t1, const std::int32_t* row) {
+  FixedInt<2> x[3][4][2];
+  for (int k = 0; k < 3; ++k)
+    if (!on_axis(x_t0, x_t1, row, k, x[k])) return std::numeric_limits<double>::quiet_NaN();
+  return Hull(vf, x).first_contact();
+}
+
+}  // namespace tauguard::cloth
