@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.detectors import _ranking
-from tauguard.detectors.calibrate import free_rows
-from tauguard.detectors.estimator import ArmModel
-from tauguard.detectors.front_end import FrontEnd
+from tauguard.detectors.estimator import Estimate
+from tauguard.detectors.per_joint import PerJoint
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
@@ -38,55 +36,29 @@ def bounded_cusum(increments: ArrayLike, cap: ArrayLike) -> Array:
 
 
 @dataclass
-class Cusum:
+class Cusum(PerJoint):
     """Two-sided CUSUM of every joint's residual in units of its envelope; the largest counts.
 
     The statistic grows by (|ratio| - drift) dt while the ratio keeps its sign, falls otherwise,
     and stays between 0 and a bound; the score is in seconds times the drift. The residual of free
-    motion is not white (friction errors last), so the drift is what free motion exceeds in one
-    sample of a hundred, not the half of a shift that white noise would ask for.
+    motion is not white (friction errors last), so the drift is the limit that free motion exceeds
+    in one sample of a hundred, not the half of a shift that white noise would ask for.
     """
 
-    front: FrontEnd = field(default_factory=FrontEnd)
-    drift: Array | None = None  #: ratio that does not count yet, shape (joints,)
-    name: str = "cusum"
+    name: ClassVar[str] = "cusum"
+    share: ClassVar[float] = 0.99
 
-    @property
-    def settle(self) -> float:
-        """Seconds at the beginning of a trace whose scores mean nothing yet."""
-        return self.front.settle
-
-    @property
-    def arm(self) -> ArmModel:
-        """The calibrated arm."""
-        return self.front.fitted()[0]
-
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> Cusum:
-        """Calibrate the arm, fit the envelope and take each joint's drift."""
-        estimates = self.front.fit(traces, robot)
-        free = [
-            np.abs(self.front.ratio(t, e)[free_rows(t, self.settle)])
-            for t, e in zip(traces, estimates, strict=True)
-        ]
-        self.drift = np.maximum(np.quantile(np.concatenate(free), 0.99, axis=0), 1e-9)
-        return self
+    def deviation(self, trace: Trace, estimate: Estimate) -> Array:
+        """The residual over its envelope."""
+        return self.front.ratio(trace, estimate)
 
     def scores(self, trace: Trace) -> Array:
         """The largest statistic over joints and signs, in units of its drift [s], shape (T,)."""
         ratio = self.front.ratio(trace)
-        assert self.drift is not None
+        assert self.limits is not None
         ratio[trace.t - trace.t[0] < self.settle] = 0.0
         both = np.concatenate([ratio, -ratio], axis=1)
-        drift = np.concatenate([self.drift, self.drift])
+        drift = np.concatenate([self.limits, self.limits])
         level = bounded_cusum((both - drift) * self.front.dt, drift * RECOVERY)
         score: Array = (level / drift).max(axis=1)
         return score
-
-    def parts(self) -> dict[str, Any]:
-        """What a model file keeps."""
-        return {"front": self.front.parts(), "drift": self.drift}
-
-    @classmethod
-    def from_parts(cls, parts: dict[str, Any]) -> Cusum:
-        """The detector again from :meth:`parts`."""
-        return cls(FrontEnd.from_parts(parts["front"]), np.asarray(parts["drift"]))

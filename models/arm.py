@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.models import cura6
+from tauguard.models.mjcf import compiled
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,7 @@ def load_arm(source: str) -> Arm:
 
 def _from_file(path: Path) -> Arm:
     spec = mujoco.MjSpec.from_file(str(path))
-    model = _compiled(spec)
+    model = compiled(spec)
     limits = _torque_limits(model)
     home = model.key_qpos[0].copy() if model.nkey else model.qpos0.copy()
     for element in (*spec.actuators, *spec.sensors, *spec.keys):
@@ -103,22 +104,6 @@ def _from_file(path: Path) -> Arm:
     arm = Arm(spec, links, joints, limits, home)
     spec.compile()
     return arm
-
-
-def _compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The model of ``spec``, without its meshes where they are not at hand."""
-    try:
-        return spec.compile()
-    except ValueError as error:
-        for geom in list(spec.geoms):
-            if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
-                spec.delete(geom)
-        for mesh in list(spec.meshes):
-            spec.delete(mesh)
-        try:
-            return spec.compile()
-        except ValueError:
-            raise error from None
 
 
 def _torque_limits(model: mujoco.MjModel) -> Array:

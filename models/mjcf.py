@@ -1,4 +1,4 @@
-"""MJCF text that compiles to the same numbers again."""
+"""Specs compiled without meshes that are not at hand; text that gives the same numbers again."""
 
 from __future__ import annotations
 
@@ -36,3 +36,23 @@ def xml_text(spec: mujoco.MjSpec) -> str:
         return str(spec.to_xml())
     finally:
         library._mjPRIVATE__set_xml_precision(before)
+
+
+def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The model of ``spec``, without its mesh geoms where these keep it from compiling.
+
+    Raises:
+        ValueError: it does not compile either way; MuJoCo's first message.
+    """
+    try:
+        return spec.compile()
+    except (ValueError, RuntimeError) as error:
+        for geom in list(spec.geoms):
+            if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
+                spec.delete(geom)
+        for mesh in list(spec.meshes):
+            spec.delete(mesh)
+        try:
+            return spec.compile()
+        except (ValueError, RuntimeError):
+            raise ValueError(str(error)) from error

@@ -58,6 +58,8 @@ def load_model(source: Any) -> Any:
     """
     import mujoco
 
+    from tauguard.models.mjcf import compiled
+
     if isinstance(source, mujoco.MjModel):
         return source
     is_text = isinstance(source, str) and source.lstrip().startswith("<")
@@ -71,23 +73,8 @@ def load_model(source: Any) -> Any:
         raise ValueError(f"{name}: no MJCF or URDF: {error}") from error
     spec.compiler.discardvisual = False
     try:
-        return spec.compile()
-    except (ValueError, RuntimeError) as error:
-        return without_meshes(spec, name, error)
-
-
-def without_meshes(spec: Any, name: str, error: Exception) -> Any:
-    """The model of ``spec`` without its mesh geoms, if that is what keeps it from compiling."""
-    import mujoco
-
-    for geom in list(spec.geoms):
-        if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
-            spec.delete(geom)
-    for mesh in list(spec.meshes):
-        spec.delete(mesh)
-    try:
-        return spec.compile()
-    except (ValueError, RuntimeError):
+        return compiled(spec)
+    except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
 
 
