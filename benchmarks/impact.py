@@ -274,7 +274,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
         if other in ("euler", "implicit"):
             continue  # on top of the default
         label = f"{row['timestep_ms']:g} ms" if plain else f"{other}, 1 ms"
-        left.annotate(f"  {label}", at, fontsize=8, va="center")
+        place = dict(xytext=(-6, -12)) if label == "1 ms" else dict(xytext=(7, 0))
+        left.annotate(label, at, **place, textcoords="offset points", fontsize=8, va="center")
     left.margins(x=0.25)
     left.axhline(2, color="0.5", lw=0.8, ls="--")
     left.set(

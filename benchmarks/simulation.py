@@ -146,6 +146,8 @@ def follow(seed: int, seconds: float, timestep: float) -> np.ndarray:
 
 def draw(rows: list[Row], figure: Figure) -> None:
     """Cost of each thing as bars; error against cost over the time step."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     left, right = figure.subplots(1, 2)
     cost = [row for row in rows if row["study"] == "cost"]
     names = [row["scene"] for row in cost]
@@ -155,7 +157,11 @@ def draw(rows: list[Row], figure: Figure) -> None:
     steps = [row for row in rows if row["study"] == "timestep"]
     x = [row["us_per_simulated_ms"]["median"] for row in steps]
     y = [row["q_error_rad"] for row in steps]
-    right.loglog(x, y, "o-", color="#d95f02")
+    right.loglog(x, y, "o", color="#d95f02")
+    right.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    right.xaxis.set_major_formatter("{x:g}")
+    right.xaxis.set_minor_formatter(NullFormatter())
+    right.margins(x=0.15)
     for row, a, b in zip(steps, x, y, strict=True):
         right.annotate(f" {row['timestep_ms']:g} ms", (a, b))
     right.set(
