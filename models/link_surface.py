@@ -1,0 +1,125 @@
+"""Points all over the links of an arm: where something can touch it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.models.nominal import compiled
+
+Array = NDArray[np.float64]
+
+#: Points on each link, and lines that may be tried for each of them (thin links are often missed).
+POINTS, TRIES = 300, 40
+
+
+@dataclass(frozen=True, eq=False)
+class LinkSurface:
+    """Points spread evenly over the collision geometry of the moving links.
+
+    Link i moves with joint i; its frame has the origin on the joint and the body's axes, which is
+    Pinocchio's joint frame.
+    """
+
+    link: NDArray[np.int64]  #: 0-based, rising, shape (K,)
+    point: Array  #: in the link's frame [m], shape (K, 3)
+    normal: Array  #: unit vector out of the link, in its frame, shape (K, 3)
+
+    def __post_init__(self) -> None:
+        """Check shapes: ``ValueError`` names the field."""
+        count = len(self.link)
+        for name in ("point", "normal"):
+            value = getattr(self, name)
+            if value.shape != (count, 3) or not np.isfinite(value).all():
+                raise ValueError(f"{name}: shape {value.shape}, expected ({count}, 3) numbers")
+        if count and (self.link.min() < 0 or (np.diff(self.link) < 0).any()):
+            raise ValueError("link: expected 0-based numbers in rising order")
+
+
+def link_surface(
+    source: str | Path | mujoco.MjSpec | mujoco.MjModel, points: int = POINTS, seed: int = 0
+) -> LinkSurface:
+    """Sample the surface of every moving link of an arm.
+
+    Straight lines with uniformly distributed direction and offset meet a convex surface with equal
+    density everywhere (Crofton), so the points where such lines enter a link are spread evenly over
+    what can be touched from outside; what lies inside another geom of the link is never met.
+
+    Args:
+        source: MJCF or URDF (text or file), a spec or a compiled model, holding the arm only.
+        points: wanted on each link.
+        seed: of the lines.
+
+    Raises:
+        ValueError: no model, or no collision geometry (``contype`` or ``conaffinity``) on any
+            moving link, as in a URDF without shapes.
+    """
+    if points < 1:
+        raise ValueError(f"points {points}: expected 1 or more")
+    model = compiled(source)
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0
+    mujoco.mj_kinematics(model, data)
+    rng = np.random.default_rng(seed)
+    links, places, normals = [], [], []
+    for joint in range(model.njnt):
+        geoms = _touchable(model, int(model.jnt_bodyid[joint]))
+        if not len(geoms):
+            continue
+        place, out = _entries(model, data, geoms, points, rng)
+        body = int(model.jnt_bodyid[joint])
+        frame = data.xmat[body].reshape(3, 3)
+        places.append((place - data.xpos[body]) @ frame - model.jnt_pos[joint])
+        normals.append(out @ frame)
+        links.append(np.full(len(place), joint, dtype=np.int64))
+    if not links:
+        raise ValueError("robot: no link has collision geometry; give a model with its shapes")
+    return LinkSurface(np.concatenate(links), np.concatenate(places), np.concatenate(normals))
+
+
+def _touchable(model: mujoco.MjModel, body: int) -> NDArray[np.intp]:
+    """Collision geoms that move with ``body``, welded bodies included."""
+    own = model.body_weldid[model.geom_bodyid] == body
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return np.flatnonzero(own & solid)
+
+
+def _entries(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    geoms: NDArray[np.intp],
+    wanted: int,
+    rng: np.random.Generator,
+) -> tuple[Array, Array]:
+    """Where random lines enter the geoms, and the outward normals there, world frame."""
+    before = model.geom_group.copy()
+    model.geom_group[:] = 0
+    model.geom_group[geoms] = 1
+    only = np.array([0, 1, 0, 0, 0, 0], dtype=np.uint8)
+    centres, radii = data.geom_xpos[geoms], model.geom_rbound[geoms]
+    low, high = (centres - radii[:, None]).min(axis=0), (centres + radii[:, None]).max(axis=0)
+    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    places, outs = [], []
+    for direction in _directions(rng, TRIES * wanted):
+        if len(places) == wanted:
+            break
+        across = np.linalg.svd(direction[None])[2][1:]
+        offset = radius * np.sqrt(rng.random()) * np.exp(2j * np.pi * rng.random())
+        start = centre - 2 * radius * direction + np.array([offset.real, offset.imag]) @ across
+        geom, normal = np.full(1, -1, dtype=np.int32), np.zeros(3)
+        along = mujoco.mj_ray(model, data, start, direction, only, 1, -1, geom, normal)
+        if along >= 0:
+            places.append(start + along * direction)
+            outs.append(normal / np.linalg.norm(normal))
+    model.geom_group[:] = before
+    return np.array(places).reshape(-1, 3), np.array(outs).reshape(-1, 3)
+
+
+def _directions(rng: np.random.Generator, count: int) -> Array:
+    directions = rng.normal(size=(count, 3))
+    unit: Array = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return unit
