@@ -8,6 +8,7 @@ from tauguard.detectors.conformal import (
     promised,
 )
 from tauguard.detectors.detector import Detector
+from tauguard.detectors.diagnosis import Diagnoser, Diagnosis, diagnose
 from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.events import Matching, find_alarms, judge, match
 from tauguard.detectors.filter import Confirmation, confirmed
@@ -37,6 +38,8 @@ __all__ = [
     "Confirmation",
     "Detector",
     "DetectorSettings",
+    "Diagnoser",
+    "Diagnosis",
     "EpisodeLevels",
     "Estimate",
     "Estimator",
@@ -54,6 +57,7 @@ __all__ = [
     "calibrate",
     "calibrate_threshold",
     "confirmed",
+    "diagnose",
     "figures",
     "find_alarms",
     "gravity_torque",

@@ -11,7 +11,7 @@ a point that needs an unlikely force, or could have explained any residual, coun
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -100,11 +100,17 @@ class ContactBelief:
     point: Array  #: world frame [m], shape (K, 3)
     probability: Array  #: of a contact there, sums to 1, shape (K,)
     force: Array  #: mean force on the arm if the contact is there, world frame [N], shape (K, 3)
+    prior: Array  #: probability before the residual was seen, shape (K,)
     evidence: float  #: log of the residual's probability density under "some contact"
+
+    def weighted(self, probability: Array) -> ContactBelief:
+        """The same points and forces, with what is known of the point from elsewhere."""
+        return replace(self, probability=probability)
 
     def links(self, count: int) -> Array:
         """Probability of each link, shape (count,)."""
-        return np.bincount(self.link, self.probability, minlength=count)
+        shares: Array = np.bincount(self.link, self.probability, minlength=count).astype(float)
+        return shares
 
     def on(self, link: int) -> tuple[Array, Array]:
         """Expected force [N] and the surface point [m] nearest to the expected one, given a link.
@@ -169,8 +175,8 @@ def contact_belief(
     log = np.stack(logs)  # (S, K)
     count = np.bincount(surface.link, minlength=n)
     used = int((count > 0).sum())
-    prior = -np.log(len(scales) * used * count[surface.link])
-    total = logsumexp(log, axis=0) + prior
+    prior = 1.0 / (used * count[surface.link])
+    total = logsumexp(log, axis=0) + np.log(prior / len(scales))
     mixed = np.einsum("sk,ski->ki", np.exp(log - logsumexp(log, axis=0)), np.stack(means))
     evidence = float(logsumexp(total))
     constant = -0.5 * float((y / sigma) @ (y / sigma)) - float(np.log(sigma).sum())
@@ -180,6 +186,7 @@ def contact_belief(
         point,
         np.exp(total - evidence),
         np.einsum("kij,kj->ki", root, mixed),
+        prior,
         evidence + constant,
     )
 
@@ -191,9 +198,9 @@ def _explain(gram: Array, seen: Array, inward: Array, scale: float) -> tuple[Arr
     surface: it pushes. The mean and the mass of a Gaussian cut by one plane are exact.
     """
     precision = gram + np.eye(3) / scale**2
-    covariance = np.linalg.inv(precision)
+    covariance, determinant = _inverse(precision)
     mean = np.einsum("kij,kj->ki", covariance, seen)
-    volume = np.linalg.slogdet(precision)[1] + 6 * np.log(scale)
+    volume = np.log(determinant) + 6 * np.log(scale)
     along = np.einsum("kij,kj->ki", covariance, inward)
     spread = np.sqrt(np.einsum("ki,ki->k", along, inward))
     alpha = np.einsum("ki,ki->k", mean, inward) / spread
@@ -201,3 +208,14 @@ def _explain(gram: Array, seen: Array, inward: Array, scale: float) -> tuple[Arr
     log = 0.5 * np.einsum("ki,ki->k", seen, mean) - 0.5 * volume + np.log(2.0) + pushing
     shift = np.exp(-0.5 * alpha**2 - 0.5 * np.log(2 * np.pi) - pushing) / spread
     return log, mean + shift[:, None] * along
+
+
+def _inverse(matrix: Array) -> tuple[Array, Array]:
+    """Inverses (K, 3, 3) and determinants (K,) of symmetric positive definite 3 x 3 matrices.
+
+    Cofactors: a tenth of the time of a factorisation for each of many small matrices.
+    """
+    rows = [matrix[:, i] for i in range(3)]
+    cofactor = np.stack([np.cross(rows[i - 2], rows[i - 1]) for i in range(3)], axis=1)
+    determinant = np.einsum("ki,ki->k", rows[0], cofactor[:, 0])
+    return cofactor / determinant[:, None, None], determinant

@@ -6,6 +6,7 @@ from tauguard.models.body_regions import BODY_REGIONS, BodyRegion, body_region
 from tauguard.models.cloth import Cloth
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.impact import blow_velocity, reflected_mass, standard_mass
+from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.models.mismatch import Mismatch
 from tauguard.models.nominal import add_payload, compiled, pin_model
 from tauguard.models.obstacles import BodyProxy, Clamp, Striker, Table
@@ -21,6 +22,7 @@ __all__ = [
     "Cloth",
     "Drive",
     "Friction",
+    "LinkSurface",
     "Mismatch",
     "Ripple",
     "Scene",
@@ -35,6 +37,7 @@ __all__ = [
     "compose",
     "cura6",
     "cura6_drive",
+    "link_surface",
     "load_arm",
     "pin_model",
     "reflected_mass",

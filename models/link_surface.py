@@ -14,7 +14,7 @@ from tauguard.models.nominal import compiled
 Array = NDArray[np.float64]
 
 #: Points on each link, and lines that may be tried for each of them (thin links are often missed).
-POINTS, TRIES = 300, 40
+POINTS, TRIES = 150, 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,8 @@ def _entries(
     centres, radii = data.geom_xpos[geoms], model.geom_rbound[geoms]
     low, high = (centres - radii[:, None]).min(axis=0), (centres + radii[:, None]).max(axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    places, outs = [], []
+    places: list[Array] = []
+    outs: list[Array] = []
     for direction in _directions(rng, TRIES * wanted):
         if len(places) == wanted:
             break

@@ -1,0 +1,61 @@
+import mujoco
+import numpy as np
+import pytest
+
+from tauguard.models import cura6, link_surface, pin_model
+
+ARM = """<mujoco><worldbody><body name="a" pos="0.1 0.2 0.3" euler="20 30 40"><joint name="j"
+ pos="0.05 0 0"/><geom type="sphere" size="0.1" pos="0.2 0 0"/>
+ <body name="welded" pos="0.2 0.1 0"><geom type="box" size="0.05 0.02 0.03"/></body>
+ <geom type="sphere" size="5" contype="0" conaffinity="0"/></body></worldbody></mujoco>"""
+
+
+def test_points_are_on_the_capsule_of_the_last_link_and_normals_point_out():
+    surface = link_surface(cura6.arm_xml(), points=80)
+    rows = surface.link == 5
+    point, normal = surface.point[rows], surface.normal[rows]
+    axis = np.column_stack([np.zeros(80), np.clip(point[:, 1], -0.015, 0.0), np.zeros(80)])
+    assert np.abs(np.linalg.norm(point - axis, axis=1) - 0.045).max() < 1e-12
+    assert np.abs(axis + 0.045 * normal - point).max() < 1e-12
+
+
+def test_points_are_spread_evenly_over_a_sphere():
+    xml = '<mujoco><worldbody><body><joint/><geom size="1"/></body></worldbody></mujoco>'
+    point = link_surface(xml, points=2000).point
+    # Archimedes: each coordinate of a uniform point on the unit sphere is uniform on [-1, 1].
+    for coordinate in point.T:
+        counts = np.histogram(coordinate, 10, (-1, 1))[0]
+        assert ((counts - 200.0) ** 2 / 200.0).sum() < 27.9  # chi square, 9 degrees, 0.1 %
+
+
+def test_frames_are_those_of_pinocchio_and_hidden_or_untouchable_surfaces_are_left_out():
+    import pinocchio as pin
+
+    surface = link_surface(ARM, points=300)
+    model = pin_model(ARM)
+    data = model.createData()
+    pin.forwardKinematics(model, data, np.zeros(1))
+    world = surface.point @ data.oMi[1].rotation.T + data.oMi[1].translation
+    mj = mujoco.MjModel.from_xml_string(ARM)
+    placed = mujoco.MjData(mj)
+    mujoco.mj_kinematics(mj, placed)
+    sphere, box = [(placed.geom_xpos[g], placed.geom_xmat[g].reshape(3, 3)) for g in (0, 2)]
+    to_sphere = np.linalg.norm(world - sphere[0], axis=1) - 0.1
+    local = np.abs((world - box[0]) @ box[1]) - np.array([0.05, 0.02, 0.03])
+    to_box = local.max(axis=1)
+    on_sphere, on_box = np.abs(to_sphere) < 1e-12, np.abs(to_box) < 1e-12
+    assert (on_sphere | on_box).all()
+    assert on_sphere.any()
+    assert on_box.any()
+    assert (to_sphere[on_box] > -1e-12).all()
+    assert (to_box[on_sphere] > -1e-12).all()
+
+
+def test_bad_input_is_named():
+    with pytest.raises(ValueError, match="no link has collision geometry"):
+        link_surface(
+            '<mujoco><worldbody><body><joint/><inertial pos="0 0 0" mass="1"'
+            ' diaginertia="1 1 1"/></body></worldbody></mujoco>'
+        )
+    with pytest.raises(ValueError, match="points 0"):
+        link_surface(cura6.arm_xml(), points=0)
