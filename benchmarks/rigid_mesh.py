@@ -160,7 +160,7 @@ def static_rows(
     """First hit per volume: a batch's mean, the median of single calls, and coal's of both."""
     trees = {v: MeshTree(mesh.vertices, mesh.faces, v) for v in get_args(Volume)}
     hits = {v: tree.overlap(tree, poses).hit for v, tree in trees.items()}
-    hit = hits["aabb"]
+    hit = hits["obb"]
     rows: list[Row] = []
     for outcome in (True, False):
         chosen = poses[hit == outcome]

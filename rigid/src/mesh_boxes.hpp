@@ -37,10 +37,12 @@ struct Placement {
   bool apart;  // the bounding balls do not meet
 
   // The pad. With S the sum of both radii (every centred coordinate is at most 2 S once the balls meet),
-  // a float test below makes fewer than 20 roundings of values at most 6 S: 2^-24 * 120 S < 2^-17 S. The
-  // doubles behind them (centres, transformed corners) err by at most 16 * 2^-53 of the largest magnitude
-  // in play. R is within `skew` of orthonormal in every entry of R^T R - I, and R^T stands for its
-  // inverse: 6 * skew * S covers a vector of length 2 S whose three coordinates each meet three entries.
+  // a float test of two boxes makes fewer than 60 roundings of values at most 6 S, counting those behind
+  // oriented boxes' axes (12 in an entry of the relative rotation, which multiplies lengths of at most 4 S):
+  // 2^-24 * 2^8 S covers them, and 2^-140 those below the normal range. The doubles behind them (centres,
+  // transformed corners) err by at most 16 * 2^-53 of the largest magnitude in play. R is within `skew` of
+  // orthonormal in every entry of R^T R - I, and R^T stands for its inverse: 6 * skew * S covers a vector of
+  // length 2 S whose three coordinates each meet three entries.
   Placement(const Tree& a, const Tree& b, const Pose& pose, double margin = 0) {
     double t[3], skew = 0, square = 0, largest = a.magnitude;
     for (int i = 0; i < 3; ++i) {
@@ -55,7 +57,7 @@ struct Placement {
       }
     }
     const double reach = a.radius + b.radius;
-    const double pad = 0x1p-17 * reach + 6 * skew * reach + 0x1p-48 * largest + margin;
+    const double pad = 0x1p-16 * reach + 0x1p-140 + 6 * skew * reach + 0x1p-48 * largest + margin;
     apart = std::sqrt(square) > (reach + pad) * (1 + 4 * skew + 0x1p-40);
     for (int i = 0; i < 3; ++i) {
       b_in_a.t[i] = static_cast<float>(t[i]);

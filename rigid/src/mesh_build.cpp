@@ -1,22 +1,31 @@
 // Building a Tree: the range with the most triangles is split until a node has its eight children. A split
 // takes the cheapest of 15 planes across the longest axis of the centres by the surface-area heuristic.
 #include <algorithm>
+#include <cstring>
 
 #include "mesh_tree.hpp"
 
 namespace tauguard::rigid {
 namespace {
 
-constexpr int bins = 16;
+constexpr int most_bins = 16;
 
+typedef float Four __attribute__((vector_size(16)));
+
+Four four(const float* x) {
+  Four v;
+  std::memcpy(&v, x, sizeof v);
+  return v;
+}
+
+// Three coordinates and one lane that nobody reads.
 struct FloatBox {
-  float lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
-  void add(const float* l, const float* h) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = l[k] < lo[k] ? l[k] : lo[k];
-      hi[k] = h[k] > hi[k] ? h[k] : hi[k];
-    }
+  Four lo = (Four){} + INFINITY, hi = (Four){} - INFINITY;
+  void add(Four l, Four h) {
+    lo = l < lo ? l : lo;
+    hi = h > hi ? h : hi;
   }
+  void add(const FloatBox& o) { add(o.lo, o.hi); }
   float area() const {
     const float x = hi[0] - lo[0], y = hi[1] - lo[1], z = hi[2] - lo[2];
     return x * y + y * z + z * x;
@@ -80,7 +89,7 @@ std::int32_t Tree::build(Range all) {
     int widest = 0;
     for (int i = 1; i < parts; ++i)
       if (part[i].count() > part[widest].count()) widest = i;
-    if (part[widest].count() <= leaf_size) break;
+    if (part[widest].count() <= small_leaf) break;
     const std::int32_t middle = split(part[widest]);
     part[parts++] = {middle, part[widest].end};
     part[widest].end = middle;
@@ -94,7 +103,7 @@ std::int32_t Tree::build(Range all) {
     }
     const Range r = part[slot];
     FloatBox box;
-    for (auto i = r.begin; i < r.end; ++i) box.add(items_[i].lo, items_[i].hi);
+    for (auto i = r.begin; i < r.end; ++i) box.add(four(items_[i].lo), four(items_[i].hi));
     const double lo[3] = {box.lo[0], box.lo[1], box.lo[2]}, hi[3] = {box.hi[0], box.hi[1], box.hi[2]};
     const Box b = outward(lo, hi);
     for (int k = 0; k < 3; ++k) node.centre[k][slot] = b.centre[k], node.extent[k][slot] = b.extent[k];
@@ -110,38 +119,39 @@ std::int32_t Tree::build(Range all) {
 
 // Reorders items [begin, end) around a plane and returns the first item behind it; both sides non-empty.
 std::int32_t Tree::split(Range r) {
-  float lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
-  for (auto i = r.begin; i < r.end; ++i)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], items_[i].middle(k));
-      hi[k] = std::max(hi[k], items_[i].middle(k));
-    }
+  FloatBox middles;
+  for (auto i = r.begin; i < r.end; ++i) {
+    const Four m = four(items_[i].lo) + four(items_[i].hi);
+    middles.add(m, m);
+  }
+  const Four lo = middles.lo, hi = middles.hi;
   int axis = 0;
   for (int k = 1; k < 3; ++k)
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
   const auto half = r.begin + r.count() / 2;
   const auto first = items_.begin();
   const auto less = [axis](const Item& a, const Item& b) { return a.middle(axis) < b.middle(axis); };
-  if (!(hi[axis] > lo[axis]) || r.count() <= 4) {
+  const int bins = r.count() < 4 * most_bins ? most_bins / 2 : most_bins;
+  const float scale = static_cast<float>(bins) * 0.9999f / (hi[axis] - lo[axis]), origin = lo[axis];
+  if (!std::isfinite(scale) || r.count() <= 4) {  // no extent, or too little for a quotient
     std::nth_element(first + r.begin, first + half, first + r.end, less);
     return half;
   }
-  const float scale = bins * 0.9999f / (hi[axis] - lo[axis]), origin = lo[axis];
   const auto bin_of = [=](const Item& item) {
     return std::min(bins - 1, static_cast<int>((item.middle(axis) - origin) * scale));
   };
-  FloatBox box[bins];
-  int count[bins] = {};
+  FloatBox box[most_bins];
+  int count[most_bins] = {};
   for (auto i = r.begin; i < r.end; ++i) {
     const int b = bin_of(items_[i]);
     ++count[b];
-    box[b].add(items_[i].lo, items_[i].hi);
+    box[b].add(four(items_[i].lo), four(items_[i].hi));
   }
-  float right_cost[bins];
+  float right_cost[most_bins];
   FloatBox side;
   int n = 0;
   for (int b = bins - 1; b > 0; --b) {
-    if (count[b]) side.add(box[b].lo, box[b].hi);
+    side.add(box[b]);
     n += count[b];
     right_cost[b] = n ? side.area() * static_cast<float>(n) : 0;
   }
@@ -150,7 +160,7 @@ std::int32_t Tree::split(Range r) {
   int best = -1;
   float best_cost = INFINITY;
   for (int b = 1; b < bins; ++b) {
-    if (count[b - 1]) side.add(box[b - 1].lo, box[b - 1].hi);
+    side.add(box[b - 1]);
     n += count[b - 1];
     if (n == 0 || n == r.count()) continue;
     const float cost = side.area() * static_cast<float>(n) + right_cost[b];

@@ -6,7 +6,7 @@ namespace tauguard::rigid {
 
 Mesh::Mesh(const double* vertices, const std::int32_t* faces, std::size_t n_faces, VolumeKind k)
     : tree(vertices, faces, n_faces), kind(k) {
-  if (kind == VolumeKind::obb) obbs = fit_all<Obb>(tree);
+  if (kind == VolumeKind::obb) obbs = fit_obbs(tree);
   if (kind == VolumeKind::k_dop) k_dops = fit_all<KDop>(tree);
   if (kind == VolumeKind::sphere) balls = fit_all<Ball>(tree);
 }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "mesh_obb.hpp"
 #include "mesh_volumes.hpp"
 
 namespace tauguard::rigid {
@@ -14,7 +15,7 @@ struct Mesh {
   Mesh(const double* vertices, const std::int32_t* faces, std::size_t n_faces, VolumeKind kind);
   Tree tree;
   VolumeKind kind;
-  std::vector<Obb> obbs;
+  ObbTree obbs;
   std::vector<KDop> k_dops;
   std::vector<Ball> balls;
 };
@@ -37,10 +38,7 @@ bool each_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scrat
     return false;
   };
   switch (a.kind) {
-    case VolumeKind::obb: {
-      const VolumeBounds<Obb> bounds{a.tree, b.tree, a.obbs, b.obbs, {a.tree, b.tree, pose}};
-      return traverse(a.tree, b.tree, bounds, scratch, leaf);
-    }
+    case VolumeKind::obb: return traverse(a.tree, b.tree, ObbBounds{a.obbs, b.obbs, at}, scratch, leaf);
     case VolumeKind::k_dop: {
       const VolumeBounds<KDop> bounds{a.tree, b.tree, a.k_dops, b.k_dops, {a.tree, b.tree, pose}};
       return traverse(a.tree, b.tree, bounds, scratch, leaf);

@@ -29,6 +29,9 @@ struct BoxBounds {
   unsigned open_b(std::int32_t node, const Slot& a_slot, float* key) const {
     return overlap_mask(b.nodes[node], a_slot.box(a), at.a_in_b, key);
   }
+  bool a_is_larger(const Slot& a_slot, const Slot& b_slot) const {
+    return a_slot.box(a).size() >= b_slot.box(b).size();
+  }
 };
 
 // Calls leaf(child of a, child of b) for every pair of leaves whose bounds may meet, until it returns true.
@@ -46,7 +49,7 @@ bool traverse(const Tree& a, const Tree& b, const Bounds& bounds, std::vector<Sl
       if (leaf(ca, cb)) return true;
       continue;
     }
-    const bool open_a = is_leaf(cb) || (!is_leaf(ca) && pair.a.box(a).size() >= pair.b.box(b).size());
+    const bool open_a = is_leaf(cb) || (!is_leaf(ca) && bounds.a_is_larger(pair.a, pair.b));
     unsigned mask = open_a ? bounds.open_a(ca, pair.b, key) : bounds.open_b(cb, pair.a, key);
     const std::size_t base = stack.size();
     for (; mask; mask &= mask - 1) {

@@ -16,7 +16,8 @@
 namespace tauguard::rigid {
 
 inline constexpr int width = 8;      // children a node: one AVX register of floats
-inline constexpr int leaf_size = 2;  // triangles a leaf, at most
+inline constexpr int leaf_size = 4;   // triangles a leaf, at most
+inline constexpr int small_leaf = 2;  // triangles that are not split while their node has room
 
 // A child: inner node (>= 0), or ~(first * 8 + count) for the leaf of triangles [first, first + count).
 using Child = std::int32_t;
@@ -67,9 +68,10 @@ class Tree {
   Box root;          // the whole mesh, relative to the centre
 
  private:
-  struct Item {  // a triangle while the tree is built: its box relative to the centre, its row
-    float lo[3], hi[3];
+  struct alignas(16) Item {  // a triangle while the tree is built: its box relative to the centre, its row
+    float lo[3];
     std::int32_t row;
+    float hi[3], unused;
     float middle(int k) const { return lo[k] + hi[k]; }  // twice the centre
   };
   struct Range {

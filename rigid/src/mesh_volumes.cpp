@@ -1,6 +1,6 @@
 #include "mesh_volumes.hpp"
 
-#include <type_traits>
+#include "symmetric.hpp"
 
 namespace tauguard::rigid {
 namespace {
@@ -16,31 +16,6 @@ void each_corner(const Cluster& c, Visit visit) {
       const double p[3] = {v[0] - c.centre[0], v[1] - c.centre[1], v[2] - c.centre[2]};
       visit(p);
     }
-}
-
-// Eigenvectors of a symmetric 3x3 matrix as rows of `axis` (cyclic Jacobi).
-void eigenvectors(double m[3][3], double axis[3][3]) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) axis[i][j] = i == j;
-  for (int sweep = 0; sweep < 12; ++sweep)
-    for (int p = 0; p < 2; ++p)
-      for (int q = p + 1; q < 3; ++q) {
-        if (m[p][q] == 0) continue;
-        const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
-        const double t = (theta >= 0 ? 1 : -1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
-        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-        if (!std::isfinite(theta)) continue;
-        for (int k = 0; k < 3; ++k) {
-          const double x = m[k][p], y = m[k][q];
-          m[k][p] = c * x - s * y, m[k][q] = s * x + c * y;
-        }
-        for (int k = 0; k < 3; ++k) {
-          const double x = m[p][k], y = m[q][k];
-          m[p][k] = c * x - s * y, m[q][k] = s * x + c * y;
-          const double u = axis[p][k], v = axis[q][k];
-          axis[p][k] = c * u - s * v, axis[q][k] = s * u + c * v;
-        }
-      }
 }
 
 // Directions k = 0..8 of a k-DOP as (first axis, second axis, sign); the first three have one axis.
@@ -253,7 +228,6 @@ std::vector<Volume> fit_all(const Tree& tree) {
 }
 
 template std::vector<Ball> fit_all(const Tree&);
-template std::vector<Obb> fit_all(const Tree&);
 template std::vector<KDop> fit_all(const Tree&);
 
 }  // namespace tauguard::rigid

@@ -96,6 +96,9 @@ struct VolumeBounds {
   }
   unsigned open_a(std::int32_t node, const Slot& b_slot, float* key) const { return open(true, node, b_slot, key); }
   unsigned open_b(std::int32_t node, const Slot& a_slot, float* key) const { return open(false, node, a_slot, key); }
+  bool a_is_larger(const Slot& a_slot, const Slot& b_slot) const {
+    return a_slot.box(a).size() >= b_slot.box(b).size();
+  }
 
  private:
   float distance2(const double* x, const double* y) const {

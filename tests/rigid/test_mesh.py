@@ -77,6 +77,23 @@ def test_every_pair_and_no_other(volume, n):
 
 
 @pytest.mark.parametrize("volume", VOLUMES)
+@pytest.mark.parametrize("scale", [1e-200, 1e-42, 1e24])
+@pytest.mark.parametrize("stretch", [(1, 1, 1e-7), (1, 1, 0), (1e5, 1, 1)])
+def test_every_pair_at_any_scale_and_however_flat(volume, scale, stretch):
+    rng = np.random.default_rng(4)
+    v, f = soup(rng, 20)
+    v *= scale * np.array(stretch)
+    poses = random_poses(rng, 5, 0.5 * scale)
+    poses[:2, :3, :3] = np.eye(3)
+    poses[:2, 2, 3] = 0
+    tree = MeshTree(v, f, volume)
+    contacts = tree.contacts(tree, poses)
+    for i, pose in enumerate(poses):
+        assert {tuple(x) for x in contacts.faces[contacts.pose == i]} == all_pairs(v, f, v, f, pose)
+    assert len(contacts) > 0
+
+
+@pytest.mark.parametrize("volume", VOLUMES)
 @pytest.mark.parametrize("shift", [0.0, 1e6, -1e9])
 def test_cubes_that_just_touch(volume, shift):
     v, f = cube()

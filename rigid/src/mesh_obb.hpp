@@ -1,0 +1,56 @@
+// Oriented boxes of a tree's children, eight side by side in float: one vector instruction works on all
+// eight, each with axes of its own (Gottschalk, Lin and Manocha 1996).
+#pragma once
+
+#include "mesh_traverse.hpp"
+
+namespace tauguard::rigid {
+
+// One child's box in its tree's centred frame; `axis` has the directions as rows.
+struct FloatObb {
+  float axis[3][3], centre[3], extent[3];
+  float size() const { return extent[0] + extent[1] + extent[2]; }
+};
+
+struct alignas(32) ObbNode {
+  float axis[3][3][width];  // zero where there is no child
+  float centre[3][width];
+  float extent[3][width];  // -inf where there is no child
+  FloatObb operator[](int slot) const;
+  void set(int slot, const FloatObb& box);
+};
+
+struct ObbTree {
+  std::vector<ObbNode> nodes;  // as the tree's
+  FloatObb root;               // the whole mesh
+  FloatObb box(const Slot& s) const { return s.node < 0 ? root : nodes[s.node][s.slot]; }
+  float size(const Slot& s) const {
+    if (s.node < 0) return root.size();
+    const auto& e = nodes[s.node].extent;
+    return e[0][s.slot] + e[1][s.slot] + e[2][s.slot];
+  }
+};
+
+// Axes are the principal ones of the surface's second moments, which are summed from the leaves up; a leaf
+// takes its normal and its longest edge. Extents are those of all corners along the axes.
+ObbTree fit_obbs(const Tree& tree);
+
+// Bit s is set where child s of `node` may meet `box`, already in the node's frame.
+unsigned overlap_mask(const ObbNode& node, const FloatObb& box, float pad, float* distance2);
+
+// `box` of one frame in the frame that `at` places it in.
+FloatObb placed(const FloatObb& box, const Relative& at);
+
+struct ObbBounds {
+  const ObbTree &a, &b;
+  const Placement& at;
+  unsigned open_a(std::int32_t node, const Slot& b_slot, float* key) const {
+    return overlap_mask(a.nodes[node], placed(b.box(b_slot), at.b_in_a), at.b_in_a.pad, key);
+  }
+  unsigned open_b(std::int32_t node, const Slot& a_slot, float* key) const {
+    return overlap_mask(b.nodes[node], placed(a.box(a_slot), at.a_in_b), at.a_in_b.pad, key);
+  }
+  bool a_is_larger(const Slot& a_slot, const Slot& b_slot) const { return a.size(a_slot) >= b.size(b_slot); }
+};
+
+}  // namespace tauguard::rigid
