@@ -246,8 +246,8 @@ def test_bad_meshes_are_refused():
         MeshTree(v, np.zeros((0, 3), dtype=int))
     with pytest.raises(ValueError, match="volume: 'ellipsoid', expected one of obb"):
         MeshTree(v, f, "ellipsoid")
-    with pytest.raises(ValueError, match="other: its volume is 'obb'"):
-        MeshTree(v, f).overlap(MeshTree(v, f, "obb"), np.eye(4))
+    with pytest.raises(ValueError, match="other: its volume is 'aabb'"):
+        MeshTree(v, f).overlap(MeshTree(v, f, "aabb"), np.eye(4))
 
 
 def test_bad_poses_are_refused():
