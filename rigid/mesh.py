@@ -59,12 +59,12 @@ class MeshContacts:
 class MeshTree:
     """A bounding-volume tree over the triangles of one rigid mesh.
 
-    Nodes have eight children, split by the surface-area heuristic. ``obb``, the default, gives every
-    child an oriented box along the principal axes of its surface (Gottschalk, Lin and Manocha
-    1996), kept in single precision and tested eight at a time; it answers fastest, apart or not,
-    on every mesh measured (``tauguard bench rigid``). ``aabb`` keeps axis-aligned boxes in the
-    mesh's own frame, tested in the same way against the other mesh's boxes, which the pose turns;
-    it builds in two thirds of the time, which pays for a mesh that is asked a few thousand poses or
+    Nodes have eight children, split by the surface-area heuristic. ``obb``, the default, gives
+    every child an oriented box along the principal axes of its surface (Gottschalk, Lin and Manocha
+    1996), kept in single precision and tested eight at a time; it answers fastest, apart or not, on
+    every mesh measured (``tauguard bench rigid``). ``aabb`` keeps axis-aligned boxes in the mesh's
+    own frame, tested in the same way against the other mesh's boxes, which the pose turns; it
+    builds in two thirds of the time, which pays for a mesh that is asked a few thousand poses or
     fewer. ``k_dop`` (18 half-spaces, Klosowski et al. 1998) and ``sphere`` (a ball) bound the same
     nodes and are there to compare. The volume never changes an answer.
 
