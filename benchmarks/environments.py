@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -13,7 +13,11 @@ from mujoco import rollout
 from mujoco.batch import Batch
 
 from tauguard.benchmarks.report import Row, measure
+from tauguard.cli.demo import FALSE_ALARMS_PER_HOUR
+from tauguard.cli.fitting import trained
 from tauguard.contacts import registered
+from tauguard.datasets import demo_plan, simulate_all
+from tauguard.detectors import CollisionDetector
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.cell import DIVERGED
 from tauguard.envs.react import ReactEnv
@@ -28,16 +32,60 @@ REACH, REACT = "tauguard:tauguard/Reach-v0", "tauguard:tauguard/React-v0"
 COPIES, SPEEDS = 16, (0.25, 0.5, 1.0)
 #: The peers of one environment: MuJoCo's own loop with the forces given, and with the drives.
 ROLLOUT, PHYSICS = "mujoco.rollout, forces given", "physics and drives, no environment"
+WHOLE, THREADED = "the environment", "make_vec, 2 threads"
 #: Below this tool speed [m/s] the arm stands.
 STANDING = 0.01
 
 
 def run(quick: bool, seed: int) -> list[Row]:
-    """Rows of three studies: ``step``, ``vector`` and ``reaction``."""
+    """Rows of three studies, ``step``, ``vector`` and ``reaction``, and what was asked of them.
+
+    The full run trains a detector first, on the motions of ``tauguard demo``.
+    """
     # Many short blocks in turn: whatever else the machine does hits every competitor alike.
     rows = steps(50, 15 if quick else 60, seed)
-    rows += vectors(20, 15 if quick else 60, seed)
-    return rows + reactions(2 if quick else 10, seed)
+    rows += vectors(50, 10 if quick else 40, seed)
+    known: dict[str, Any] = {"contact": None, "observer": "observer"}
+    if not quick:
+        known["trained detector"] = trained_detector(seed)
+    rows += reactions(2 if quick else 10, seed, known)
+    return rows + answers(rows)
+
+
+def trained_detector(seed: int) -> CollisionDetector:
+    """The demo's: trained on its arm and motions, none of which is a swing of this study."""
+    episodes = list(simulate_all(demo_plan(seed).train, None, "simulate training"))
+    return trained(episodes, FALSE_ALARMS_PER_HOUR)
+
+
+def answers(rows: list[Row]) -> list[Row]:
+    """What an environment must show, beside what was measured."""
+    step = {row["what"]: row for row in rows if row["study"] == "step"}
+    vector = {row["what"]: row for row in rows if row["study"] == "vector"}
+    peaks = {
+        (row["speed_m_s"], row["known_from"], row["reaction"]): row["peak_force_N"]["median"]
+        for row in rows
+        if row["study"] == "reaction"
+    }
+    worst = max(
+        force / peaks[speed, known, "continue"]
+        for (speed, known, reaction), force in peaks.items()
+        if reaction != "continue"
+    )
+    found = [
+        ("an action over that of the physics loop", "<= 1.07", step[WHOLE]["ratio_to_physics"]),
+        ("make_vec over SyncVectorEnv, 2 threads", ">= 2", vector[THREADED]["ratio_to_sync"]),
+        (
+            "vector environments with the bits of the single ones",
+            "all",
+            f"{sum(row['same_bits_as_sync'] is True for row in vector.values())} of 3",
+        ),
+        ("a reaction's peak force over that of going on, worst", "< 1", worst),
+    ]
+    return [
+        {"study": "asked", "what": what, "asked": asked, "measured": measured}
+        for what, asked, measured in found
+    ]
 
 
 # -- one environment -------------------------------------------------------------------------------
@@ -51,7 +99,7 @@ def steps(count: int, repeats: int, seed: int) -> list[Row]:
     calls: dict[str, Callable[[], object]] = {
         ROLLOUT: bare(env, forces, seed),
         PHYSICS: driven(env, actions, seed),
-        "the environment": acting(env, actions, seed),
+        WHOLE: acting(env, actions, seed),
         "through gymnasium.make": acting(gymnasium.make(REACH), actions, seed),
         "without labels": acting(made(seed, labels=False), actions, seed),
         "with an ideal drive": acting(made(seed, ideal_drive=True), actions, seed),
@@ -62,7 +110,7 @@ def steps(count: int, repeats: int, seed: int) -> list[Row]:
         calls[f"checker {name}"] = acting(made(seed, checkers=(name,)), actions, seed)
     taken = measure(calls, repeats)
     rollout_time, base = taken[ROLLOUT]["median"], taken[PHYSICS]["median"]
-    whole = taken["the environment"]["median"]
+    whole = taken[WHOLE]["median"]
     return [
         {
             "study": "step",
@@ -214,18 +262,21 @@ def batched(seed: int, count: int, threads: int) -> Callable[[], object]:
 # -- reactions -------------------------------------------------------------------------------------
 
 
-def reactions(count: int, seed: int) -> list[Row]:
-    """Each reaction at three speeds, known from the contact itself and from the detector."""
+def reactions(count: int, seed: int, known: Mapping[str, Any]) -> list[Row]:
+    """Each reaction at three speeds, the collision known from the contact itself or a detector.
+
+    ``known`` names the detectors; ``None`` stands for the contact.
+    """
     rows: list[Row] = []
     for speed in SPEEDS:
-        for detector in (None, "observer"):
+        for source, detector in known.items():
             for reaction in REACTIONS:
                 runs = [swing(speed, detector, reaction, seed + k) for k in range(count)]
                 rows.append(
                     {
                         "study": "reaction",
                         "speed_m_s": speed,
-                        "known_from": "contact" if detector is None else "detector",
+                        "known_from": source,
                         "reaction": reaction,
                         **{key: spread([run[key] for run in runs]) for key in runs[0]},
                     }
@@ -241,7 +292,7 @@ def spread(values: list[float]) -> dict[str, float | None]:
     return {"median": float(np.median(known)), "low": min(known), "high": max(known)}
 
 
-def swing(speed: float, detector: str | None, reaction: str, seed: int) -> dict[str, float]:
+def swing(speed: float, detector: Any, reaction: str, seed: int) -> dict[str, float]:
     """One swing into the chest: peak force, energy, and how long and far the tool went on."""
     made = gymnasium.make(
         REACT, speed=speed, detector=detector, approach=False, max_episode_steps=10**6
@@ -253,7 +304,7 @@ def swing(speed: float, detector: str | None, reaction: str, seed: int) -> dict[
     way = np.diff(inner.task.swing[0], axis=0) * 100 / inner.world.max_speed  # type: ignore[attr-defined]
     n = len(inner.world.scene.joint_names)
     tools, times, force, onset, begun = [], [], 0.0, -1.0, -1.0
-    for step in range(len(way) + 150):
+    for step in range(len(way) + 200):
         action = way[step] if step < len(way) else np.zeros(n)
         observation, _, _, _, info = env.step(action)
         tools.append(observation[3 * n : 3 * n + 3].copy())
@@ -267,9 +318,13 @@ def swing(speed: float, detector: str | None, reaction: str, seed: int) -> dict[
 def judged(
     tools: np.ndarray, times: np.ndarray, force: float, onset: float, begun: float
 ) -> dict[str, float]:
-    """The figures of one swing; the stop is the tool's first standstill after the touch."""
+    """The figures of one swing, which goes along y.
+
+    The tool has stopped when it no longer goes forward; ``end_m`` is where it is in the end, from
+    where it was at the touch.
+    """
     touch = int(np.searchsorted(times, onset))
-    speed = np.linalg.norm(np.diff(tools, axis=0), axis=1) / np.diff(times)
+    speed = np.diff(tools[:, 1]) / np.diff(times)
     still = np.flatnonzero(speed[touch + 1 :] < STANDING)
     stop = touch + 1 + int(still[0]) if len(still) else -1
     region = body_region("chest")
@@ -278,10 +333,8 @@ def judged(
         "energy_J": force**2 / (2 * region.stiffness),
         "delay_s": begun - onset if begun >= 0 else np.nan,
         "stopping_time_s": float(times[stop] - onset) if len(still) else np.nan,
-        "stopping_distance_m": float(np.linalg.norm(tools[stop] - tools[touch]))
-        if len(still)
-        else np.nan,
-        "farthest_m": float((tools[touch:, 1] - tools[touch, 1]).max()),
+        "stopping_distance_m": float((tools[touch:, 1] - tools[touch, 1]).max()),
+        "end_m": float(tools[-1, 1] - tools[touch, 1]),
         "force_over_limit": force / region.transient_force,
     }
 
@@ -302,7 +355,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
         axes.invert_yaxis()
         axes.set(xlabel=label)
     limit = body_region("chest").transient_force
-    for axes, known in ((plain, "contact"), (detected, "detector")):
+    last = [row["known_from"] for row in rows if row["study"] == "reaction"][-1]
+    for axes, known in ((plain, "contact"), (detected, last)):
         for reaction in REACTIONS:
             line = [
                 row

@@ -36,6 +36,8 @@ FIGURES = (
     SPEED,
 ) = range(len(FIGURES))
 assert len(FIGURES) == _env.FIGURES
+#: What replaces an action, by its native code: nothing, velocities, no power, no power and brakes.
+FREE, VELOCITY, LIMP, BRAKE = range(4)
 
 
 class Cell:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.envs.base import ArmEnv, Task
-from tauguard.envs.cell import FORCE, ONSET_TIME, RATIO, SPEED, TIME, Cell
+from tauguard.envs.cell import FORCE, FREE, ONSET_TIME, RATIO, SPEED, TIME, VELOCITY, Cell
 from tauguard.envs.settings import positive
 from tauguard.envs.vector import VectorArmEnv
 from tauguard.envs.world import World, find_tools, tool_position
@@ -76,17 +77,20 @@ class React(Task):
         cell.target[i, 0] = begin + np.array([0.0, RUN_UP + BEYOND, 0.0])
         cell.start(i)
         self.memory[i] = 0.0
-        if not self._approach:
-            return
         still = np.zeros(len(cell.actions))
-        for speeds in np.diff(self.swing[i], axis=0) / period:
-            cell.plants[i].override(1, speeds)
+        if cell.sensing is not None:  # a detector that must settle does so while the arm stands
+            cell.plants[i].override(VELOCITY, np.zeros(len(self.swing[i][0])))
+            for _ in range(math.ceil(cell.sensing[i].settle / period - 1e-9)):
+                cell.step(i, still, rng)
+        way = np.diff(self.swing[i], axis=0) / period
+        for speeds in way if self._approach else way[:0]:
+            cell.plants[i].override(VELOCITY, speeds)
             cell.step(i, still, rng)
             since = cell.figure[i, TIME] - cell.figure[i, ONSET_TIME]
             touched = cell.figure[i, ONSET_TIME] >= 0
             if touched and (cell.sensing is None or cell.alarm[i] or since >= PATIENCE):
                 break
-        cell.plants[i].override(0, np.zeros(len(self.swing[i][0])))
+        cell.plants[i].override(FREE, np.zeros(len(self.swing[i][0])))
 
     def _plan(self, begin: Array, speed: float, period: float) -> Array:
         """Joint positions, one an action, of a straight swing that speeds up at once: (T, n)."""
@@ -144,7 +148,8 @@ class ReactEnv(ArmEnv):
     """A swinging tool has struck a body region: choose what the arm does next.
 
     An episode begins at the first touch, or with ``detector=`` at its alarm (at the latest 0.1 s
-    after the touch); with ``approach=False`` it begins before the swing. ``speed`` is that of the
+    after the touch); with ``approach=False`` it begins before the swing. A trained detector settles
+    first, while the arm stands. ``speed`` is that of the
     tool at the blow [m/s], give or take 20 %.
 
     ## Actions (joint velocity, the default; n joints)

@@ -11,6 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from tauguard.envs.base import ArmEnv
+from tauguard.envs.cell import BRAKE, FREE, LIMP, VELOCITY
 from tauguard.envs.detecting import arm_env
 from tauguard.envs.settings import one_of
 from tauguard.models import cura6
@@ -25,12 +26,11 @@ TRIGGERS = ("alarm", "contact")
 BRAKE_DELAY = 0.02
 #: Deceleration of an arm whose limits are not known [rad/s^2].
 DECELERATION = 10.0
-#: A retraction follows the way back at this share of the speed it came with, for this long [s].
+#: A retraction follows the way back at this share of the speed it came with, and for this long [s]
+#: beyond where it was when the reaction began.
 RETRACT_SPEED, RETRACT_TIME = 0.5, 0.3
 #: The admittance's virtual inertia in units of the joint's own, and its time constant [s].
 ADMITTANCE_INERTIA, ADMITTANCE_TIME = 0.5, 0.1
-#: Native codes of what replaces an action.
-FREE, VELOCITY, LIMP, BRAKE = 0, 1, 2, 3
 
 
 class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
@@ -39,8 +39,12 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     * ``continue``: nothing happens.
     * ``stop0``: category 0 of IEC 60204-1: power off at once, brakes after :data:`BRAKE_DELAY`.
     * ``stop1``: category 1: the drives stop the arm along its path, then power off and brakes.
+      The deceleration is the arm's own limit, which is gentler than a brake: the peak force comes
+      within 50 ms of the touch and is higher than with ``stop0``. It is that of ``stop2`` and
+      ``retract`` too, which begin in the same way.
     * ``stop2``: category 2: the drives stop the arm and hold it.
-    * ``retract``: stop, go back the way the arm came, hold.
+    * ``retract``: stop as in category 2, go back the way the arm came and beyond where it was at
+      the trigger, hold.
     * ``admittance``: the arm yields to the residual beyond the detector's thresholds (to the true
       external torque where the trigger is the contact): ``M dv/dt = tau - D v`` in every joint.
 
@@ -97,7 +101,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     def _forget(self) -> None:
         self._since: float | None = None
         self._speed = np.zeros(len(self._deceleration))
-        self._tau = np.zeros(len(self._deceleration))
+        self._tau = self._measured = np.zeros(len(self._deceleration))
         self._returning: list[Array] | None = None
         self._past.clear()
         self._arm.cell.plants[0].override(FREE, self._speed)
@@ -127,9 +131,10 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         n = len(self._deceleration)
         observation = self._arm.cell.observation[0]
         self._past.append(observation[:n].copy())
+        self._measured = observation[n : 2 * n].copy()
         if self._since is None and (info["alarm"] if self.trigger == "alarm" else info["force"]):
             self._since = 0.0
-            self._speed = observation[n : 2 * n].copy()
+            self._speed = self._measured
         self._tau = info["residual"] if self.trigger == "alarm" else info["tau_ext"]
 
     def _react(self) -> tuple[int, Array]:
@@ -153,7 +158,15 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return VELOCITY, self._speed
 
     def _slow_down(self) -> bool:
-        """All joints together, so that the arm stays on its path; whether it stands."""
+        """All joints together, so that the arm stays on its path; whether it stands.
+
+        Where the person has already slowed the arm down, the stop goes on from that speed: a ramp
+        by the clock alone would push.
+        """
+        squared = float(self._speed @ self._speed)
+        if squared > 0:
+            share = float(self._measured @ self._speed) / squared
+            self._speed = self._speed * min(max(share, 0.0), 1.0)
         fastest = (np.abs(self._speed) / self._deceleration).max()
         if fastest <= self._period:
             self._speed = np.zeros_like(self._speed)
@@ -164,8 +177,10 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     def _back(self) -> Array:
         """Velocity along the remembered way, backwards; zero once the time is over."""
         if self._returning is None:
-            rows = np.array(self._past)
-            each = round(1 / RETRACT_SPEED)
+            rows, each = np.array(self._past), round(1 / RETRACT_SPEED)
+            assert self._since is not None
+            gone = each * round(self._since / self._period)  # back to where the reaction began
             speeds = -np.diff(rows, axis=0)[::-1] / (each * self._period)
-            self._returning = list(np.repeat(speeds, each, axis=0)[: self._retract_steps])
+            back = np.repeat(speeds, each, axis=0)[: gone + self._retract_steps]
+            self._returning = list(back)
         return self._returning.pop(0) if self._returning else np.zeros_like(self._speed)

@@ -151,6 +151,8 @@ class Sensing:
         self._sensors = world.scene.drive.sensors
         self._gain = world.nominal.gain
         self.detector = detector
+        #: The detector is silent for this long after a reset [s], as a trained one is.
+        self.settle = float(getattr(getattr(detector, "settings", None), "settle", 0.0))
         table = observation_table(world)
         self._low = np.array([entry.low for entry in table])
         self._high = np.array([entry.high for entry in table])

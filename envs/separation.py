@@ -11,8 +11,9 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from tauguard.envs.base import ArmEnv
+from tauguard.envs.cell import FREE, VELOCITY
 from tauguard.envs.detecting import arm_env
-from tauguard.envs.reactions import DECELERATION, FREE, VELOCITY
+from tauguard.envs.reactions import DECELERATION
 from tauguard.envs.settings import positive
 from tauguard.models import cura6
 

@@ -7,6 +7,8 @@ import pytest
 from tauguard.benchmarks import STUDIES, environments
 from tauguard.benchmarks.report import table
 
+KNOWN = {"contact": None, "observer": "observer"}
+
 
 def test_it_is_listed():
     assert "environments" in STUDIES
@@ -22,9 +24,8 @@ def test_the_bare_loop_makes_the_same_motion():
 
 @pytest.fixture(scope="module")
 def rows():
-    return (
-        environments.steps(5, 1, 0) + environments.vectors(3, 1, 0) + environments.reactions(1, 0)
-    )
+    found = environments.steps(5, 1, 0) + environments.vectors(3, 1, 0)
+    return found + environments.reactions(1, 0, KNOWN)
 
 
 def test_a_row_a_checker_and_a_reaction(rows):
@@ -40,7 +41,7 @@ def test_a_row_a_checker_and_a_reaction(rows):
 
 def test_stopping_beats_going_on(rows):
     for speed in environments.SPEEDS:
-        for known in ("contact", "detector"):
+        for known in KNOWN:
             peak = {
                 row["reaction"]: row["peak_force_N"]["median"]
                 for row in rows
@@ -48,6 +49,21 @@ def test_stopping_beats_going_on(rows):
                 and (row["speed_m_s"], row["known_from"]) == (speed, known)
             }
             assert peak["stop0"] < peak["continue"]
+
+
+def test_what_was_asked_is_answered(rows):
+    asked = {row["what"]: row["measured"] for row in environments.answers(rows)}
+    assert asked["vector environments with the bits of the single ones"] == "3 of 3"
+    assert 0 < asked["a reaction's peak force over that of going on, worst"] < 1
+
+
+def test_a_retraction_ends_behind_the_touch_and_a_stop_does_not(rows):
+    ends = {
+        row["reaction"]: row["end_m"]["high"]
+        for row in rows
+        if row["study"] == "reaction" and row["known_from"] == "contact"
+    }
+    assert ends["retract"] < -0.02 < ends["stop2"] < ends["continue"]
 
 
 def test_table_and_figure(rows):

@@ -1,6 +1,7 @@
 """React, ClothReach and TwoArms: what happens in them is what their names say."""
 
 import warnings
+from types import SimpleNamespace
 
 import gymnasium as gym
 import mujoco
@@ -52,6 +53,30 @@ def test_react_begins_at_the_first_touch_at_about_the_asked_speed(speed):
         reached = tool_velocity(env)
         assert 0.6 * speed < reached[1] < 1.3 * speed
         assert np.abs(reached[[0, 2]]).max() < 0.3 * speed
+
+
+class Slow:
+    """Must settle for 0.4 s, keeps what it sees, and never raises an alarm."""
+
+    settings = SimpleNamespace(settle=0.4)
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        self.seen = []
+
+    def step(self, q, qd, current):
+        self.seen.append(np.abs(qd).max())
+        return False
+
+
+def test_react_waits_for_a_detector_that_must_settle():
+    env = gym.make("tauguard/React-v0", detector=Slow()).unwrapped
+    _, info = env.reset(seed=0)
+    seen = env.cell.sensing[0].detector.seen
+    assert max(seen[100:400]) < 0.05 < max(seen[400:500])
+    assert info["onset_time"] > 0.4
 
 
 def test_react_with_a_detector_begins_at_its_alarm():
