@@ -33,8 +33,8 @@ COPIES, SPEEDS = 16, (0.25, 0.5, 1.0)
 #: The peers of one environment: MuJoCo's own loop with the forces given, and with the drives.
 ROLLOUT, PHYSICS = "mujoco.rollout, forces given", "physics and drives, no environment"
 WHOLE, THREADED = "the environment", "make_vec, 2 threads"
-#: Below this tool speed [m/s] the arm stands.
-STANDING = 0.01
+#: The tool counts as stopped this near to the farthest place that it comes to [m].
+NEAR = 5e-4
 
 
 def run(quick: bool, seed: int) -> list[Row]:
@@ -304,12 +304,12 @@ def swing(speed: float, detector: Any, reaction: str, seed: int) -> dict[str, fl
     way = np.diff(inner.task.swing[0], axis=0) * 100 / inner.world.max_speed  # type: ignore[attr-defined]
     n = len(inner.world.scene.joint_names)
     tools, times, force, onset, begun = [], [], 0.0, -1.0, -1.0
-    for step in range(len(way) + 200):
+    for step in range(len(way) + 150):
         action = way[step] if step < len(way) else np.zeros(n)
         observation, _, _, _, info = env.step(action)
         tools.append(observation[3 * n : 3 * n + 3].copy())
         times.append(info["time"])
-        force, onset = max(force, info["force"]), max(onset, info["onset_time"])
+        force, onset = max(force, info["force"]), info["onset_time"] if onset < 0 else onset
         if begun < 0 and info["reacting"]:
             begun = info["time"]
     return judged(np.array(tools), np.array(times), force, onset, begun)
@@ -320,21 +320,20 @@ def judged(
 ) -> dict[str, float]:
     """The figures of one swing, which goes along y.
 
-    The tool has stopped when it no longer goes forward; ``end_m`` is where it is in the end, from
-    where it was at the touch.
+    The tool has stopped where it is farthest forward from where it was at the touch, to within
+    :data:`NEAR`; ``end_m`` is where it is in the end.
     """
     touch = int(np.searchsorted(times, onset))
-    speed = np.diff(tools[:, 1]) / np.diff(times)
-    still = np.flatnonzero(speed[touch + 1 :] < STANDING)
-    stop = touch + 1 + int(still[0]) if len(still) else -1
+    gone = tools[touch:, 1] - tools[touch, 1]
+    stop = touch + int(np.flatnonzero(gone >= gone.max() - NEAR)[0])
     region = body_region("chest")
     return {
         "peak_force_N": force,
         "energy_J": force**2 / (2 * region.stiffness),
         "delay_s": begun - onset if begun >= 0 else np.nan,
-        "stopping_time_s": float(times[stop] - onset) if len(still) else np.nan,
-        "stopping_distance_m": float((tools[touch:, 1] - tools[touch, 1]).max()),
-        "end_m": float(tools[-1, 1] - tools[touch, 1]),
+        "stopping_time_s": float(times[stop] - onset),
+        "stopping_distance_m": float(gone.max()),
+        "end_m": float(gone[-1]),
         "force_over_limit": force / region.transient_force,
     }
 
