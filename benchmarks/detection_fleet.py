@@ -55,11 +55,11 @@ class Training:
 
 @dataclass(frozen=True)
 class Fleet:
-    """Trained detectors of one arm by name, and their collision-free peaks."""
+    """Trained detectors of one arm by name, and their collision-free peaks by speed and name."""
 
     arm: int
     detectors: dict[str, Detector]
-    peaks: dict[str, Peaks]
+    peaks: dict[float, dict[str, Peaks]]
 
 
 def nominal() -> ArmModel:
@@ -87,18 +87,21 @@ def train(seed: int, arm: int, names: Sequence[str], training: Training, hours: 
 
 def calibration_peaks(
     seed: int, arm: int, detectors: dict[str, Detector], hours: float
-) -> dict[str, Peaks]:
-    """Peaks over collision-free motion at all speeds with the training payloads."""
+) -> dict[float, dict[str, Peaks]]:
+    """Peaks over collision-free motion with the training payloads, by speed and detector."""
     under = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
-    found = []
+    peaks = {}
     for speed in SPEEDS:
         pool = free_pool(stream(seed, CALIBRATE), speed, (arm,), hours / len(SPEEDS), under)
-        found += [free_peaks(detectors, simulate(episode)) for _, episode in pool]
-    return {name: Peaks.joined([f[name] for f in found]) for name in detectors}
+        found = [free_peaks(detectors, simulate(episode)) for _, episode in pool]
+        peaks[speed] = {name: Peaks.joined([f[name] for f in found]) for name in detectors}
+    return peaks
 
 
 def common_thresholds(fleets: Sequence[Fleet], per_hour: float) -> Thresholds:
     """One threshold for all arms: their detectors' peaks are put together."""
-    names = fleets[0].detectors
-    joined = {name: Peaks.joined([fleet.peaks[name] for fleet in fleets]) for name in names}
+    joined = {
+        speed: {name: Peaks.joined([f.peaks[speed][name] for f in fleets]) for name in own}
+        for speed, own in fleets[0].peaks.items()
+    }
     return set_thresholds(joined, NETWORK, per_hour)

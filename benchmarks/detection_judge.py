@@ -132,19 +132,31 @@ def free_peaks(fleet: Detectors, trace: Trace) -> dict[str, Peaks]:
     return {name: Peaks.of(levels(d, trace)[settled], trace.dt) for name, d in fleet.items()}
 
 
-def set_thresholds(peaks: Mapping[str, Peaks], network: str, per_hour: float) -> Thresholds:
+def set_thresholds(
+    peaks: Mapping[float, Mapping[str, Peaks]], network: str, per_hour: float
+) -> Thresholds:
     """Thresholds of every detector at the operating points, from collision-free training motion.
 
-    The network's first two are its residual current; every other detector gets the network's
-    specificity at each.
+    The network's first two are its residual current. Every other detector gets at each the lowest
+    threshold with which it is, at every speed, at least as specific on that motion as the network:
+    rows then compare speed by speed, and no detector buys sensitivity with alarms that the network
+    does not raise.
+
+    Args:
+        peaks: by speed [%], then by detector.
+        network: the name whose specificity is matched.
+        per_hour: false alarms that the third point aims at.
     """
-    shares = {str(a): peaks[network].specificity(a) for a in AMPERES}
+    names = list(next(iter(peaks.values())))
     found: dict[str, dict[str, float]] = {}
-    for name, own in peaks.items():
-        found[name] = {point: own.at_specificity(share) for point, share in shares.items()}
+    for name in names:
+        found[name] = {
+            str(a): max(p[name].at_specificity(p[network].specificity(a)) for p in peaks.values())
+            for a in AMPERES
+        }
         if name == network:
             found[name] = {str(a): a for a in AMPERES}
-        found[name][HOURLY] = own.at_rate(per_hour)
+        found[name][HOURLY] = Peaks.joined([p[name] for p in peaks.values()]).at_rate(per_hour)
     return found
 
 

@@ -376,7 +376,7 @@ def _draw_output(rows: list[Row], axis: Any) -> None:
 
 
 def _draw_sigma(rows: list[Row], axis: Any) -> None:
-    own = [r for r in rows if r["study"] == "sigma"]
+    own = [r for r in rows if r["study"] == "sigma" and r["detector"] == "srq-svr"]
     sigma = [r["sigma"] for r in own]
     for key, label in (("sensitivity", "from 16 N m up"), ("sensitivity_all", "from 4 N m up")):
         rates = [r[key] for r in own]

@@ -164,16 +164,21 @@ def training_size(bench: Bench, names: Sequence[str]) -> list[Row]:
 
 
 def sigmas(bench: Bench) -> list[Row]:
-    """``sigma``: the length of the SRQ kernel."""
+    """``sigma``: the length of the SRQ kernel; the plain form with and without its one factor."""
     calibration, both = bench.calibration(), bench.pools()
     traces = bench.training(Training())
     rows = []
-    for sigma in SIGMAS:
-        detector = SvrDetector(CollisionDetector(DetectorSettings(sigma=sigma)))
-        own: dict[str, Detector] = {"srq-svr": detector.fit(traces, nominal())}
+    cases = [("srq-svr", DetectorSettings(sigma=sigma)) for sigma in SIGMAS]
+    cases += [
+        ("srq-svr-plain", DetectorSettings.plain_form()),
+        ("srq-svr-plain, residuals in N m", DetectorSettings.plain_form(distance=0.0)),
+    ]
+    for name, settings in cases:
+        detector = SvrDetector(CollisionDetector(settings))
+        own: dict[str, Detector] = {name: detector.fit(traces, nominal())}
         thresholds = own_thresholds(own, calibration, bench.extent.target)
-        tally = judged(own, thresholds, both)["srq-svr"]
-        rows.append(_row("sigma", {"sigma": sigma}, "srq-svr", tally))
+        tally = judged(own, thresholds, both)[name]
+        rows.append(_row("sigma", {"sigma": settings.sigma}, name, tally))
     return rows
 
 

@@ -30,7 +30,7 @@ class SvrDetector:
 
     @classmethod
     def plain(cls) -> SvrDetector:
-        """The dissertation's form: raw residuals, labels 0/1, no friction model."""
+        """The dissertation's form: residuals times one factor, labels 0/1, no friction model."""
         return cls(CollisionDetector(DetectorSettings.plain_form()), "srq-svr-plain")
 
     @property
