@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from tauguard.benchmarks import detection_report as report
+from tauguard.benchmarks import detection_table
 from tauguard.benchmarks import detection_variations as variations
 from tauguard.benchmarks.detection_fleet import (
     TEST,
@@ -80,8 +81,8 @@ FULL = Size(3, ALL, Training(), 0.5, 10.0, 1.0, 13, 5, variations=True)
 QUICK = Size(
     1,
     ("srq-svr", "srq-svr-plain", "current-network", "residual-thresholds"),
-    Training(free=8, free_seconds=30.0),
-    0.05,
+    Training(free=10, free_seconds=30.0),
+    0.1,
     0.1,
     0.1,
     2,
@@ -112,6 +113,7 @@ def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
             speed: merged(t for (own, _), t in tallies.items() if own == speed) for speed in SPEEDS
         }
         rows = report.rows(by_speed, thresholds)
+        rows += detection_table.headline(rows)
         if size.variations:
             jobs_more = [(part, fleets, thresholds, seed) for part in PARTS]
             for more in each(_vary, jobs_more):
@@ -175,6 +177,11 @@ class _pool:
     def __exit__(self, *_: object) -> None:
         if self._processes is not None:
             self._processes.terminate()
+
+
+def shown(rows: list[Row]) -> list[Row]:
+    """See :func:`tauguard.benchmarks.detection_table.shown`."""
+    return detection_table.shown(rows)
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

@@ -172,7 +172,8 @@ def run_study(
         raise ValueError(f"no study {name!r}: there are {', '.join(STUDIES) or 'none yet'}")
     study = importlib.import_module(f"tauguard.benchmarks.{name}")
     rows: list[Row] = study.run(quick=quick, seed=seed)
-    print(table(rows))
+    shown: Callable[[list[Row]], list[Row]] | None = getattr(study, "shown", None)
+    print(table(shown(rows) if shown else rows))
 
     import matplotlib
 

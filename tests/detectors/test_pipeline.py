@@ -5,6 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 import skops.io
+from scipy.spatial.distance import pdist
 
 from tauguard.detectors import (
     CollisionDetector,
@@ -82,13 +83,18 @@ def test_an_unwritable_place_is_named(detector, tmp_path):
 def test_the_plain_form_is_the_dissertations(training, robot, drive_gain):
     settings = DetectorSettings.plain_form(windows=600)
     plain = CollisionDetector(settings).fit(training, robot, drive_gain)
-    assert plain.features.envelope is None
-    assert plain.features.factor == 1.0
-    assert plain.arm.friction is None
-    assert plain.features.size == 44
-    kernel = plain.regressor
-    # raw N m with sigma = 3: windows are so far apart that almost all are support vectors
-    assert len(kernel.support_vectors_) > 0.6 * 600
+    literal = DetectorSettings.plain_form(windows=600, distance=0.0)
+    raw = CollisionDetector(literal).fit(training, robot, drive_gain)
+    for one in (plain, raw):
+        assert one.features.envelope is None
+        assert one.arm.friction is None
+        assert one.features.size == 44
+    assert raw.features.factor == 1.0
+    # In N m nearly every window stands alone in the kernel's length of 3; one factor mends that.
+    assert len(raw.regressor.support_vectors_) > 0.6 * 600
+    gaps = pdist(raw.regressor.support_vectors_ * plain.features.factor)
+    assert 0.5 * settings.sigma < np.median(gaps) < 2 * settings.sigma
+    assert np.median(gaps) / plain.features.factor > 5 * settings.sigma
 
 
 def test_same_seed_same_detector(training, robot, drive_gain, unseen):
