@@ -18,5 +18,6 @@ STUDIES: dict[str, str] = {
     "contacts": "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",
     "guard": "fast things against thin ones: fixed steps, MuJoCo's modes, guarded steps",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
+    "diagnosis": "after the alarm: link, force, point and kind of event against the truth",
     "detection": "the dissertation's experiment: detectors, speeds, operating points, false alarms",
 }

@@ -1,0 +1,323 @@
+"""After the alarm: which link, which force, where, and what kind of event, against the truth.
+
+Three ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
+hypothesis (tauguard.detectors.diagnosis). ``usual``: the link of the last joint with a significant
+residual, and the least-squares force at the middle of that link. ``told``: as ``surface``, but with
+the true external torque instead of the observer's estimate: what is wrong then is not the
+observer's fault, other contacts explain the same torques.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.benchmarks.detection_fleet import CALIBRATE, TEST, Training, nominal, stream
+from tauguard.benchmarks.detection_pool import SPEEDS, free_pool
+from tauguard.benchmarks.diagnosis_pool import (
+    Event,
+    payload_events,
+    push_events,
+    struck_events,
+)
+from tauguard.benchmarks.report import Row, measure, rate
+from tauguard.detectors import Diagnoser, Diagnosis, Thresholded, make_detector
+from tauguard.detectors.aftermath import Aftermath, AftermathOf
+from tauguard.detectors.classification import KINDS
+from tauguard.detectors.contact_force import link_poses, point_jacobians
+from tauguard.detectors.diagnosis import believed
+from tauguard.detectors.metrics import stratum
+from tauguard.detectors.operating_point import threshold_for_rate
+from tauguard.envs import STRATA, simulate
+from tauguard.models import LinkSurface, cura6, link_surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+#: The detector whose alarms are explained, and its false alarms per hour.
+DETECTOR, PER_HOUR = "moving-thresholds", 5.0
+METHODS = ("surface", "usual", "told")
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is simulated."""
+
+    arms: int
+    speeds: tuple[float, ...]
+    training: Training
+    calibration_hours: float  #: of each arm, for the threshold
+    per_stratum: int  #: collisions of a stratum at one speed
+    pushes: int  #: episodes of five pushes at one speed
+    payloads: int  #: episodes with one payload up and down at one speed
+
+
+FULL = Size(3, SPEEDS, Training(slices=3), 0.3, 13, 3, 8)
+QUICK = Size(1, (10.0, 60.0), Training(slices=1, free=6, free_seconds=20.0), 0.02, 2, 1, 2)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one method says of an event."""
+
+    link: int  #: 1-based, 0: none
+    force: Array  #: [N]
+    point: Array  #: [m]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An event, its diagnosis and the answers of all methods; none without an alarm."""
+
+    event: Event
+    diagnosis: Diagnosis | None
+    answers: dict[str, Answer]
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """Rows of five studies: link, link_confusion, contact, kind, payload, cost."""
+    size = QUICK if quick else FULL
+    # Arms and streams of seeds that nothing was tuned on.
+    arms = [31_000 + 100 * seed + k for k in range(size.arms)]
+    watchers = {arm: watcher(seed, arm, size) for arm in arms}
+    surface = link_surface(cura6.arm_xml())
+    judged: list[Judged] = []
+    for speed in size.speeds:
+        test = stream(seed, TEST, 5)
+        for events in (
+            struck_events(test, speed, watchers, size.per_stratum),
+            push_events(test, speed, watchers, size.pushes),
+            payload_events(test, speed, watchers, size.payloads),
+        ):
+            judged += [judge(event, watchers[event.arm], surface) for event in events]
+    contacts = [j for j in judged if j.event.collision is not None]
+    rows = [*link_rows(contacts), *confusion_rows(contacts), *contact_rows(contacts)]
+    rows += [*kind_rows(judged), *payload_rows(judged)]
+    return [*rows, cost_row(judged, watchers, surface)]
+
+
+def watcher(seed: int, arm: int, size: Size) -> Thresholded:
+    """The detector of one arm, trained and thresholded on motion of its own."""
+    detector = make_detector(DETECTOR).fit(size.training.traces(seed, arm), nominal())
+    open_ended = Thresholded(detector, np.inf)
+    levels, dt = [], 1e-3
+    for speed in size.speeds:
+        hours = size.calibration_hours / len(size.speeds)
+        for _, episode in free_pool(stream(seed, CALIBRATE, 5), speed, (arm,), hours):
+            levels.append(open_ended.levels(simulate(episode)))
+    return Thresholded(detector, threshold_for_rate(levels, dt, PER_HOUR))
+
+
+def judge(event: Event, watching: Thresholded, surface: LinkSurface) -> Judged:
+    """All methods' answers to one event."""
+    if event.alarm is None:
+        return Judged(event, None, {})
+    arm, envelope = believed(watching)
+    diagnoser = Diagnoser(arm, surface, envelope)
+    after = AftermathOf(arm, envelope, event.trace).at(event.alarm.start)
+    found = diagnoser.explain(event.alarm, after)
+    answers = {
+        "surface": Answer(found.link, found.force, found.point),
+        "usual": usual(diagnoser, after, found),
+    }
+    if event.collision is not None:
+        assert event.trace.truth is not None
+        exact = replace(after, residual=event.trace.truth.tau_ext[after.rows])
+        told = diagnoser.explain(event.alarm, exact)
+        answers["told"] = Answer(told.link, told.force, told.point)
+    return Judged(event, found, answers)
+
+
+def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
+    """Last significant joint; least-squares force at the middle of its link."""
+    robot, link = diagnoser.arm.robot, max(found.last_joint, 1) - 1
+    row = int(after.level.argmax())
+    poses = link_poses(robot, after.q[row])
+    rows = diagnoser.surface.link == link
+    middle = diagnoser.surface.point[rows].mean(axis=0)
+    point = poses.origin[link] + poses.rotation[link] @ middle
+    jacobian = point_jacobians(robot, poses, np.array([link]), point[None])[0]
+    force = np.linalg.lstsq(jacobian.T, after.residual[row], rcond=1e-2)[0]
+    return Answer(found.last_joint, force, point)
+
+
+def groups(contacts: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
+    """All, by speed and by severity; only events that raised an alarm."""
+    known = [j for j in contacts if j.diagnosis is not None and j.event.kind != "push"]
+    speeds = sorted({j.event.speed for j in known})
+    named = [("all", known)]
+    named += [(f"{s:g} %", [j for j in known if j.event.speed == s]) for s in speeds]
+    for low, _ in STRATA:
+        name = stratum(low)
+        named.append((f"{name} N m", [j for j in known if stratum(_peak(j)) == name]))
+    named.append(("from 16 N m", [j for j in known if _peak(j) >= 16]))
+    pushes = [j for j in contacts if j.diagnosis is not None and j.event.kind == "push"]
+    return [(name, some) for name, some in [*named, ("pushes", pushes)] if some]
+
+
+def _peak(judged: Judged) -> float:
+    assert judged.event.collision is not None
+    return judged.event.collision.peak_tau
+
+
+def _link(judged: Judged) -> int:
+    assert judged.event.collision is not None
+    return judged.event.collision.link
+
+
+def link_rows(contacts: Sequence[Judged]) -> list[Row]:
+    """How often the link is right, and how often it or a neighbour is."""
+    rows = []
+    for group, some in groups(contacts):
+        for method in METHODS:
+            off = [abs(j.answers[method].link - _link(j)) for j in some]
+            rows.append(
+                {
+                    "study": "link",
+                    "group": group,
+                    "method": method,
+                    "link_right": rate(sum(o == 0 for o in off), len(off)),
+                    "link_or_neighbour": rate(sum(o <= 1 for o in off), len(off)),
+                }
+            )
+    return rows
+
+
+def confusion_rows(contacts: Sequence[Judged]) -> list[Row]:
+    """True link (a row) against the link said, for every method."""
+    known = [j for j in contacts if j.diagnosis is not None]
+    rows = []
+    for method in METHODS:
+        for link in sorted({_link(j) for j in known}):
+            said = [j.answers[method].link for j in known if _link(j) == link]
+            counts = {f"said_{k}": said.count(k) for k in range(1, 7)}
+            row = {"study": "link_confusion", "method": method, "link": link, **counts}
+            rows.append({**row, "said_none": said.count(0)})
+    return rows
+
+
+def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
+    """Errors of force and point at the time of the estimated force: median and p95."""
+    rows = []
+    for group, some in groups(contacts):
+        for method in METHODS:
+            errors = np.array([_errors(j, method) for j in some])
+            row: Row = {"study": "contact", "group": group, "method": method, "n": len(some)}
+            names = ("true_force_n", "force_error_n", "direction_deg", "point_cm")
+            for name, column in zip(names, errors.T, strict=True):
+                row[name] = float(np.median(column))
+                row[f"{name}_p95"] = float(np.percentile(column, 95))
+            rows.append(row)
+    return rows
+
+
+def _errors(judged: Judged, method: str) -> tuple[float, float, float, float]:
+    """True force [N], its error [N], angle between them [deg], distance of the points [cm]."""
+    assert judged.diagnosis is not None
+    answer = judged.answers[method]
+    force, point = judged.event.truth_at(judged.diagnosis.time)
+    sizes = float(np.linalg.norm(force)), float(np.linalg.norm(answer.force))
+    cosine = float(answer.force @ force) / max(sizes[0] * sizes[1], 1e-12)
+    return (
+        sizes[0],
+        float(np.linalg.norm(answer.force - force)),
+        float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))),
+        100 * float(np.linalg.norm(answer.point - point)),
+    )
+
+
+def kind_rows(judged: Sequence[Judged]) -> list[Row]:
+    """True kind (a row) against the kind said."""
+    rows = []
+    for kind in KINDS:
+        said = [j.diagnosis.kind for j in judged if j.diagnosis and j.event.kind == kind]
+        counts = {f"said_{other}": said.count(other) for other in KINDS}
+        right = rate(said.count(kind), len(said))
+        rows.append({"study": "kind", "kind": kind, **counts, "kind_right": right})
+    return rows
+
+
+def payload_rows(judged: Sequence[Judged]) -> list[Row]:
+    """Payload changes that raised an alarm, those then called a collision, and the mass found."""
+    rows = []
+    changes = [j for j in judged if j.event.kind == "payload"]
+    for mass in (None, *sorted({abs(j.event.mass) for j in changes})):
+        some = [j for j in changes if mass in (None, abs(j.event.mass))]
+        found = [(j.diagnosis, j.event.mass) for j in some if j.diagnosis is not None]
+        told = [abs(d.signs.mass - m) for d, m in found if not d.collision]
+        rows.append(
+            {
+                "study": "payload",
+                "payload_kg": mass or "all",
+                "alarm_raised": rate(len(found), len(some)),
+                "called_collision": rate(sum(d.collision for d, _ in found), len(found)),
+                "mass_error_g": 1000 * float(np.median(told)) if told else None,
+            }
+        )
+    return rows
+
+
+def cost_row(
+    judged: Sequence[Judged], watchers: dict[int, Thresholded], surface: LinkSurface
+) -> Row:
+    """Milliseconds of a diagnosis, and of what must be computed before."""
+    first = next(j for j in judged if j.diagnosis is not None)
+    alarm, trace = first.event.alarm, first.event.trace
+    assert alarm is not None
+    arm, envelope = believed(watchers[first.event.arm])
+    diagnoser = Diagnoser(arm, surface, envelope)
+    looked = AftermathOf(arm, envelope, trace)
+    after = looked.at(alarm.start)
+    times: dict[str, Any] = measure(
+        {
+            "diagnosis_us": lambda: diagnoser.explain(alarm, after),
+            "aftermath_us": lambda: looked.at(alarm.start),
+        },
+        repeats=15,
+    )
+    scaled = {n: {k: 1e6 * v for k, v in t.items()} for n, t in times.items()}
+    return {"study": "cost", "surface_points": len(surface.link), **scaled}
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Link accuracy and point error by severity, and both confusion tables."""
+    axes = figure.subplots(2, 2)
+    names = [f"{stratum(low)} N m" for low, _ in STRATA]
+    for method in METHODS:
+        own = {r["group"]: r for r in rows if r["study"] == "link" and r["method"] == method}
+        own_errors = {
+            r["group"]: r for r in rows if r["study"] == "contact" and r["method"] == method
+        }
+        at = [i for i, name in enumerate(names) if name in own]
+        rates = [own[names[i]]["link_right"] for i in at]
+        bars = [
+            [r["value"] - r["low"] for r in rates],
+            [r["high"] - r["value"] for r in rates],
+        ]
+        axes[0, 0].errorbar(at, [r["value"] for r in rates], bars, fmt="o-", label=method)
+        axes[0, 1].plot(at, [own_errors[names[i]]["point_cm"] for i in at], "o-", label=method)
+    for axis, label in ((axes[0, 0], "link right"), (axes[0, 1], "point error, median [cm]")):
+        axis.set_xticks(range(len(names)), names)
+        axis.set_ylabel(label)
+        axis.legend()
+    links = [r for r in rows if r["study"] == "link_confusion" and r["method"] == "surface"]
+    _table(axes[1, 0], links, "link", [f"said_{k}" for k in range(1, 7)])
+    kinds = [r for r in rows if r["study"] == "kind"]
+    _table(axes[1, 1], kinds, "kind", [f"said_{k}" for k in KINDS])
+
+
+def _table(axes: Any, rows: list[Row], name: str, columns: list[str]) -> None:
+    counts = np.array([[row[c] for c in columns] for row in rows])
+    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(share, cmap="YlGnBu", vmin=0, vmax=1, aspect="auto")
+    for (i, j), count in np.ndenumerate(counts):
+        axes.text(j, i, str(count), ha="center", color="white" if share[i, j] > 0.6 else "black")
+    axes.set_xticks(range(len(columns)), [c.removeprefix("said_") for c in columns])
+    axes.set_yticks(range(len(rows)), [str(row[name]) for row in rows])
+    axes.set(xlabel=f"{name} said", ylabel=f"true {name}")
