@@ -2,8 +2,8 @@
 
 Three ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
 hypothesis (tauguard.detectors.diagnosis). ``usual``: the link of the last joint with a significant
-residual, and the least-squares force at the middle of that link. ``told``: as ``surface``, but with
-the true external torque instead of the observer's estimate: what is wrong then is not the
+residual, and the damped least-squares force at the middle of that link. ``told``: as ``surface``,
+but with the true external torque instead of the observer's estimate: what is wrong then is not the
 observer's fault, other contacts explain the same torques.
 """
 
@@ -42,6 +42,8 @@ Array = NDArray[np.float64]
 
 #: The detector whose alarms are explained, and its false alarms per hour.
 DETECTOR, PER_HOUR = "moving-thresholds", 5.0
+#: Force that the damping of the usual way expects [N].
+EXPECTED = 100.0
 METHODS = ("surface", "usual", "told")
 
 
@@ -135,7 +137,7 @@ def judge(event: Event, watching: Thresholded, surface: LinkSurface) -> Judged:
 
 
 def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
-    """Last significant joint; least-squares force at the middle of its link."""
+    """Last significant joint; damped least-squares force at the middle of its link."""
     robot, link = diagnoser.arm.robot, max(found.last_joint, 1) - 1
     row = int(after.level.argmax())
     poses = link_poses(robot, after.q[row])
@@ -143,7 +145,9 @@ def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
     middle = diagnoser.surface.point[rows].mean(axis=0)
     point = poses.origin[link] + poses.rotation[link] @ middle
     jacobian = point_jacobians(robot, poses, np.array([link]), point[None])[0]
-    force = np.linalg.lstsq(jacobian.T, after.residual[row], rcond=1e-2)[0]
+    columns = jacobian.T / after.envelope[row][:, None]
+    damped = columns.T @ columns + np.eye(3) / EXPECTED**2
+    force = np.linalg.solve(damped, columns.T @ (after.residual[row] / after.envelope[row]))
     return Answer(found.last_joint, force, point)
 
 

@@ -1,4 +1,4 @@
-"""Judged events of the diagnosis study: struck, pushed and loaded arms, and what is true of each."""
+"""Judged events of the diagnosis study: struck, pushed and loaded arms, and the truth of each."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ END = 0.03
 SETTLING = 0.04
 #: Log odds of an intended push: constant, per decade of N/s, per unit of the cosine. Fitted by
 #: logistic regression to simulated clampings and pushes, on arms and seeds that no study judges.
-INTENT = (6.2, -2.9, 1.6)
+INTENT = (4.2, -1.2, 3.6)
 #: Levels between which the rise is measured, shares of the highest.
 RISE = (0.25, 0.75)
 
@@ -52,6 +52,7 @@ class Signs:
     reach: float  #: its distance from the last joint [m]
     rise: float  #: rate of the force between a quarter and three quarters of its peak [N/s]
     along: float  #: cosine between force and velocity of the touched point, -1 to 1
+    speed: float  #: of the touched point before the alarm [m/s]
 
     def probabilities(self) -> dict[str, float]:
         """Of each of :data:`KINDS`; they sum to 1."""
@@ -89,6 +90,7 @@ def signs(after: Aftermath, force: Array, velocity: Array) -> Signs:
         reach,
         (RISE[1] - RISE[0]) * size / rising,
         along,
+        speed,
     )
 
 

@@ -143,7 +143,7 @@ class Diagnoser:
             alarm,
             link + 1,
             links,
-            last_joint(residual[-1], noise[-1]),
+            last_joint(residual[-1], after.envelope[rows[-1]]),
             alarm.start + float(after.t[peak]),
             force,
             point,

@@ -131,6 +131,7 @@ def test_a_residual_that_says_nothing_leaves_every_link_as_likely_as_before():
 def test_the_usual_rule():
     noise = np.ones(6)
     assert last_joint(np.array([9.0, 5, 0, -7, 1, 3]), noise) == 4
+    assert last_joint(np.array([900.0, 5, 0, -7, 1, 3]), noise) == 1
     assert last_joint(np.ones(6), noise) == 0
 
 
