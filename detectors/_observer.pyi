@@ -41,13 +41,14 @@ class FrictionBasis:
         slopes: list[float],
         loaded: list[float],
         saturation: bool,
+        modelled: bool,
         cycles: list[float],
         play: float,
         joints: int,
     ) -> None: ...
     @property
     def columns(self) -> int: ...
-    def evaluate(self, q: Array, qd: Array, tau: Array, out: Array) -> None: ...
+    def evaluate(self, q: Array, qd: Array, tau: Array, load: Array, out: Array) -> None: ...
 
 class Estimator:
     def __init__(

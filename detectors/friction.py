@@ -22,8 +22,8 @@ class FrictionModel:
     """Friction torque of n joints: per joint a weighted sum of the same columns.
 
     Columns: 1; qd; a Dahl bristle b for each settling length; a stop operator for each width;
-    b exp(-(qd/w)^2) for each Stribeck velocity; tanh(qd/w) for each slope; |tau| b;
-    |tau| tanh(qd/w) for each loaded slope; cos(c q) and sin(c q) for each ripple frequency c of
+    b exp(-(qd/w)^2) for each Stribeck velocity; tanh(qd/w) for each slope; |load| b;
+    |load| tanh(qd/w) for each loaded slope; cos(c q) and sin(c q) for each ripple frequency c of
     the joint; tau |tau| where ``saturation`` says so.
     """
 
@@ -33,6 +33,10 @@ class FrictionModel:
     slopes: tuple[float, ...] = (0.05, 0.3)  #: [rad/s]
     loaded: tuple[float, ...] = ()  #: slopes of load-dependent friction [rad/s]
     saturation: bool = False  #: the torque per ampere changes with the current
+    modelled: bool = False
+    """The load is what the arm's model says that gravity and speed ask of the joint, not the torque
+    of its drive: where that is mostly friction, friction would be predicted from itself, and the
+    torque of a contact would vanish in it."""
     cycles: Array = field(default_factory=lambda: np.empty((0, 0)))
     """Ripple frequencies [1/rad at the joint], shape (n, h); empty: none."""
     play: float = 5e-6  #: dead zone of the bristles' position, a few quanta of the sensor [rad]
@@ -65,6 +69,12 @@ class FrictionModel:
         groups = self.bristles, self.stops, self.stribeck, self.slopes, self.loaded
         return 3 + sum(map(len, groups)) + 2 * int(self.cycles.shape[1]) + int(self.saturation)
 
+    @property
+    def load_columns(self) -> slice:
+        """Which columns grow with the load."""
+        before = 2 + sum(map(len, (self.bristles, self.stops, self.stribeck, self.slopes)))
+        return slice(before, before + 1 + len(self.loaded))
+
     def basis(self, joints: int) -> _observer.FrictionBasis:
         """The native form."""
         if self.cycles.size and len(self.cycles) != joints:
@@ -76,31 +86,38 @@ class FrictionModel:
             list(self.slopes),
             list(self.loaded),
             self.saturation,
+            self.modelled,
             [float(c) for c in self.cycles.ravel()],
             self.play,
             joints,
         )
 
-    def evaluate(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
+    def evaluate(
+        self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, load: ArrayLike | None = None
+    ) -> Array:
         """The columns of every sample.
 
         Args:
             q: positions [rad], shape (T, n).
             qd: velocities [rad/s], shape (T, n).
             tau: drive torques [N m], shape (T, n).
+            load: torques that load-dependent friction grows with [N m], shape (T, n); default: tau.
 
         Returns:
             Shape (T, n, columns).
         """
         joints = np.asarray(q).shape[-1]
-        q, qd, tau = same_rows(joints, q=q, qd=qd, tau=tau)
+        force = tau if load is None else load
+        q, qd, tau, force = same_rows(joints, q=q, qd=qd, tau=tau, load=force)
         out = np.empty((*q.shape, self.columns))
-        self.basis(joints).evaluate(q, qd, tau, out)
+        self.basis(joints).evaluate(q, qd, tau, force, out)
         return out
 
-    def torque(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Array:
+    def torque(
+        self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, load: ArrayLike | None = None
+    ) -> Array:
         """Friction torque [N m] of a motion, positive against positive velocity, shape (T, n)."""
-        columns = self.evaluate(q, qd, tau)
+        columns = self.evaluate(q, qd, tau, load)
         if self.weights.shape != columns.shape[1:]:
             raise ValueError(
                 f"FrictionModel.weights: shape {self.weights.shape}, "
@@ -116,7 +133,12 @@ class FrictionModel:
         level: Array = np.zeros(n)
         for _ in range(5):  # load-dependent friction counts the torque that overcomes friction
             there, back = (
-                self.torque(sign * q, np.full_like(q, sign * speed), sign * level + 0 * q)[-1]
+                self.torque(
+                    sign * q,
+                    np.full_like(q, sign * speed),
+                    sign * level + 0 * q,
+                    0 * q if self.modelled else None,
+                )[-1]
                 for sign in (1.0, -1.0)
             )
             level = 0.5 * np.abs(there - back)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.consistent import solve_consistent
-from tauguard.detectors.estimator import PAYLOAD, ArmModel
+from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.filter import confirmed
 from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.numbers import (
@@ -46,6 +46,7 @@ REAL_FRICTION = FrictionModel(
     slopes=(0.01, 0.05, 0.1, 0.3),
     loaded=(0.02, 0.1, 0.3),
     saturation=True,
+    modelled=True,
 )
 #: An axis slower than this in every sample of a log does not move in it [rad/s].
 MOVING = 0.01
@@ -84,11 +85,16 @@ class Beliefs:
     mass: float = 0.1  #: relative
     centre: float = 0.02  #: of the centre of mass, each axis [m]
     inertia: float = 0.1  #: relative to the link's largest entry
-    armature: float = 1.0  #: relative to the largest entry of the mass matrix at the joint
+    armature: float = 1.0
+    """Relative to the joint's largest entry of the mass matrix, or to a twentieth of the arm's largest:
+    the rotor of a wrist weighs more, through its gear, than all that it turns."""
     gain: float = 0.5  #: relative, where gains are identified
-    friction: float = 30.0  #: of every friction weight [N m per unit]
+    friction: float = 30.0  #: of a friction weight [N m per unit], but for the following
+    loaded: float = 0.3  #: of friction per load [1]
+    saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
     payload: float = 5.0  #: of a load that was not told [kg]
     moment: float = 0.5  #: of its first moment [kg m]
+    spread: float = 0.2  #: of its inertia about the last link's origin [kg m^2]
     softness: float = 5.0  #: a sample counts 1/softness^2: model errors are not white
     evenness: float = 0.15  #: a joint's level of error is at least this share of the largest
     rest: float = 0.5  #: a joint that has stood still for longer counts no more [s]
@@ -99,7 +105,9 @@ class Identified:
     """An identified arm and how it was found."""
 
     arm: ArmModel
-    loads: Array  #: mass and first moment in each recording [kg, kg m], shape (recordings, 4)
+    loads: Array
+    """Inertial numbers of what each recording carried, in the last link's frame: mass [kg], first
+    moment [kg m], inertia [kg m^2], shape (recordings, 10)."""
     rms: Array  #: of the residual on the recordings used [N m], shape (n,)
     scale: str  #: "gains", "payload" or "masses": what fixed the scale of the torques
     gain_error: Array  #: relative standard deviation of each gain, 0 where it was given, (n,)
@@ -145,8 +153,12 @@ def filtered(
     model: FrictionModel,
     rate: float,
     rest: float,
+    load: Array | None = None,
 ) -> Filtered:
-    """Everything that the regression needs of a recording at these gains."""
+    """Everything that the regression needs of a recording at these gains.
+
+    ``load`` is what it carries, shape (10,), for friction that depends on it (default: as told).
+    """
     trace = recording.trace
     stride = max(1, round(4e-3 / trace.dt))
     count = len(trace.t) // stride
@@ -157,7 +169,12 @@ def filtered(
         return out
 
     tau = trace.current * gain
-    columns, drive = mean(model.evaluate(trace.q, trace.qd, tau)), mean(tau)
+    if model.modelled:
+        held = _carried(trace, robot, _known(recording) if load is None else load)
+        columns = mean(model.evaluate(trace.q, trace.qd, tau, held))
+    else:
+        columns = mean(model.evaluate(trace.q, trace.qd, tau))
+    drive = mean(tau)
     q, qd, t = (x[:rows:stride] for x in (trace.q, trace.qd, trace.t))
     dt = intervals(t, count)
 
@@ -183,6 +200,13 @@ def filtered(
     )
 
 
+def _carried(trace: Trace, robot: RobotNumbers, load: Array) -> Array:
+    """What load-dependent friction grows with [N m], shape (T, n)."""
+    carrying = robot.inertial.copy()
+    carrying[-1] += load
+    return momentum_terms(robot.with_inertial(carrying), trace.q, trace.qd)[1]
+
+
 class _System:
     """Normal equations over errors of inertia and armature, friction, gains and payloads.
 
@@ -195,19 +219,19 @@ class _System:
         self.friction = (INERTIAL + 1) * self.n
         self.gain = self.friction + self.n * columns
         self.load = self.gain + self.n
-        self.size = self.load + PAYLOAD * recordings
+        self.size = self.load + INERTIAL * recordings
         self.matrix = np.zeros((self.size, self.size))
         self.vector = np.zeros(self.size)
 
     def places(self, joint: int, recording: int) -> NDArray[np.intp]:
         own = np.arange(self.friction + joint * self.c, self.friction + (joint + 1) * self.c)
-        load = self.load + PAYLOAD * recording + np.arange(PAYLOAD)
+        load = self.load + INERTIAL * recording + np.arange(INERTIAL)
         body = np.arange(INERTIAL * self.n)
         return np.concatenate([body, [INERTIAL * self.n + joint], own, [self.gain + joint], load])
 
     def design(self, data: Filtered, joint: int, known: Array) -> Array:
         """Columns of one joint; ``known`` is the load that the torque scales with."""
-        last = slice(INERTIAL * (self.n - 1), INERTIAL * (self.n - 1) + PAYLOAD)
+        last = slice(INERTIAL * (self.n - 1), INERTIAL * self.n)
         load = data.inertial[:, joint, last]
         return np.column_stack(
             [
@@ -246,6 +270,7 @@ def _deviations(
     beliefs: Beliefs,
     gain: Array,
     free_masses: bool,
+    friction: Array,
 ) -> tuple[Array, Array]:
     """Standard deviations and means of all unknowns."""
     spread = 4.0 if free_masses else 1.0
@@ -258,16 +283,17 @@ def _deviations(
     heaviest = np.diagonal(mass_matrix(robot, poses), axis1=1, axis2=2).max(axis=0)
     loads, means = [], []
     for recording in recordings:
-        load = recording.load
-        told = load is not None and (load.mass == 0 or load.centre is not None)
+        load, told = recording.load, _told(recording)
         loads += [1e-6 if load is not None else beliefs.payload]
         loads += [1e-6 if told else beliefs.moment] * 3
+        nothing = load is not None and load.mass == 0
+        loads += [1e-6 if nothing else beliefs.spread] * 6
         means.append(_known(recording))
     deviations = np.concatenate(
         [
             body,
-            beliefs.armature * heaviest,
-            np.full(system.n * system.c, beliefs.friction),
+            beliefs.armature * np.maximum(heaviest, 0.05 * heaviest.max()),
+            friction.ravel(),
             np.maximum(gain, 1e-9),
             loads,
         ]
@@ -275,9 +301,28 @@ def _deviations(
     return deviations, np.concatenate([np.zeros(system.load), *means])
 
 
+def _friction_beliefs(
+    friction: FrictionModel, beliefs: Beliefs, gain: Array, recordings: Sequence[Recording]
+) -> Array:
+    """Standard deviations of the friction weights, shape (n, columns)."""
+    out = np.full((len(gain), friction.columns), beliefs.friction)
+    out[:, friction.load_columns] = beliefs.loaded
+    if friction.saturation:
+        peaks = [np.abs(r.trace.current * gain).max(axis=0) for r in recordings]
+        out[:, -1] = beliefs.saturation / np.maximum(np.max(peaks, axis=0), 1e-9)
+    return out
+
+
+def _told(recording: Recording) -> bool:
+    load = recording.load
+    return load is not None and (load.mass == 0 or load.centre is not None)
+
+
 def _known(recording: Recording) -> Array:
     load = recording.load or Load()
-    return load.mass * np.array([1.0, *(load.centre or (0.0, 0.0, 0.0))])
+    x, y, z = load.centre or (0.0, 0.0, 0.0)
+    spread = y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y
+    return load.mass * np.array([1.0, x, y, z, *spread])
 
 
 def identify(
@@ -343,14 +388,20 @@ def _fit(
     for turn in range(rounds):
         if data is None or not held:
             data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
+        if turn and friction.modelled:  # loads that were not told are known by now
+            data = [
+                d if _told(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)
+                for d, r, load in zip(data, recordings, loads, strict=True)
+            ]
         if turn == 0:
             if sum(len(d.current) for d in data) < 500:
                 raise ValueError("fewer than 10 s of motion in all: give 20 s or more")
             level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
         system = _System(robot, friction.columns, len(recordings))
         loose = np.full(robot.joints, 0.0 if held else beliefs.gain)
+        weights = _friction_beliefs(friction, beliefs, gain, recordings)
         deviations, means = _deviations(
-            system, robot, recordings, beliefs, loose, scale != "masses"
+            system, robot, recordings, beliefs, loose, scale != "masses", weights
         )
         means[system.gain : system.load] = gain / arm.drive_gain - 1
         for k, one in enumerate(data):
@@ -361,6 +412,7 @@ def _fit(
             matrix, system.vector + precision * means, robot.inertial, robot.armature
         )
         left = np.concatenate([system.left(d, k, solution, known[k]) for k, d in enumerate(data)])
+        loads = solution[system.load :].reshape(-1, INERTIAL)
         rms = np.sqrt((left**2).mean(axis=0))
         level = np.maximum(rms, beliefs.evenness * rms.max())
         if not held:
@@ -397,6 +449,6 @@ def _result(
         armature=robot.armature - solution[INERTIAL * n : system.friction],
     )
     weights: Array = solution[system.friction : system.gain].reshape(n, -1)
-    loads: NDArray[Any] = solution[system.load :].reshape(-1, PAYLOAD)
+    loads: NDArray[Any] = solution[system.load :].reshape(-1, INERTIAL)
     identified = ArmModel(found, gain, replace(friction, weights=weights), np.maximum(rms, 1e-6))
     return Identified(identified, loads, rms, "gains", np.zeros(n), ())

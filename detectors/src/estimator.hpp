@@ -76,10 +76,10 @@ class Estimator {
             double* left, double* acceleration) {
     if (!started_) begin(q, qd);
     if (fusion_.active()) qd = started_ ? fusion_.step(q, qd, dt) : fusion_.last();
-    drive(q, qd, current);
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
     if (adapts_)
       chain_.link_regressor_again(static_cast<int>(n_) - 1, kPayload, load_p_.data(), load_beta_.data(), work_);
+    drive(q, qd, current);
     if (started_) filter(dt);
     remember();
     for (std::size_t j = 0; j < n_; ++j) {
@@ -109,7 +109,8 @@ class Estimator {
     const std::size_t columns = basis_.columns(), smooth = basis_.smooth();
     for (std::size_t j = 0; j < n_; ++j) {
       const double tau = set_.drive_gain[j] * current[j];
-      basis_.evaluate(j, q[j], qd[j], tau, &memory_[j * basis_.memory()], column_.data());
+      const double load = basis_.modelled ? carried(j) : tau;
+      basis_.evaluate(j, q[j], qd[j], tau, load, &memory_[j * basis_.memory()], column_.data());
       const double* w = &set_.weights[j * columns];
       const double viscous = w[FrictionBasis::kViscous] * column_[FrictionBasis::kViscous];
       double coulomb = 0.0, other = w[FrictionBasis::kOffset];
@@ -120,6 +121,14 @@ class Estimator {
       own_now_[kPerJoint * j + 1] = viscous;
       own_now_[kPerJoint * j + 2] = coulomb;
     }
+  }
+
+  // Torque that arm and tracked payload need at joint j, accelerations aside.
+  double carried(std::size_t j) const {
+    double sum = beta_[j];
+    if (adapts_)
+      for (int a = 0; a < kPayload; ++a) sum += load_beta_[kPayload * j + a] * theta_[a];
+    return sum;
   }
 
   void filter(double dt) {

@@ -16,7 +16,7 @@ using Numbers = std::vector<double>;
 
 FrictionBasis make_basis(const Numbers& bristles, const Numbers& stops, const Numbers& stribeck,
                          const Numbers& slopes, const Numbers& loaded, bool saturation,
-                         const Numbers& cycles, double play, std::size_t joints) {
+                         bool modelled, const Numbers& cycles, double play, std::size_t joints) {
   require(bristles.size() + stops.size() > 0 && joints > 0 && cycles.size() % joints == 0 && play >= 0,
           "friction: no bristle and no stop, cycles not per joint, or play below 0");
   FrictionBasis basis;
@@ -27,15 +27,17 @@ FrictionBasis make_basis(const Numbers& bristles, const Numbers& stops, const Nu
   basis.slopes = slopes;
   basis.loaded = loaded;
   basis.saturation = saturation;
+  basis.modelled = modelled;
   basis.cycles = cycles;
   basis.ripples = cycles.size() / joints;
   return basis;
 }
 
 // Columns of every joint: (T, n, c).
-void friction_columns(const FrictionBasis& basis, In2 q, In2 qd, In2 tau, Out3 out) {
+void friction_columns(const FrictionBasis& basis, In2 q, In2 qd, In2 tau, In2 load, Out3 out) {
   const std::size_t rows = q.shape(0), n = q.shape(1), c = basis.columns();
   require(qd.shape(0) == rows && qd.shape(1) == n && tau.shape(0) == rows && tau.shape(1) == n &&
+              load.shape(0) == rows && load.shape(1) == n &&
               out.shape(0) == rows && out.shape(1) == n && out.shape(2) == c &&
               basis.cycles.size() == n * basis.ripples,
           "friction_columns: arrays differ in shape");
@@ -45,7 +47,8 @@ void friction_columns(const FrictionBasis& basis, In2 q, In2 qd, In2 tau, Out3 o
     for (std::size_t t = 0; t < rows; ++t) {
       const std::size_t at = t * n + j;
       if (t == 0) basis.reset(q.data()[at], memory.data());
-      basis.evaluate(j, q.data()[at], qd.data()[at], tau.data()[at], memory.data(), out.data() + at * c);
+      basis.evaluate(j, q.data()[at], qd.data()[at], tau.data()[at], load.data()[at], memory.data(),
+                     out.data() + at * c);
     }
 }
 
@@ -75,13 +78,13 @@ void bind_estimator(nb::module_& m) {
   nb::class_<FrictionBasis>(m, "FrictionBasis")
       .def("__init__",
            [](FrictionBasis* self, const Numbers& bristles, const Numbers& stops, const Numbers& stribeck,
-              const Numbers& slopes, const Numbers& loaded, bool saturation, const Numbers& cycles,
-              double play, std::size_t joints) {
+              const Numbers& slopes, const Numbers& loaded, bool saturation, bool modelled,
+              const Numbers& cycles, double play, std::size_t joints) {
              new (self) FrictionBasis(
-                 make_basis(bristles, stops, stribeck, slopes, loaded, saturation, cycles, play, joints));
+                 make_basis(bristles, stops, stribeck, slopes, loaded, saturation, modelled, cycles, play, joints));
            })
       .def_prop_ro("columns", &FrictionBasis::columns)
-      .def("evaluate", &friction_columns, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+      .def("evaluate", &friction_columns, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
   nb::class_<Estimator>(m, "Estimator")
       .def("__init__",
            [](Estimator* self, const Chain& chain, const FrictionBasis& basis, const Numbers& drive_gain,

@@ -7,8 +7,10 @@
 // left a dead zone of `play` around it. With b the first bristle (the first stop where there is none), the
 // columns of one joint are, in this order,
 //   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each width w,
-//   |tau| b, |tau| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each ripple frequency c,
+//   |load| b, |load| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each ripple frequency c,
 //   tau |tau| where the drive's torque per ampere changes with the current
+// The load is the drive's torque, or with `modelled` what the arm's own model says of it: a joint without
+// gravity needs hardly any torque but friction, and friction must not be predicted from itself.
 #pragma once
 
 #include <algorithm>
@@ -26,6 +28,7 @@ class FrictionBasis {
   std::vector<double> slopes;    // tanh widths [rad/s]
   std::vector<double> loaded;    // tanh widths of load-dependent friction [rad/s]
   bool saturation = false;       // the column tau |tau|
+  bool modelled = false;         // whose torque the load is
   std::vector<double> cycles;    // per joint, `ripples` each [1/rad]
   std::size_t ripples = 0;
   double play = 0.0;             // [rad]
@@ -49,7 +52,8 @@ class FrictionBasis {
     for (std::size_t k = 0; k < stops.size(); ++k) *memory++ = q;
   }
 
-  void evaluate(std::size_t joint, double q, double qd, double tau, double* memory, double* out) const {
+  void evaluate(std::size_t joint, double q, double qd, double tau, double load, double* memory,
+                double* out) const {
     *out++ = 1.0;
     *out++ = qd;
     const double* coulomb = out;
@@ -70,8 +74,8 @@ class FrictionBasis {
     const double b = *coulomb;
     for (const double w : stribeck) *out++ = b * std::exp(-(qd / w) * (qd / w));
     for (const double w : slopes) *out++ = std::tanh(qd / w);
-    *out++ = std::fabs(tau) * b;
-    for (const double w : loaded) *out++ = std::fabs(tau) * std::tanh(qd / w);
+    *out++ = std::fabs(load) * b;
+    for (const double w : loaded) *out++ = std::fabs(load) * std::tanh(qd / w);
     for (std::size_t h = 0; h < ripples; ++h) {
       const double phase = cycles[joint * ripples + h] * q;
       *out++ = std::cos(phase);
