@@ -19,5 +19,6 @@ STUDIES: dict[str, str] = {
     "guard": "fast things against thin ones: fixed steps, MuJoCo's modes, guarded steps",
     "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
     "diagnosis": "after the alarm: link, force, point and kind of event against the truth",
+    "real_arm": "logs of a real UR10e: residuals, false alarms, smallest contacts, beside a peer",
     "detection": "the dissertation's experiment: detectors, speeds, operating points, false alarms",
 }

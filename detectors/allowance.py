@@ -1,17 +1,23 @@
 """How much residual collision-free motion may leave: a bound a joint, linear in what is measured.
 
-Terms: 1; the joint's speed; the sums of all speeds and of all accelerations; and how much the
-rigid-body torque at the joint has changed within the last second or so. The last one is for joints
-at rest: static friction may take all of such a change or none of it, and no current tells which.
+Terms: 1; the sum of all speeds; the largest sum of all accelerations of late; how much the
+rigid-body torque at the joint has changed within the last second or so; and whether the joint has
+been slow of late. The fourth is for joints at rest: static friction may take all of such a change
+or none of it, and no current tells which. The last is for joints that start, stop or turn round,
+where friction is known least. "Of late" is the last ``HELD`` seconds, which a blow's residual and
+its confirmation take.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
+from scipy.ndimage import maximum_filter1d
+from scipy.optimize import linprog
+from scipy.sparse import csr_array, eye_array, hstack
 
 from tauguard.detectors.numbers import RobotNumbers, momentum_terms
 from tauguard.detectors.observer import intervals, low_pass
@@ -19,8 +25,19 @@ from tauguard.detectors.observer import intervals, low_pass
 Array = NDArray[np.float64]
 
 TERMS = 5
+#: Terms that count for a joint at rest, and for one in motion, whose friction is known.
+AT_REST, IN_MOTION = (0, 1, 2, 3), (0, 2, 4)
 #: Rate at which a change of torque is forgotten, as the tracked offset follows it [1/s].
 FORGET = 1.0
+#: How long accelerations and slowness count [s].
+HELD = 0.2
+#: Speed at which a joint is half slow [rad/s].
+SLOW = 0.05
+#: Share of the residual's peaks that the unscaled bound covers.
+COVERED = 0.8
+#: Share of its Coulomb friction that a joint's bound never goes below: friction changes by as much
+#: while an arm warms up, and a payload brings more, whatever the training logs say.
+LEAST = 0.1
 
 
 def torque_change(robot: RobotNumbers, t: Array, q: Array, qd: Array, gain: float) -> Array:
@@ -43,12 +60,44 @@ def torque_change(robot: RobotNumbers, t: Array, q: Array, qd: Array, gain: floa
     return change
 
 
-def terms(qd: Array, acceleration: Array, change: Array) -> Array:
-    """The terms of every joint, shape (T, n, TERMS)."""
-    speed = np.abs(qd)
-    shaken = np.abs(acceleration).sum(axis=-1, keepdims=True)
-    columns = np.ones_like(qd), speed, speed.sum(axis=-1, keepdims=True), shaken, np.abs(change)
+def held(x: Array, samples: int) -> Array:
+    """The largest of the last ``samples`` values along the first axis, shape of ``x``."""
+    if samples <= 1:
+        return x
+    out: Array = maximum_filter1d(x, samples, axis=0, origin=(samples - 1) // 2, mode="nearest")
+    return out
+
+
+def terms(qd: Array, acceleration: Array, change: Array, dt: float) -> Array:
+    """The terms of every joint, shape (T, n, TERMS); causal."""
+    speed, samples = np.abs(qd), max(1, round(HELD / dt))
+    shaken = held(np.abs(acceleration).sum(axis=-1, keepdims=True), samples)
+    slow = held(1 / (1 + (qd / SLOW) ** 2), samples)
+    columns = np.ones_like(qd), speed.sum(axis=-1, keepdims=True), shaken, np.abs(change), slow
     return np.stack([np.broadcast_to(c, qd.shape) for c in columns], axis=-1)
+
+
+def quantile_bound(x: Array, y: Array, quantile: float) -> Array:
+    """Weights, none below 0, of the linear function of ``x`` that ``quantile`` of ``y`` stay below.
+
+    Koenker & Bassett 1978: the linear program that puts ``quantile`` of the weight of all
+    differences above the function and the rest below.
+
+    Args:
+        x: shape (N, c), not negative.
+        y: shape (N,).
+        quantile: in (0, 1).
+
+    Returns:
+        Shape (c,).
+    """
+    rows, count = x.shape
+    scale = np.maximum(x.mean(axis=0), 1e-9)
+    one = eye_array(rows)
+    cost = np.concatenate([np.zeros(count), np.full(rows, quantile), np.full(rows, 1 - quantile)])
+    found = linprog(cost, A_eq=hstack([csr_array(x / scale), one, -one]), b_eq=y, method="highs")
+    weights: Array = found.x[:count] / scale
+    return weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,20 +107,28 @@ class Allowance:
     weights: Array  #: not negative [N m per unit of each term], shape (n, TERMS)
 
     @classmethod
-    def fit(cls, left: Array, terms: Array, use: NDArray[np.bool_]) -> Allowance:
-        """Non-negative least squares of ``|left|``.
+    def fit(
+        cls, left: Array, terms: Array, use: NDArray[np.bool_], rows: int, columns: Sequence[int]
+    ) -> Allowance:
+        """A bound that ``COVERED`` of the peaks of ``left`` stay below.
 
         Args:
-            left: residual without collisions [N m], shape (T, n).
+            left: level of the residual without collisions [N m], shape (T, n).
             terms: shape (T, n, TERMS).
-            use: rows of each joint that count, shape (T, n); a joint with fewer than 50 takes all.
+            use: rows of each joint that count, shape (T, n); where they have fewer than 30 peaks,
+                all rows do.
+            rows: samples that have one peak.
+            columns: terms to use.
         """
         weights = np.zeros((left.shape[1], TERMS))
         for j in range(left.shape[1]):
-            rows = use[:, j] if use[:, j].sum() >= 50 else np.ones(len(left), dtype=np.bool_)
-            size = np.abs(left[rows, j])
-            weights[j] = nnls(terms[rows, j], size)[0]
-            weights[j, 0] = max(weights[j, 0], 0.1 * float(size.mean()), 1e-9)
+            at = peaks(np.where(use[:, j], left[:, j], 0.0), rows)
+            if len(at) < 30:
+                at = peaks(left[:, j], rows)
+            size = left[at, j]
+            weights[j, columns] = quantile_bound(terms[at, j][:, columns], size, COVERED)
+            mean = float(size.mean()) if len(size) else 0.0
+            weights[j, 0] = max(weights[j, 0], 0.2 * mean, 1e-9)
         return cls(weights)
 
     def scale(self, terms: Array) -> Array:
@@ -83,14 +140,14 @@ class Allowance:
         """The constant term of each joint raised to a common multiple of ``level``.
 
         What friction leaves is alike in all joints when measured in their Coulomb friction, and
-        no log shows all of it for every joint.
+        no log shows all of it for every joint. The multiple is ``LEAST`` or more.
 
         Args:
             level: Coulomb friction [N m], shape (n,).
             pooled: quantile of the joints' ratios that becomes the common multiple; 1: the largest.
         """
         safe = np.maximum(level, 1e-9)
-        common = float(np.quantile(self.weights[:, 0] / safe, pooled))
+        common = max(float(np.quantile(self.weights[:, 0] / safe, pooled)), LEAST)
         weights = self.weights.copy()
         weights[:, 0] = np.maximum(weights[:, 0], common * level)
         return Allowance(weights)
@@ -98,3 +155,9 @@ class Allowance:
     def times(self, factors: Array) -> Allowance:
         """Each joint's bound times its factor, shape (n,)."""
         return Allowance(self.weights * factors[:, None])
+
+
+def peaks(level: Array, rows: int) -> NDArray[np.intp]:
+    """Index of the largest value above 0 of every ``rows`` samples of ``level``, shape (T,)."""
+    found = [k + int(np.argmax(level[k : k + rows])) for k in range(0, len(level), rows)]
+    return np.array([k for k in found if level[k] > 0], dtype=np.intp)

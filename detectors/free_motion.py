@@ -6,8 +6,10 @@ acceleration, apart for joints that stand still. Static friction is indeterminat
 of a joint at rest wanders with the others' motion, which the tracked offset follows.
 
 Allowances come from residuals of logs that the calibration in use did not see: every training log
-is judged by a calibration from the others, as new logs will be. Each joint's allowance at rest and
-in motion is scaled to its own share of the false alarms to accept, so that 1 is the threshold.
+is judged by a calibration from the others, as new logs will be. The allowances at rest and in
+motion are scaled to half of the false alarms to accept each, so that 1 is the threshold. The tail
+of the ratios of residual to allowance is taken to be that of all joints together: one joint's share
+of some minutes says too little of what it does once in hours.
 """
 
 from __future__ import annotations
@@ -18,10 +20,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.allowance import Allowance, terms, torque_change
+from tauguard.detectors.allowance import (
+    AT_REST,
+    IN_MOTION,
+    Allowance,
+    peaks,
+    terms,
+    torque_change,
+)
 from tauguard.detectors.detector import check_interval, common_interval
 from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
-from tauguard.detectors.events import find_alarms
+from tauguard.detectors.events import MERGE_GAP, find_alarms
 from tauguard.detectors.filter import confirmation_samples, confirmed
 from tauguard.detectors.identification import (
     REAL_FRICTION,
@@ -30,7 +39,7 @@ from tauguard.detectors.identification import (
     filtered,
     identify,
 )
-from tauguard.detectors.operating_point import sustained, threshold_for_rate
+from tauguard.detectors.operating_point import followed, sustained
 from tauguard.detectors.thresholds import still
 from tauguard.traces.trace import Bools, Detection, Trace
 
@@ -38,20 +47,23 @@ Array = NDArray[np.float64]
 
 #: Travel after which a joint that stood still counts as moving [rad].
 RELEASE = 5e-3
+#: A joint's threshold over its largest training peak is at least this.
+HEADROOM = 1.2
 
 
 @dataclass(frozen=True)
 class FreeMotionSettings:
     """What can be chosen; the defaults are for real arms at 100 Hz and above."""
 
-    observer_gain: float = 20.0  #: [1/s]
+    observer_gain: float = 40.0  #: [1/s]
+    calibration_rate: float = 20.0  #: of the filter that the calibration looks through [1/s]
     confirmation: float = 0.04  #: t_c [s]
     settle: float = 2.0  #: seconds at the beginning that are never an alarm
     false_alarms_per_hour: float = 1.0  #: to accept when the allowances are scaled
     spike: bool = True
     """Take the median of three successive currents: a controller's kick of one sample, as at a
     commanded stop, says nothing about contact. It costs one sample of delay."""
-    unknowns: Unknowns = field(default_factory=Unknowns)  #: what is tracked
+    unknowns: Unknowns = field(default_factory=lambda: Unknowns(offset=0.6))  #: what is tracked
     beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
 
 
@@ -113,9 +125,9 @@ class FreeMotionDetector:
             raise ValueError(f"{len(recordings)} logs: give three or more, to leave each out once")
         self.dt = common_interval([r.trace for r in recordings], robot)
         bare = replace(robot.friction or REAL_FRICTION, weights=np.empty((0, 0)))
-        gain, beliefs = self.settings.observer_gain, self.settings.beliefs
+        rate, beliefs = self.settings.calibration_rate, self.settings.beliefs
         numbers, drive = robot.robot, robot.drive_gain
-        data = [filtered(r, numbers, drive, bare, gain, beliefs.rest) for r in recordings]
+        data = [filtered(r, numbers, drive, bare, rate, beliefs.rest) for r in recordings]
 
         def without(k: int) -> ArmModel:
             use = [i for i in range(len(recordings)) if i != k]
@@ -124,7 +136,7 @@ class FreeMotionDetector:
                 [recordings[i] for i in use],
                 friction=bare,
                 beliefs=beliefs,
-                rate=gain,
+                rate=rate,
                 data=[data[i] for i in use],
             ).arm
 
@@ -138,30 +150,46 @@ class FreeMotionDetector:
     def _learn(self, judged: Sequence[Judged], coulomb: Array) -> None:
         """Allowances of left-out residuals, scaled to the false alarms to accept."""
         first = int(np.ceil(self.settings.settle / self.dt))
-        parts = [Judged(j.left[first:], j.terms[first:], j.rest[first:]) for j in judged]
-        left, columns, rest = (
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("left", "terms", "rest")
-        )
-        self.seconds = len(left) * self.dt
-        at_rest = self._scaled(Allowance.fit(left, columns, rest), parts, True)
-        # In motion friction's share is known, and changes of torque allow nothing.
-        steady = columns.copy()
-        steady[..., -1] = 0.0
-        moving = self._scaled(Allowance.fit(left, steady, ~rest), parts, False)
-        self.resting, self.moving = at_rest.at_least(coulomb, 1.0), moving.at_least(coulomb, 0.5)
+        self.seconds = sum(len(part.left) - first for part in judged) * self.dt
+        columns = np.concatenate([part.terms[first:] for part in judged])
+        rest = np.concatenate([part.rest[first:] for part in judged])
+        bounds = []
+        for use, which in ((rest, AT_REST), (~rest, IN_MOTION)):
+            level = np.concatenate([self._level(part, use is rest)[first:] for part in judged])
+            rows = max(1, round(MERGE_GAP / self.dt))
+            allowance = Allowance.fit(level, columns, use, rows, which)
+            factors = self._factors(level / allowance.scale(columns), rows)
+            bounds.append(allowance.times(factors).at_least(coulomb))
+        room = self._room(judged, bounds[0], bounds[1])
+        self.resting, self.moving = (bound.times(np.full(len(coulomb), room)) for bound in bounds)
 
-    def _scaled(self, allowance: Allowance, parts: Sequence[Judged], resting: bool) -> Allowance:
-        """Each joint's allowance times its threshold for a share of the false alarms."""
-        joints = len(allowance.weights)
-        rate = self.settings.false_alarms_per_hour / (2 * joints)
-        levels: list[list[Array]] = [[] for _ in range(joints)]
-        for part in parts:
-            ratio = np.abs(part.left) / allowance.scale(part.terms)
-            ratio[part.rest != resting] = 0.0
-            for j in range(joints):
-                levels[j].append(sustained(ratio[:, j], self._samples()))
-        return allowance.times(np.array([threshold_for_rate(own, self.dt, rate) for own in levels]))
+    def _room(self, judged: Sequence[Judged], at_rest: Allowance, moving: Allowance) -> float:
+        """At least 1: for alarms that several joints, or rest and motion, make in turn."""
+        if self._allowed() >= 1:
+            return 1.0
+        first = int(np.ceil(self.settings.settle / self.dt))
+        scores = [self._ratio(part, at_rest, moving)[first:].max(axis=1) for part in judged]
+        worst = max(float(sustained(score, self._samples()).max()) for score in scores)
+        return max(1.0, HEADROOM * worst)
+
+    def _allowed(self) -> float:
+        """False alarms at rest, or in motion, to accept in the training logs."""
+        return self.settings.false_alarms_per_hour / 2 * self.seconds / 3600
+
+    def _level(self, judged: Judged, resting: bool) -> Array:
+        """What an alarm of each joint would need, 0 in the other regime, shape (T, n)."""
+        size = np.where(judged.rest == resting, np.abs(judged.left), 0.0)
+        return np.column_stack([sustained(own, self._samples()) for own in size.T])
+
+    def _factors(self, ratio: Array, rows: int) -> Array:
+        """What each joint's allowance is to be multiplied by, shape (n,)."""
+        own = [np.sort(column[peaks(column, rows)])[::-1] for column in ratio.T]
+        pooled = np.sort(np.concatenate(own))[::-1]
+        allowed = self._allowed()
+        if allowed >= 1:
+            return np.full(len(own), pooled[min(int(allowed), len(pooled) - 1)])
+        common = followed(pooled, allowed, max(10, round(0.02 * len(pooled))))
+        return np.array([max(common, HEADROOM * float(z[0])) if len(z) else common for z in own])
 
     # -- detection --------------------------------------------------------------------------------
 
@@ -175,7 +203,9 @@ class FreeMotionDetector:
         gain = self.settings.observer_gain
         found = Estimator(model, gain, self.dt, self.settings.unknowns).run(t, q, qd, current)
         change = torque_change(model.robot, t, q, qd, gain)
-        return Judged(found.left, terms(qd, found.acceleration, change), resting(q, qd, self.dt))
+        return Judged(
+            found.left, terms(qd, found.acceleration, change, self.dt), resting(q, qd, self.dt)
+        )
 
     def _checked(self, trace: Trace) -> Judged:
         model = self._fitted()[0]

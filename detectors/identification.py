@@ -86,8 +86,8 @@ class Beliefs:
     centre: float = 0.02  #: of the centre of mass, each axis [m]
     inertia: float = 0.1  #: relative to the link's largest entry
     armature: float = 1.0
-    """Relative to the joint's largest entry of the mass matrix, or to a twentieth of the arm's largest:
-    the rotor of a wrist weighs more, through its gear, than all that it turns."""
+    """Relative to the joint's largest entry of the mass matrix, or to a twentieth of the arm's
+    largest: the rotor of a wrist weighs more, through its gear, than all that it turns."""
     gain: float = 0.5  #: relative, where gains are identified
     friction: float = 30.0  #: of a friction weight [N m per unit], but for the following
     loaded: float = 0.3  #: of friction per load [1]
@@ -385,6 +385,7 @@ def _fit(
     gain, error = arm.drive_gain.copy(), np.zeros(robot.joints)
     level: Array = np.ones(robot.joints)
     known = [_known(recording) for recording in recordings]
+    loads = np.array(known)
     for turn in range(rounds):
         if data is None or not held:
             data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]

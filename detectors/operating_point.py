@@ -56,8 +56,21 @@ def threshold_for_rate(
     allowed = per_hour * hours
     if allowed >= 1:
         return float(peaks[min(int(allowed), len(peaks) - 1)])
-    count = max(2, min(len(peaks) - 1, round(tail * len(peaks))))
-    base = float(peaks[min(count, len(peaks) - 1)])
-    mean_excess = float(np.mean(peaks[:count] - base))
-    followed = base + mean_excess * float(np.log(count / allowed))
-    return max(followed, float(np.nextafter(peaks[0], np.inf)))
+    return followed(peaks, allowed, max(2, round(tail * len(peaks))))
+
+
+def followed(peaks: Array, allowed: float, count: int) -> float:
+    """The level that ``allowed`` (fewer than 1) peaks are expected to exceed.
+
+    An exponential tail through the ``count`` largest; never below the largest.
+
+    Args:
+        peaks: in descending order, shape (N,), N >= 1.
+        allowed: above 0.
+        count: at most N - 1 are used.
+    """
+    count = min(count, len(peaks) - 1)
+    base = float(peaks[count])
+    mean_excess = float(np.mean(peaks[:count] - base)) if count else 0.0
+    level = base + mean_excess * float(np.log(max(count, 1) / allowed))
+    return max(level, float(np.nextafter(peaks[0], np.inf)))

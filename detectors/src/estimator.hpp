@@ -123,11 +123,12 @@ class Estimator {
     }
   }
 
-  // Torque that arm and tracked payload need at joint j, accelerations aside.
+  // Torque that arm and tracked payload need at joint j, accelerations aside. The residual of a payload
+  // that the model lacks has the sign of what is missing: theta is less than 0 for it.
   double carried(std::size_t j) const {
     double sum = beta_[j];
     if (adapts_)
-      for (int a = 0; a < kPayload; ++a) sum += load_beta_[kPayload * j + a] * theta_[a];
+      for (int a = 0; a < kPayload; ++a) sum -= load_beta_[kPayload * j + a] * theta_[a];
     return sum;
   }
 

@@ -118,7 +118,9 @@ def test_more_alarms_accepted_means_a_lower_bound():
         )
         for rate in (0.1, 100.0)
     )
-    assert (many.moving.weights[:, 0] < few.moving.weights[:, 0]).all()
+    # The constant terms may both be at their floor.
+    assert (many.moving.weights <= few.moving.weights + 1e-12).all()
+    assert (many.moving.weights.sum(axis=1) < few.moving.weights.sum(axis=1)).all()
 
 
 def test_what_it_refuses(detector, fresh):

@@ -1,12 +1,22 @@
 """The friction columns, and what calibration identifies."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors import ArmModel, Estimator, FrictionModel, Unknowns, calibrate
+from tauguard.detectors import (
+    ArmModel,
+    Estimator,
+    FrictionModel,
+    Unknowns,
+    calibrate,
+    gravity_torque,
+)
 from tauguard.models import Mismatch, cura6_drive
+from tests.detectors.synthetic_arm import nominal
 
 
 def column(model, q, index):
@@ -48,6 +58,37 @@ def test_published_numbers():
     q = np.cumsum(qd, axis=0) * 1e-3
     torque = model.torque(q, qd, np.full((300, 2), -20.0))
     np.testing.assert_allclose(torque[-1], [10 + 1 + 2, 5 + 0.5 + 2], rtol=1e-6)
+
+
+def test_modelled_load_does_not_take_a_contact_for_friction():
+    """A contact on a joint without gravity: the drive's torque hides some of it."""
+    robot = nominal()  # gravity does nothing about its first, vertical axis
+    t = np.arange(0, 6, 0.01)
+    q = np.column_stack([0.5 * t, np.full_like(t, 0.3), np.full_like(t, -0.2)])
+    qd = np.column_stack([np.full_like(t, 0.5), 0 * t, 0 * t])
+    contact = np.where(t > 3, -4.0, 0.0)  # the drive gives 4 N m more
+    seen = {}
+    for modelled in (False, True):
+        model = FrictionModel(bristles=(), stops=(1e-3,), stribeck=(), slopes=(), modelled=modelled)
+        weights = np.zeros((3, model.columns))
+        weights[:, 2], weights[:, 3] = (2.0, 0.5) if not modelled else (4.0, 0.5)
+        model = dataclasses.replace(model, weights=weights)
+        current = gravity_torque(robot, q)
+        current[:, 0] += 4.0 - contact
+        estimator = Estimator(ArmModel(robot, np.ones(3), model), 20.0, 0.01, Unknowns.none())
+        seen[modelled] = estimator.run(t, q, qd, current).residual[[290, -1], 0]
+    np.testing.assert_allclose(seen[True], [0, -4], atol=0.02)
+    np.testing.assert_allclose(seen[False], [0, -2], atol=0.02)
+
+
+def test_load_columns_are_those_that_grow_with_the_load():
+    model = FrictionModel(loaded=(0.1, 0.3), saturation=True)
+    q, qd = np.linspace(0, 1, 50)[:, None], np.full((50, 1), 0.4)
+    tau = np.full((50, 1), 3.0)
+    one, two = (model.evaluate(q, qd, tau, load)[..., :-1] for load in (tau, 2 * tau))
+    grown = np.flatnonzero((np.abs(two - one) > 1e-9).any(axis=(0, 1)))
+    np.testing.assert_array_equal(grown, np.arange(model.columns)[model.load_columns])
+    np.testing.assert_array_equal(model.evaluate(q, qd, tau), model.evaluate(q, qd, tau, tau))
 
 
 def test_calibration_finds_the_friction_and_the_payloads(training, robot, drive_gain):

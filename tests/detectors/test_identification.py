@@ -86,6 +86,22 @@ def test_an_unknown_payload_is_found(logs):
     assert result.loads[:-1, 0] == pytest.approx(0.0, abs=1e-3)
 
 
+def test_the_inertia_of_a_load_is_found():
+    """A load far from the last link's origin, whose inertia matters: without it, 2 N m are left."""
+    logs = [Recording(record(seed)) for seed in range(3)]
+    found = identify(ArmModel(nominal(), GAIN), [*logs, Recording(record(30, load=4.0), None)])
+    mass, inertia = found.loads[-1, 0], found.loads[-1, 6]  # about the joint's axis, y
+    assert mass == pytest.approx(4.0, abs=0.4)
+    assert inertia == pytest.approx(4.0 * (0.3**2 + 0.05**2), abs=0.15)
+
+
+def test_a_wrist_whose_rotor_outweighs_its_link():
+    found = identify(ArmModel(nominal(), GAIN), [Recording(record(seed)) for seed in range(3)])
+    light = mass_matrix(nominal(), np.zeros((1, 3)))[0, 2, 2]
+    assert ROTOR[2] > 2 * light
+    assert found.arm.robot.armature[2] == pytest.approx(ROTOR[2], abs=0.1)
+
+
 def test_first_guess_of_the_gains(logs):
     assert start_gains(nominal(), logs) == pytest.approx(GAIN, rel=0.6)
 
