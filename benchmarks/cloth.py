@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tauguard.benchmarks import cloth_adversarial, cloth_frames, cloth_queries, cloth_scaling
+from tauguard.benchmarks.cloth_summary import summary
 from tauguard.benchmarks.report import Row
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     rows += cloth_scaling.size(sizes, seed, repeats)
     rows += cloth_scaling.threads(triangles, seed, repeats)
     rows += cloth_scaling.topology(triangles, seed, repeats)
-    return rows
+    return rows + summary(rows)
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

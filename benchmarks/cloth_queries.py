@@ -94,7 +94,30 @@ def on_recording(frame: Frame, seed: int, limit: int, calls: int, repeats: int) 
         truth = solver(queries, "ab2pf")()
         rows += _methods(frame.name, len(found), queries, truth, repeats)
         rows += _peers(ipctk, frame.name, mesh, candidates, queries, truth, rng, calls, rows[-1])
-    return rows
+    return rows + _both_kinds(rows, len(found.fv_candidates), len(found.ee_candidates))
+
+
+def _both_kinds(rows: list[Row], n_vf: int, n_ee: int) -> list[Row]:
+    """The peers' and our times per query in the mix of kinds that the broad phase leaves."""
+    share = {"vf": n_vf / (n_vf + n_ee), "ee": n_ee / (n_vf + n_ee)}
+    found: list[Row] = []
+    for peer in dict.fromkeys(row["peer"] for row in rows if row["study"] == "query peer"):
+        own = [row for row in rows if row.get("peer") == peer]
+        ns = sum(share[row["kind"]] * row["ns"] for row in own)
+        ab2pf_ns = sum(share[row["kind"]] * row["ab2pf_ns"] for row in own)
+        found.append(
+            {
+                "study": "query peer",
+                "set": own[0]["set"],
+                "kind": "both",
+                "peer": peer,
+                "n": sum(row["n"] for row in own),
+                "ns": ns,
+                "ab2pf_ns": ab2pf_ns,
+                "speedup": ns / ab2pf_ns,
+            }
+        )
+    return found
 
 
 def on_hard_sets(folder: Path, calls: int) -> list[Row]:

@@ -82,6 +82,7 @@ def front(triangles: int, seed: int, frames: int) -> list[Row]:
                 "frames": count,
                 "node_tests_kept": round(tests[0] / count),
                 "node_tests_fresh": round(tests[1] / count),
+                "node_tests_saved": float(1 - tests[0] / tests[1]),
                 "descent_ms_kept": 1e3 * seconds[0] / count,
                 "descent_ms_fresh": 1e3 * seconds[1] / count,
                 "descent_saved": 1 - seconds[0] / seconds[1],

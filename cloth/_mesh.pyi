@@ -36,6 +36,7 @@ class Mesh:
 def overlap_rows(
     variant: str, a: NDArray[np.float32], b: NDArray[np.float32]
 ) -> NDArray[np.int32]: ...
+def lanes_sharing(variant: str, a: NDArray[np.int32], b: NDArray[np.int32]) -> int | None: ...
 def solve(
     vf: bool,
     x_t0: NDArray[np.float64],

@@ -10,6 +10,10 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
           const std::int32_t* vb, Mask hits, const Groups& groups, CandidateBlock& out) {
   std::int32_t a[ArityA];
   for (int j = 0; j < ArityA; ++j) a[j] = va[j * lanes + i];
+  static const auto lanes_sharing = overlap_kernels().lanes_sharing;
+  const Mask shared = hits & lanes_sharing(a, ArityA, vb, ArityB);
+  out.adjacent += __builtin_popcount(shared);
+  hits &= ~shared;
   std::int32_t *row = out.rows.data() + 4 * out.size, *pair = out.pairs.data() + 2 * out.size;
   // Every hit is written; the place is taken only by those that count (no branch to mispredict).
   for (; hits; hits &= hits - 1) {
@@ -18,22 +22,15 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
     const std::int32_t id_a = ArityA == 1 ? a[0] : ids_a[i], id_b = ids_b[lane];
     const bool swap = ArityA == ArityB && id_a > id_b;
     const int at_a = swap ? ArityB : 0, at_b = swap ? 0 : ArityA;
-    bool shared = false;
-    for (int k = 0; k < ArityB; ++k) {
-      const std::int32_t v = vb[k * lanes + lane];
-      row[at_b + k] = v;
-      for (int j = 0; j < ArityA; ++j) shared |= a[j] == v;
-    }
+    for (int k = 0; k < ArityB; ++k) row[at_b + k] = vb[k * lanes + lane];
     for (int j = 0; j < ArityA; ++j) row[at_a + j] = a[j];
     pair[0] = swap ? id_b : id_a;
     pair[1] = swap ? id_a : id_b;
     const bool meet =
         !groups.any() || groups.meet(groups.of_vertex[a[0]], groups.of_vertex[vb[lane]]);
-    const bool counts = !shared & meet;
-    out.adjacent += shared;
-    out.kept_apart += !shared & !meet;
-    row += 4 * counts;
-    pair += 2 * counts;
+    out.kept_apart += !meet;
+    row += 4 * meet;
+    pair += 2 * meet;
   }
   out.size = (pair - out.pairs.data()) / 2;
 }
@@ -60,6 +57,7 @@ void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves
     const int i = __builtin_ctz(rows);
     Mask hits = masks[i];
     if (same) hits &= ~Mask(0) << i << 1;  // each unordered pair once
+    if (hits == 0) continue;
     if (edges) {
       emit<2, 2>(ids_a, va, i, ids_b, vb, hits, groups, out);
     } else {

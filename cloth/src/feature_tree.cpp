@@ -1,6 +1,7 @@
 #include "feature_tree.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <numeric>
 
@@ -123,53 +124,69 @@ void FeatureTree::fill_groups(const Features& features, const Groups& groups) {
   }
 }
 
+// Both ends of the step on every axis slot, [end][slot], four values at a time.
+template <int slots>
+struct Row {
+  using Four = float __attribute__((vector_size(16)));
+  static constexpr int fours = slots / 2;
+  Four value[fours];
+
+  float& operator[](int r) { return reinterpret_cast<float*>(value)[r]; }
+  void fill(float x) { std::fill(value, value + fours, Four{x, x, x, x}); }
+  void load(const float* from) { std::memcpy(value, from, sizeof value); }
+  void lower_to(const Row& o) {
+    for (int i = 0; i < fours; ++i) value[i] = o.value[i] < value[i] ? o.value[i] : value[i];
+  }
+  void raise_to(const Row& o) {
+    for (int i = 0; i < fours; ++i) value[i] = value[i] < o.value[i] ? o.value[i] : value[i];
+  }
+  void add(const Row& o, float sign) {
+    for (int i = 0; i < fours; ++i) value[i] += sign * o.value[i];
+  }
+};
+
 template <int slots>
 void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
-  constexpr int both = 2 * slots;  // [end of the step][axis slot]
-  float* block = blocks_.data() + leaf * block_stride();
   const std::int32_t* v = vertices(leaf);
-  float node_low[both], node_high[both];
-  std::fill(node_low, node_low + both, infinity);
-  std::fill(node_high, node_high + both, -infinity);
+  // Vertices lie anywhere in memory: the next leaf's are asked for before they are used.
+  if (leaf + 1 < leaves_)
+    for (int i = 0; i < lanes * arity_; ++i) __builtin_prefetch(points.of(std::max(v[lanes * arity_ + i], 0)));
+  Row<slots> pad, point, low[lanes], high[lanes], node_low, node_high;
+  for (int r = 0; r < 2 * slots; ++r) pad[r] = points.pad()[r % slots];
+  node_low.fill(infinity);
+  node_high.fill(-infinity);
   for (int lane = 0; lane < lanes; ++lane) {
-    if (!(occupied_[leaf] >> lane & 1)) {
-      for (int r = 0; r < 2 * times_ * axes_; ++r) block[r * lanes + lane] = r % 2 == 0 ? infinity : -infinity;
-      continue;
-    }
-    float low[both], high[both];
-    const float* first = points.of(v[lane]);
-    std::copy(first, first + both, low);
-    std::copy(first, first + both, high);
-    for (int j = 1; j < arity_; ++j) {
-      const float* p = points.of(v[j * lanes + lane]);
-      for (int r = 0; r < both; ++r) {
-        low[r] = std::min(low[r], p[r]);
-        high[r] = std::max(high[r], p[r]);
-      }
+    low[lane].fill(infinity);
+    high[lane].fill(-infinity);
+    if (!(occupied_[leaf] >> lane & 1)) continue;
+    for (int j = 0; j < arity_; ++j) {
+      point.load(points.of(v[j * lanes + lane]));
+      low[lane].lower_to(point);
+      high[lane].raise_to(point);
     }
     if (times_ == 1)
       for (int k = 0; k < slots; ++k) {
-        low[k] = std::min(low[k], low[slots + k]);
-        high[k] = std::max(high[k], high[slots + k]);
+        low[lane][k] = std::min(low[lane][k], low[lane][slots + k]);
+        high[lane][k] = std::max(high[lane][k], high[lane][slots + k]);
       }
-    for (int r = 0; r < both; ++r) {
-      low[r] -= points.pad()[r % slots];
-      high[r] += points.pad()[r % slots];
-      node_low[r] = std::min(node_low[r], low[r]);
-      node_high[r] = std::max(node_high[r], high[r]);
-    }
-    float* out = block + lane;
-    for (int k = 0; k < axes_; ++k)
-      for (int t = 0; t < times_; ++t, out += 2 * lanes) {
-        out[0] = low[t * slots + k];
-        out[lanes] = high[t * slots + k];
-      }
+    low[lane].add(pad, -1);
+    high[lane].add(pad, 1);
+    node_low.lower_to(low[lane]);
+    node_high.raise_to(high[lane]);
   }
+  float* out = blocks_.data() + leaf * block_stride();
+  for (int k = 0; k < axes_; ++k)
+    for (int t = 0; t < times_; ++t, out += 2 * lanes)
+      for (int lane = 0; lane < lanes; ++lane) {
+        out[lane] = low[lane][t * slots + k];
+        out[lanes + lane] = high[lane][t * slots + k];
+      }
   float* node = nodes_.data() + (leaves_ + std::size_t(leaf)) * node_stride();
-  for (int t = 0; t < times_; ++t) {
-    std::copy(node_low + t * slots, node_low + (t + 1) * slots, node + 2 * t * slots);
-    std::copy(node_high + t * slots, node_high + (t + 1) * slots, node + (2 * t + 1) * slots);
-  }
+  for (int t = 0; t < times_; ++t, node += 2 * slots)
+    for (int k = 0; k < slots; ++k) {
+      node[k] = node_low[t * slots + k];
+      node[slots + k] = node_high[t * slots + k];
+    }
 }
 
 void FeatureTree::fit_inner(std::int32_t i) {

@@ -231,4 +231,12 @@ NB_MODULE(_mesh, m) {
     const std::size_t n = rows.size();
     return array_of<nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1>>>(std::move(rows), {n});
   });
+  // For tests: the lanes of `b` that share a vertex with `a`, by the named variant; None where it cannot run here.
+  m.def("lanes_sharing", [](const std::string& variant, nb::ndarray<const std::int32_t, nb::shape<-1>, nb::c_contig> a,
+                            nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> b) -> nb::object {
+    const OverlapKernels* kernels = overlap_kernels(variant.c_str());
+    if (!kernels) return nb::none();
+    return nb::int_(kernels->lanes_sharing(a.data(), static_cast<int>(a.shape(0)), b.data(),
+                                           static_cast<int>(b.shape(0))));
+  });
 }

@@ -50,6 +50,15 @@ void rows_portable(const float* a, Mask rows, const float* b, int axes, int time
     out[row] = static_cast<std::uint16_t>(apart_portable(a + row, in_block(times), b, axes, times, wanted));
   }
 }
+Mask sharing_portable(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
+  std::int32_t equal[lanes] = {};
+  for (int j = 0; j < arity_a; ++j)
+    for (int k = 0; k < arity_b; ++k)
+      for (int i = 0; i < lanes; ++i) equal[i] |= a[j] == b[k * lanes + i];
+  Mask mask = 0;
+  for (int i = 0; i < lanes; ++i) mask |= Mask(equal[i]) << i;
+  return mask;
+}
 
 #if defined(__x86_64__)
 #define TAUGUARD_AVX2 __attribute__((target("avx2")))
@@ -87,6 +96,18 @@ TAUGUARD_AVX2 void rows_avx2(const float* a, Mask rows, const float* b, int axes
     out[row] = static_cast<std::uint16_t>(overlap_avx2(a + row, in_block(times), b, axes, times, wanted));
   }
 }
+TAUGUARD_AVX2 Mask sharing_avx2(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
+  __m256i left = _mm256_setzero_si256(), right = left;
+  for (int j = 0; j < arity_a; ++j)
+    for (int k = 0; k < arity_b; ++k) {
+      const auto* at = reinterpret_cast<const __m256i*>(b + k * lanes);
+      const __m256i v = _mm256_set1_epi32(a[j]);
+      left = _mm256_or_si256(left, _mm256_cmpeq_epi32(v, _mm256_loadu_si256(at)));
+      right = _mm256_or_si256(right, _mm256_cmpeq_epi32(v, _mm256_loadu_si256(at + 1)));
+    }
+  return Mask(_mm256_movemask_ps(_mm256_castsi256_ps(left))) |
+         Mask(_mm256_movemask_ps(_mm256_castsi256_ps(right))) << 8;
+}
 
 TAUGUARD_AVX512 TAUGUARD_INLINE __mmask16 apart16(const float* row, RowStride s, const float* b, int times) {
   __mmask16 below = _mm512_cmp_ps_mask(_mm512_set1_ps(row[s.side]), _mm512_loadu_ps(b), _CMP_LT_OQ);
@@ -120,9 +141,17 @@ TAUGUARD_AVX512 void rows_avx512(const float* a, Mask rows, const float* b, int 
     out[row] = static_cast<std::uint16_t>(overlap_avx512(a + row, in_block(times), b, axes, times, wanted));
   }
 }
-constexpr OverlapKernels avx2{node_avx2, rows_avx2}, avx512{node_avx512, rows_avx512};
+TAUGUARD_AVX512 Mask sharing_avx512(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
+  Mask mask = 0;
+  for (int k = 0; k < arity_b; ++k) {
+    const __m512i at = _mm512_loadu_si512(b + k * lanes);
+    for (int j = 0; j < arity_a; ++j) mask |= _mm512_cmpeq_epi32_mask(at, _mm512_set1_epi32(a[j]));
+  }
+  return mask;
+}
+constexpr OverlapKernels avx2{node_avx2, rows_avx2, sharing_avx2}, avx512{node_avx512, rows_avx512, sharing_avx512};
 #endif
-constexpr OverlapKernels portable{node_portable, rows_portable};
+constexpr OverlapKernels portable{node_portable, rows_portable, sharing_portable};
 
 }  // namespace
 

@@ -18,6 +18,8 @@ struct OverlapKernels {
   // not stand apart from.
   void (*rows_of_block)(const float* a, Mask rows, const float* b, int axes, int times, Mask candidates,
                         std::uint16_t* out);
+  // The lanes of `b`, 16 features as [vertex][lane], that share a vertex with one feature, `a`.
+  Mask (*lanes_sharing)(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b);
 };
 
 // The fastest that this processor runs. Comparisons only: every variant gives the same bits.

@@ -163,6 +163,19 @@ def test_vector_variants_give_the_portable_bits(axes, times):
     assert tried or not len(_mesh.overlap_rows("avx2", a, b))
 
 
+@pytest.mark.parametrize(("arity_a", "arity_b"), [(1, 3), (2, 2)])
+def test_every_variant_sees_the_same_shared_vertices(arity_a, arity_b):
+    rng = np.random.default_rng(8)
+    for _ in range(20):
+        a = rng.integers(0, 9, arity_a, dtype=np.int32)
+        b = rng.integers(0, 9, (arity_b, 16), dtype=np.int32)
+        want = [lane for lane in range(16) if set(a) & set(b[:, lane])]
+        for variant in ("portable", "avx2", "avx512"):
+            have = _mesh.lanes_sharing(variant, a, b)
+            assert have is None or [i for i in range(16) if have >> i & 1] == want, variant
+        assert _mesh.lanes_sharing("portable", a, b) is not None
+
+
 class TestGroups:
     def test_pairs_of_groups_that_do_not_meet_are_left_out(self):
         faces, x_t0, x_t1 = sheet(10, np.random.default_rng(7))
