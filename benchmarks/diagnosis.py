@@ -30,6 +30,7 @@ from tauguard.detectors.aftermath import Aftermath, AftermathOf
 from tauguard.detectors.classification import KINDS
 from tauguard.detectors.contact_force import link_poses, point_jacobians
 from tauguard.detectors.diagnosis import believed
+from tauguard.detectors.diagnosis_metrics import ContactErrors, contact_at
 from tauguard.detectors.metrics import stratum
 from tauguard.detectors.operating_point import threshold_for_rate
 from tauguard.envs import STRATA, simulate
@@ -223,17 +224,12 @@ def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
 
 def _errors(judged: Judged, method: str) -> tuple[float, float, float, float]:
     """True force [N], its error [N], angle between them [deg], distance of the points [cm]."""
+    event, answer = judged.event, judged.answers[method]
     assert judged.diagnosis is not None
-    answer = judged.answers[method]
-    force, point = judged.event.truth_at(judged.diagnosis.time)
-    sizes = float(np.linalg.norm(force)), float(np.linalg.norm(answer.force))
-    cosine = float(answer.force @ force) / max(sizes[0] * sizes[1], 1e-12)
-    return (
-        sizes[0],
-        float(np.linalg.norm(answer.force - force)),
-        float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))),
-        100 * float(np.linalg.norm(answer.point - point)),
-    )
+    assert event.collision is not None
+    truth = contact_at(event.trace, event.collision, judged.diagnosis.time)
+    errors = ContactErrors.of(answer.force, answer.point, truth)
+    return errors.true_force, errors.force, errors.direction, 100 * errors.point
 
 
 def kind_rows(judged: Sequence[Judged]) -> list[Row]:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.benchmarks.detection_pool import FORCES, PAYLOADS, Conditions, struck_pool
 from tauguard.datasets.plans import BEGIN, collision_plans, episode_seconds
@@ -16,10 +15,6 @@ from tauguard.detectors.events import detection_window
 from tauguard.envs import STRATA, Episode, PayloadPick, simulate
 from tauguard.traces import Alarm, Collision, Trace
 
-Array = NDArray[np.float64]
-
-#: The observer's estimate is compared with the largest true force of so many seconds before it.
-LAG = 0.015
 #: Seconds at the end of the look in which a lasting contact must touch without a break.
 END = 0.03
 #: A hand's push: half a sine of force that lasts so long [s].
@@ -41,18 +36,6 @@ class Event:
     alarm: Alarm | None
     collision: Collision | None  #: None for a payload change
     mass: float = 0.0  #: of a payload change [kg]
-
-    def truth_at(self, time: float) -> tuple[Array, Array]:
-        """True force [N] and point [m] at ``time`` [s], for an estimate that lags."""
-        assert self.collision is not None
-        truth, t = self.trace.truth, self.trace.t
-        assert truth is not None
-        first, last = np.searchsorted(t, (time - LAG, time), side="left")
-        forces = truth.contact_vector[first : last + 1]
-        row = int(np.linalg.norm(forces, axis=1).argmax())
-        if not forces[row].any():
-            return self.collision.force, self.collision.point
-        return forces[row], truth.contact_point[first + row]
 
 
 def struck_events(

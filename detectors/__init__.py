@@ -9,6 +9,7 @@ from tauguard.detectors.conformal import (
 )
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.diagnosis import Diagnoser, Diagnosis, diagnose
+from tauguard.detectors.diagnosis_metrics import diagnosis_figures, judge_diagnoses
 from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.events import Matching, find_alarms, judge, match
 from tauguard.detectors.filter import Confirmation, confirmed
@@ -58,11 +59,13 @@ __all__ = [
     "calibrate_threshold",
     "confirmed",
     "diagnose",
+    "diagnosis_figures",
     "figures",
     "find_alarms",
     "gravity_torque",
     "inverse_dynamics",
     "judge",
+    "judge_diagnoses",
     "load_model",
     "make_detector",
     "mass_matrix",

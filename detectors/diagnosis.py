@@ -99,6 +99,7 @@ def believed(detector: Any) -> tuple[ArmModel, Envelope | None]:
         ValueError: not fitted.
     """
     inner = getattr(detector, "detector", detector)
+    inner = getattr(inner, "chain", inner)
     arm = inner.arm
     if arm is None:
         raise ValueError("this detector is not fitted: call fit or load first")

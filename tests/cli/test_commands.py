@@ -78,7 +78,13 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     # Judged on what it was trained on: blows from 16 N m up are not missed.
     assert row["headline"]["sensitivity"]["value"] > 0.8
     assert (tmp_path / "f.png").stat().st_size > 10_000
-    assert "sensitivity from 16 N m up" in capsys.readouterr().out
+    said = row["diagnosis"]
+    assert said["link_right"]["n"] == row["confusion"]["tp"]
+    assert said["link_right"]["value"] >= said["last_joint_right"]["low"]
+    assert 0 < said["point_cm"]["median"] < 60
+    out = capsys.readouterr().out
+    assert "sensitivity from 16 N m up" in out
+    assert "link or its neighbour" in out
 
 
 def test_train_any_detector_with_a_promise(tmp_path, capsys):

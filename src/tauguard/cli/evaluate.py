@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tauguard.detectors import Thresholded
+    from tauguard.traces import Detection, Trace
 
 
 def command(
@@ -21,16 +27,17 @@ def command(
     """
     from tauguard.benchmarks.report import machine, versions, write_json
     from tauguard.cli.folder import labelled
-    from tauguard.cli.summary import draw, text
+    from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.detectors import figures, judge, load_model
 
     watched = load_model(model)
     recordings = labelled(traces)
-    matchings = [
-        judge(watched.detect(trace), trace, watched.detector.settle) for trace in recordings
-    ]
+    pairs = [(watched.detect(trace), trace) for trace in recordings]
+    matchings = [judge(found, trace, watched.detector.settle) for found, trace in pairs]
     summary = figures(matchings)
+    summary["diagnosis"] = explained(watched, pairs)
     print(text(summary))
+    print(diagnosis_text(summary["diagnosis"]))
     if figure is not None:
         draw(figure, summary, matchings)
     if json is not None:
@@ -45,3 +52,21 @@ def command(
                 "rows": [summary],
             },
         )
+
+
+def explained(detector: Thresholded, pairs: Sequence[tuple[Detection, Trace]]) -> dict[str, Any]:
+    """Figures of what is said after the alarms of recordings that carry their arm's file."""
+    from tauguard.detectors import diagnose, diagnosis_figures, judge_diagnoses
+    from tauguard.models import link_surface
+
+    judged = []
+    surfaces: dict[str, Any] = {}
+    for detection, trace in pairs:
+        arm = trace.attachments.get("arm.xml")
+        if arm is None:
+            continue
+        if arm not in surfaces:
+            surfaces[arm] = link_surface(arm)
+        said = diagnose(detector, trace, detection, surfaces[arm])
+        judged += judge_diagnoses(said, trace)
+    return diagnosis_figures(judged)

@@ -61,6 +61,31 @@ def text(summary: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def diagnosis_text(found: Mapping[str, Any]) -> str:
+    """What was said after the alarms, as aligned lines."""
+    if not found["link_right"]["n"]:
+        return ""
+    lines = [
+        "",
+        f"  after the alarm, {found['link_right']['n']} collisions found",
+        f"  link right                  {rate(found['link_right'])}",
+        f"  link or its neighbour       {rate(found['link_or_neighbour'])}",
+        f"  last joint with torque      {rate(found['last_joint_right'])}",
+    ]
+    for name, label, unit in (
+        ("force_error_n", "force error", "N"),
+        ("direction_deg", "force direction", "deg"),
+        ("point_cm", "contact point", "cm"),
+    ):
+        own = found[name]
+        lines.append(
+            f"  {label:<26}  median {own['median']:.1f} {unit}, p95 {own['p95']:.1f} {unit}"
+        )
+    if found["false_alarms_called_payload"]["n"]:
+        lines.append(f"  false alarms, called load   {rate(found['false_alarms_called_payload'])}")
+    return "\n".join(lines)
+
+
 def draw(path: Path, summary: Mapping[str, Any], matchings: Sequence[Matching]) -> None:
     """Sensitivity and delay over severity, the confusion matrix, and delays by kind."""
     import matplotlib
