@@ -145,7 +145,7 @@ def build_rows(mesh: Mesh, peer: Peer | None, repeats: int) -> list[Row]:
             "coal_obbrss_ms": "coal is not installed" if coal is None else coal,
             "times_faster": coal / (1e3 * seconds["median"]) if coal else None,
         }
-        for volume, seconds in measure(calls, repeats).items()
+        for volume, seconds in measure(calls, repeats, time.process_time).items()
     ]
 
 
@@ -165,7 +165,7 @@ def static_rows(
     for outcome in (True, False):
         chosen = poses[hit == outcome]
         calls = {v: partial(tree.overlap, tree, chosen) for v, tree in trees.items()}
-        times = measure(calls, repeats)
+        times = measure(calls, repeats, time.process_time)
         for volume, tree in trees.items():
             mean = times[volume]["median"] / len(chosen) * 1e6
             wrong = int((hits[volume] != (hit if peer is None else peer.hit)).sum())
@@ -234,7 +234,9 @@ def dynamic_rows(
         for outcome in (True, False):
             chosen = found.hit == outcome
             part = Motion(start[chosen], move[chosen], angular[chosen])
-            seconds = measure({"toi": partial(tree.time_of_impact, tree, part)}, 2)["toi"]
+            seconds = measure(
+                {"toi": partial(tree.time_of_impact, tree, part)}, 2, time.process_time
+            )["toi"]
             rows.append(
                 {
                     "study": "table 2.2 dynamic",

@@ -42,17 +42,17 @@ def collide(a: Bodies, b: Bodies, count: int) -> NDArray[np.bool_]:
 def collide_all(
     left: list[tuple[Any, Any]], right: list[tuple[Any, Any]]
 ) -> tuple[list[bool], float]:
-    """Boolean answers of prepared pairs, and the seconds of the bare loop."""
+    """Boolean answers of prepared pairs, and the processor seconds of the bare loop."""
     coal = coal_module()
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.enable_contact = False
     collide, clear = coal.collide, result.clear
     hit = []
-    start = time.perf_counter()
+    start = time.process_time()
     for (ga, ta), (gb, tb) in zip(left, right, strict=True):
         clear()
         hit.append(collide(ga, ta, gb, tb, request, result) > 0)
-    return hit, time.perf_counter() - start
+    return hit, time.process_time() - start
 
 
 def geometries(bodies: Bodies) -> list[tuple[Any, Any]]:
@@ -99,7 +99,7 @@ def _convex(coal: Any, points: NDArray[np.float64], faces: Any) -> Any:
 
 
 def mesh(vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]) -> tuple[Any, float]:
-    """coal's OBBRSS model of a mesh, and the seconds its construction took."""
+    """coal's OBBRSS model of a mesh, and the processor seconds of its construction."""
     coal = coal_module()
     points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for p in vertices:
@@ -108,10 +108,10 @@ def mesh(vertices: NDArray[np.float64], faces: NDArray[np.integer[Any]]) -> tupl
         triangles.append(coal.Triangle(*face))
     model = coal.BVHModelOBBRSS()
     model.beginModel(len(faces), len(vertices))
-    start = time.perf_counter()
+    start = time.process_time()
     model.addSubModel(points, triangles)
     model.endModel()
-    return model, time.perf_counter() - start
+    return model, time.process_time() - start
 
 
 def collide_mesh(

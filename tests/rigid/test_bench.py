@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from tauguard.benchmarks import rigid_convex, rigid_impact, rigid_mesh, rigid_volumes
+from tauguard.benchmarks import (
+    rigid_claims,
+    rigid_convex,
+    rigid_impact,
+    rigid_mesh,
+    rigid_volumes,
+)
+from tauguard.benchmarks.report import rate
 from tauguard.rigid import Boxes, Motion, overlap
 
 
@@ -130,3 +137,33 @@ def test_the_size_of_a_volume_is_that_of_geometry():
         numbers = np.empty((1, volume.numbers))
         volume.write(numbers)
         assert rigid_volumes.size(name, numbers[0]) == pytest.approx(value)
+
+
+def test_claims_are_judged_by_their_worst_figure():
+    row = rigid_claims.at_least("ratio", 4, [5.0, 3.0])
+    assert (row["measured"], row["met"]) == (3.0, False)
+    row = rigid_claims.at_most("errors", 0, [0.0, 0.0])
+    assert (row["measured"], row["met"]) == (0.0, True)
+    assert rigid_claims.at_least("peer", 6, [7.0, None])["met"] is None
+
+
+def test_a_wrong_answer_or_a_slow_cell_breaks_a_claim():
+    names = ("abfme", "sat", "auto")
+    cell = {
+        "study": "table 2.1 static",
+        "pair": "boxes-boxes",
+        "outcome": "collision",
+        "pairs": 100,
+        "abfme_vs_textbook": 2.0,
+        "published": 1.39,
+        "auto_vs_sat": 0.9,
+        "auto_vs_coal_net": 20.0,
+        **{f"{n}_wrong": rate(int(n == "sat"), 100) for n in names},
+    }
+    hard = {"study": "hard cases", "pairs": 10}
+    hard |= {f"{n}_{k}": 0 for n in names for k in ("false_hit", "false_clear")}
+    batch = {"study": "batched box-box", "vectors_ns": {"median": 6.0}}
+    rows = [cell, hard, batch]
+    judged = rigid_claims.wrong_answers(rows) + rigid_claims.convex_ratios(rows)
+    broken = {row["claim"] for row in judged if row["met"] is False}
+    assert broken == {"sat: wrong of 100 pairs", "auto over tuned SAT, every cell"}
