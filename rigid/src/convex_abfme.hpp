@@ -165,23 +165,16 @@ struct Slabs {
 // 20 u b^2 for each of the three generators, covered by counting 6 a into the reach.
 TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const double* b) {
   const Slabs sa(a);
-  double p[4][3], reach = 0.0;
-  for (int j = 0; j < 4; ++j) {
-    double from_origin[3];
-    for (int k = 0; k < 3; ++k) {
-      from_origin[k] = b[3 * j + k] - a.origin[k];
-      p[j][k] = from_origin[k] - a.shift[k];
-    }
-    reach = std::max(reach, norm1(from_origin));
-  }
-  reach += 3 * sa.size;
+  Double4 p[3];  // one vertex of B a lane
+  load_points(b, a.origin, p);
+  const double reach = largest(abs(p[0]) + abs(p[1]) + abs(p[2])) + 3 * sa.size;
+  for (int k = 0; k < 3; ++k) p[k] -= a.shift[k];
   if (!in_range(sa.size) || !in_range(reach)) return undecided;
   const double ea = 32 * unit * sa.size * sa.size * reach, wall = sa.determinant;
-  Double4 row[4];
-  for (int j = 0; j < 4; ++j) row[j] = sa.at(p[j]);
-  const Double4 top = max(max(row[0], row[1]), max(row[2], row[3]));
-  const Double4 bottom = min(min(row[0], row[1]), min(row[2], row[3]));
-  if (any((bottom > wall + ea) | (top < -wall - ea))) return separated;
+  Double4 row[3];  // slab i at the vertices
+  for (int i = 0; i < 3; ++i) row[i] = sa.n[0][i] * p[0] + sa.n[1][i] * p[1] + sa.n[2][i] * p[2];
+  for (const auto& r : row)
+    if (all(r > wall + ea) || all(r < -wall - ea)) return separated;
 
   const TetrahedronFacets fb(b);
   if (!in_range(fb.size)) return undecided;
@@ -196,19 +189,18 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
     column += abs(fb.n[0] * a.g[i][0] + fb.n[1] * a.g[i][1] + fb.n[2] * a.g[i][2]);
   const double eb = tetrahedron_error(fb.size, far + 6 * sa.size);
   if (any(column < -eb)) return separated;
-  for (int j = 0; j < 4; ++j)
-    if (all(abs(row[j]) < wall - ea)) return common;
+  if (any(max(abs(row[0]), max(abs(row[1]), abs(row[2]))) < wall - ea)) return common;
 
-  bool certain = wall > ea && all(fb.determinant > eb) && all(column > eb) && all(bottom < wall - ea) &&
-                 all(top > ea - wall);
+  bool certain = wall > ea && all(fb.determinant > eb) && all(column > eb);
+  for (const auto& r : row) certain = certain && any(r < wall - ea) && any(r > ea - wall);
   const Double4 side_x{1.0, 1.0, -1.0, -1.0}, side_y{1.0, -1.0, 1.0, -1.0};
   Double4 x[4], y[4];
   for (int i = 0; i < 3; ++i) {  // the four edges of A along generator i + 2, one a lane
     const int k = i == 2 ? 0 : i + 1;
     const auto open = [&](double shift) __attribute__((always_inline)) {
       for (int j = 0; j < 4; ++j) {
-        x[j] = wall - side_x * row[j][i] + shift;
-        y[j] = wall - side_y * row[j][k] + shift;
+        x[j] = wall - side_x * row[i][j] + shift;
+        y[j] = wall - side_y * row[k][j] + shift;
       }
       return any(leaves_interval(x, y));
     };

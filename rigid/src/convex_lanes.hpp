@@ -37,8 +37,21 @@ TAUGUARD_INLINE Float8 abs(Float8 x) { return (Float8)((Mask8)x & INT32_MAX); }
 TAUGUARD_INLINE Double4 max(Double4 x, Double4 y) { return x > y ? x : y; }
 TAUGUARD_INLINE Double4 min(Double4 x, Double4 y) { return x < y ? x : y; }
 TAUGUARD_INLINE Float8 max(Float8 x, Float8 y) { return x > y ? x : y; }
+#if defined(__x86_64__)
+// Halves first: the sign bits of two lanes are read by an instruction that every x86-64 has.
+typedef double Double2 __attribute__((vector_size(16)));
+TAUGUARD_INLINE bool any(Mask4 m) {
+  const auto half = __builtin_shufflevector(m, m, 0, 1) | __builtin_shufflevector(m, m, 2, 3);
+  return __builtin_ia32_movmskpd((Double2)half) != 0;
+}
+TAUGUARD_INLINE bool all(Mask4 m) {
+  const auto half = __builtin_shufflevector(m, m, 0, 1) & __builtin_shufflevector(m, m, 2, 3);
+  return __builtin_ia32_movmskpd((Double2)half) == 3;
+}
+#else
 TAUGUARD_INLINE bool any(Mask4 m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 TAUGUARD_INLINE bool all(Mask4 m) { return (m[0] & m[1] & m[2] & m[3]) == -1; }
+#endif
 TAUGUARD_INLINE double largest(Double4 x) { return std::max(std::max(x[0], x[1]), std::max(x[2], x[3])); }
 // Lane k of the result is lane k + 1, k + 2 (of four), or the next of the first three.
 TAUGUARD_INLINE Double4 turn1(Double4 x) { return __builtin_shufflevector(x, x, 1, 2, 3, 0); }
