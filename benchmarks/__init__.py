@@ -13,6 +13,7 @@ STUDIES: dict[str, str] = {
     "simulation": "what each part of a scene costs, and what the time step costs in accuracy",
     "impact": "blows against body regions beside the two-mass model: error against cost",
     "detection_conformal": "false alarms per hour: what calibration promises, and what is counted",
+    "detection_online": "observer and SVR a sample: microseconds, and fewer support vectors",
     "environments": "what an environment costs beside its physics, many at once, and reactions",
     "rigid": "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
     "contacts": "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",

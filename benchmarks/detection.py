@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from threadpoolctl import threadpool_limits
+
 from tauguard.benchmarks import detection_report as report
 from tauguard.benchmarks import detection_table
 from tauguard.benchmarks import detection_variations as variations
@@ -170,7 +172,9 @@ class _pool:
     def __enter__(self) -> Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]:
         if self._count == 1:
             return lambda call, jobs: map(call, jobs)
-        self._processes = multiprocessing.get_context("spawn").Pool(self._count)
+        context = multiprocessing.get_context("spawn")
+        # One thread a process: more of both than processors slows linear algebra many times over.
+        self._processes = context.Pool(self._count, threadpool_limits, (1,))
         imap: Callable[..., Iterator[Any]] = self._processes.imap
         return imap
 

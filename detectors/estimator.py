@@ -8,6 +8,7 @@ columns that pass through the observer's own filter.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -162,9 +163,14 @@ class Estimator:
         self._native.reset()
 
     def step(
-        self, q: Array, qd: Array, current: Array, out: Array, dt: float | None = None
+        self,
+        q: Array,
+        qd: Array,
+        current: Array,
+        out: Array | Sequence[Array],
+        dt: float | None = None,
     ) -> None:
-        """One sample into ``out``, shape (3, n): residual, left, acceleration.
+        """One sample into ``out``, three rows of shape (n,): residual, left, acceleration.
 
         Raises:
             ValueError: wrong shapes or numbers that are not finite; the state is as before.

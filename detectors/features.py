@@ -11,7 +11,6 @@ collisions and of free motion to ``distance``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -146,6 +145,21 @@ class Features:
         """Numbers of a window."""
         return len(self.joints) * self.shape.count
 
+    def sliding(self, kernel: _kernel.KernelSum) -> _kernel.Sliding:
+        """:meth:`signal`, window and ``kernel`` sample by sample, without allocation."""
+        weights = self.envelope.weights if self.envelope else np.empty((0, 4))
+        joints, shape = np.array(self.joints, dtype=np.int64), self.shape
+        return _kernel.Sliding(
+            kernel,
+            joints,
+            np.ascontiguousarray(weights),
+            self.units,
+            self.factor,
+            self.compress,
+            shape.lag,
+            shape.count,
+        )
+
     def windows(self, signal: Array, ends: ArrayLike) -> Array:
         """The windows that end at rows ``ends``, shape (N, size): joint by joint, oldest first.
 
@@ -161,34 +175,3 @@ def median_distance(a: Array, b: Array, rng: np.random.Generator, pairs: int = 4
     """Median Euclidean distance between random rows of ``a`` and of ``b``."""
     one, two = rng.integers(len(a), size=pairs), rng.integers(len(b), size=pairs)
     return float(np.median(np.linalg.norm(a[one] - b[two], axis=1)))
-
-
-class Ring:
-    """The last rows of a signal, for windows online without allocation."""
-
-    def __init__(self, features: Features) -> None:
-        """For the windows of ``features``."""
-        self._lag, self._count = features.shape.lag, features.shape.count
-        self._length = self._lag * (self._count - 1) + 1
-        self._rows = np.zeros((2 * self._length, len(features.joints)))
-        self._columns: Sequence[int] = range(len(features.joints))
-        self.window = np.zeros((1, features.size))
-        self._view = self.window.reshape(len(features.joints), self._count)
-        self._at = -1
-
-    def reset(self) -> None:
-        """Forget."""
-        self._at = -1
-
-    def push(self, row: Array) -> Array:
-        """The window that ends with ``row``, shape (1, size); overwritten by the next call."""
-        if self._at < 0:
-            self._rows[:] = row
-            self._at = 0
-        else:
-            self._at = (self._at + 1) % self._length
-            self._rows[self._at] = row
-            self._rows[self._at + self._length] = row
-        end = self._at + self._length
-        self._view[:] = self._rows[end - self._length + 1 : end + 1 : self._lag].T
-        return self.window

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tauguard.detectors.calibrate import calibrate, free_rows
 from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.events import find_alarms
-from tauguard.detectors.features import Envelope, Features, Ring, WindowShape, median_distance
+from tauguard.detectors.features import Envelope, Features, WindowShape, median_distance
 from tauguard.detectors.filter import CONFIRMATION, Confirmation, confirmation_samples, confirmed
 from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.numbers import RobotNumbers
@@ -358,32 +358,26 @@ class _Online:
     """State of a detector that runs sample by sample."""
 
     def __init__(self, detector: CollisionDetector) -> None:
-        arm, self._features, regressor = detector._fitted()
+        arm, features, regressor = detector._fitted()
         settings = detector.settings
         unknowns = None if settings.adapt else Unknowns.none()
         self._estimator = Estimator(arm, settings.observer_gain, detector.dt, unknowns)
-        self._sum = regressor.kernel_sum()
-        self._ring = Ring(self._features)
+        self._sliding = features.sliding(regressor.kernel_sum())
         self._filter = Confirmation(detector._samples())
         self._threshold, self._settle = detector.threshold, settings.settle
-        self._out = np.zeros((3, arm.robot.joints))
-        self._value = np.zeros(1)
+        self._out = tuple(np.zeros((3, arm.robot.joints)))
         self._dt, self._time, self._first = detector.dt, 0.0, True
         self.score = 0.0
 
     @property
     def left(self) -> Array:
         """Row of the estimator's output that the features see [N m], shape (n,)."""
-        row: Array = self._out[1]
-        return row
+        return self._out[1]
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None) -> bool:
         self._estimator.step(q, qd, current, self._out, dt)
         if not self._first:
             self._time += self._dt if dt is None else dt
         self._first = False
-        left, acceleration = self._out[1], self._out[2]
-        window = self._ring.push(self._features.signal(left, qd, acceleration))
-        self._sum.rows(window, self._value, 1)
-        self.score = float(self._value[0])
+        self.score = self._sliding.step(self._out[1], qd, self._out[2])
         return self._filter.step(self.score > self._threshold and self._time >= self._settle)

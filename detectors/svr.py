@@ -78,6 +78,26 @@ class SrqSVR(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         model.n_features_in_ = vectors.shape[1]
         return model._adopt(svr, vectors)
 
+    def reduced(self, count: int) -> SrqSVR:
+        """The same function, nearly, with at most ``count`` support vectors.
+
+        See :func:`tauguard.detectors.reduced_set.reduced_set`. ``svr_`` stays the full one, which
+        is what a model file keeps: reduce again after loading.
+
+        Raises:
+            ValueError: a count outside 1 to the number of support vectors.
+        """
+        from tauguard.detectors.reduced_set import reduced_set
+
+        check_is_fitted(self)
+        model = SrqSVR(self.sigma, self.C, self.epsilon)
+        model.n_features_in_, model.svr_ = self.n_features_in_, self.svr_
+        model.intercept_ = self.intercept_
+        model.support_vectors_, model.dual_coef_ = reduced_set(
+            self.support_vectors_, self.dual_coef_, self.sigma, count
+        )
+        return model
+
     def kernel_sum(self) -> _kernel.KernelSum:
         """The native form of the fitted function."""
         check_is_fitted(self)

@@ -5,6 +5,9 @@
 // number of threads and online evaluation give the same bits too.
 #include <nanobind/nanobind.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <vector>
 
@@ -128,6 +131,66 @@ void series(const KernelSum& kernel, In2 signal, std::size_t lag, std::size_t co
   });
 }
 
+// Online: scales a residual, keeps the last window of it, and evaluates the kernel sum. All memory is taken in
+// the constructor; a step allocates nothing.
+class Sliding {
+ public:
+  // weights: of the envelope, a row of four a joint; no rows: the residual in N m times `factor`.
+  Sliding(const KernelSum& kernel, Ids joints, In2 weights, double units, double factor, bool compress,
+          std::size_t lag, std::size_t count)
+      : kernel_(kernel), units_(units), factor_(factor), compress_(compress), lag_(lag), count_(count) {
+    require(joints.shape(0) * count == kernel.dimension() && lag > 0 && count > 0, "Sliding: sizes differ");
+    require(weights.shape(0) == 0 || weights.shape(1) == 4, "Sliding: four weights a joint");
+    joints_.assign(joints.data(), joints.data() + joints.shape(0));
+    weights_.assign(weights.data(), weights.data() + weights.shape(0) * weights.shape(1));
+    rows_.resize((lag * (count - 1) + 1) * joints_.size());
+    window_.resize(kernel.dimension());
+  }
+
+  void reset() { filled_ = false; }
+
+  double step(In1 left, In1 qd, In1 acceleration) {
+    const std::size_t n = left.shape(0), m = joints_.size(), length = rows_.size() / m;
+    require(qd.shape(0) == n && acceleration.shape(0) == n && (weights_.empty() || weights_.size() == 4 * n),
+            "step: expected one number a joint");
+    double speed = 0.0, shaken = 0.0;
+    for (std::size_t j = 0; j < n; ++j) {
+      speed += std::abs(qd.data()[j]);
+      shaken += std::abs(acceleration.data()[j]);
+    }
+    at_ = filled_ ? (at_ + 1) % length : 0;
+    double* row = rows_.data() + at_ * m;
+    for (std::size_t k = 0; k < m; ++k) {
+      const auto j = static_cast<std::size_t>(joints_[k]);
+      require(j < n, "step: expected one number a joint");
+      row[k] = scaled(left.data()[j], j, std::abs(qd.data()[j]), speed, shaken);
+    }
+    if (!filled_)
+      for (std::size_t r = 1; r < length; ++r) std::copy(row, row + m, rows_.data() + r * m);
+    filled_ = true;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double* past = rows_.data() + ((at_ + length - (count_ - 1 - i) * lag_) % length) * m;
+      for (std::size_t k = 0; k < m; ++k) window_[k * count_ + i] = past[k];
+    }
+    return kernel_.at(window_.data());
+  }
+
+ private:
+  double scaled(double left, std::size_t j, double own, double speed, double shaken) const {
+    if (weights_.empty()) return left * factor_;
+    const double* w = weights_.data() + 4 * j;
+    const double ratio = left / (units_ * (w[0] + w[1] * own + w[2] * speed + w[3] * shaken));
+    return factor_ * (compress_ ? std::asinh(ratio) : ratio);
+  }
+
+  KernelSum kernel_;
+  std::vector<std::int64_t> joints_;
+  double units_, factor_;
+  bool compress_, filled_ = false;
+  std::size_t lag_, count_, at_ = 0;
+  std::vector<double> weights_, rows_, window_;
+};
+
 // K_ij between the rows of a and b.
 void gram(In2 a, In2 b, double sigma, Out2 out, int threads) {
   const std::size_t d = a.shape(1), columns = b.shape(0);
@@ -156,6 +219,10 @@ NB_MODULE(_kernel, m) {
       .def(nb::init<In2, In1, double, double>())
       .def("rows", &rows, nb::arg(), nb::arg().noconvert(), nb::arg())
       .def("series", &series, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
+  nb::class_<Sliding>(m, "Sliding")
+      .def(nb::init<const KernelSum&, Ids, In2, double, double, bool, std::size_t, std::size_t>())
+      .def("reset", &Sliding::reset)
+      .def("step", &Sliding::step);
   m.def("gram", &gram, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
   m.def("windows", &windows, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
 }

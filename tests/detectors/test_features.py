@@ -5,14 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tauguard.detectors import _kernel
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.features import (
     Envelope,
     Features,
-    Ring,
     WindowShape,
     median_distance,
 )
+from tauguard.detectors.svr import srq_kernel
 
 
 def test_the_dissertations_window_is_44_numbers():
@@ -45,15 +46,46 @@ def test_windows_are_causal_and_equal_to_a_plain_gather(seed, lag, count):
     signal = rng.normal(size=(40, 3))
     features = Features((0, 1, 2), WindowShape(lag, count), None)
     windows = features.windows(signal, np.arange(40))
-    ring = Ring(features)
     for t in range(40):
         rows = [max(0, t - k * lag) for k in reversed(range(count))]
         expected = signal[rows].T.ravel()
         np.testing.assert_array_equal(windows[t], expected)
-        np.testing.assert_array_equal(ring.push(signal[t])[0], expected)
     changed = signal.copy()
     changed[25:] += 1
     np.testing.assert_array_equal(features.windows(changed, np.arange(25)), windows[:25])
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**31),
+    lag=st.integers(1, 5),
+    count=st.integers(1, 6),
+    envelope=st.booleans(),
+    compress=st.booleans(),
+)
+def test_sliding_is_the_kernel_sum_of_every_window(seed, lag, count, envelope, compress):
+    rng = np.random.default_rng(seed)
+    left, qd, acceleration = rng.normal(size=(3, 50, 4)) * 3
+    known = Envelope(rng.uniform(0.1, 1, (4, 4))) if envelope else None
+    features = Features((0, 2, 3), WindowShape(lag, count), known, 0.7, 5.0, compress)
+    vectors, weights = rng.normal(size=(9, features.size)), rng.normal(size=9)
+    windows = features.windows(features.signal(left, qd, acceleration), np.arange(50))
+    truth = 0.3 + srq_kernel(windows, vectors, 2.0) @ weights
+    sliding = features.sliding(_kernel.KernelSum(vectors, weights, 0.3, 2.0))
+    for _ in range(2):  # and once more from the beginning
+        rows = zip(left, qd, acceleration, strict=True)
+        values = [sliding.step(*row) for row in rows]
+        np.testing.assert_allclose(values, truth, rtol=0, atol=1e-12)
+        sliding.reset()
+
+
+def test_sliding_refuses_joints_that_are_not_there():
+    features = Features((0, 5), WindowShape(1, 1), None)
+    sliding = features.sliding(_kernel.KernelSum(np.zeros((1, 2)), np.ones(1), 0.0, 1.0))
+    with pytest.raises(ValueError, match="one number a joint"):
+        sliding.step(np.zeros(4), np.zeros(4), np.zeros(4))
+    with pytest.raises(ValueError, match="one number a joint"):
+        sliding.step(np.zeros(6), np.zeros(5), np.zeros(6))
 
 
 def test_envelope_finds_what_the_noise_grows_with():
