@@ -129,6 +129,12 @@ def test_detect_with_a_trained_model(tmp_path, capsys):
     result = json.loads(found.read_text())
     assert result["detector"] == "srq-svr"
     assert 3 <= len(result["events"]) <= 6
+    assert all(sum(event["links"]) == pytest.approx(1.0) for event in result["events"])
+    kinds = [event["kind"] for event in result["events"]]
+    assert set(kinds) <= {"impact", "clamp", "push"}
+    out = capsys.readouterr().out
+    assert f"{kinds[0]}, " in out
+    assert " N on link " in out
     rows = ["time,q1,q2,q3,q4,q5,q6"] + [f"{k / 100},0,0,0,0,0,0" for k in range(500)]
     log, columns = tmp_path / "slow.csv", tmp_path / "columns.json"
     log.write_text("\n".join(rows))

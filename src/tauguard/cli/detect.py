@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tauguard.datasets import ColumnMap
     from tauguard.datasets.drives import DriveNumbers
     from tauguard.datasets.watch import Watch
+    from tauguard.detectors import Diagnosis
     from tauguard.traces import Trace
 
 
@@ -67,12 +70,17 @@ def command(
     read = read_log(log, column_map(columns))
     numbers = RobotNumbers.from_pin(pin_model(robot))
     trace = matched(read.trace, numbers.joint_names)
+    said: Sequence[Diagnosis] = ()
+    notes: tuple[str, ...] = ()
     if model is not None:
-        found = (
-            watch_free(load_free_motion(model), trace)
-            if is_free_motion(model)
-            else watch_with(CollisionDetector.load(model), trace)
-        )
+        detector: Any
+        if is_free_motion(model):
+            detector = load_free_motion(model)
+            found = watch_free(detector, trace)
+        else:
+            detector = CollisionDetector.load(model)
+            found = watch_with(detector, trace)
+        said, notes = explained(detector, trace, found, robot)
     else:
         drive = drive_numbers(columns, gains, viscous, coulomb, len(trace.joint_names))
         found = watch(
@@ -85,9 +93,9 @@ def command(
             factor=factor,
             joints=joints or range(1, min(4, numbers.joints) + 1),
         )
-    for note in (*read.notes, *found.notes):
+    for note in (*read.notes, *found.notes, *notes):
         print(f"note: {note}")
-    result = summary(log, trace, found)
+    result = summary(log, trace, found, said)
     report(result)
     if json is not None:
         write_json(json, result)
@@ -168,7 +176,23 @@ def drive_numbers(
     return DriveNumbers(gains, viscous, coulomb)
 
 
-def summary(log: Path, trace: Trace, found: Watch) -> dict[str, Any]:
+def explained(
+    detector: Any, trace: Trace, found: Watch, robot: Path
+) -> tuple[Sequence[Diagnosis], tuple[str, ...]]:
+    """What each alarm was, where the robot's file has shapes to look for a contact on."""
+    from tauguard.detectors import diagnose
+    from tauguard.models import link_surface
+
+    try:
+        surface = link_surface(robot)
+    except ValueError:
+        return (), (f"{robot.name} has no collision shapes: links and forces are not looked for",)
+    return diagnose(detector, trace, found.detection, surface), ()
+
+
+def summary(
+    log: Path, trace: Trace, found: Watch, said: Sequence[Diagnosis] = ()
+) -> dict[str, Any]:
     """The figures of a run, ready for JSON."""
     import numpy as np
 
@@ -176,11 +200,21 @@ def summary(log: Path, trace: Trace, found: Watch) -> dict[str, Any]:
     from tauguard.detectors import poisson_rate
 
     watched = float(trace.t[-1] - found.quiet_until)
-    events = []
+    events: list[dict[str, Any]] = []
     for alarm in found.detection.alarms:
         joint = loudest_joint(found, alarm.start, alarm.end)
         name = trace.joint_names[joint]
         events.append({"start": alarm.start, "end": alarm.end, "joint": name})
+    for event, one in zip(events, said, strict=False):
+        event |= {
+            "kind": one.kind,
+            "kinds": one.kinds,
+            "link": one.link,
+            "links": one.links.tolist(),
+            "force_n": one.force.tolist(),
+            "point_m": one.point.tolist(),
+            "payload_kg": None if one.collision else one.signs.mass,
+        }
     return {
         "name": "detect",
         "log": log.name,
@@ -206,12 +240,24 @@ def report(result: dict[str, Any]) -> None:
     else:
         print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")
     for event in result["events"]:
-        print(f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}")
+        line = f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}"
+        print(line + what(event))
     print(
         f"{result['alarms']} alarms in {result['watched_seconds']:.1f} s watched; in a log without "
         "collisions each of them is a false one, at most "
         f"{result['alarms_per_hour_high']:.0f} per hour (95 %)"
     )
+
+
+def what(event: dict[str, Any]) -> str:
+    """What an alarm was, if that is known."""
+    if "kind" not in event:
+        return ""
+    if event["payload_kg"] is not None:
+        return f": payload changed by {event['payload_kg']:+.2f} kg, no collision"
+    force = sum(value**2 for value in event["force_n"]) ** 0.5
+    likely = event["links"][event["link"] - 1]
+    return f": {event['kind']}, {force:.0f} N on link {event['link']} (probability {likely:.2f})"
 
 
 def leave(out: Path, trace: Trace, found: Watch, result: dict[str, Any], robot: Path) -> None:
