@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,6 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from tauguard.replay.estimates import Explained, arrows, during
 from tauguard.replay.robot import Body, Motion, Shape, bodies, load_model, motion, quats_wxyz
 from tauguard.replay.story import cut, first_moment, page
 from tauguard.traces.trace import Array, Detection, Trace
@@ -37,6 +39,7 @@ COLOURS = np.array(
     np.uint8,
 )
 RED, GREEN, GREY = (230, 60, 50), (70, 190, 90), (140, 140, 150)
+BLUE = (66, 135, 245)
 
 
 def write_rrd(
@@ -46,6 +49,7 @@ def write_rrd(
     model: Any = None,
     *,
     whole: bool = False,
+    explained: Sequence[Explained] = (),
 ) -> None:
     """Write a recording that ``rerun FILE`` opens with its own layout.
 
@@ -59,6 +63,7 @@ def write_rrd(
         model: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by
             default the trace's first attachment that ends in ``.xml``.
         whole: keep what comes before the first detected collision.
+        explained: what each alarm was; contacts are drawn as blue arrows.
 
     Raises:
         ValueError: no model, a model without the trace's joints, an empty trace.
@@ -77,11 +82,12 @@ def write_rrd(
         draft = Path(folder) / "draft.rrd"
         recording = rr.RecordingStream("tauguard", recording_id=path.stem)
         recording.save(draft)
-        text = page(trace, detection)
+        text = page(trace, detection, explained)
         if not whole:
             trace, detection = cut(trace, detection, first_moment(trace, detection))
         center = log_scene(recording, trace, scene)
         log_checked(recording, trace)
+        log_explained(recording, trace, explained)
         log_series(recording, trace, detection)
         log_states(recording, trace, detection)
         page_text = rr.TextDocument(text, media_type="text/markdown")
@@ -246,6 +252,20 @@ def log_checked(recording: Any, trace: Trace) -> None:
             recording.log(f"{place}/{part}", style, static=True)
             parted = [column.partition(lengths) for column in columns]
             rr.send_columns(f"{place}/{part}", times(frames), parted, recording=recording)
+
+
+def log_explained(recording: Any, trace: Trace, explained: Sequence[Explained]) -> None:
+    """The contacts that are believed in, as arrows from the alarm on."""
+    if not explained:
+        return
+    frames = trace.t[thin(trace.t, FRAME_RATE, MOST_FRAMES)]
+    drawn_arrows = arrows(during(explained, frames), ARROW, LONGEST_ARROW)
+    lengths = drawn_arrows.pop("lengths")
+    place = "scene/estimated_force"
+    styles = rr.Arrows3D.from_fields(radii=0.012, colors=BLUE, show_labels=True)
+    recording.log(place, styles, static=True)
+    parted = [column.partition(lengths) for column in rr.Arrows3D.columns(**drawn_arrows)]
+    rr.send_columns(place, times(frames), parted, recording=recording)
 
 
 def log_series(recording: Any, trace: Trace, detection: Detection | None) -> None:

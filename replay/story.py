@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from tauguard.replay.estimates import Explained, what
 from tauguard.traces import Alarm, Collision, Detection, Trace
 
 ALARM_WINDOW = 0.5  # [s] after onset in which an alarm detects a collision (a clamp: until its end)
@@ -55,7 +57,7 @@ def cut(trace: Trace, detection: Detection | None, start: float) -> tuple[Trace,
     return trace, detection
 
 
-def page(trace: Trace, detection: Detection | None) -> str:
+def page(trace: Trace, detection: Detection | None, explained: Sequence[Explained] = ()) -> str:
     """The text beside the pictures, in Markdown."""
     lines: list[str] = []
     span = trace.t[-1] - trace.t[0]
@@ -65,6 +67,8 @@ def page(trace: Trace, detection: Detection | None) -> str:
             "- **3D**: the arm in its real geometry. A red arrow is the contact force on the arm, "
             "at the point of contact.",
         ]
+    if explained:
+        lines += ["- **3D**: a blue arrow is the contact force that was estimated after an alarm."]
     if trace.contacts:
         names = ", ".join(one.checker for one in trace.contacts)
         lines += [f"- **3D**: a dot is a contact that a checker reported ({names})."]
@@ -76,7 +80,10 @@ def page(trace: Trace, detection: Detection | None) -> str:
             "- **Alarm and truth**: when the alarm was up, and when there really was a contact.",
         ]
     lines += ["- **Current**: the measured motor currents, the only input.", ""]
-    lines += collision_table(trace, detection) if trace.truth is not None else alarms(detection)
+    if trace.truth is not None:
+        lines += collision_table(trace, detection, explained)
+    else:
+        lines += alarms(detection, explained)
     lines += [
         "",
         "Press the space bar to play (at half speed); click into a chart to go to a time.",
@@ -86,7 +93,9 @@ def page(trace: Trace, detection: Detection | None) -> str:
     return "\n".join(lines)
 
 
-def collision_table(trace: Trace, detection: Detection | None) -> list[str]:
+def collision_table(
+    trace: Trace, detection: Detection | None, explained: Sequence[Explained] = ()
+) -> list[str]:
     """Markdown rows of the collisions and when each was noticed."""
     assert trace.truth is not None
     found = detection.alarms if detection is not None else ()
@@ -95,25 +104,35 @@ def collision_table(trace: Trace, detection: Detection | None) -> list[str]:
     lines = [f"## {len(rows)} collisions" + (f", {seen} noticed" if detection else ""), ""]
     if not rows:
         return lines
-    lines += ["| onset [s] | kind | link | peak torque [N m] | noticed after |", "|-|-|-|-|-|"]
+    said = {one.alarm.start: what(one) for one in explained}
+    extra = ("| said |", "-|") if said else ("|", "")
+    lines += [
+        "| onset [s] | kind | link | peak torque [N m] | noticed after " + extra[0],
+        "|-|-|-|-|-|" + extra[1],
+    ]
     for collision in rows[:LISTED]:
         alarm = alarm_of(collision, found)
         after = f"{1e3 * (alarm.start - collision.onset):.0f} ms" if alarm else "-"
-        lines.append(
+        line = (
             f"| {collision.onset:.3f} | {collision.kind} | {collision.link} "
             f"| {collision.peak_tau:.1f} | {after} |"
         )
+        lines.append(f"{line} {said.get(alarm.start, '-') if alarm else '-'} |" if said else line)
     if len(rows) > LISTED:
         lines += ["", f"and {len(rows) - LISTED} more."]
     return lines
 
 
-def alarms(detection: Detection | None) -> list[str]:
+def alarms(detection: Detection | None, explained: Sequence[Explained] = ()) -> list[str]:
     """Markdown list of the alarms of a recording without truth."""
     if detection is None:
         return []
     lines = [f"## {len(detection.alarms)} alarms", ""]
-    lines += [f"- {a.start:.3f} s to {a.end:.3f} s" for a in detection.alarms[:LISTED]]
+    said = {one.alarm.start: f": {what(one)}" for one in explained}
+    lines += [
+        f"- {a.start:.3f} s to {a.end:.3f} s{said.get(a.start, '')}"
+        for a in detection.alarms[:LISTED]
+    ]
     if len(detection.alarms) > LISTED:
         lines.append(f"- and {len(detection.alarms) - LISTED} more")
     return lines

@@ -16,7 +16,7 @@ from tauguard.replay import write_rrd
 from tauguard.replay.robot import bodies, load_model, motion
 from tauguard.replay.rrd import extremes, thin
 from tauguard.replay.story import cut, first_moment, page
-from tauguard.traces import write_mcap
+from tauguard.traces import Alarm, write_mcap
 
 spec = spec_from_file_location("arm", Path(__file__).with_name("arm.py"))
 arm = module_from_spec(spec)
@@ -128,6 +128,36 @@ def test_the_page_tells_what_was_noticed():
     assert "2 collisions, 1 noticed" in text
     assert "| 3.000 | strike | 3 | 20.0 | 12 ms |" in text
     assert "| 1.000 | strike | 3 | 20.0 | - |" in text
+
+
+@dataclasses.dataclass(frozen=True)
+class Said:
+    alarm: Alarm
+    kind: str = "clamp"
+    link: int = 3
+    force: np.ndarray = dataclasses.field(default_factory=lambda: np.array([0.0, 60.0, 80.0]))
+    point: np.ndarray = dataclasses.field(default_factory=lambda: np.array([0.5, 0.1, 0.4]))
+
+
+def test_estimated_forces_are_drawn_from_the_alarm_on_and_told(tmp_path):
+    trace, detection = arm.make()
+    alarm = detection.alarms[0]
+    load = Said(Alarm(0.2, 0.3), "payload")
+    write_rrd(tmp_path / "a.rrd", trace, detection, whole=True, explained=[load, Said(alarm)])
+    times, batch = columns(tmp_path / "a.rrd")["/scene/estimated_force"]
+    vectors = batch.column("Arrows3D:vectors").to_pylist()
+    there = np.array([bool(v) for v in vectors])
+    np.testing.assert_array_equal(there, (times >= alarm.start) & (times <= alarm.start + 0.5))
+    first = int(np.argmax(there))
+    vector = np.array(vectors[first][0])
+    np.testing.assert_allclose(vector, 0.2 * np.array([0, 0.6, 0.8]), atol=1e-6)
+    origin = np.array(batch.column("Arrows3D:origins").to_pylist()[first][0])
+    np.testing.assert_allclose(origin + vector, [0.5, 0.1, 0.4], atol=1e-6)
+    text = page(trace, detection, [load, Said(alarm)])
+    assert "| 3.000 | strike | 3 | 20.0 | 12 ms | clamp, link 3, 100 N |" in text
+    assert "| 1.000 | strike | 3 | 20.0 | - | - |" in text
+    bare = dataclasses.replace(trace, truth=None)
+    assert ": clamp, link 3, 100 N" in page(bare, detection, [Said(alarm)])
 
 
 def test_collision_geometry_is_hidden_and_every_kind_drawn():

@@ -83,12 +83,14 @@ def command(
 
 def leave(out: Path, showcase: Trace, detector: CollisionDetector) -> None:
     """Write the recording, what the viewer shows of it, and the detector into the folder."""
+    from tauguard.detectors import diagnose
     from tauguard.replay import write_rrd
     from tauguard.traces import write_mcap
 
     shown = detector.detect(showcase)
+    said = diagnose(detector, showcase, shown)
     write_mcap(out / "demo.mcap", showcase, shown)
-    write_rrd(out / "demo.rrd", showcase, shown)
+    write_rrd(out / "demo.rrd", showcase, shown, explained=said)
     detector.save(out / "model.skops")
 
 
