@@ -7,13 +7,9 @@ slice had and nobody tells.
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-from threadpoolctl import threadpool_limits
+from typing import TYPE_CHECKING
 
 from tauguard.benchmarks import detection_report as report
 from tauguard.benchmarks import detection_table
@@ -42,6 +38,7 @@ from tauguard.benchmarks.detection_pool import (
     struck_pool,
 )
 from tauguard.benchmarks.report import Row
+from tauguard.benchmarks.workers import Workers
 from tauguard.envs import STRATA, simulate
 
 if TYPE_CHECKING:
@@ -100,7 +97,7 @@ def run(quick: bool, seed: int) -> list[Row]:
 def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
     """Train, judge, report; the result does not depend on the number of ``workers``."""
     arms = [1000 * (seed + 1) + k for k in range(size.arms)]
-    with _pool(workers) as each:
+    with Workers(workers) as each:
         fleets = list(each(_train, [(size, seed, arm) for arm in arms]))
         thresholds = common_thresholds(fleets, size.target)
         jobs = [(size, seed, speed, arm) for speed in SPEEDS for arm in (*arms, 0)]
@@ -160,27 +157,6 @@ def _judge(job: tuple[tuple[Size, int, float, int], Sequence[Fleet], Thresholds]
         if count
         for struck in struck_pool(test + k, speed, list(by_arm), count, strata, forces)
     )
-
-
-class _pool:
-    """A map over processes; in this process where one worker is asked for."""
-
-    def __init__(self, workers: int | None) -> None:
-        self._count = workers or os.cpu_count() or 1
-        self._processes: Any = None
-
-    def __enter__(self) -> Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]:
-        if self._count == 1:
-            return lambda call, jobs: map(call, jobs)
-        context = multiprocessing.get_context("spawn")
-        # One thread a process: more of both than processors slows linear algebra many times over.
-        self._processes = context.Pool(self._count, threadpool_limits, (1,))
-        imap: Callable[..., Iterator[Any]] = self._processes.imap
-        return imap
-
-    def __exit__(self, *_: object) -> None:
-        if self._processes is not None:
-            self._processes.terminate()
 
 
 def shown(rows: list[Row]) -> list[Row]:

@@ -8,7 +8,7 @@ the alarms counted. The same pool is then split anew, again and again: how many 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from tauguard.detectors.detector import Detector
     from tauguard.envs import Episode
     from tauguard.models import Mismatch
-    from tauguard.traces import Trace
 
 Row = dict[str, Any]
 
@@ -60,20 +59,24 @@ def episodes(seed: int, count: int, seconds: float, arm: Mismatch) -> Iterator[E
         )
 
 
-def pool(detectors: Sequence[Detector], traces: Iterable[Trace]) -> list[list[EpisodeLevels]]:
-    """The levels of every detector (outer) on every episode; traces are not kept."""
+def levels_of(job: tuple[Sequence[Detector], Episode]) -> list[EpisodeLevels]:
+    """The levels of every detector on one episode; its trace is not kept."""
     from tauguard.detectors import Thresholded
     from tauguard.detectors.conformal import EpisodeLevels
+    from tauguard.envs import simulate
 
-    watched = [Thresholded(detector, float("inf")) for detector in detectors]
-    levels: list[list[EpisodeLevels]] = [[] for _ in detectors]
-    for trace in traces:
-        for own, one in zip(levels, watched, strict=True):
-            own.append(EpisodeLevels.of(one, trace))
-    return levels
+    detectors, episode = job
+    trace = simulate(episode)
+    return [EpisodeLevels.of(Thresholded(d, float("inf")), trace) for d in detectors]
 
 
-def promise_rows(detectors: Sequence[Detector], arm: Mismatch, plan: Plan, seed: int) -> list[Row]:
+def promise_rows(
+    detectors: Sequence[Detector],
+    arm: Mismatch,
+    plan: Plan,
+    seed: int,
+    workers: int | None = 1,
+) -> list[Row]:
     """A row per detector and rate asked for.
 
     Args:
@@ -81,19 +84,22 @@ def promise_rows(detectors: Sequence[Detector], arm: Mismatch, plan: Plan, seed:
         arm: the simulated one.
         plan: how much.
         seed: of the episodes and the splits; not one of training's.
+        workers: processes; the rows do not depend on them (``None``: one a processor).
     """
     from tqdm import tqdm
 
-    from tauguard.envs import simulate
+    from tauguard.benchmarks.workers import Workers
 
     total = plan.calibration + plan.fresh
     settle = max(detector.settle for detector in detectors)
-    planned = episodes(seed, total, plan.seconds + settle, arm)
-    bar = tqdm(planned, total=total, desc="episodes", disable=None, leave=False)
-    levels = pool(detectors, (simulate(episode) for episode in bar))
+    planned = list(episodes(seed, total, plan.seconds + settle, arm))
+    with Workers(workers) as each:
+        jobs = [(detectors, episode) for episode in planned]
+        found = tqdm(each(levels_of, jobs), total=total, desc="episodes", disable=None, leave=False)
+        by_episode = list(found)
     return [
-        _row(detector.name, own, asked, plan, seed)
-        for detector, own in zip(detectors, levels, strict=True)
+        _row(detector.name, [levels[k] for levels in by_episode], asked, plan, seed)
+        for k, detector in enumerate(detectors)
         for asked in plan.asked
     ]
 
@@ -156,7 +162,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     arm = Mismatch(seed=seed)
     names = ("moving-thresholds", "current-network") if quick else NAMES
     detectors = trained(names, arm, 40 + 4 * seed, quick=quick)
-    return promise_rows(detectors, arm, QUICK if quick else Plan(), 41 + 4 * seed)
+    return promise_rows(detectors, arm, QUICK if quick else Plan(), 41 + 4 * seed, None)
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
