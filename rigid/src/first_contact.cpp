@@ -152,7 +152,7 @@ Vec contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, d
 
 }  // namespace
 
-Impact first_contact(MovingBody& a, MovingBody& b, double start, double end, double gap) {
+Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
   // Rounding: a projection takes fewer than 40 operations on values up to `magnitude`, once for each body,
   // and again in the tangents; 128 covers both.
   const double margin = 128 * unit_roundoff * (a.magnitude() + b.magnitude());
@@ -162,7 +162,7 @@ Impact first_contact(MovingBody& a, MovingBody& b, double start, double end, dou
     a.move_to(t), b.move_to(t);
     const Axis axis = best_axis(a, b, 2 * margin);
     const auto touch = [&] { return Impact{t, true, contact_normal(a, b, last, t - before, axis)}; };
-    if (axis.separation <= 2 * margin + gap) return touch();
+    if (axis.separation <= 2 * margin) return touch();
     // Beyond the time that the direction takes to turn by a radian its tangent says nothing.
     const double turn = norm(axis.rate), left = end - t, horizon = turn * left > 1 ? 1 / turn : left;
     const Lower lower(a, b, axis, horizon, margin);

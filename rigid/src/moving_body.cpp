@@ -44,19 +44,4 @@ MovingBody moving_triangle(const double v[3][3], const RigidMotion& motion, cons
   return body;
 }
 
-MovingBody moving_box(const Vec& centre, const Vec& extent, const RigidMotion& motion, const Vec& origin) {
-  MovingBody body(motion, origin);
-  for (int corner = 0; corner < 8; ++corner) {
-    Vec p = centre;
-    for (int k = 0; k < 3; ++k) p[k] += (corner >> k & 1 ? 1 : -1) * extent[k];
-    body.add_vertex(p);
-  }
-  for (int k = 0; k < 3; ++k) {
-    Vec axis{};
-    axis[k] = 1;
-    body.add_normal(axis), body.add_edge(axis);
-  }
-  return body;
-}
-
 }  // namespace tauguard::rigid

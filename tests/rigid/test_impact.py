@@ -105,6 +105,45 @@ def test_touching_at_the_start_is_a_hit_at_zero():
     assert time_of_impact(box, box, REST, Motion(pose, [1.0, 0, 0], np.zeros(3))).toi[0] == 0
 
 
+def repeated(motion, i, n):
+    """Row i of a motion, n times."""
+    fields = motion.pose_t0[i], motion.linear[i], motion.angular[i]
+    return Motion(*(np.repeat(x[None], n, axis=0) for x in fields))
+
+
+@pytest.mark.parametrize(
+    ("distance", "linear", "angular"),
+    [(1.5, 1.0, 0.0), (1.5, 2.0, 2.0), (1.5, 0.3, 25.0), (80.0, 160.0, 3.0), (3.0, 1e4, 0.0)],
+    ids=["sweep", "turn", "spin", "bullet", "faster bullet"],
+)
+def test_meshes_touch_when_the_first_of_all_their_triangles_do(distance, linear, angular):
+    rng = np.random.default_rng(7)
+    corners = rng.uniform(-1, 1, (2, 12, 1, 3)) + rng.uniform(-0.4, 0.4, (2, 12, 3, 3))
+    i, j = (x.ravel() for x in np.indices((12, 12)))
+    a, b = (Hulls(c[k].reshape(-1, 3), 3 * np.arange(145)) for c, k in zip(corners, (i, j)))
+    pose = np.tile(np.eye(4), (2, 8, 1, 1))
+    pose[:, :, :3, :3] = Rotation.random(16, random_state=rng).as_matrix().reshape(2, 8, 3, 3)
+    way = rng.normal(size=(8, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    pose[1, :, :3, 3] = distance * way
+    pose[:, :, :3, 3] += 5.0
+    aim = -linear * way + 0.3 * rng.normal(size=(8, 3))
+    turn = angular * rng.uniform(-1, 1, (2, 8, 3))
+    ma, mb = Motion(pose[0], np.full((8, 3), 0.2), turn[0]), Motion(pose[1], aim, turn[1])
+    truth = [
+        time_of_impact(a, b, repeated(ma, k, len(i)), repeated(mb, k, len(i))).toi.min()
+        for k in range(8)
+    ]
+    assert np.isfinite(truth).sum() >= 3
+    faces = np.arange(36).reshape(12, 3)
+    for volume in ("obb", "aabb", "k_dop", "sphere"):
+        x, y = (MeshTree(c.reshape(-1, 3), faces, volume) for c in corners)
+        found = time_of_impact(x, y, ma, mb)
+        np.testing.assert_allclose(found.toi, truth, rtol=0, atol=1e-10)
+        # Never late, to the rounding of either search.
+        assert (found.toi <= np.array(truth) + 1e-12).all()
+
+
 def test_meshes_give_the_time_of_their_hulls_and_of_sweeps():
     rng = np.random.default_rng(2)
     tree = MeshTree(CUBE, CUBE_FACES)

@@ -11,10 +11,9 @@ struct Impact {
   Vec normal;   // unit, from a to b; zero where the bodies meet at `start` and no axis tells
 };
 
-// Advances from `start` as long as the bodies are further apart than `gap` plus rounding; with gap = 0 the
-// time it stops at is the time of impact, never late. A positive gap stops early, which a caller that
-// only prunes is glad of.
-Impact first_contact(MovingBody& a, MovingBody& b, double start, double end, double gap = 0);
+// Advances from `start` as long as the bodies are further apart than rounding; the time it stops at is the time
+// of impact, never late.
+Impact first_contact(MovingBody& a, MovingBody& b, double start, double end);
 
 // Bodies this close count as touching where a contact is described.
 inline double contact_tolerance(const MovingBody& a, const MovingBody& b) {

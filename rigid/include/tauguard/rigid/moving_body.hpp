@@ -113,6 +113,5 @@ class MovingBody {
 // Row `r` of a batch, placed by `motion`.
 MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& motion, const Vec& origin);
 MovingBody moving_triangle(const double v[3][3], const RigidMotion& motion, const Vec& origin);
-MovingBody moving_box(const Vec& centre, const Vec& extent, const RigidMotion& motion, const Vec& origin);
 
 }  // namespace tauguard::rigid
