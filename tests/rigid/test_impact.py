@@ -120,7 +120,9 @@ def test_meshes_touch_when_the_first_of_all_their_triangles_do(distance, linear,
     rng = np.random.default_rng(7)
     corners = rng.uniform(-1, 1, (2, 12, 1, 3)) + rng.uniform(-0.4, 0.4, (2, 12, 3, 3))
     i, j = (x.ravel() for x in np.indices((12, 12)))
-    a, b = (Hulls(c[k].reshape(-1, 3), 3 * np.arange(145)) for c, k in zip(corners, (i, j)))
+    a, b = (
+        Hulls(c[k].reshape(-1, 3), 3 * np.arange(145)) for c, k in zip(corners, (i, j), strict=True)
+    )
     pose = np.tile(np.eye(4), (2, 8, 1, 1))
     pose[:, :, :3, :3] = Rotation.random(16, random_state=rng).as_matrix().reshape(2, 8, 3, 3)
     way = rng.normal(size=(8, 3))
