@@ -34,7 +34,7 @@ def run(quick: bool, seed: int) -> list[Row]:
             most = (40_000, 400) if quick else (10**7, 20_000)
             rows += cloth_queries.on_recording(frame, seed, *most, repeats)
     if data:
-        rows += cloth_queries.on_hard_sets(Path(data) / "ccd", 20 if quick else 250)
+        rows += cloth_queries.on_hard_sets(Path(data) / "ccd", 20 if quick else 60)
     rows += cloth_adversarial.adversarial(12_000 if quick else 1_000_000, seed)
     rows += cloth_scaling.volumes(triangles, seed, repeats)
     rows += cloth_scaling.front(triangles, seed, 15 if quick else 60)

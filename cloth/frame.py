@@ -17,7 +17,8 @@ class FrameStats:
     Attributes:
         vf: Counts of the vertex-face side, in the order in which work is left out: ``node_tests``,
             ``front`` (entries kept for the next frame), ``leaf_pairs``; pairs of features left out
-            as ``adjacent`` or ``kept_apart`` (by groups); ``candidates``; how many of them the
+            as ``adjacent`` or ``kept_apart`` (by groups); ``candidates``; how many of them were
+            apart on an axis (``axes``: asked where the volumes sweep the step), how many the
             cubic cleared (``cubic_sign``: no root) and its roots (``roots``: no contact at any);
             how many were ``resolved`` one by one, cut into how many ``intervals`` of time; how
             many ``exact`` arithmetic decided, and of these with integers of any length

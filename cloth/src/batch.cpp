@@ -66,16 +66,45 @@ TAUGUARD_INLINE void finish(Group& g) {
 
 constexpr int ahead = 8;  // queries between asking for positions and using them
 
+TAUGUARD_INLINE void prefetch(const double* x0, const double* x1, const std::int32_t* row) {
+  for (int v = 0; v < 4; ++v) {
+    __builtin_prefetch(x0 + 3 * std::ptrdiff_t(row[v]));
+    __builtin_prefetch(x1 + 3 * std::ptrdiff_t(row[v]));
+  }
+}
+
+TAUGUARD_INLINE Wide point(const double* x, std::int32_t v) {
+  const double* p = x + 3 * std::ptrdiff_t(v);
+  return Wide{p[0], p[1], p[2], p[2]};
+}
+
+template <bool vf>
+TAUGUARD_INLINE int not_apart(const double* x0, const double* x1, const std::int32_t* rows, int n,
+                              std::int32_t* left) {
+  int count = 0;
+  for (int i = 0; i < n; ++i) {
+    prefetch(x0, x1, rows + 4 * std::min(i + ahead, n - 1));
+    const std::int32_t* row = rows + 4 * i;
+    Choice above{-1, -1, -1, -1}, below = above;
+    for (int e = 0; e < 2; ++e) {
+      const double* x = e ? x1 : x0;
+      const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]), d = point(x, row[3]);
+      above &= (vf ? a : min(a, b)) > (vf ? max(max(b, c), d) : max(c, d));
+      below &= (vf ? a : max(a, b)) < (vf ? min(min(b, c), d) : min(c, d));
+    }
+    const Choice apart = above | below;
+    left[count] = i;
+    count += (apart[0] | apart[1] | apart[2]) == 0;
+  }
+  return count;
+}
+
 template <bool vf>
 TAUGUARD_INLINE void gather(const double* x0, const double* x1, const std::int32_t* rows, int n, Group* groups) {
   for (int first = 0; first < n; first += width, ++groups) {
     for (int i = 0; i < width; ++i) {
       const std::int32_t* row = rows + 4 * std::min(first + i, n - 1);
-      const std::int32_t* soon = rows + 4 * std::min(first + i + ahead, n - 1);
-      for (int v = 0; v < 4; ++v) {
-        __builtin_prefetch(x0 + 3 * std::ptrdiff_t(soon[v]));
-        __builtin_prefetch(x1 + 3 * std::ptrdiff_t(soon[v]));
-      }
+      prefetch(x0, x1, rows + 4 * std::min(first + i + ahead, n - 1));
       for (int e = 0; e < 2; ++e) {
         const double* x = e ? x1 : x0;
         const double *a = x + 3 * std::ptrdiff_t(row[0]), *b = x + 3 * std::ptrdiff_t(row[1]),
@@ -216,7 +245,11 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
                                   double* toi) {                                                               \
     vf ? at_roots<true>(groups, pieces, n, outcome, toi) : at_roots<false>(groups, pieces, n, outcome, toi);   \
   }                                                                                                            \
-  constexpr BatchKernels name{gather_##name, at_roots_##name};
+  attributes int not_apart_##name(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n,  \
+                                  std::int32_t* left) {                                                        \
+    return vf ? not_apart<true>(x0, x1, rows, n, left) : not_apart<false>(x0, x1, rows, n, left);              \
+  }                                                                                                            \
+  constexpr BatchKernels name{not_apart_##name, gather_##name, at_roots_##name};
 
 TAUGUARD_VARIANT(portable, )
 #if defined(__x86_64__)

@@ -115,6 +115,7 @@ nb::tuple candidates(Mesh& mesh, Positions x_t0, Positions x_t1, double min_dist
 }
 
 void add_counts(nb::dict& d, const Stats& s) {
+  d["axes"] = s.axes;
   d["cubic_sign"] = s.cubic_sign;
   d["roots"] = s.roots;
   d["resolved"] = s.resolved;
@@ -207,7 +208,7 @@ NB_MODULE(_mesh, m) {
       const nb::gil_scoped_release release;
       const tauguard::geometry::RoundToNearest guard;
       (vf ? solve_vf : solve_ee)(x_t0.data(), x_t1.data(), rows.data(), rows.shape(0), Method(method), min_distance,
-                                 hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats);
+                                 hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats, true);
     }
     nb::dict counts;
     add_counts(counts, stats);

@@ -39,6 +39,7 @@ class MeshCcd {
 
   const Topology& topology() const { return topology_; }
   int threads() const { return threads_; }
+  VolumeKind volume() const { return volume_; }
 
   // Trees, volumes and fronts for this step. fresh: descend from the root instead of the last front.
   void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance, bool fresh);

@@ -18,7 +18,7 @@
 namespace tauguard::cloth {
 namespace {
 
-constexpr int batch = 128;
+constexpr int batch = 128, block = 512;  // queries at a time, after and before those apart on an axis are left out
 constexpr double never = std::numeric_limits<double>::infinity();
 
 Vec at(const double* x0, const double* x1, std::int32_t v, double t) { return mix(load(x0, v), load(x1, v), t); }
@@ -194,6 +194,28 @@ void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, 
   for (int i = 0; i < b.left; ++i) toi[b.open[i]] = resolve<vf>(x0, x1, rows + 4 * b.open[i], 0, stats);
 }
 
+// A block: what no axis keeps apart goes on in batches.
+template <bool vf>
+void in_batches(const double* x0, const double* x1, const std::int32_t* rows, int n, bool on_axes, double* toi,
+                Stats& stats) {
+  if (!on_axes) {
+    for (int first = 0; first < n; first += batch)
+      ab2pf<vf>(x0, x1, rows + 4 * first, std::min(batch, n - first), toi + first, stats);
+    return;
+  }
+  std::int32_t left[block], part[4 * batch];
+  double found[batch];
+  const int count = batch_kernels().not_apart(vf, x0, x1, rows, n, left);
+  stats.axes += n - count;
+  std::fill(toi, toi + n, never);
+  for (int first = 0; first < count; first += batch) {
+    const int some = std::min(batch, count - first);
+    for (int i = 0; i < some; ++i) std::copy_n(rows + 4 * left[first + i], 4, part + 4 * i);
+    ab2pf<vf>(x0, x1, part, some, found, stats);
+    for (int i = 0; i < some; ++i) toi[left[first + i]] = found[i];
+  }
+}
+
 template <bool vf>
 void one_by_one(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method,
                 double distance, double* toi, Stats& stats) {
@@ -224,7 +246,7 @@ Query query_of(const Group& g, int lane) {
 template <bool vf>
 void compare(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method, double* toi,
              Stats& stats) {
-  static thread_local Group groups[batch / width];
+  static thread_local Group groups[block / width];
   batch_kernels().gather(vf, x0, x1, rows, n, groups);
   for (int i = 0; i < n; ++i) {
     const Group& g = groups[i / width];
@@ -243,13 +265,13 @@ void compare(const double* x0, const double* x1, const std::int32_t* rows, int n
 
 template <bool vf>
 void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n, Method method,
-           double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats) {
-  double toi[batch];
-  for (std::size_t first = 0; first < n; first += batch) {
-    const int count = static_cast<int>(std::min<std::size_t>(batch, n - first));
+           double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats, bool on_axes) {
+  double toi[block];
+  for (std::size_t first = 0; first < n; first += block) {
+    const int count = static_cast<int>(std::min<std::size_t>(block, n - first));
     const std::int32_t* part = rows + 4 * first;
     if (method == Method::ab2pf && distance == 0) {
-      ab2pf<vf>(x0, x1, part, count, toi, stats);
+      in_batches<vf>(x0, x1, part, count, on_axes, toi, stats);
     } else if (method == Method::ab2pf || method == Method::exact) {
       one_by_one<vf>(x0, x1, part, count, method, distance, toi, stats);
     } else {
@@ -266,11 +288,11 @@ void solve(const double* x0, const double* x1, const std::int32_t* rows, std::si
 }  // namespace
 
 void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
-  solve<true>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats);
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, bool on_axes) {
+  solve<true>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, on_axes);
 }
 void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
-  solve<false>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats);
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, bool on_axes) {
+  solve<false>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, on_axes);
 }
 }  // namespace tauguard::cloth

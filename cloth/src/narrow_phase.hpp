@@ -16,12 +16,13 @@ struct ImpactArrays {
   double *toi, *point, *normal, *weights;  // (n), (n, 3), (n, 3), (n, 4)
 };
 
-// How many queries each filter removed (no root of the cubic; no contact at its roots); how many were resolved
+// How many queries each filter removed (apart on an axis; no root of the cubic; no contact at its roots); how many were resolved
 // one by one and cut into how many intervals of time; how many exact arithmetic decided, and of these with numbers of
 // any length.
 struct Stats {
-  std::uint64_t cubic_sign = 0, roots = 0, resolved = 0, intervals = 0, exact = 0, long_exact = 0;
+  std::uint64_t axes = 0, cubic_sign = 0, roots = 0, resolved = 0, intervals = 0, exact = 0, long_exact = 0;
   Stats& operator+=(const Stats& o) {
+    axes += o.axes;
     cubic_sign += o.cubic_sign;
     roots += o.roots;
     resolved += o.resolved;
@@ -32,11 +33,12 @@ struct Stats {
   }
 };
 
-// rows: (n, 4) indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge. Callable from several
-// threads. Needs round-to-nearest.
+// rows: (n, 4) indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge. on_axes: some may be apart on
+// x, y or z at both ends of the step; false spares ab2pf the look. Callable from several threads. Needs
+// round-to-nearest.
 void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats);
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, bool on_axes);
 void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats);
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, bool on_axes);
 
 }  // namespace tauguard::cloth

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tauguard.benchmarks.cloth_queries import Queries, solver
 from tauguard.cloth import _mesh, edge_edge, vertex_face
 
 QUERIES = {"vf": vertex_face, "ee": edge_edge}
@@ -59,3 +60,21 @@ def test_batches_agree_with_exact_arithmetic(kind):
     early = exact.toi[exact.hit] - ours.toi[exact.hit]
     assert early.min() >= 0
     assert early.max() <= 1e-9  # of the step
+
+
+@pytest.mark.parametrize("kind", QUERIES)
+def test_queries_apart_on_an_axis_are_left_out_and_no_others(kind):
+    x = queries(4)
+    x[::2, :, :, 1] = np.abs(x[::2, :, :, 1])  # on one side of a plane: apart, or nearly
+    x[::2, :, 0, 1] *= -1
+    if kind == "ee":
+        x[::2, :, 1, 1] *= -1
+    a, b = (x[:, :, :1], x[:, :, 1:]) if kind == "vf" else (x[:, :, :2], x[:, :, 2:])
+    above, below = ((lo.min(axis=2) > hi.max(axis=2)).all(axis=1) for lo, hi in ((a, b), (b, a)))
+    apart = (above | below).any(axis=1)
+    start, end = (np.ascontiguousarray(x[:, i]).reshape(-1, 3) for i in (0, 1))
+    rows = np.arange(4 * len(x), dtype=np.int32).reshape(-1, 4)
+    ours, exact = (solver(Queries(kind == "vf", start, end, rows), m)() for m in ("ab2pf", "exact"))
+    assert ours.counts["axes"] == apart.sum() > 1_000
+    assert np.array_equal(ours.hit, exact.hit)
+    assert not exact.hit[apart].any()
