@@ -1,6 +1,6 @@
 """Single queries: nanoseconds beside misses, false hits and errors in time; ipctk in its own loop.
 
-Times are of one thread and one call over the whole list, gather included. ipctk is timed over
+Times are the processor's (other programs do not count), of one thread and one call over the whole list, gather included. ipctk is timed over
 candidates that the truth calls clear, through ``compute_collision_free_stepsize`` (a hit would
 shorten the step for what follows; its false hits do, to its advantage); what it costs on hits and
 what it answers is asked call by call, Python included, and stated apart.
@@ -8,9 +8,9 @@ what it answers is asked call by call, Python included, and stated apart.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
+from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -129,9 +129,9 @@ def on_hard_sets(folder: Path, calls: int) -> list[Row]:
             for method in METHODS:
                 call = solver(queries, method)
                 answer = call()
-                start = time.perf_counter()
+                start = process_time()
                 call()
-                spent = time.perf_counter() - start
+                spent = process_time() - start
                 rows.append(
                     {
                         "study": "hard query",
@@ -178,9 +178,9 @@ def _methods(name: str, total: int, queries: Queries, truth: Answer, repeats: in
     few = np.arange(0, len(queries.rows), 1 + len(queries.rows) // 2000)
     lists = {method: queries.some(few) if method == "exact" else queries for method in METHODS}
     calls = {method: solver(lists[method], method) for method in METHODS}
-    spent = measure(calls, repeats)
+    spent = measure(calls, repeats, process_time)
     clear = queries.some(~truth.hit)
-    spent["clear"] = measure({"": solver(clear, "ab2pf")}, repeats)[""]
+    spent["clear"] = measure({"": solver(clear, "ab2pf")}, repeats, process_time)[""]
     exact = solver(queries.some(truth.hit), "exact")()
     rows: list[Row] = []
     for method, call in calls.items():
@@ -239,11 +239,11 @@ def _peers(
         part = ipctk.Candidates()
         timed = [candidates[i] for i in rng.permutation(clear)[:most]]
         setattr(part, "fv_candidates" if queries.vertex else "ee_candidates", timed)
-        start = time.perf_counter()
+        start = process_time()
         part.compute_collision_free_stepsize(
             mesh, *map(np.asfortranarray, queries[1:3]), 0.0, method
         )
-        ns = 1e9 * (time.perf_counter() - start) / len(timed)
+        ns = 1e9 * (process_time() - start) / len(timed)
         hit, toi, hit_us = _ask(method, queries.some(asked))
         real = truth.hit[asked]
         both = real & hit
@@ -274,9 +274,9 @@ def _ask(method: Any, queries: Queries) -> tuple[NDArray[np.bool_], NDArray[np.f
     hit, toi, spent = [], [], []
     for row in queries.rows:
         points = [*queries.x_t0[row], *queries.x_t1[row]]
-        start = time.perf_counter()
+        start = process_time()
         answer = call(*points)
-        spent.append(1e6 * (time.perf_counter() - start))
+        spent.append(1e6 * (process_time() - start))
         hit.append(answer[0])
         toi.append(answer[1])
     return np.array(hit, dtype=bool), np.array(toi), np.array(spent)

@@ -6,6 +6,7 @@ Every function returns flat rows whose ``study`` names what is varied.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,9 @@ def volumes(triangles: int, seed: int, repeats: int) -> list[Row]:
     for scene in scenes(triangles, seed):
         step = step_at(scene, 0.85)
         meshes = {kind: MeshCCD(scene.faces, groups=scene.groups, volume=kind) for kind in KINDS}
-        times = measure({kind: bound(ccd.find, *step) for kind, ccd in meshes.items()}, repeats)
+        times = measure(
+            {kind: bound(ccd.find, *step) for kind, ccd in meshes.items()}, repeats, process_time
+        )
         for kind, ccd in meshes.items():
             stats = ccd.find(*step).stats
             rows.append(
@@ -105,7 +108,7 @@ def size(sizes: list[int], seed: int, repeats: int) -> list[Row]:
             step = step_at(scene, 0.7)
             ccd = MeshCCD(scene.faces, groups=scene.groups)
             few = repeats if triangles < 300_000 else min(repeats, 3)
-            spent = measure({"frame": bound(ccd.find, *step)}, few)["frame"]
+            spent = measure({"frame": bound(ccd.find, *step)}, few, process_time)["frame"]
             stats = ccd.find(*step).stats
             points.append((len(scene.faces), spent["median"]))
             candidates = stats.vf["candidates"] + stats.ee["candidates"]
