@@ -5,8 +5,8 @@ Everything here runs in one thread, and times are the processor's: other program
 
 from __future__ import annotations
 
-from time import process_time
 from pathlib import Path
+from time import process_time
 from typing import Any, NamedTuple
 
 import numpy as np

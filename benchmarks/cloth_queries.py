@@ -1,9 +1,10 @@
 """Single queries: nanoseconds beside misses, false hits and errors in time; ipctk in its own loop.
 
-Times are the processor's (other programs do not count), of one thread and one call over the whole list, gather included. ipctk is timed over
-candidates that the truth calls clear, through ``compute_collision_free_stepsize`` (a hit would
-shorten the step for what follows; its false hits do, to its advantage); what it costs on hits and
-what it answers is asked call by call, Python included, and stated apart.
+Times are the processor's (other programs do not count), of one thread and one call over the whole
+list, gather included. ipctk is timed over candidates that the truth calls clear, through
+``compute_collision_free_stepsize`` (a hit would shorten the step for what follows; its false hits
+do, to its advantage); what it costs on hits and what it answers is asked call by call, Python
+included, and stated apart.
 """
 
 from __future__ import annotations
