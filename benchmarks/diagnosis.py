@@ -35,6 +35,7 @@ from tauguard.detectors.metrics import stratum
 from tauguard.detectors.operating_point import threshold_for_rate
 from tauguard.envs import STRATA, simulate
 from tauguard.models import LinkSurface, cura6, link_surface
+from tauguard.traces import Collision
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,11 +77,18 @@ class Answer:
 
 @dataclass(frozen=True)
 class Judged:
-    """An event, its diagnosis and the answers of all methods; none without an alarm."""
+    """What one event was, and what all methods say of it; nothing without an alarm.
 
-    event: Event
+    Its trace is not kept: many would fill the memory.
+    """
+
+    kind: str
+    speed: float  #: percent
+    collision: Collision | None
+    mass: float  #: [kg]
     diagnosis: Diagnosis | None
-    answers: dict[str, Answer]
+    links: dict[str, int]  #: said by each method, 1-based, 0: none
+    errors: dict[str, ContactErrors]
 
 
 def run(quick: bool, seed: int) -> list[Row]:
@@ -91,6 +99,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     watchers = {arm: watcher(seed, arm, size) for arm in arms}
     surface = link_surface(cura6.arm_xml())
     judged: list[Judged] = []
+    sample: Event | None = None
     for speed in size.speeds:
         test = stream(seed, TEST, 5)
         for events in (
@@ -98,11 +107,14 @@ def run(quick: bool, seed: int) -> list[Row]:
             push_events(test, speed, watchers, size.pushes),
             payload_events(test, speed, watchers, size.payloads),
         ):
-            judged += [judge(event, watchers[event.arm], surface) for event in events]
-    contacts = [j for j in judged if j.event.collision is not None]
+            for event in events:
+                judged.append(judge(event, watchers[event.arm], surface))
+                sample = sample or (event if event.alarm is not None else None)
+    contacts = [j for j in judged if j.collision is not None]
     rows = [*link_rows(contacts), *confusion_rows(contacts), *contact_rows(contacts)]
     rows += [*kind_rows(judged), *payload_rows(judged)]
-    return [*rows, cost_row(judged, watchers, surface)]
+    assert sample is not None
+    return [*rows, cost_row(sample, watchers[sample.arm], surface)]
 
 
 def watcher(seed: int, arm: int, size: Size) -> Thresholded:
@@ -119,22 +131,26 @@ def watcher(seed: int, arm: int, size: Size) -> Thresholded:
 
 def judge(event: Event, watching: Thresholded, surface: LinkSurface) -> Judged:
     """All methods' answers to one event."""
+    known = (event.kind, event.speed, event.collision, event.mass)
     if event.alarm is None:
-        return Judged(event, None, {})
+        return Judged(*known, None, {}, {})
     arm, envelope = believed(watching)
     diagnoser = Diagnoser(arm, surface, envelope)
     after = AftermathOf(arm, envelope, event.trace).at(event.alarm.start)
     found = diagnoser.explain(event.alarm, after)
+    if event.collision is None:
+        return Judged(*known, found, {}, {})
+    assert event.trace.truth is not None
+    exact = replace(after, residual=event.trace.truth.tau_ext[after.rows])
+    told = diagnoser.explain(event.alarm, exact)
     answers = {
         "surface": Answer(found.link, found.force, found.point),
         "usual": usual(diagnoser, after, found),
+        "told": Answer(told.link, told.force, told.point),
     }
-    if event.collision is not None:
-        assert event.trace.truth is not None
-        exact = replace(after, residual=event.trace.truth.tau_ext[after.rows])
-        told = diagnoser.explain(event.alarm, exact)
-        answers["told"] = Answer(told.link, told.force, told.point)
-    return Judged(event, found, answers)
+    truth = contact_at(event.trace, event.collision, found.time)
+    errors = {n: ContactErrors.of(a.force, a.point, truth) for n, a in answers.items()}
+    return Judged(*known, found, {n: a.link for n, a in answers.items()}, errors)
 
 
 def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
@@ -154,26 +170,26 @@ def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
 
 def groups(contacts: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
     """All, by speed and by severity; only events that raised an alarm."""
-    known = [j for j in contacts if j.diagnosis is not None and j.event.kind != "push"]
-    speeds = sorted({j.event.speed for j in known})
+    known = [j for j in contacts if j.diagnosis is not None and j.kind != "push"]
+    speeds = sorted({j.speed for j in known})
     named = [("all", known)]
-    named += [(f"{s:g} %", [j for j in known if j.event.speed == s]) for s in speeds]
+    named += [(f"{s:g} %", [j for j in known if j.speed == s]) for s in speeds]
     for low, _ in STRATA:
         name = stratum(low)
         named.append((f"{name} N m", [j for j in known if stratum(_peak(j)) == name]))
     named.append(("from 16 N m", [j for j in known if _peak(j) >= 16]))
-    pushes = [j for j in contacts if j.diagnosis is not None and j.event.kind == "push"]
+    pushes = [j for j in contacts if j.diagnosis is not None and j.kind == "push"]
     return [(name, some) for name, some in [*named, ("pushes", pushes)] if some]
 
 
 def _peak(judged: Judged) -> float:
-    assert judged.event.collision is not None
-    return judged.event.collision.peak_tau
+    assert judged.collision is not None
+    return judged.collision.peak_tau
 
 
 def _link(judged: Judged) -> int:
-    assert judged.event.collision is not None
-    return judged.event.collision.link
+    assert judged.collision is not None
+    return judged.collision.link
 
 
 def link_rows(contacts: Sequence[Judged]) -> list[Row]:
@@ -181,7 +197,7 @@ def link_rows(contacts: Sequence[Judged]) -> list[Row]:
     rows = []
     for group, some in groups(contacts):
         for method in METHODS:
-            off = [abs(j.answers[method].link - _link(j)) for j in some]
+            off = [abs(j.links[method] - _link(j)) for j in some]
             rows.append(
                 {
                     "study": "link",
@@ -200,7 +216,7 @@ def confusion_rows(contacts: Sequence[Judged]) -> list[Row]:
     rows = []
     for method in METHODS:
         for link in sorted({_link(j) for j in known}):
-            said = [j.answers[method].link for j in known if _link(j) == link]
+            said = [j.links[method] for j in known if _link(j) == link]
             counts = {f"said_{k}": said.count(k) for k in range(1, 7)}
             row = {"study": "link_confusion", "method": method, "link": link, **counts}
             rows.append({**row, "said_none": said.count(0)})
@@ -212,7 +228,8 @@ def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
     rows = []
     for group, some in groups(contacts):
         for method in METHODS:
-            errors = np.array([_errors(j, method) for j in some])
+            own = [j.errors[method] for j in some]
+            errors = np.array([(e.true_force, e.force, e.direction, 100 * e.point) for e in own])
             row: Row = {"study": "contact", "group": group, "method": method, "n": len(some)}
             names = ("true_force_n", "force_error_n", "direction_deg", "point_cm")
             for name, column in zip(names, errors.T, strict=True):
@@ -222,21 +239,11 @@ def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
     return rows
 
 
-def _errors(judged: Judged, method: str) -> tuple[float, float, float, float]:
-    """True force [N], its error [N], angle between them [deg], distance of the points [cm]."""
-    event, answer = judged.event, judged.answers[method]
-    assert judged.diagnosis is not None
-    assert event.collision is not None
-    truth = contact_at(event.trace, event.collision, judged.diagnosis.time)
-    errors = ContactErrors.of(answer.force, answer.point, truth)
-    return errors.true_force, errors.force, errors.direction, 100 * errors.point
-
-
 def kind_rows(judged: Sequence[Judged]) -> list[Row]:
     """True kind (a row) against the kind said."""
     rows = []
     for kind in KINDS:
-        said = [j.diagnosis.kind for j in judged if j.diagnosis and j.event.kind == kind]
+        said = [j.diagnosis.kind for j in judged if j.diagnosis and j.kind == kind]
         counts = {f"said_{other}": said.count(other) for other in KINDS}
         right = rate(said.count(kind), len(said))
         rows.append({"study": "kind", "kind": kind, **counts, "kind_right": right})
@@ -246,10 +253,10 @@ def kind_rows(judged: Sequence[Judged]) -> list[Row]:
 def payload_rows(judged: Sequence[Judged]) -> list[Row]:
     """Payload changes that raised an alarm, those then called a collision, and the mass found."""
     rows = []
-    changes = [j for j in judged if j.event.kind == "payload"]
-    for mass in (None, *sorted({abs(j.event.mass) for j in changes})):
-        some = [j for j in changes if mass in (None, abs(j.event.mass))]
-        found = [(j.diagnosis, j.event.mass) for j in some if j.diagnosis is not None]
+    changes = [j for j in judged if j.kind == "payload"]
+    for mass in (None, *sorted({abs(j.mass) for j in changes})):
+        some = [j for j in changes if mass in (None, abs(j.mass))]
+        found = [(j.diagnosis, j.mass) for j in some if j.diagnosis is not None]
         told = [abs(d.signs.mass - m) for d, m in found if not d.collision]
         rows.append(
             {
@@ -263,16 +270,13 @@ def payload_rows(judged: Sequence[Judged]) -> list[Row]:
     return rows
 
 
-def cost_row(
-    judged: Sequence[Judged], watchers: dict[int, Thresholded], surface: LinkSurface
-) -> Row:
-    """Milliseconds of a diagnosis, and of what must be computed before."""
-    first = next(j for j in judged if j.diagnosis is not None)
-    alarm, trace = first.event.alarm, first.event.trace
+def cost_row(event: Event, watching: Thresholded, surface: LinkSurface) -> Row:
+    """Microseconds of a diagnosis, and of what must be computed before."""
+    alarm = event.alarm
     assert alarm is not None
-    arm, envelope = believed(watchers[first.event.arm])
+    arm, envelope = believed(watching)
     diagnoser = Diagnoser(arm, surface, envelope)
-    looked = AftermathOf(arm, envelope, trace)
+    looked = AftermathOf(arm, envelope, event.trace)
     after = looked.at(alarm.start)
     times: dict[str, Any] = measure(
         {

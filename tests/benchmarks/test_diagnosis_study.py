@@ -5,10 +5,11 @@ import pytest
 
 from tauguard.benchmarks import diagnosis
 from tauguard.benchmarks.detection_fleet import Training
-from tauguard.benchmarks.diagnosis import Answer, Judged
-from tauguard.benchmarks.diagnosis_pool import Event, contact_kind, first_alarm
+from tauguard.benchmarks.diagnosis import Judged
+from tauguard.benchmarks.diagnosis_pool import contact_kind, first_alarm
 from tauguard.detectors import Diagnosis
 from tauguard.detectors.classification import Signs
+from tauguard.detectors.diagnosis_metrics import ContactErrors
 from tauguard.traces import Alarm, Collision, Trace, Truth
 
 T = np.arange(0, 2, 1e-3)
@@ -29,13 +30,14 @@ def trace(pressed):
 
 def judged(link=3, said=3, kind="impact", called="impact", force=50.0, **event):
     alarm = Alarm(0.51, 0.6)
-    of = Event(1, 30.0, kind, trace(np.zeros(len(T), bool)), alarm, collision(link=link))
     signs = Signs(0.0, 0.0, 1.4, 0.1, 1e4, 1.0, 0.1)
     found = Diagnosis(
         alarm, said, np.ones(6) / 6, 1, 0.52, np.zeros(3), np.zeros(3), called, {}, signs
     )
-    answer = Answer(said, np.array([force, 0.0, 0.0]), np.zeros(3))
-    return Judged(replace(of, **event), found, dict.fromkeys(diagnosis.METHODS, answer))
+    errors = ContactErrors.of([force, 0, 0], np.zeros(3), ([50.0, 0, 0], np.array([0.1, 0, 0])))
+    methods = diagnosis.METHODS
+    links, each = dict.fromkeys(methods, said), dict.fromkeys(methods, errors)
+    return replace(Judged(kind, 30.0, collision(link=link), 0.0, found, links, each), **event)
 
 
 def test_links_are_counted_with_their_neighbours():
@@ -48,14 +50,13 @@ def test_links_are_counted_with_their_neighbours():
     assert (third["said_3"], third["said_4"], third["said_none"]) == (1, 1, 0)
 
 
-def test_errors_are_measured_against_the_contact_at_that_time():
-    row = diagnosis.contact_rows([judged(force=40.0)])[0]
-    assert (row["true_force_n"], row["force_error_n"], row["direction_deg"]) == (50.0, 10.0, 0.0)
+def test_errors_are_those_of_the_group():
+    rows = diagnosis.contact_rows([judged(force=40.0), judged(force=20.0, speed=60.0)])
+    row = next(r for r in rows if r["group"] == "60 %")
+    assert (row["true_force_n"], row["force_error_n"], row["direction_deg"]) == (50.0, 30.0, 0.0)
     assert row["point_cm"] == pytest.approx(10.0)
-    during = judged(force=-10.0, trace=trace((T > 0.5) & (T < 0.6)))
-    row = diagnosis.contact_rows([during])[0]
-    assert (row["true_force_n"], row["force_error_n"], row["direction_deg"]) == (10.0, 20.0, 180.0)
-    assert row["point_cm"] == pytest.approx(20.0)
+    assert rows[0]["n"] == 2
+    assert rows[0]["force_error_n"] == pytest.approx(20.0)
 
 
 def test_a_payload_that_is_called_a_collision_is_counted():
