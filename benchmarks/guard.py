@@ -297,17 +297,25 @@ def draw(rows: list[Row], figure: Any) -> None:
     for axis, speed in zip(axes, speeds, strict=True):
         for method, (color, marker) in looks.items():
             chosen = [r for r in rows if r["speed"] == speed and r["method"] == method]
+            chosen.sort(key=lambda r: r["timestep_ms"])
+            if not chosen:
+                continue
             x = [r["ms"]["median"] for r in chosen]
             y = [max(r["error"]["median"] / speed, 1e-4) for r in chosen]
-            if method == "plain":
+            if method not in ("speculative", "ipc"):
                 axis.plot(x, y, color=color, lw=0.7, zorder=1)
             full = [color if r["held"]["value"] == 1.0 else "white" for r in chosen]
             axis.scatter(x, y, c=full, edgecolors=color, marker=marker, label=method, zorder=2)
-            if method not in ("speculative", "ipc"):
-                for row, x0, y0 in zip(chosen, x, y, strict=True):
-                    text = f"{row['timestep_ms']:g}"
-                    axis.annotate(text, (x0, y0), (4, 3), textcoords="offset points", fontsize=7)
+            if method in ("speculative", "ipc"):
+                continue
+            above = 3 if method == "plain" else -10
+            for row, x0, y0 in zip(chosen, x, y, strict=True):
+                text = f"{row['timestep_ms']:g}"
+                shift = {"xytext": (4, above), "textcoords": "offset points"}
+                axis.annotate(text, (x0, y0), **shift, color=color, fontsize=7)
         axis.set(xscale="log", yscale="log", title=f"{speed:g} m/s", xlabel="ms per run")
         axis.grid(alpha=0.3)
-    axes[0].set_ylabel("rebound error / speed (labels: timestep in ms)")
-    axes[0].legend(title="hollow: not all held", fontsize=8)
+    axes[0].set_ylabel("rebound error / speed")
+    handles, labels = axes[0].get_legend_handles_labels()
+    title = "ball into cloth, stiff contact; labels: timestep in ms; hollow: not every run held"
+    figure.legend(handles, labels, title=title, loc="outside upper center", ncols=len(labels))

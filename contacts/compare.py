@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from tauguard.contacts.checker import Checker, State, checker
+from tauguard.contacts.checker import Checker, State, checker, geom_kinds, pair_kind
 from tauguard.contacts.mujoco_checker import MujocoChecker
 from tauguard.contacts.referee import Referee
-from tauguard.contacts.report import Report
+from tauguard.contacts.report import Report, Score
 from tauguard.contacts.run import Run
 from tauguard.contacts.scenes import SCENES, ContactScene
 from tauguard.contacts.scoring import judge, score
@@ -68,13 +69,16 @@ def compare(
     run = _simulate(model, data, scene, duration, {**chosen, "mujoco": yardstick}, judging, keep)
     outcomes = judge(model, run.times, run.verdicts, run.contacts["mujoco"])
     scores = tuple(score(model, name, one.covers, judged, run) for name, one in chosen.items())
+    first = _first_contact(scene, model.opt.timestep / fine, duration) if fine else None
+    if first is not None:
+        scores = tuple(_beside(s, first, chosen[s.checker].covers) for s in scores)
     return Report(
         scene=scene.name,
         timestep=float(model.opt.timestep),
         steps=len(run.step_seconds),
         scores=scores,
         outcomes=outcomes,
-        first_contact=_first_contact(scene, model.opt.timestep / fine, duration) if fine else None,
+        first_contact=first[0] if first is not None else None,
         disagreements=tuple(d for s in scores for d in s.disagreements),
         step_us=1e6 * float(np.median(run.step_seconds)),
         state_us=1e6 * float(np.median(run.state_seconds)),
@@ -118,14 +122,33 @@ def _simulate(
     return run
 
 
-def _first_contact(scene: ContactScene, timestep: float, seconds: float) -> float | None:
-    """When MuJoCo alone first lists surfaces that touch, in steps of ``timestep`` [s]."""
+def _first_contact(
+    scene: ContactScene, timestep: float, seconds: float
+) -> tuple[float, set[tuple[str, str]]] | None:
+    """When MuJoCo alone first lists surfaces that touch, in steps of ``timestep`` [s], and whose.
+
+    Whose: kinds of pairs, see :func:`pair_kind`.
+    """
     model, data = scene.start(timestep)
+    kinds = geom_kinds(model)
     for _ in range(max(1, round(seconds / timestep))):
         if scene.control is not None:
             scene.control(model, data)
         now = float(data.time)
         mujoco.mj_step(model, data)  # lists the contacts of the state it starts from
-        if (data.contact.dist <= 0).any():
-            return now
+        touching = np.flatnonzero(data.contact.dist <= 0)
+        if len(touching):
+            both = (
+                [kinds[g] if g >= 0 else "flex" for g in data.contact.geom[k]] for k in touching
+            )
+            return now, {pair_kind(*names) for names in both}
     return None
+
+
+def _beside(
+    score: Score, first: tuple[float, set[tuple[str, str]]], covers: frozenset[tuple[str, str]]
+) -> Score:
+    """The score with its first report beside that contact, where the checker covers the pair."""
+    if score.first is None or not first[1] & covers:
+        return score
+    return replace(score, first_error_ms=1e3 * (score.first - first[0]))

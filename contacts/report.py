@@ -51,6 +51,8 @@ class Score:
         steps_found: Of them, reported in that very step.
         delay_ms: From an event's onset to its first report, median [ms].
         first: Its first report of any pair [s].
+        first_error_ms: How much later that is than the first contact of a finely stepped run of
+            MuJoCo [ms]; ``None`` without such a run, or where it does not cover that pair.
         lead_ms: How much earlier than MuJoCo it reports a pair's first contact, median [ms].
         depth_mm: Difference from MuJoCo's depth at the same state, median [mm].
         normal_deg: Angle between its normal and MuJoCo's, median [deg].
@@ -70,6 +72,7 @@ class Score:
     steps_found: int | None = None
     delay_ms: float | None = None
     first: float | None = None
+    first_error_ms: float | None = None
     lead_ms: float | None = None
     depth_mm: float | None = None
     normal_deg: float | None = None

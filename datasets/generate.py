@@ -5,16 +5,21 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from tqdm import tqdm
 
+from tauguard.contacts import registered
 from tauguard.envs import Episode, simulate
 from tauguard.traces import Trace, read_mcap, write_mcap
 
 
 def simulate_all(
-    episodes: Sequence[Episode], workers: int | None = None, label: str = "simulate"
+    episodes: Sequence[Episode],
+    workers: int | None = None,
+    label: str = "simulate",
+    checkers: Sequence[str] = (),
 ) -> Iterator[Trace]:
     """The traces of ``episodes`` in their order, whatever the number of workers.
 
@@ -22,41 +27,57 @@ def simulate_all(
         episodes: what to simulate.
         workers: processes (default: the processors there are); 1 stays in this process.
         label: of the progress bar.
+        checkers: names of contact checkers whose answers go into ``Trace.contacts``. One that is
+            not among ours must be registered where a worker imports it, or ``workers`` be 1.
     """
+    one = partial(simulate, checkers=tuple(checkers))
     workers = min(workers or os.cpu_count() or 1, max(len(episodes), 1))
     bar = tqdm(total=len(episodes), desc=label, unit="episode", disable=None, leave=False)
     with bar:
         if workers == 1:
             for episode in episodes:
-                yield simulate(episode)
+                yield one(episode)
                 bar.update()
             return
         with multiprocessing.get_context("spawn").Pool(workers) as pool:
-            for trace in pool.imap(simulate, episodes):
+            for trace in pool.imap(one, episodes):
                 yield trace
                 bar.update()
 
 
 def write_dataset(
-    episodes: Sequence[Episode], folder: Path, workers: int | None = None
+    episodes: Sequence[Episode],
+    folder: Path,
+    workers: int | None = None,
+    checkers: Sequence[str] = (),
 ) -> list[Path]:
     """Write one MCAP an episode into ``folder``; whole files of the same episodes are kept.
 
+    Args:
+        episodes: what to simulate.
+        folder: made if it does not exist.
+        workers: processes (default: the processors there are); 1 stays in this process.
+        checkers: as for :func:`simulate_all`.
+
     Raises:
         OSError: the folder cannot be made or written.
-        ValueError: a file of that name holds another episode (nothing is overwritten).
+        ValueError: an unknown checker; a file of that name holds another episode or other checkers
+            (nothing is overwritten).
     """
+    for name in checkers:
+        if name not in registered():
+            raise ValueError(f"checkers {name!r}: expected some of {', '.join(registered())}")
     folder.mkdir(parents=True, exist_ok=True)
     width = max(5, len(str(len(episodes))))
     paths = [folder / f"episode-{i:0{width}d}.mcap" for i in range(len(episodes))]
-    missing = [i for i, path in enumerate(paths) if not _holds(path, episodes[i])]
-    traces = simulate_all([episodes[i] for i in missing], workers)
+    missing = [i for i, path in enumerate(paths) if not _holds(path, episodes[i], checkers)]
+    traces = simulate_all([episodes[i] for i in missing], workers, checkers=checkers)
     for i, trace in zip(missing, traces, strict=True):
         write_mcap(paths[i], trace)
     return paths
 
 
-def _holds(path: Path, episode: Episode) -> bool:
+def _holds(path: Path, episode: Episode, checkers: Sequence[str]) -> bool:
     if not path.exists():
         return False
     trace, _ = read_mcap(path)
@@ -64,5 +85,11 @@ def _holds(path: Path, episode: Episode) -> bool:
         raise ValueError(
             f"{path}: holds another episode than this seed and these settings give; "
             "choose another folder or remove it"
+        )
+    seen = [one.checker for one in trace.contacts]
+    if seen != list(checkers):
+        raise ValueError(
+            f"{path}: holds contacts of {', '.join(seen) or 'no checker'}, not of "
+            f"{', '.join(checkers) or 'no checker'}; choose another folder or remove it"
         )
     return True

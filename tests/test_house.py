@@ -18,7 +18,7 @@ ALLOWED = {
     "detectors": {"traces", "models"},
     "contacts": {"cloth", "rigid", "models", "traces"},
     "envs": {"models", "contacts", "detectors", "traces"},
-    "datasets": {"envs", "traces", "models", "detectors"},
+    "datasets": {"envs", "contacts", "traces", "models", "detectors"},
     "replay": {"traces", "models"},
 }
 

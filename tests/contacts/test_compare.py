@@ -111,9 +111,15 @@ def test_a_finely_stepped_run_is_a_second_yardstick():
     assert impact <= report.first_contact <= impact + 1e-4
     assert report["rigid"].first == pytest.approx(impact, abs=1e-6)
     assert impact < report["mujoco"].first <= impact + 2e-3
+    off = 1e3 * (report["rigid"].first - report.first_contact)
+    assert report["rigid"].first_error_ms == pytest.approx(off)
     never = compare(bounce(2.0), ["rigid"], seconds=0.1, referee=False, fine=2)
     assert never.first_contact is None
     assert never["rigid"].first is None
+    assert never["rigid"].first_error_ms is None
+    flat = compare(bounce(2.001), ["cloth"], seconds=0.46, referee=False, fine=2)
+    assert flat.first_contact is not None  # of a ball and a plane, which cloth does not cover
+    assert flat["cloth"].first_error_ms is None
 
 
 def test_without_a_referee_there_is_cost_but_no_judgement():

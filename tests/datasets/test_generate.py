@@ -71,3 +71,20 @@ def test_another_datasets_files_are_not_overwritten(episodes, tmp_path):
     write_dataset(episodes[:1], tmp_path, workers=1)
     with pytest.raises(ValueError, match="holds another episode"):
         write_dataset(episodes[1:2], tmp_path, workers=1)
+
+
+def test_checkers_write_their_contacts_and_are_part_of_what_a_file_is(episodes, tmp_path):
+    (path,) = write_dataset(episodes[:1], tmp_path, workers=1, checkers=["mujoco", "rigid"])
+    trace, _ = read_mcap(path)
+    assert [one.checker for one in trace.contacts] == ["mujoco", "rigid"]
+    before = path.read_bytes()
+    write_dataset(episodes[:1], tmp_path, workers=1, checkers=["mujoco", "rigid"])
+    with pytest.raises(ValueError, match="holds contacts of mujoco, rigid, not of no checker"):
+        write_dataset(episodes[:1], tmp_path, workers=1)
+    assert path.read_bytes() == before
+
+
+def test_an_unknown_checker_is_named_before_anything_is_written(episodes, tmp_path):
+    with pytest.raises(ValueError, match=r"'rigidd': expected some of mujoco, cloth, rigid"):
+        write_dataset(episodes[:1], tmp_path / "new", workers=1, checkers=["rigidd"])
+    assert not (tmp_path / "new").exists()

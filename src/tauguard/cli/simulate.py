@@ -18,6 +18,7 @@ def command(
     payloads_g: tuple[float, ...] = (0.0, 1016.0, 4039.0),
     seed: int = 0,
     mismatch_seed: int | None = 0,
+    checkers: tuple[str, ...] = (),
     workers: int | None = None,
     json: Path | None = None,
 ) -> None:
@@ -35,6 +36,8 @@ def command(
         seed: of everything that is drawn.
         mismatch_seed: which arm: how its masses, gains and friction differ from the nominal ones;
             None simulates the nominal arm.
+        checkers: contact checkers (mujoco, cloth, rigid) that watch every step; their contacts go
+            into the recordings and the replay.
         workers: processes (default: all processors).
         json: write what was simulated here as JSON.
     """
@@ -52,7 +55,7 @@ def command(
         if collisions
         else free_episodes(seed, episodes, seconds, speeds, payloads_g, arm)
     )
-    paths = write_dataset(planned, out, workers)
+    paths = write_dataset(planned, out, workers, checkers)
     rows = [told(path, episode) for path, episode in zip(paths, planned, strict=True)]
     if json is not None:
         write_json(json, {"name": "simulate", "seed": seed, "rows": rows})
@@ -64,9 +67,11 @@ def told(path: Path, episode: Episode) -> dict[str, object]:
 
     trace, _ = read_mcap(path)
     found = trace.truth.collisions if trace.truth else ()
+    contacts = {one.checker: len(one) for one in trace.contacts}
     print(
         f"{path.name}  {episode.seconds:6.1f} s  {episode.speed:5.1f} %  "
         f"{episode.payload_g:6.0f} g  {len(found)} collisions"
+        + "".join(f"  {name}: {count} contacts" for name, count in contacts.items())
     )
     return {
         "file": path.name,
@@ -74,5 +79,6 @@ def told(path: Path, episode: Episode) -> dict[str, object]:
         "speed": episode.speed,
         "payload_g": episode.payload_g,
         "collisions": len(found),
+        **{f"contacts_{name}": count for name, count in contacts.items()},
         "peak_tau": max((c.peak_tau for c in found), default=0.0),
     }
