@@ -20,7 +20,7 @@ from tauguard.traces.trace import Array
 #: Contacts of one checker: their times [s], shape (K,), and points [m], shape (K, 3).
 Marks = tuple[Array, Array]
 POINT = 6e-3  # [m] radius of a drawn contact
-CLOTH = (170, 120, 90)
+CLOTH = (170, 120, 90, 150)  # lets contacts behind it show
 
 
 def write_contacts_rrd(
@@ -73,21 +73,37 @@ def write_contacts_rrd(
             _log_cloth(recording, model, t, vertices)
         for number, (name, (when, points)) in enumerate((marks or {}).items()):
             _log_marks(recording, name, COLOURS[number % len(COLOURS)], t, when, points)
+        if not notes:
+            recording.set_time(TIMELINE, duration=float(t[0]))
+            recording.log("notes", rr.TextLog("no disagreements"))
         for moment, text in notes:
             recording.set_time(TIMELINE, duration=moment)
             recording.log("notes", rr.TextLog(text))
-        recording.send_blueprint(
-            rrb.Blueprint(
-                rrb.Vertical(
-                    rrb.Spatial3DView(origin="/", name="scene"),
-                    rrb.TextLogView(origin="notes", name="disagreements"),
-                    row_shares=[4, 1],
-                )
-            )
-        )
+        recording.send_blueprint(_blueprint())
         recording.flush()
         recording.disconnect()
         os.replace(draft, path)
+
+
+def _blueprint() -> rrb.Blueprint:
+    """The scene; beside it how many contacts each checker saw, and where they disagree."""
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Spatial3DView(origin="/", name="scene"),
+            rrb.Vertical(
+                rrb.TimeSeriesView(
+                    origin="seen",
+                    name="contacts seen in a step, by checker (colours as in the scene)",
+                ),
+                rrb.TextLogView(origin="notes", name="disagreements with the referee"),
+            ),
+            column_shares=[3, 2],
+        ),
+        rrb.TimePanel(
+            state="collapsed", timeline=TIMELINE, play_state="paused", playback_speed=0.1
+        ),
+        collapse_panels=True,
+    )
 
 
 def _log_bodies(recording: Any, model: Any, t: Array, positions: Array, rotations: Array) -> None:
@@ -132,7 +148,18 @@ def _log_marks(
     row, points = row[known], points[known]
     order = np.argsort(row, kind="stable")
     counts = np.bincount(row, minlength=len(t))
+    _log_count(recording, name, colour, t, counts)
     columns = rr.Points3D.columns(positions=points[order])
     rr.send_columns(
         place, times(t), [column.partition(counts) for column in columns], recording=recording
     )
+
+
+def _log_count(
+    recording: Any, name: str, colour: NDArray[np.uint8], t: Array, counts: NDArray[np.int64]
+) -> None:
+    """How many contacts fell into each interval, as a line over time."""
+    place = entity("seen", name)
+    recording.log(place, rr.SeriesLines(names=[name], colors=[colour], widths=[2]), static=True)
+    columns = rr.Scalars.columns(scalars=counts.astype(np.float64))
+    rr.send_columns(place, times(t), columns, recording=recording)
