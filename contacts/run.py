@@ -57,10 +57,11 @@ class Run:
             "marks": {name: self._marks(found) for name, found in self.contacts.items()},
         }
 
-    def _marks(self, found: list[Contacts]) -> tuple[Array, Array]:
-        """Times [s] and points of all contacts in which surfaces touch."""
+    def _marks(self, found: list[Contacts]) -> tuple[Array, Array, Array]:
+        """Times [s], points and normals of all contacts in which surfaces touch."""
         begin, length = np.array(self.times[:-1]), np.diff(self.times)
         when = [begin[k] + length[k] * one.time for k, one in enumerate(found)]
         touching = np.concatenate([one.distance <= TOUCHING for one in found])
         points = np.concatenate([one.point for one in found])
-        return np.concatenate(when)[touching], points[touching]
+        normals = np.concatenate([one.normal for one in found])
+        return np.concatenate(when)[touching], points[touching], normals[touching]

@@ -17,10 +17,11 @@ from tauguard.replay.robot import Motion, bodies, quats_wxyz
 from tauguard.replay.rrd import COLOURS, TIMELINE, drawn, entity, log_pose, times
 from tauguard.traces.trace import Array
 
-#: Contacts of one checker: their times [s], shape (K,), and points [m], shape (K, 3).
-Marks = tuple[Array, Array]
+#: Contacts of one checker: their times [s], shape (K,), points [m] and normals, shape (K, 3).
+Marks = tuple[Array, Array, Array]
 POINT = 6e-3  # [m] radius of a drawn contact
-CLOTH = (170, 120, 90, 150)  # lets contacts behind it show
+NORMAL = 0.06  # [m] an arrow along its normal begins and ends this far from it, to be seen outside
+CLOTH = (170, 120, 90)
 
 
 def write_contacts_rrd(
@@ -71,25 +72,46 @@ def write_contacts_rrd(
         _log_bodies(recording, model, t, positions, rotations)
         if vertices is not None:
             _log_cloth(recording, model, t, vertices)
-        for number, (name, (when, points)) in enumerate((marks or {}).items()):
-            _log_marks(recording, name, COLOURS[number % len(COLOURS)], t, when, points)
+        for number, (name, seen) in enumerate((marks or {}).items()):
+            _log_marks(recording, name, COLOURS[number % len(COLOURS)], t, seen)
         if not notes:
             recording.set_time(TIMELINE, duration=float(t[0]))
             recording.log("notes", rr.TextLog("no disagreements"))
         for moment, text in notes:
             recording.set_time(TIMELINE, duration=moment)
             recording.log("notes", rr.TextLog(text))
-        recording.send_blueprint(_blueprint())
+        recording.send_blueprint(_blueprint(_eye(marks or {}, positions, vertices)))
         recording.flush()
         recording.disconnect()
         os.replace(draft, path)
 
 
-def _blueprint() -> rrb.Blueprint:
+def _eye(
+    marks: Mapping[str, Marks], positions: Array, vertices: Array | None
+) -> rrb.EyeControls3D | None:
+    """Across the contacts' mean normal, so that both partners are seen from the side."""
+    known = [np.isfinite(seen[1]).all(axis=1) for seen in marks.values()]
+    points = [seen[1][rows] for seen, rows in zip(marks.values(), known, strict=True)]
+    normals = [seen[2][rows] for seen, rows in zip(marks.values(), known, strict=True)]
+    if not sum(map(len, points)):
+        return None
+    target = np.median(np.concatenate(points), axis=0)
+    normal = np.nan_to_num(np.concatenate(normals)).mean(axis=0)
+    across = np.array([normal[1], -normal[0], 0.0])
+    if np.linalg.norm(across) < 0.1:  # a floor: from anywhere
+        across = np.array([1.0, 0.0, 0.0])
+    moving = positions[:, 1:] if vertices is None else vertices
+    spread = moving.max(axis=(0, 1)) - moving.min(axis=(0, 1)) if moving.size else np.ones(3)
+    away = across / np.linalg.norm(across) + [0.0, 0.0, 0.35]
+    eye = target + (0.2 + float(np.linalg.norm(spread))) * away
+    return rrb.EyeControls3D(position=tuple(eye), look_target=tuple(target), eye_up=(0, 0, 1))
+
+
+def _blueprint(eye: rrb.EyeControls3D | None) -> rrb.Blueprint:
     """The scene; beside it how many contacts each checker saw, and where they disagree."""
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Spatial3DView(origin="/", name="scene"),
+            rrb.Spatial3DView(origin="/", name="scene", eye_controls=eye),
             rrb.Vertical(
                 rrb.TimeSeriesView(
                     origin="seen",
@@ -137,22 +159,26 @@ def _log_cloth(recording: Any, model: Any, t: Array, vertices: Array) -> None:
 
 
 def _log_marks(
-    recording: Any, name: str, colour: NDArray[np.uint8], t: Array, when: Array, points: Array
+    recording: Any, name: str, colour: NDArray[np.uint8], t: Array, marks: Marks
 ) -> None:
     """The contacts of each interval between two states, shown at its end; none where none."""
-    place = entity("contacts", name)
-    styles = rr.Points3D.from_fields(radii=POINT, colors=[colour])
-    recording.log(place, styles, static=True)
+    when, points, normals = marks
     row = np.searchsorted(t, when)
-    known = (row < len(t)) & np.isfinite(points).all(axis=1)
-    row, points = row[known], points[known]
-    order = np.argsort(row, kind="stable")
-    counts = np.bincount(row, minlength=len(t))
+    known = np.flatnonzero((row < len(t)) & np.isfinite(points).all(axis=1))
+    order = known[np.argsort(row[known], kind="stable")]
+    counts = np.bincount(row[order], minlength=len(t))
     _log_count(recording, name, colour, t, counts)
-    columns = rr.Points3D.columns(positions=points[order])
-    rr.send_columns(
-        place, times(t), [column.partition(counts) for column in columns], recording=recording
-    )
+    points, normals = points[order], np.nan_to_num(normals[order])
+    dots = rr.Points3D.columns(positions=points)
+    arrows = rr.Arrows3D.columns(origins=points - NORMAL * normals, vectors=2 * NORMAL * normals)
+    for part, columns, style in (
+        ("point", dots, rr.Points3D.from_fields(radii=POINT, colors=[colour])),
+        ("normal", arrows, rr.Arrows3D.from_fields(radii=0.2 * POINT, colors=[colour])),
+    ):
+        place = f"{entity('contacts', name)}/{part}"
+        recording.log(place, style, static=True)
+        parted = [column.partition(counts) for column in columns]
+        rr.send_columns(place, times(t), parted, recording=recording)
 
 
 def _log_count(

@@ -36,7 +36,7 @@ def run():
 
 def test_it_holds_bodies_cloth_contacts_and_notes(run, tmp_path):
     points = np.array([[0, 0, 0.1], [0, 0.1, 0.1], [np.nan] * 3])
-    marks = {"rigid": (run["t"][[1, 1, 2]] - 1e-3, points)}
+    marks = {"rigid": (run["t"][[1, 1, 2]] - 1e-3, points, np.full((3, 3), np.nan))}
     path = tmp_path / "run.rrd"
     write_contacts_rrd(path, **run, marks=marks, notes=[(0.004, "mujoco missed: ball")])
     found = {}
@@ -51,7 +51,7 @@ def test_it_holds_bodies_cloth_contacts_and_notes(run, tmp_path):
     points = [
         chunk.to_record_batch().column("Points3D:positions").to_pylist()
         for chunk in RrdReader(str(path)).stream()
-        if str(chunk.entity_path) == "/contacts/rigid"
+        if str(chunk.entity_path) == "/contacts/rigid/point"
         and "time" in chunk.to_record_batch().schema.names
     ]
     assert [len(row) for row in points[0]] == [0, 2, 0, 0, 0]
