@@ -183,10 +183,12 @@ def _summary(rows: list[Row]) -> list[Row]:
             met = count == runs if bar else None
             out.append(answer(f"{name}: {kind}", "1.0" if bar else "figure", text, met))
         if name != "mujoco":
-            leads = {r["scene"]: r["lead_ms"] for r in mine if r["lead_ms"] is not None}
-            text = ", ".join(f"{scene} {lead:.2g}" for scene, lead in leads.items())
-            longest = max(r["timestep_ms"] for r in mine)
-            out.append(answer(f"{name}: lead at {longest:g} ms [ms]", "figure", text))
+            for kind, what in (
+                ("lead_ms", "lead over MuJoCo [ms]"),
+                ("depth_mm", "depth beside MuJoCo's [mm]"),
+                ("normal_deg", "normal beside MuJoCo's [deg]"),
+            ):
+                out.append(answer(f"{name}: {what}", "figure", _ranges(mine, kind)))
     flights = [r for r in rows if r["study"] == "crossing"]
     seen = min(r["cloth_recall"]["value"] for r in flights)
     off = max(r["cloth_time_error"] for r in flights)
@@ -198,12 +200,25 @@ def _summary(rows: list[Row]) -> list[Row]:
             f"{kind} {np.mean([r[f'mujoco_{kind}']['value'] for r in mine]):.3f}"
             for kind in ("generates", "holds")
         ]
-        out.append(answer(f"ball: MuJoCo alone, {mode}", "share", ", ".join(shares)))
+        out.append(
+            answer(
+                f"ball: MuJoCo alone, {mode}, all speeds and timesteps", "share", ", ".join(shares)
+            )
+        )
     for row in (r for r in rows if r["study"] == "cost" and r["checker"] != "mujoco"):
         text = f"{row['share']:.3f}, {row['share_with_state']:.3f} with the state's copy"
         what = f"{row['checker']}: share of mj_step, arm and 40x40 cloth"
         out.append(answer(what, "below 0.25", text, row["share_with_state"] < 0.25))
     return out
+
+
+def _ranges(rows: list[Row], kind: str) -> str:
+    """By scene, the least and greatest of its timesteps' medians."""
+    scenes: dict[str, list[float]] = {}
+    for row in rows:
+        if row[kind] is not None:
+            scenes.setdefault(row["scene"], []).append(row[kind])
+    return ", ".join(f"{name} {min(v):.2g}..{max(v):.2g}" for name, v in scenes.items())
 
 
 def draw(rows: list[Row], figure: Any) -> None:

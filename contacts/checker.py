@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Protocol, runtime_checkable
@@ -36,6 +37,9 @@ _POSE = int(
     | mujoco.mjtState.mjSTATE_MOCAP_POS
     | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 )
+
+
+_NO_VERTICES = np.zeros((0, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +86,9 @@ class State:
         scratch = mujoco.MjData(model) if scratch is None else scratch
         mujoco.mj_copyState(model, data, scratch, _POSE)
         mujoco.mj_kinematics(model, scratch)
-        if model.flex_interp.any():
+        if not model.nflex:
+            vertices = _NO_VERTICES
+        elif model.flex_interp.any():
             mujoco.mj_comPos(model, scratch)
             mujoco.mj_flex(model, scratch)
             vertices = scratch.flexvert_xpos.copy()
@@ -256,12 +262,20 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
     """The checker ``name`` for ``model``.
 
     Raises:
-        ValueError: no such checker (the message lists those there are), or a geom in the model
-            that this checker cannot handle.
+        ValueError: no such checker or option (the message lists those there are), or a geom in the
+            model that this checker cannot handle.
     """
     if name not in _FACTORIES:
         raise ValueError(f"checker {name!r}: there are {', '.join(_FACTORIES) or 'none'}")
-    return _FACTORIES[name](model, **options)
+    factory = _FACTORIES[name]
+    try:
+        inspect.signature(factory).bind(model, **options)
+    except TypeError as error:
+        known = list(inspect.signature(factory).parameters)[1:]
+        raise ValueError(
+            f"checker {name!r}: {error}; its options are {', '.join(known) or 'none'}"
+        ) from None
+    return factory(model, **options)
 
 
 def pair_kind(a: str, b: str) -> tuple[str, str]:

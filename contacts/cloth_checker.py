@@ -126,7 +126,10 @@ class _Flex:
         dim = int(model.flex_dim[number])
         if dim != 2:
             name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, number)
-            raise ValueError(f"cloth: flex {name!r} has dimension {dim}; this checker handles 2")
+            raise ValueError(
+                f"cloth: flex {name!r} has dimension {dim}; this checker handles 2 "
+                '(contype="0" conaffinity="0" leaves such a flex out)'
+            )
         start, count = int(model.flex_elemdataadr[number]), int(model.flex_elemnum[number])
         local = model.flex_elem[start : start + 3 * count].reshape(-1, 3)
         self.number = number

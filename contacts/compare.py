@@ -47,7 +47,7 @@ def compare(
 
     Raises:
         ValueError: an unknown scene or checker, a geom that a checker or the referee cannot
-            handle, a timestep or duration that is not above 0, a ``fine`` below 1.
+            handle, options of a checker that is not asked for, a timestep or duration that is not above 0, a ``fine`` below 1.
     """
     if isinstance(scene, str):
         if scene not in SCENES:
@@ -58,6 +58,9 @@ def compare(
         raise ValueError(f"seconds {duration}: expected a time above 0")
     if fine is not None and fine < 1:
         raise ValueError(f"fine {fine}: expected 1 or more steps in one")
+    for name in options or {}:
+        if name not in checkers:
+            raise ValueError(f"options of {name!r}: the checkers are {', '.join(checkers)}")
     model, data = scene.start(timestep)
     chosen = {
         name: checker(name, model, **dict((options or {}).get(name, {}))) for name in checkers

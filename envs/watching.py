@@ -52,6 +52,8 @@ class Watching:
         after = State.of(self._model, data, self._scratch)
         for one, found in zip(self._checkers, self._pairs, strict=True):
             contacts = one.check(self._before, after)
+            if not len(contacts):
+                continue
             rows = np.concatenate([contacts.geom, contacts.flex], axis=1)
             found.update(map(tuple, rows.tolist()))
         self._before = after

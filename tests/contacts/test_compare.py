@@ -135,6 +135,10 @@ def test_bad_input_is_named():
         compare("moon")
     with pytest.raises(ValueError, match=r"checker 'eye': there are .*mujoco"):
         compare(bounce(1.0), ["eye"])
+    with pytest.raises(ValueError, match=r"options of 'rigd': the checkers are rigid"):
+        compare("arm_boxes", ["rigid"], options={"rigd": {}})
+    with pytest.raises(ValueError, match=r"'rigid': .*'bad'; its options are threshold, skip, me"):
+        compare("arm_boxes", ["rigid"], options={"rigid": {"bad": 1}})
     with pytest.raises(ValueError, match="seconds -1"):
         compare(bounce(1.0), seconds=-1)
     with pytest.raises(ValueError, match="fine 0"):
