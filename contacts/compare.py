@@ -47,7 +47,8 @@ def compare(
 
     Raises:
         ValueError: an unknown scene or checker, a geom that a checker or the referee cannot
-            handle, options of a checker that is not asked for, a timestep or duration that is not above 0, a ``fine`` below 1.
+            handle, options of a checker that is not asked for, a timestep or duration that is not
+            above 0, a ``fine`` below 1.
     """
     if isinstance(scene, str):
         if scene not in SCENES:
