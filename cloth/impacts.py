@@ -3,11 +3,11 @@
 ab2pf answers for the doubles given: contact at some time of the step, in exact arithmetic, is a
 hit, nothing else is, and ``toi`` is at most 1e-9 of the step before the first such time. What a
 query can cost is bounded: three cuts of its cubic into at most three pieces of one root, 40 Newton
-steps each; then 41 cuts into intervals (124 at most) of 20 separating directions; then a fixed number of signs of
-polynomials of degree 3 in exact integers, of fixed width first, of any length where those do not
-tell. That is some 50 ns for most, 3 us where the fixed width tells, 200 us at worst for positions
-of like magnitude; 0.2 s where magnitudes within one query span 10^600, the widest that doubles
-can. With a minimum distance: 4001 cuts, no exact arithmetic, conservative.
+steps each; then 41 cuts into intervals (124 at most) of 20 separating directions each; then a fixed
+number of signs of polynomials of degree 3 in exact integers, of fixed width first, of any length
+where those do not tell. That is some 20 ns for most, 3 us where the fixed width tells, 200 us at
+worst for positions of like magnitude; 0.2 s where magnitudes within one query span 10^600, the
+widest that doubles can. With a minimum distance: 4001 cuts, no exact arithmetic, conservative.
 """
 
 from __future__ import annotations
