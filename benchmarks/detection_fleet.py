@@ -12,6 +12,7 @@ from tauguard.benchmarks.detection_pool import SPEEDS, Conditions, free_pool
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
 from tauguard.detectors.detector import Detector
+from tauguard.detectors.front_end import shared_front_ends
 from tauguard.detectors.zoo import make_detector
 from tauguard.envs import simulate
 from tauguard.models import SceneSpec, compose, cura6_drive, pin_model
@@ -79,9 +80,12 @@ def train(seed: int, arm: int, names: Sequence[str], training: Training, hours: 
     """Train on the arm's slices, then look at ``hours`` of other collision-free motion of it."""
     traces = training.traces(seed, arm)
     robot = nominal()
-    detectors: dict[str, Detector] = {
-        name: make_detector(name).fit(traces, robot) for name in names
-    }
+    detectors: dict[str, Detector] = {name: make_detector(name) for name in names}
+    fronts = shared_front_ends(detectors.values())
+    for detector in detectors.values():
+        detector.fit(traces, robot)
+    for front in fronts:
+        front.forget()
     return Fleet(arm, detectors, calibration_peaks(seed, arm, detectors, hours))
 
 

@@ -54,7 +54,7 @@ class Cusum(PerJoint):
 
     def scores(self, trace: Trace) -> Array:
         """The largest statistic over joints and signs, in units of its drift [s], shape (T,)."""
-        ratio = self.front.ratio(trace)
+        ratio = self.front.ratio(trace).copy()
         assert self.limits is not None
         ratio[trace.t - trace.t[0] < self.settle] = 0.0
         both = np.concatenate([ratio, -ratio], axis=1)

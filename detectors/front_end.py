@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,9 @@ class FrontEnd:
     The envelope is the standard deviation that free motion shows at this speed and acceleration
     (see :class:`~tauguard.detectors.features.Envelope`), so a ratio of 5 means the same at rest and
     at full speed.
+
+    Several detectors can hold one front end (:func:`shared_front_ends`): what it found for the same
+    traces is kept, so that the second to ask pays nothing.
     """
 
     gain: float = 200.0  #: of the observer [1/s]
@@ -38,6 +41,19 @@ class FrontEnd:
     arm: ArmModel | None = None
     envelope: Envelope | None = None
     dt: float = 1e-3  #: sample interval [s]
+    _shared: bool = field(default=False, init=False, repr=False, compare=False)
+    _trained: tuple[object, object, list[Estimate]] | None = field(
+        default=None, init=False, repr=False, compare=False
+    )
+    _recent: tuple[Trace, Array] | None = field(default=None, init=False, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is kept for the next to ask."""
+        return {**self.__dict__, "_trained": None, "_recent": None}
+
+    def forget(self) -> None:
+        """Let go of the traces that were seen last."""
+        self._trained = self._recent = None
 
     def fit(self, traces: Sequence[Trace], robot: ArmModel) -> list[Estimate]:
         """Identify the arm from the collision-free rows, and the envelope.
@@ -48,6 +64,8 @@ class FrontEnd:
         Raises:
             ValueError: traces that do not fit, or without collision-free motion.
         """
+        if self._trained and self._trained[0] is traces and self._trained[1] is robot:
+            return self._trained[2]
         self.dt = common_interval(traces, robot)
         free = [np.flatnonzero(free_rows(trace, self.settle))[::THIN] for trace in traces]
         if not sum(len(rows) for rows in free):
@@ -66,6 +84,9 @@ class FrontEnd:
             for own in tables
         ]
         self.envelope = Envelope.fit(*gathered)
+        self._recent = None
+        if self._shared:
+            self._trained = traces, robot, estimates
         return estimates
 
     def fitted(self) -> tuple[ArmModel, Envelope]:
@@ -85,10 +106,16 @@ class FrontEnd:
             ValueError: not fitted, other joints or another rate.
         """
         arm, envelope = self.fitted()
+        if self._recent and self._recent[0] is trace:
+            return self._recent[1]
         check_trace(trace, arm.robot.joints, self.dt)
         known = estimate or self._run(arm, trace)
         ratio = known.left / envelope.scale(trace.qd, known.acceleration)
-        return np.ascontiguousarray(ratio[:, : self.joints])
+        found = np.ascontiguousarray(ratio[:, : self.joints])
+        found.flags.writeable = False
+        if self._shared:
+            self._recent = trace, found
+        return found
 
     def _run(self, arm: ArmModel, trace: Trace) -> Estimate:
         unknowns = None if self.adapt else Unknowns.none()
@@ -120,3 +147,25 @@ class FrontEnd:
             arm=arm_from_parts(parts["arm"]),
             envelope=Envelope(np.asarray(parts["envelope"], dtype=np.float64)),
         )
+
+
+def shared_front_ends(detectors: Iterable[object]) -> list[FrontEnd]:
+    """Give unfitted detectors with equal front ends one in common.
+
+    Args:
+        detectors: those with an attribute ``front`` are changed.
+
+    Returns:
+        The front ends that are left; :meth:`FrontEnd.forget` frees what they hold after training.
+    """
+    fronts: list[FrontEnd] = []
+    for detector in detectors:
+        own = getattr(detector, "front", None)
+        if isinstance(own, FrontEnd) and own.arm is None:
+            known = next((front for front in fronts if front == own), None)
+            if known is None:
+                own._shared = True
+                fronts.append(own)
+            else:
+                detector.front = known  # type: ignore[attr-defined]
+    return fronts

@@ -1,6 +1,7 @@
 """Every detector of the table keeps the shared contract."""
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -176,3 +177,26 @@ def test_an_unfitted_detector_cannot_be_saved(tmp_path):
         with pytest.raises(ValueError, match="not fitted"):
             save_model(Thresholded(make_detector(name), 0.0), tmp_path / "model.skops")
     assert not list(tmp_path.iterdir())
+
+
+def test_detectors_with_one_front_end_say_what_they_say_alone(some, arm, identified):
+    names = ("residual-thresholds", "moving-thresholds", "cusum")
+    with pytest.MonkeyPatch.context() as patch:
+        calls = []
+        patch.setattr(front_end, "calibrate", lambda *_, **__: calls.append(1) or identified)
+        alone = [make_detector(name).fit(some, arm).scores(some[0]) for name in names]
+        assert len(calls) == 3
+        together = [make_detector(name) for name in names]
+        fronts = front_end.shared_front_ends(together)
+        assert len(fronts) == 2  # the first has another one: it does not track the payload
+        for detector in together:
+            detector.fit(some, arm)
+        assert len(calls) == 5
+    for front in fronts:
+        front.forget()
+    again = pickle.loads(pickle.dumps(together))
+    assert again[1].front is again[2].front
+    for trace_scores, detector, copy in zip(alone, together, again, strict=True):
+        for one in (detector, copy, detector):
+            assert one.scores(some[0]).tobytes() == trace_scores.tobytes()
+            one.scores(some[1])  # what was kept of a trace is not said of another
