@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.contacts._contacts import all_finite
+from tauguard.contacts._contacts import all_finite, carried
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -93,7 +93,7 @@ class State:
             mujoco.mj_flex(model, scratch)
             vertices = scratch.flexvert_xpos.copy()
         else:
-            vertices = _carried(model, scratch)
+            vertices = carried(scratch.xpos, scratch.xmat, model.flex_vertbodyid, model.flex_vert)
         return cls(
             time=float(data.time),
             qpos=data.qpos.copy(),
@@ -104,18 +104,6 @@ class State:
             geom_xmat=scratch.geom_xmat.copy(),
             flexvert_xpos=vertices,
         )
-
-
-def _carried(model: Any, data: Any) -> Array:
-    """Positions of flex vertices that their bodies carry, with the bits of ``mj_flex``. (V, 3)."""
-    body, local = model.flex_vertbodyid, model.flex_vert
-    vertices: Array = data.xpos.take(body, axis=0)
-    rows = np.flatnonzero(local.any(axis=1))  # the others lie at their body's origin
-    if len(rows):
-        turn = data.xmat.take(body[rows], axis=0).reshape(-1, 3, 3)
-        x, y, z = local[rows].T[:, :, None]
-        vertices[rows] += turn[:, :, 0] * x + turn[:, :, 1] * y + turn[:, :, 2] * z
-    return vertices
 
 
 def checked(name: str, state: State, bodies: int, vertices: int = 0) -> State:

@@ -152,6 +152,20 @@ auto bound(const Travel& travel, IntRows geom, IntRows flex, Rows3 point, Rows3 
   return owned(std::move(out), std::array<std::size_t, 2>{2, count});
 }
 
+// Points (V, 3) that bodies carry, in the order of MuJoCo's own sums so that the bits are its own.
+auto carried(Rows3 xpos, Rows9 xmat, Ints body, Rows3 local) {
+  std::vector<double> out(3 * body.size());
+  for (std::size_t i = 0; i < body.size(); ++i) {
+    const double *at = xpos.data() + 3 * body.data()[i], *r = xmat.data() + 9 * body.data()[i];
+    const double* v = local.data() + 3 * i;
+    const bool origin = v[0] == 0 && v[1] == 0 && v[2] == 0;
+    for (int k = 0; k < 3; ++k)
+      out[3 * i + k] = origin ? at[k] : r[3 * k] * v[0] + r[3 * k + 1] * v[1] + r[3 * k + 2] * v[2] + at[k];
+  }
+  const std::size_t count = body.size();
+  return owned(std::move(out), std::array<std::size_t, 2>{count, 3});
+}
+
 // Whether every number of a state is finite.
 bool all_finite(Anything a, Anything b, Anything c) {
   for (const Anything* values : {&a, &b, &c}) {
@@ -194,6 +208,7 @@ NB_MODULE(_contacts, m) {
       .def("find_flex", &Scene::find_flex);
   nb::class_<Travel>(m, "Travel").def("bound", &bound);
   m.def("travel", &travel);
+  m.def("carried", &carried);
   m.def("simplices", &simplices);
   m.def("all_finite", &all_finite);
 }
