@@ -17,9 +17,13 @@ HEIGHT, WIDTH = 480, 640
 #: Groups that are shown: bodies and obstacles, and the arm's visual shapes; not its collision ones.
 SHOWN = (0, 1, 2)
 #: Lights, and what is seen where nothing is.
-AMBIENT, DIFFUSE, BACKGROUND = 0.35, 0.55, (228, 233, 240)
-#: The floor that is drawn (not simulated): half extents [m], height [m] and colour.
-FLOOR, FLOOR_HEIGHT, FLOOR_COLOUR = (2.0, 2.0, 0.001), -0.002, (0.62, 0.65, 0.7, 1.0)
+AMBIENT, DIFFUSE, SKY = 0.35, 0.4, ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90))
+#: The floor that is drawn, not simulated: half extents and grid [m], height [m] and colour.
+FLOOR, FLOOR_HEIGHT, FLOOR_COLOUR = (8.0, 8.0, 1.0), -0.001, (0.80, 0.82, 0.85, 1.0)
+#: The lamp that throws the shadows: where it stands [m], shining down, and how bright.
+LAMP, LAMP_COLOUR = (0.0, 0.0, 3.0), 0.35
+#: Shadows fall this far from the middle of the scene [m].
+SHADOW_REACH = 3.0
 #: Radius [m] and colour of the ball that marks a target.
 MARK, MARK_COLOUR = 0.03, (0.1, 0.8, 0.3, 0.7)
 
@@ -35,6 +39,37 @@ def _need_display() -> None:
         )
 
 
+def _staged(world: World) -> mujoco.MjModel:
+    """The scene with floor, sky and lamp, which are drawn and not simulated."""
+    spec = mujoco.MjSpec.from_string(world.scene.xml)
+    bright, blue = SKY
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=blue,
+        rgb2=bright,
+        width=256,
+        height=256,
+    )
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=FLOOR,
+        pos=[0, 0, FLOOR_HEIGHT],
+        rgba=FLOOR_COLOUR,
+        contype=0,
+        conaffinity=0,
+    )
+    spec.worldbody.add_light(
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=LAMP,
+        dir=[0, 0, -1],
+        diffuse=[LAMP_COLOUR] * 3,
+        castshadow=True,
+    )
+    return spec.compile()
+
+
 class Picture:
     """A camera on one copy of a world: off-screen, or a window."""
 
@@ -46,13 +81,16 @@ class Picture:
         """
         self._world, self._data, self._mode = world, data, mode
         #: The scene as it is shown, and its own state, which follows the simulated one.
-        self._model = world.shown()
+        self._model = _staged(world)
         self._drawn = mujoco.MjData(self._model)
         self._window: Any = None
         self._renderer: Any = None
         model = self._model
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)
         model.vis.global_.offheight = max(model.vis.global_.offheight, HEIGHT)
+        model.vis.quality.offsamples = 8
+        model.vis.quality.shadowsize = 2048
+        model.vis.map.shadowclip = SHADOW_REACH / model.stat.extent
         model.vis.headlight.ambient[:] = AMBIENT
         model.vis.headlight.diffuse[:] = DIFFUSE
         self._camera = mujoco.MjvCamera()
@@ -78,9 +116,15 @@ class Picture:
             ) from error
 
     def _look(self, camera: Any) -> None:
-        reach = self._world.reach
-        camera.lookat[:] = (0.35 * reach, 0.0, 0.35 * reach)
-        camera.distance, camera.azimuth, camera.elevation = 2.0 * reach, 140.0, -20.0
+        """From beside the first arm's front; two arms from the side, so that neither hides one."""
+        world, reach = self._world, self._world.reach
+        if world.arms == 1:
+            camera.lookat[:] = (0.35 * reach, 0.0, 0.4 * reach)
+            camera.distance, camera.azimuth, camera.elevation = 1.9 * reach, 140.0, -20.0
+        else:
+            base = self._model.body_pos[self._model.body_rootid[world.tools[-1][1]]]
+            camera.lookat[:] = (base[0] / 2, base[1] / 2, 0.35 * reach)
+            camera.distance, camera.azimuth, camera.elevation = 2.4 * reach, 100.0, -20.0
 
     def show(self, targets: NDArray[np.float64]) -> NDArray[np.uint8] | None:
         """Draw the state and a ball at each target, shape (arms, 3)."""
@@ -96,7 +140,6 @@ class Picture:
         self._renderer.update_scene(self._drawn, self._camera, self._options)
         self._mark(self._renderer.scene, targets)
         pixels: NDArray[np.uint8] = self._renderer.render()
-        pixels[(pixels == 0).all(axis=2)] = BACKGROUND
         return pixels
 
     def _follow(self) -> None:
@@ -108,20 +151,17 @@ class Picture:
             place(model, drawn)
 
     def _mark(self, scene: Any, targets: NDArray[np.float64]) -> None:
-        """The floor and a ball at each target."""
-        box, ball = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_SPHERE
-        parts = [(box, FLOOR, (0.0, 0.0, FLOOR_HEIGHT), FLOOR_COLOUR)]
-        parts += [(ball, (MARK,) * 3, tuple(target), MARK_COLOUR) for target in targets]
-        for kind, size, place, colour in parts:
+        """A ball at each target."""
+        for target in targets:
             if scene.ngeom >= scene.maxgeom:
                 return
             mujoco.mjv_initGeom(
                 scene.geoms[scene.ngeom],
-                kind,
-                np.array(size),
-                np.array(place),
+                mujoco.mjtGeom.mjGEOM_SPHERE,
+                np.full(3, MARK),
+                np.array(target),
                 np.eye(3).ravel(),
-                np.array(colour, dtype=np.float32),
+                np.array(MARK_COLOUR, dtype=np.float32),
             )
             scene.ngeom += 1
 

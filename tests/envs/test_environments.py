@@ -341,8 +341,15 @@ def test_human_mode_without_a_display_says_what_would_work(monkeypatch):
 @pytest.mark.skipif(ctypes.util.find_library("EGL") is None, reason="no EGL library")
 def test_pictures_show_the_arm_and_the_target():
     code = """
-import gymnasium, numpy
-env = gymnasium.make("tauguard:tauguard/Reach-v0", render_mode="rgb_array")
+import gymnasium, numpy, tauguard, warnings
+from gymnasium.utils.env_checker import check_env
+from tauguard.environments import ENVIRONMENTS
+warnings.simplefilter("error")
+for name in ENVIRONMENTS:
+    env = gymnasium.make(name, render_mode="rgb_array").unwrapped
+    env.metadata = env.metadata | {"render_modes": ["rgb_array"]}  # a window needs a display
+    check_env(env)
+env = gymnasium.make("tauguard/Reach-v0", render_mode="rgb_array")
 env.reset(seed=0)
 a = env.render()
 assert a.shape == (480, 640, 3) and a.dtype == numpy.uint8
