@@ -66,12 +66,32 @@ def learn(generations=30, population=24, steps=250, seed=0):
     return mean, np.array(curve)
 
 
+def record(weights, folder, seed=0, steps=1000):
+    """One episode of the policy, ten seconds, as an MCAP recording: `tauguard replay` shows it."""
+    from tauguard.envs.wrappers import RecordMcap
+
+    env = RecordMcap(gym.make("tauguard:tauguard/Reach-v0", max_speed=1.0), folder)
+    joints = env.action_space.shape[0]
+    observation, _ = env.reset(seed=seed)
+    reached, worst = 0, 0.0
+    for _ in range(steps):
+        action = act(weights[None], observation[None], joints)[0]
+        observation, _, terminated, truncated, info = env.step(action)
+        reached += info["success"]
+        worst = max(worst, info["limit_ratio"])
+        if terminated or truncated:
+            break
+    env.close()
+    return env.files[0], reached, worst
+
+
 def main():
     """Learn, print the curve, draw it, and keep the policy."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--generations", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("learned"))
+    parser.add_argument("--record", action="store_true", help="leave an episode of the policy")
     options = parser.parse_args()
     weights, curve = learn(options.generations, seed=options.seed)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -90,6 +110,9 @@ def main():
     axes.set(xlabel="wall clock [s]", ylabel="return of the mean policy", title="Reach-v0")
     figure.savefig(options.out / "curve.png", dpi=120)
     print(f"policy and curve: {options.out}")
+    if options.record:
+        path, reached, worst = record(weights, options.out, options.seed)
+        print(f"recording: {path}: {reached} targets, largest force {worst:.0%} of its limit")
 
 
 if __name__ == "__main__":

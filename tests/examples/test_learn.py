@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from tauguard.traces import read_mcap
+
 SOURCE = Path(__file__).parents[2] / "examples" / "learn_reach.py"
 
 
-def test_the_cross_entropy_method_reaches_targets():
+def test_the_cross_entropy_method_reaches_targets(tmp_path):
     spec = importlib.util.spec_from_file_location("learn_reach", SOURCE)
     example = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(example)
@@ -18,6 +20,9 @@ def test_the_cross_entropy_method_reaches_targets():
     assert curve[0, 1] == 0
     assert curve[-2:, 1].mean() >= 0.5  # targets an episode of two seconds
     assert curve[-2:, 0].mean() > curve[0, 0] + 0.3
+    path, _, worst = example.record(weights, tmp_path, steps=50)
+    assert len(read_mcap(path)[0].t) == 500
+    assert worst >= 0
 
 
 def test_stable_baselines_trains(monkeypatch, capsys):

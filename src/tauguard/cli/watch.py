@@ -78,14 +78,15 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
 
     inner = env.unwrapped
     view = LiveView(inner.world.shown(), save, port)
-    view.layout(
-        {
-            "force": "Contact force and limit [N, of the limit]",
-            "tau_ext": "External torque, truth [N m]",
-            "residual": "Residual of the detector [N m]",
-            "tool": "Distance to the target [m]",
-        }
-    )
+    charts = {
+        "force": "Contact force [N], and of its limit [%]",
+        "tau_ext": "External torque, truth [N m]",
+        "residual": "Residual of the detector [N m]",
+        "tool": "Distance to the target [m]",
+    }
+    if inner.cell.sensing is None:
+        del charts["residual"]
+    view.layout(charts)
     env.action_space.seed(seed)
     period, now, episodes, worst = 1 / inner.world.settings.control_rate, 0.0, 0, 0.0
     _, info = env.reset(seed=seed)
@@ -136,7 +137,9 @@ def send(view: Any, inner: Any, info: dict[str, Any], now: float) -> None:
     contact = cell.contact[0]
     strongest = contact[contact[:, 0].argmax()]
     view.contact(strongest[2:5], strongest[5:8] if info["force"] else 0 * strongest[5:8])
-    view.chart("force", ["force [N]", "limit ratio"], [info["force"], info["limit_ratio"]])
+    share = 100 * info["limit_ratio"]
+    view.chart("force", ["force [N]", "of the limit [%]"], [info["force"], share])
     view.chart("tau_ext", names, info["tau_ext"])
-    view.chart("residual", [*names, "alarm"], [*info["residual"], float(info["alarm"])])
+    if cell.sensing is not None:
+        view.chart("residual", [*names, "alarm"], [*info["residual"], float(info["alarm"])])
     view.chart("tool", ["distance"], [info["distance"]])
