@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 GAIN, PER_SAMPLE = 200.0, 0.2
 #: What was known this long before the alarm is held [s].
 BEFORE = 0.02
-#: The residual is followed this long after the alarm [s].
-AFTER = 0.3
+#: The residual is followed this long after the alarm [s], longer where the observer lags more.
+AFTER, LAGS = 0.3, 10.0
 #: Time constants of the observer after which a payload's columns have forgotten their start.
 SETTLED = 10.0
 
@@ -41,6 +41,7 @@ class Aftermath:
     residual: Array  #: that came with the alarm [N m], shape (M, n)
     envelope: Array  #: its standard deviation in free motion [N m], shape (M, n)
     payload: Array  #: residual per unit of payload mass [kg] and moment [kg m], shape (M, n, 4)
+    lag: float = 1 / GAIN  #: of the observer [s]
 
     @property
     def level(self) -> Array:
@@ -73,13 +74,16 @@ class AftermathOf:
         Raises:
             ValueError: not within the trace.
         """
-        trace, known = self.trace, self._estimate
+        trace, known, lag = self.trace, self._estimate, 1 / self._gain
+        after = max(after, LAGS * lag)
         if not trace.t[0] <= start <= trace.t[-1]:
             raise ValueError(f"start {start} s: the trace goes from {trace.t[0]} to {trace.t[-1]}")
         assert known.unknowns is not None
-        begin, first, last = np.searchsorted(
-            trace.t, (start - BEFORE - SETTLED / self._gain, start - BEFORE, start + after)
+        begin, first, at, last = np.searchsorted(
+            trace.t, (start - BEFORE - SETTLED * lag, start - BEFORE, start, start + after)
         )
+        # Slow logs: at least the sample before the alarm's, where there is one.
+        first, begin = min(first, max(at - 1, 0)), min(begin, max(at - 1, 0))
         columns = self._payload_columns(slice(begin, last + 1))[first - begin :]
         rows = np.arange(first, first + len(columns))
         taken = known.residual[first] - known.left[first]
@@ -92,6 +96,7 @@ class AftermathOf:
             known.residual[rows] - taken - carried,
             self._envelope.scale(trace.qd[rows], known.acceleration[rows]),
             columns,
+            lag,
         )
 
     def _payload_columns(self, rows: slice) -> Array:

@@ -33,11 +33,14 @@ LOAD, LOAD_WIDTH = 0.9, 0.01
 REACH, HEAVIEST = 0.5, 7.0
 #: The end of the look that tells whether it lasts [s].
 END = 0.03
-#: Samples this soon after the alarm are still in motion: the load's share looks at later ones [s].
-SETTLING = 0.04
+#: Samples this soon after the alarm [s], and so many lags of the observer, are still in motion: the
+#: load's share looks at later ones.
+SETTLING, SETTLING_LAGS = 0.025, 3.0
 #: Log odds of an intended push: constant, per decade of N/s, per unit of the cosine. Fitted by
 #: logistic regression to simulated clampings and pushes, on arms and seeds that no study judges.
 INTENT = (4.2, -1.2, 3.6)
+#: No rise counts as shorter than this, or one sample of a faster trace [s].
+SHORTEST = 1e-3
 #: Levels between which the rise is measured, shares of the highest.
 RISE = (0.25, 0.75)
 
@@ -82,7 +85,8 @@ def signs(after: Aftermath, force: Array, velocity: Array) -> Signs:
     size, speed = float(np.linalg.norm(force)), float(np.linalg.norm(velocity))
     along = float(force @ velocity) / (size * speed) if size * speed > 0 else 0.0
     first, second = (int(np.flatnonzero(level >= share * highest)[0]) for share in RISE)
-    rising = max(float(after.t[second] - after.t[first]), float(np.diff(after.t[:2])[0]))
+    shortest = float(np.diff(after.t).min(initial=SHORTEST))
+    rising = max(float(after.t[second] - after.t[first]), shortest)
     return Signs(
         float(same_way[after.t > after.t[-1] - END].mean()),
         share,
@@ -99,7 +103,7 @@ def load(after: Aftermath) -> tuple[float, float, float]:
 
     Weighted least squares for mass and first moment over the samples once the blow is over.
     """
-    rows = after.t > min(SETTLING, 0.5 * float(after.t[-1]))
+    rows = after.t >= min(SETTLING + SETTLING_LAGS * after.lag, 0.5 * float(after.t[-1]))
     weight = 1 / after.envelope[rows]
     y = (after.residual[rows] * weight).ravel()
     columns = (after.payload[rows] * weight[:, :, None]).reshape(len(y), -1)

@@ -22,8 +22,8 @@ from tauguard.traces.trace import Alarm, Detection, Trace
 Array = NDArray[np.float64]
 
 #: Link and point are found from the samples up to this long after the alarm, and from those this
-#: long before it [s].
-ISOLATE, EARLY = 0.1, 0.01
+#: long before it [s]; longer after it, by so many lags, where the observer is slow.
+ISOLATE, EARLY, ISOLATE_LAGS = 0.1, 0.01, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,8 @@ class Diagnoser:
     def explain(self, alarm: Alarm, after: Aftermath) -> Diagnosis:
         """The diagnosis from the residual around an alarm."""
         robot, level = self.arm.robot, after.level
-        first = np.flatnonzero((after.t >= -EARLY) & (after.t <= ISOLATE))
+        last = max(ISOLATE, ISOLATE_LAGS * after.lag)
+        first = np.flatnonzero((after.t >= -EARLY) & (after.t <= last))
         rows = first[moments(level[first])]
         residual, noise = after.residual[rows], self._noise(after)[rows]
         belief = isolate(robot, self.surface, after.q[rows], residual, noise)

@@ -146,3 +146,21 @@ def test_alarms_of_any_detector_are_explained(trace, detector):
         AftermathOf(arm, envelope, trace).at(99.0)
     with pytest.raises(ValueError, match="not fitted"):
         believed(type(detector)())
+
+
+@pytest.mark.parametrize("stride", [1, 10, 42])
+def test_alarms_anywhere_and_at_any_rate_are_explained(trace, stride):
+    """The first and the last sample, 100 Hz, and the 24 Hz of slow recordings."""
+    tables = {n: getattr(trace, n)[::stride] for n in ("t", "q", "qd", "current")}
+    none = dict.fromkeys(("q_des", "qd_des", "qdd_des"))
+    slow = replace(trace, truth=None, **none, **tables)
+    times = [*slow.t[[0, 1, 2, -2, -1]], *(a.start for a in alarms(trace))]
+    found = Diagnoser(ARM, link_surface(XML, 40)).diagnose(slow, [Alarm(t, t) for t in times])
+    for one in found:
+        assert np.isfinite(one.force).all()
+        assert np.isfinite(one.point).all()
+        assert one.kinds[one.kind] == max(one.kinds.values())
+        assert sum(one.kinds.values()) == pytest.approx(1.0)
+    # At 24 Hz the observer lags by 0.2 s, and the recording ends 0.8 s after the load.
+    assert stride == 42 or found[-1].kind == "payload"
+    assert {one.kind for one in found[5:7]} <= {"impact", "clamp"}
