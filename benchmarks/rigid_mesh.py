@@ -126,9 +126,12 @@ class Peer:
         self.us = 1e6 * np.minimum(first, again)
         self.call_us = float(1e6 * np.median(coal_peer.collide_mesh(one, one, far)[1]))
 
-    def collides(self, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """coal's answers at other poses."""
-        return coal_peer.collide_mesh(self.model, self.model, poses)[0]
+    def touches(self, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """coal's answers at other poses, without hits that its own distance calls gaps."""
+        hit = coal_peer.collide_mesh(self.model, self.model, poses)[0]
+        for i in np.flatnonzero(hit):
+            hit[i] = coal_peer.mesh_distance(self.model, self.model, poses[i]) <= 0
+        return hit
 
 
 def build_rows(mesh: Mesh, peer: Peer | None, repeats: int) -> list[Row]:
@@ -258,14 +261,15 @@ def judged(
     """Pairs that touch before the time found, and pairs that do not touch 1e-7 after it.
 
     The exact query of one pose judges 1e-10 before and 1e-7 after; coal judges the way there, up
-    to 1e-4 of the step before, because gaps of about a micrometre are hits to it.
+    to 1e-4 of the step before. To its boolean query gaps of a micrometre are hits, so its distance
+    confirms them.
     """
     hit = np.isfinite(toi)
     end = np.where(hit, toi, 1.0)
     late = hit & tree.overlap(tree, motion.at(np.maximum(end - 1e-10, 0))).hit
     if peer is not None:
         for t in np.linspace(0, np.maximum(end - 1e-4, 0), SAMPLES):
-            late |= peer.collides(motion.at(t))
+            late |= peer.touches(motion.at(t))
     early = hit & ~tree.overlap(tree, motion.at(np.minimum(end + 1e-7, 1))).hit
     return rate(int(late.sum()), len(toi)), rate(int(early.sum()), int(hit.sum()))
 

@@ -71,9 +71,11 @@ TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
 }
 
 // The facet functions of a tetrahedron, lane i the one that vanishes on the facet opposite vertex i and is
-// positive at it: F = n . p - c, with points p taken from vertex 0.
+// positive at it: F = n . p - c, negated where the determinant is negative, with points p taken from vertex 0.
+// (The sign comes last, so that no entry waits for the determinant.)
 struct TetrahedronFacets {
   Double4 n[3], c, determinant;
+  Mask4 turned;  // the sign bit, in lanes whose normal points outwards
   double size;
   TAUGUARD_INLINE explicit TetrahedronFacets(const double* v) {
     Double4 x[3], e[3], f[3];
@@ -91,12 +93,12 @@ struct TetrahedronFacets {
     }
     c = n[0] * base[0] + n[1] * base[1] + n[2] * base[2];
     determinant = n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - c;
-    const Mask4 turned = (Mask4)determinant & INT64_MIN;  // lanes whose normal points outwards
-    for (auto& component : n) component = (Double4)((Mask4)component ^ turned);
-    c = (Double4)((Mask4)c ^ turned);
+    turned = (Mask4)determinant & INT64_MIN;
     determinant = (Double4)((Mask4)determinant ^ turned);
   }
-  TAUGUARD_INLINE Double4 at(const double* p) const { return n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - c; }
+  TAUGUARD_INLINE Double4 at(const double* p) const {
+    return (Double4)((Mask4)(n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - c) ^ turned);
+  }
 };
 
 // E of a tetrahedron's table at points p - a0 of 1-norm at most `reach`, a = the largest 1-norm of a
@@ -159,7 +161,7 @@ struct Slabs {
 };
 
 // Zonotope A against tetrahedron B. E of A's table at points p_j = (b_j - origin) - shift, `reach` the
-// largest 1-norm of b_j - origin plus 3 a: a point is off by 3 u reach, a normal by 4 u a^2, an entry by
+// 1-norm of b_j - origin plus 3 a: a point is off by 3 u reach, a normal by 4 u a^2, an entry by
 // (4 + 3 + 1 + 2) u a^2 reach, the determinant by 8 u a^3 (a <= reach / 3), their sum by one rounding
 // more: 14 u and the slack of 8 u, 32 u a^2 reach. B's planes at A's centre: as tetrahedron_error, with
 // 20 u b^2 for each of the three generators, covered by counting 6 a into the reach.
@@ -167,14 +169,16 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
   const Slabs sa(a);
   Double4 p[3];  // one vertex of B a lane
   load_points(b, a.origin, p);
-  const double reach = largest(abs(p[0]) + abs(p[1]) + abs(p[2])) + 3 * sa.size;
+  const Double4 reach = abs(p[0]) + abs(p[1]) + abs(p[2]) + 3 * sa.size;
   for (int k = 0; k < 3; ++k) p[k] -= a.shift[k];
-  if (!in_range(sa.size) || !in_range(reach)) return undecided;
-  const double ea = 32 * unit * sa.size * sa.size * reach, wall = sa.determinant;
+  if (!in_range(sa.size) || !all((reach >= 1e-30) & (reach <= 1e30))) return undecided;
+  const Double4 ea = 32 * unit * sa.size * sa.size * reach;  // of every vertex's entries
+  const double wall = sa.determinant;
   Double4 row[3];  // slab i at the vertices
   for (int i = 0; i < 3; ++i) row[i] = sa.n[0][i] * p[0] + sa.n[1][i] * p[1] + sa.n[2][i] * p[2];
-  for (const auto& r : row)
-    if (all(r > wall + ea) || all(r < -wall - ea)) return separated;
+  bool beyond = false;
+  for (const auto& r : row) beyond = beyond | all(r > wall + ea) | all(r < -wall - ea);
+  if (beyond) return separated;
 
   const TetrahedronFacets fb(b);
   if (!in_range(fb.size)) return undecided;
@@ -191,16 +195,16 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
   if (any(column < -eb)) return separated;
   if (any(max(abs(row[0]), max(abs(row[1]), abs(row[2]))) < wall - ea)) return common;
 
-  bool certain = wall > ea && all(fb.determinant > eb) && all(column > eb);
+  bool certain = all(wall > ea) && all(fb.determinant > eb) && all(column > eb);
   for (const auto& r : row) certain = certain && any(r < wall - ea) && any(r > ea - wall);
   const Double4 side_x{1.0, 1.0, -1.0, -1.0}, side_y{1.0, -1.0, 1.0, -1.0};
   Double4 x[4], y[4];
   for (int i = 0; i < 3; ++i) {  // the four edges of A along generator i + 2, one a lane
     const int k = i == 2 ? 0 : i + 1;
-    const auto open = [&](double shift) __attribute__((always_inline)) {
+    const auto open = [&](const Double4& shift) __attribute__((always_inline)) {
       for (int j = 0; j < 4; ++j) {
-        x[j] = wall - side_x * row[i][j] + shift;
-        y[j] = wall - side_y * row[k][j] + shift;
+        x[j] = wall - side_x * row[i][j] + shift[j];
+        y[j] = wall - side_y * row[k][j] + shift[j];
       }
       return any(leaves_interval(x, y));
     };
@@ -231,10 +235,9 @@ TAUGUARD_INLINE Verdict abfme_zonotopes(const Zonotope& a, const Zonotope& b) {
 
   const Double4 m = sa.at(d), c[3] = {sa.at(b.g[0]), sa.at(b.g[1]), sa.at(b.g[2])};
   const Double4 gap_a = abs(m) - sa.determinant - abs(c[0]) - abs(c[1]) - abs(c[2]);
-  if (any(gap_a > ea)) return separated;
   const Double4 gap_b =
       abs(sb.at(d)) - sb.determinant - abs(sb.at(a.g[0])) - abs(sb.at(a.g[1])) - abs(sb.at(a.g[2]));
-  if (any(gap_b > eb)) return separated;
+  if (any((gap_a > ea) | (gap_b > eb))) return separated;
 
   bool certain = all(gap_a < -ea) && all(gap_b < -eb);
   const double ee = 128 * unit * sa.size * sa.size * sa.size * sa.size * sb.size * w;
