@@ -140,7 +140,8 @@ def set_thresholds(
     The network's first two are its residual current. Every other detector gets at each the lowest
     threshold with which it is, at every speed, at least as specific on that motion as the network:
     rows then compare speed by speed, and no detector buys sensitivity with alarms that the network
-    does not raise.
+    does not raise. At the third point the rate is asked for at every speed: over all speeds
+    together the slow ones would hide what the fastest does.
 
     Args:
         peaks: by speed [%], then by detector.
@@ -156,7 +157,7 @@ def set_thresholds(
         }
         if name == network:
             found[name] = {str(a): a for a in AMPERES}
-        found[name][HOURLY] = Peaks.joined([p[name] for p in peaks.values()]).at_rate(per_hour)
+        found[name][HOURLY] = max(p[name].at_rate(per_hour) for p in peaks.values())
     return found
 
 

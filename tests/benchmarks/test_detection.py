@@ -139,8 +139,8 @@ def test_others_are_as_specific_as_the_network_at_every_speed():
         ]
         assert min(margins) == pytest.approx(0.0, abs=1e-3)  # somewhere it is just as specific
         assert min(margins) >= 0.0
-    blocks = np.concatenate([p["other"].blocks for p in peaks.values()])
-    assert np.sum(blocks > found["other"]["hourly"]) == 4
+    alarms = [np.sum(p["other"].blocks > found["other"]["hourly"]) for p in peaks.values()]
+    assert max(alarms) == 2  # of 2 hours at each speed: no more than 1 an hour at any
 
 
 class Given:
