@@ -46,58 +46,90 @@ def run(quick: bool, seed: int) -> list[Row]:
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
-    """Time per scene and method, ratio to the peers, growth with size, candidates per volume."""
+    """Times of the methods and of the peers, growth with size, candidates per volume."""
     axes: Any = figure.subplots(2, 2)
-    _bars(axes[0, 0], [row for row in rows if row["study"] == "frame"])
+    _methods(axes[0, 0], [row for row in rows if row["study"] == "frame"])
     _peers(axes[0, 1], [row for row in rows if row["study"] == "frame peer" and "speedup" in row])
     _growth(axes[1, 0], [row for row in rows if row["study"] == "size"])
     _volumes(axes[1, 1], [row for row in rows if row["study"] == "volume"])
 
 
-def _bars(axes: Any, rows: list[Row]) -> None:
-    names = list(dict.fromkeys(row["scene"] for row in rows))
-    entries = list(dict.fromkeys((row["method"], row["volume"]) for row in rows))
-    width = 0.8 / max(1, len(entries))
-    for i, entry in enumerate(entries):
-        heights = [
-            row["frame_ms"]["median"] for row in rows if (row["method"], row["volume"]) == entry
-        ]
-        axes.bar(np.arange(len(names)) + i * width, heights, width, label=" ".join(entry))
-    axes.set_xticks(np.arange(len(names)) + 0.4, names, rotation=20, ha="right")
-    axes.set(title="One frame, all collisions, one thread", ylabel="ms", yscale="log")
+def _methods(axes: Any, rows: list[Row]) -> None:
+    """Each method on the volume that it was published with, and ab2pf on its own."""
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    width = 0.8 / max(1, len(methods))
+    for i, method in enumerate(methods):
+        own = [next(r for r in rows if (r["scene"], r["method"]) == (s, method)) for s in scenes]
+        at = np.arange(len(scenes)) + (i + 0.5) * width - 0.4
+        label = f"{method}, {own[0]['volume'].replace('_', ' ')}"
+        axes.bar(at, [row["times_ab2pf"] for row in own], width, label=label)
+        for x, row in zip(at, own, strict=True):
+            if row["missed"]:
+                axes.annotate("misses", (x, row["times_ab2pf"]), rotation=90, ha="center",
+                              va="bottom", fontsize="xx-small")  # fmt: skip
+    _name_scenes(axes, scenes)
+    axes.set(title="A frame, all collisions, one thread", ylabel="time over ab2pf's")
     axes.legend(fontsize="x-small", ncols=2)
 
 
 def _peers(axes: Any, rows: list[Row]) -> None:
-    names = list(dict.fromkeys(row["scene"] for row in rows))
-    peers = list(dict.fromkeys(row["peer"] for row in rows))
-    for i, peer in enumerate(peers):
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    for i, peer in enumerate(dict.fromkeys(row["peer"] for row in rows)):
         heights = [row["speedup"] for row in rows if row["peer"] == peer]
-        axes.bar(np.arange(len(names)) + 0.4 * i, heights, 0.4, label=peer)
-    axes.set_xticks(np.arange(len(names)) + 0.2, names, rotation=20, ha="right")
-    axes.set(title="Peer's time over ab2pf's, same frame", ylabel="times", yscale="log")
+        bars = axes.bar(np.arange(len(scenes)) + 0.4 * i - 0.2, heights, 0.4, label=peer)
+        axes.bar_label(bars, fmt="%.3g", fontsize="xx-small")
+    _name_scenes(axes, scenes)
+    axes.set(title="The same frame by ipctk", ylabel="time over ab2pf's", yscale="log")
+    axes.set_ylim(1)
+    _plain(axes.yaxis)
     axes.legend(fontsize="x-small")
 
 
 def _growth(axes: Any, rows: list[Row]) -> None:
     for name in dict.fromkeys(row["scene"] for row in rows):
         own = [row for row in rows if row["scene"] == name]
-        exponent = own[-1]["exponent"]
         axes.loglog(
             [row["triangles"] for row in own],
             [row["frame_ms"]["median"] for row in own],
             marker="o",
-            label=f"{name}: n^{exponent:.2f}",
+            label=f"{_spaced(name)}: n^{own[-1]['exponent']:.2f}",
         )
-    axes.set(title="Growth with the mesh", xlabel="triangles", ylabel="ms a frame")
+    axes.set(title="Growth with the mesh", xlabel="triangles n", ylabel="ms a frame")
+    _plain(axes.yaxis)
     axes.legend(fontsize="x-small")
 
 
 def _volumes(axes: Any, rows: list[Row]) -> None:
-    for name in dict.fromkeys(row["scene"] for row in rows):
-        own = [row for row in rows if row["scene"] == name]
-        candidates = [row["vf_candidates"] + row["ee_candidates"] for row in own]
-        axes.semilogy([row["volume"] for row in own], candidates, marker="o", label=name)
-    axes.tick_params(axis="x", rotation=30)
-    axes.set(title="Candidates that a volume leaves", ylabel="pairs")
+    for i, name in enumerate(dict.fromkeys(row["scene"] for row in rows)):
+        for prefix, style in (("k_dop", "-"), ("moving_k_dop", "--")):
+            own = [r for r in rows if r["scene"] == name and r["volume"].startswith(prefix)]
+            candidates = [row["vf_candidates"] + row["ee_candidates"] for row in own]
+            label = _spaced(name) if style == "-" else None
+            k = [int(row["volume"].removeprefix(prefix)) for row in own]
+            axes.semilogy(k, candidates, style, marker="o", color=f"C{i}", label=label)
+    axes.set(
+        title="Candidates that a volume leaves (dashed: moving with the step)",
+        xlabel="k of the k-DOP",
+        ylabel="pairs",
+        xticks=[6, 14, 18, 26],
+    )
     axes.legend(fontsize="x-small")
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _name_scenes(axes: Any, scenes: list[str]) -> None:
+    axes.set_xticks(range(len(scenes)), [_spaced(s) for s in scenes], rotation=20, ha="right")
+    axes.axhline(1, color="black", linewidth=0.8)
+
+
+def _plain(axis: Any) -> None:
+    """Ticks of a logarithmic axis as plain numbers: 1, 2, 5, 10, ..."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -112,8 +112,8 @@ KINDS: dict[str, Make] = {
 
 
 def adversarial(total: int, seed: int) -> list[Row]:
-    """About ``total`` queries of either kind, spread evenly over :data:`KINDS`."""
-    n = total // len(KINDS)
+    """At least ``total`` queries of either kind, spread evenly over :data:`KINDS`."""
+    n = -(-total // len(KINDS))
     rows: list[Row] = []
     for name, make in KINDS.items():
         for vertex in (True, False):
