@@ -1,7 +1,8 @@
 """After the alarm: which link, which force, where, and what kind of event, against the truth.
 
-Three ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
-hypothesis (tauguard.detectors.diagnosis). ``usual``: the link of the last joint with a significant
+Four ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
+hypothesis (tauguard.detectors.diagnosis). ``exposed``: the same, told that nothing reaches link 1,
+the shoulder on its base. ``usual``: the link of the last joint with a significant
 residual, and the damped least-squares force at the middle of that link. ``told``: as ``surface``,
 but with the true external torque instead of the observer's estimate: what is wrong then is not the
 observer's fault, other contacts explain the same torques.
@@ -46,7 +47,9 @@ Array = NDArray[np.float64]
 DETECTOR, PER_HOUR = "moving-thresholds", 5.0
 #: Force that the damping of the usual way expects [N].
 EXPECTED = 100.0
-METHODS = ("surface", "usual", "told")
+METHODS = ("surface", "exposed", "usual", "told")
+#: Links that collisions of these plans are on, which ``exposed`` knows.
+EXPOSED = (2, 3, 4, 5, 6)
 
 
 @dataclass(frozen=True)
@@ -143,8 +146,10 @@ def judge(event: Event, watching: Thresholded, surface: LinkSurface) -> Judged:
     assert event.trace.truth is not None
     exact = replace(after, residual=event.trace.truth.tau_ext[after.rows])
     told = diagnoser.explain(event.alarm, exact)
+    exposed = replace(diagnoser, surface=surface.only(EXPOSED)).explain(event.alarm, after)
     answers = {
         "surface": Answer(found.link, found.force, found.point),
+        "exposed": Answer(exposed.link, exposed.force, exposed.point),
         "usual": usual(diagnoser, after, found),
         "told": Answer(told.link, told.force, told.point),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,6 +39,19 @@ class LinkSurface:
                 raise ValueError(f"{name}: shape {value.shape}, expected ({count}, 3) numbers")
         if count and (self.link.min() < 0 or (np.diff(self.link) < 0).any()):
             raise ValueError("link: expected 0-based numbers in rising order")
+
+    def only(self, links: Iterable[int]) -> LinkSurface:
+        """The surface of some links alone (1-based): what can be reached, where that is known.
+
+        Raises:
+            ValueError: a link that has no surface here.
+        """
+        wanted = sorted(set(links))
+        there = sorted({int(i) + 1 for i in self.link})
+        if not wanted or not set(wanted) <= set(there):
+            raise ValueError(f"links {wanted}: expected some of {there}")
+        rows = np.isin(self.link + 1, wanted)
+        return LinkSurface(self.link[rows], self.point[rows], self.normal[rows])
 
 
 def link_surface(

@@ -51,6 +51,15 @@ def test_frames_are_those_of_pinocchio_and_hidden_or_untouchable_surfaces_are_le
     assert (to_box[on_sphere] > -1e-12).all()
 
 
+def test_some_links_alone():
+    whole = link_surface(cura6.arm_xml(), points=20)
+    part = whole.only((6, 2, 2))
+    assert set(part.link.tolist()) == {1, 5}
+    np.testing.assert_array_equal(part.point[part.link == 5], whole.point[whole.link == 5])
+    with pytest.raises(ValueError, match=r"links \[2, 7\]: expected some of \[1, 2, 3, 4, 5, 6\]"):
+        whole.only((2, 7))
+
+
 def test_bad_input_is_named():
     with pytest.raises(ValueError, match="no link has collision geometry"):
         link_surface(
