@@ -264,4 +264,4 @@ def draw(rows: list[Row], axes: Any) -> None:
     axes.axvline(20, color="grey", lw=0.8)
     axes.set(xlim=(1, 1000), ylim=(1e-13, 1), xlabel="us a hit", ylabel="largest error of the time")
     axes.set_title("time of impact, turning bodies", fontsize="medium")
-    axes.legend(fontsize="x-small")
+    axes.legend(fontsize="x-small", loc="lower right")

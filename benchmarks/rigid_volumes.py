@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -159,6 +160,7 @@ def hull_row(hulls: Hull, poses: Array, pairs: NDArray[np.int64], repeats: int) 
             "test": partial(native_overlap, a, b, "auto"),
         },
         min(repeats, 3),
+        process_time,
     )
     hit = hulls.meet(poses, pairs)
     return {
@@ -207,6 +209,7 @@ def volume_row(
             "test": partial(volume.meet, pairs, found),
         },
         repeats,
+        process_time,
     )
     volume.place(poses)
     volume.meet(pairs, found)
