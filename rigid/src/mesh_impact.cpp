@@ -93,8 +93,8 @@ class MeshImpact {
     const double slack = fine_ * (both + gap) + shift_;
     if (gap > (both + 0.5 * length * speed_ + slack) * more) return;
     const bool short_enough = (ma_.speed + mb_.speed) * length <= most_turn && speed_ * length <= most_move * both;
-    // Below 2^-40 of the step a piece of any motion is as good as the rounding of its ends.
-    if (short_enough || length < 0x1p-40) return open(begin, length, both);
+    // Below 2^-50 of the step the ends of a piece are hardly told apart, whatever moves how fast.
+    if (short_enough || length < 0x1p-50) return open(begin, length, both);
     piece(begin, 0.5 * length);
     piece(begin + 0.5 * length, 0.5 * length);
   }
