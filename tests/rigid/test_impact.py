@@ -113,7 +113,14 @@ def repeated(motion, i, n):
 
 @pytest.mark.parametrize(
     ("distance", "linear", "angular"),
-    [(1.5, 1.0, 0.0), (1.5, 2.0, 2.0), (1.5, 0.3, 25.0), (80.0, 160.0, 3.0), (3.0, 1e4, 0.0), (3.0, 1e12, 0.0)],
+    [
+        (1.5, 1.0, 0.0),
+        (1.5, 2.0, 2.0),
+        (1.5, 0.3, 25.0),
+        (80.0, 160.0, 3.0),
+        (3.0, 1e4, 0.0),
+        (3.0, 1e12, 0.0),
+    ],
     ids=["sweep", "turn", "spin", "bullet", "faster bullet", "fastest"],
 )
 def test_meshes_touch_when_the_first_of_all_their_triangles_do(distance, linear, angular):
