@@ -4,7 +4,7 @@ Three studies. ``scenes``: every checker in every contact scene, judged by a ref
 path that the checkers are told. ``crossing``: a ball into pinned cloth, from starts spread over one
 step's travel, where the time of impact is known in closed form. ``cost``: a large cloth, where a
 checker's time is a share of MuJoCo's step. Precision, recall and lead are those of
-:func:`tauguard.contacts.compare`; a time is the median with the 10 % and 90 % quantiles.
+:func:`tauguard.contacts.compare`; a time is the processor's (median, 10 % and 90 %).
 ``first_error_ms`` is the second yardstick: a checker's first report beside the first contact of
 MuJoCo alone in steps fifty (quick: ten) times shorter, where it covers that pair. MuJoCo's flags
 ``speculative`` (rigid convex pairs) and ``ipc`` (cloth against what stands still, or cloth) leave

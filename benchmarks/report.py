@@ -51,7 +51,7 @@ def answer(question: str, asked: str, measured: str, met: bool | None = None) ->
         "question": question,
         "asked": asked,
         "measured": measured,
-        "met": met,
+        "met": None if met is None else bool(met),
     }
 
 

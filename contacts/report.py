@@ -56,10 +56,10 @@ class Score:
         lead_ms: How much earlier than MuJoCo it reports a pair's first contact, median [ms].
         depth_mm: Difference from MuJoCo's depth at the same state, median [mm].
         normal_deg: Angle between its normal and MuJoCo's, median [deg].
-        us_per_step: Its own time, median [us].
+        us_per_step: Processor time of a call, median [us].
         us_low: 10 % quantile.
         us_high: 90 % quantile.
-        share: Of the time of ``mj_step``.
+        share: Of the processor time of ``mj_step``.
         disagreements: By time.
     """
 
