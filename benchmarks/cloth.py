@@ -31,7 +31,7 @@ def run(quick: bool, seed: int) -> list[Row]:
         rows += cloth_frames.peers(frame, repeats, *((20_000, 500) if quick else (10**7, 20_000)))
     for frame in frames:
         if data and frame.name == "cloth-ball":
-            most = (40_000, 400) if quick else (10**7, 20_000)
+            most = (40_000, 2_000) if quick else (10**7, 20_000)
             rows += cloth_queries.on_recording(frame, seed, *most, repeats)
     if data:
         rows += cloth_queries.on_hard_sets(Path(data) / "ccd", 20 if quick else 60)
