@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tauguard.benchmarks import cloth_adversarial, cloth_frames, cloth_queries, cloth_scaling
+from tauguard.benchmarks import (
+    cloth_adversarial,
+    cloth_frames,
+    cloth_queries,
+    cloth_scaling,
+    cloth_truth,
+)
 from tauguard.benchmarks.cloth_summary import summary
 from tauguard.benchmarks.report import Row
 
@@ -34,6 +40,7 @@ def run(quick: bool, seed: int) -> list[Row]:
             most = (40_000, 2_000) if quick else (10**7, 20_000)
             rows += cloth_queries.on_recording(frame, seed, *most, repeats)
     if data:
+        rows += cloth_truth.on_listed_frames(Path(data) / "ccd")
         rows += cloth_queries.on_hard_sets(Path(data) / "ccd", 20 if quick else 60)
     rows += cloth_adversarial.adversarial(12_000 if quick else 1_000_000, seed)
     rows += cloth_scaling.volumes(triangles, seed, repeats)

@@ -73,7 +73,7 @@ def on_recording(frame: Frame, seed: int, limit: int, calls: int, repeats: int) 
     """Every method and peer on the candidates of ipctk's LBVH, up to ``limit`` of each kind.
 
     Args:
-        frame: A step whose collisions ab2pf finds exactly (the tests say so).
+        frame: A step whose collisions ab2pf finds exactly (the study "truth" says so).
         seed: Of the choice of candidates.
         limit: Candidates of each kind for the timings.
         calls: Candidates of each kind for the peers' answers, asked call by call.
