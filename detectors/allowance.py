@@ -31,6 +31,8 @@ AT_REST, IN_MOTION = (0, 1, 2, 3), (0, 2, 4)
 FORGET = 1.0
 #: How long accelerations and slowness count [s].
 HELD = 0.2
+#: Rate at which accelerations are seen [1/s]: as fast as the jolt of a hard stop comes.
+JOLT = 100.0
 #: Speed at which a joint is half slow [rad/s].
 SLOW = 0.05
 #: Share of the residual's peaks that the unscaled bound covers.
@@ -58,6 +60,14 @@ def torque_change(robot: RobotNumbers, t: Array, q: Array, qd: Array, gain: floa
     slow = low_pass(np.full(n, FORGET), dt, nothing, nothing, np.ascontiguousarray(-shifted))
     change: Array = shifted - slow
     return change
+
+
+def acceleration(t: Array, qd: Array) -> Array:
+    """Velocity differentiated at the rate ``JOLT`` [rad/s^2], shape (T, n)."""
+    qd = np.ascontiguousarray(qd)
+    rate = np.full(qd.shape[1], JOLT)
+    out: Array = low_pass(rate, intervals(t, len(t)), qd, np.zeros_like(qd))
+    return out
 
 
 def held(x: Array, samples: int) -> Array:

@@ -67,6 +67,19 @@ def common_interval(traces: Sequence[Trace], robot: ArmModel) -> float:
     Raises:
         ValueError: no traces, joints that are not the robot's, or rates that differ (named).
     """
+    check_joints(traces, robot)
+    dt = float(np.median([trace.dt for trace in traces]))
+    for k, trace in enumerate(traces):
+        check_interval(f"trace {k}", trace, dt)
+    return dt
+
+
+def check_joints(traces: Sequence[Trace], robot: ArmModel) -> None:
+    """Refuse traces that are none, of another arm or of fewer than two samples.
+
+    Raises:
+        ValueError: says which.
+    """
     if not traces:
         raise ValueError("no traces to train on")
     joints = robot.robot.joints
@@ -78,10 +91,6 @@ def common_interval(traces: Sequence[Trace], robot: ArmModel) -> float:
             )
         if len(trace.t) < 2:
             raise ValueError(f"trace {k} has {len(trace.t)} samples: expected 2 or more")
-    dt = float(np.median([trace.dt for trace in traces]))
-    for k, trace in enumerate(traces):
-        check_interval(f"trace {k}", trace, dt)
-    return dt
 
 
 def check_trace(trace: Trace, joints: int, dt: float) -> None:

@@ -24,11 +24,12 @@ from tauguard.detectors.allowance import (
     AT_REST,
     IN_MOTION,
     Allowance,
+    acceleration,
     peaks,
     terms,
     torque_change,
 )
-from tauguard.detectors.detector import check_interval, common_interval
+from tauguard.detectors.detector import check_joints
 from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
 from tauguard.detectors.events import MERGE_GAP, find_alarms
 from tauguard.detectors.filter import confirmation_samples, confirmed
@@ -40,6 +41,7 @@ from tauguard.detectors.identification import (
     identify,
 )
 from tauguard.detectors.operating_point import followed, sustained
+from tauguard.detectors.resampling import coarser, rows_known, samples_each
 from tauguard.detectors.thresholds import still
 from tauguard.traces.trace import Bools, Detection, Trace
 
@@ -57,12 +59,12 @@ class FreeMotionSettings:
 
     observer_gain: float = 40.0  #: [1/s]
     calibration_rate: float = 20.0  #: of the filter that the calibration looks through [1/s]
-    confirmation: float = 0.04  #: t_c [s]
+    confirmation: float = 0.05  #: t_c [s]
     settle: float = 2.0  #: seconds at the beginning that are never an alarm
     false_alarms_per_hour: float = 1.0  #: to accept when the allowances are scaled
     spike: bool = True
-    """Take the median of three successive currents: a controller's kick of one sample, as at a
-    commanded stop, says nothing about contact. It costs one sample of delay."""
+    """Take the median of three successive currents, or of five where it jumps: a controller's kick,
+    as at a commanded stop, says nothing about contact. It costs one sample of delay or two."""
     unknowns: Unknowns = field(default_factory=lambda: Unknowns(offset=0.6))  #: what is tracked
     beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
 
@@ -114,16 +116,21 @@ class FreeMotionDetector:
         """Calibrate, then learn allowances from left-out logs.
 
         Args:
-            traces: collision-free logs, three or more; plain traces count as without a load.
+            traces: collision-free logs, three or more; plain traces count as without a load. The
+                slowest sample rate among them becomes that of all.
             robot: nominal numbers and drive gains, whose scale holds.
 
         Raises:
-            ValueError: fewer than three logs, other joints, different sample rates.
+            ValueError: fewer than three logs, or other joints.
         """
         recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
         if len(recordings) < 3:
             raise ValueError(f"{len(recordings)} logs: give three or more, to leave each out once")
-        self.dt = common_interval([r.trace for r in recordings], robot)
+        check_joints([r.trace for r in recordings], robot)
+        self.dt = max(r.trace.dt for r in recordings)
+        recordings = [
+            replace(r, trace=coarser(r.trace, samples_each(r.trace, self.dt))) for r in recordings
+        ]
         bare = replace(robot.friction or REAL_FRICTION, weights=np.empty((0, 0)))
         rate, beliefs = self.settings.calibration_rate, self.settings.beliefs
         numbers, drive = robot.robot, robot.drive_gain
@@ -198,30 +205,44 @@ class FreeMotionDetector:
 
     def _judged(self, model: ArmModel, trace: Trace) -> Judged:
         t, q, qd, current = trace.t, trace.q, trace.qd, trace.current
+        shaken = acceleration(t, qd)  # of this sample, though the residual is of one before
         if self.settings.spike:
-            q, qd, current = delayed(q), delayed(qd), median_of_three(current)
+            q, qd, current = delayed(q), delayed(qd), without_kicks(current, self._jump(model))
         gain = self.settings.observer_gain
         found = Estimator(model, gain, self.dt, self.settings.unknowns).run(t, q, qd, current)
         change = torque_change(model.robot, t, q, qd, gain)
         return Judged(
-            found.left, terms(qd, found.acceleration, change, self.dt), resting(q, qd, self.dt)
+            found.left, terms(qd, shaken, change, self.dt), resting(q, qd, self.dt)
         )
 
+    @staticmethod
+    def _jump(model: ArmModel) -> Array:
+        """What is called a jump of the current [A], shape (n,): twice the Coulomb friction."""
+        n = model.robot.joints
+        level = model.friction.coulomb() if model.friction else np.full(n, np.inf)
+        jump: Array = 2 * level / np.abs(model.drive_gain)
+        return jump
+
     def _checked(self, trace: Trace) -> Judged:
+        """At every sample of the trace, whose rate may be higher than training's."""
         model = self._fitted()[0]
         if len(trace.joint_names) != model.robot.joints:
             raise ValueError(
                 f"the trace has {len(trace.joint_names)} joints, this detector "
                 f"{model.robot.joints}: {', '.join(model.robot.joint_names)}"
             )
-        check_interval("the trace", trace, self.dt)
-        return self._judged(model, trace)
+        count, length = samples_each(trace, self.dt), len(trace.t)
+        if length // count < 2:
+            raise ValueError(f"the trace has {length} samples: expected {2 * count} or more")
+        seen = self._judged(model, coarser(trace, count))
+        rows = rows_known(count, length, len(seen.left))
+        return Judged(seen.left[rows], seen.terms[rows], seen.rest[rows])
 
     def ratios(self, trace: Trace) -> Array:
         """Each joint's residual over its allowance, shape (T, n).
 
         Raises:
-            ValueError: not fitted, other joints or another sample rate than the training's.
+            ValueError: not fitted, other joints or a lower sample rate than the training's.
         """
         return self._ratio(self._checked(trace), *self._fitted()[1:])
 
@@ -251,7 +272,8 @@ class FreeMotionDetector:
         judged = self._checked(trace)
         score = self._ratio(judged, *self._fitted()[1:]).max(axis=1)
         settled = trace.t - trace.t[0] >= self.settings.settle
-        alarm = confirmed((score > self.threshold) & settled, self._samples())
+        samples = confirmation_samples(self.settings.confirmation, min(self.dt, trace.dt))
+        alarm = confirmed((score > self.threshold) & settled, samples)
         alarms = find_alarms(trace.t, alarm)
         return Detection(self.name, trace.t, judged.left, score, self.threshold, alarm, alarms)
 
@@ -282,7 +304,23 @@ def delayed(x: Array) -> Array:
     return np.ascontiguousarray(np.concatenate([x[:1], x[:-1]]))
 
 
-def median_of_three(x: Array) -> Array:
-    """Median of the sample before and its neighbours, shape (T, n): causal, one sample late."""
-    before = delayed(x)
-    return np.ascontiguousarray(np.median(np.stack([x, before, delayed(before)]), axis=0))
+def median_of(count: int, x: Array) -> Array:
+    """Running median of the last ``count`` samples (odd), shape (T, n); the first counts often."""
+    parts = [x]
+    for _ in range(count - 1):
+        parts.append(delayed(parts[-1]))
+    return np.ascontiguousarray(np.median(np.stack(parts), axis=0))
+
+
+def without_kicks(x: Array, jump: Array) -> Array:
+    """Median of the last three samples, or of five where they differ by more than ``jump``.
+
+    Args:
+        x: shape (T, n).
+        jump: shape (n,).
+
+    Returns:
+        Shape (T, n): x one sample late, two where it jumps.
+    """
+    three, five = median_of(3, x), median_of(5, x)
+    return np.where(np.abs(three - five) > jump, five, three)

@@ -42,7 +42,9 @@ def record(seed, seconds=25.0, load=0.0, dt=0.01, noise=0.01, dwell=(8.0, 10.0))
     t = np.arange(0, seconds, dt)
     # A warped clock that stops in the dwell.
     rate = np.where((t > dwell[0]) & (t < dwell[1]), 0.0, 1.0)
-    rate = np.convolve(np.pad(rate, 25, mode="edge"), np.ones(51) / 51, mode="valid")
+    half = round(0.25 / dt)
+    window = np.ones(2 * half + 1) / (2 * half + 1)
+    rate = np.convolve(np.pad(rate, half, mode="edge"), window, mode="valid")
     s = np.cumsum(rate) * dt
     sd, sdd = rate, np.gradient(rate, dt)
     q, qd, qdd = (np.zeros((len(t), 3)) for _ in range(3))
