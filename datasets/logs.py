@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.datasets.columns import PRESETS, Column, ColumnMap
+from tauguard.datasets.log_checks import checked
 from tauguard.traces.trace import Array, Trace
 
 
@@ -42,8 +43,9 @@ def read_log(
         The trace, without truth, its times as they are in the log, and notes on repairs.
 
     Raises:
-        ValueError: a missing column, a bad number, a cut-off row, time that does not increase: one
-            line with the file, the row or line, and what would work. Only what a map's ``repair``
+        ValueError: a missing column, a bad number, a cut-off row, time that does not increase, a
+            gap, degrees, velocities that are not those of the positions: one line with the file,
+            the row or line, and what would work. Only what a map's ``repair``
             names is repaired, and a note says so.
         OSError: the file is missing or cannot be read.
     """
@@ -116,7 +118,8 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
         signals |= {n: np.deg2rad(v) for n, v in signals.items() if n != "current"}
     names = named(joint_names or columns.joint_names, len(columns.q))
     trace = Trace(joint_names=names, t=t[keep], meta={"log": path.name}, **signals)
-    return Log(trace, tuple(notes))
+    kept = lines[keep]
+    return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")))
 
 
 def named(names: Sequence[str], joints: int) -> tuple[str, ...]:

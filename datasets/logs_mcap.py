@@ -27,6 +27,7 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
     from mcap.exceptions import McapError
     from mcap.reader import make_reader
 
+    from tauguard.datasets.log_checks import checked
     from tauguard.datasets.logs import Log
 
     with open(path, "rb") as stream:
@@ -45,9 +46,9 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
             messages = [(m.log_time, m.data) for _, _, m in reader.iter_messages(topics=[topic])]
         except (McapError, struct.error) as error:
             raise ValueError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
-    return Log(
-        assemble(topic, messages, joint_names), (f"{topic}: effort is taken as current [A]",)
-    )
+    trace = assemble(topic, messages, joint_names)
+    notes = checked(trace, lambda row: f"{topic}, message {row}")
+    return Log(trace, (f"{topic}: effort is taken as current [A]", *notes))
 
 
 def assemble(

@@ -21,6 +21,7 @@ from tauguard.traces.trace import Array, Detection, Trace
 GAIN = 20.0  # [1/s] of the observer: what 100 Hz and a real arm's friction allow
 CONFIRMATION = 0.05  # [s]
 FACTOR = 1.5  # threshold over the largest residual of the quiet seconds
+STRANGE = 0.2  # share of a log in alarm that says that the log is another arm's
 SETTLING = 3.0  # time constants of the observer that are not looked at
 
 
@@ -130,7 +131,8 @@ def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
     """Look for collisions with a detector that was trained on collision-free motion.
 
     Raises:
-        ValueError: another number of joints or another sample rate than it was trained at.
+        ValueError: another number of joints or another sample rate than it was trained at, or a
+            log that ends before the detector has settled.
     """
     detection = detector.detect(trace)
     assert detector.moving is not None
@@ -139,7 +141,18 @@ def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
         f"{detector.settings.false_alarms_per_hour:g} false alarms per hour"
     )
     settled = float(trace.t[0] + detector.settle)
-    return Watch(detection, detector.moving.weights[:, 0], settled, (note,))
+    if not trace.t[-1] > settled:
+        raise ValueError(
+            f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector watches from "
+            f"{detector.settle:g} s on"
+        )
+    notes = [note]
+    if detection.alarm[trace.t >= settled].mean() > STRANGE:
+        notes.append(
+            "alarms fill much of this log: this is not the arm, the joints' order, the sign or the "
+            "unit of the currents that the detector was trained on, or it is held all the time"
+        )
+    return Watch(detection, detector.moving.weights[:, 0], settled, tuple(notes))
 
 
 def loudest_joint(found: Watch, start: float, end: float) -> int:

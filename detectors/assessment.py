@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
 from tauguard.detectors.friction import FrictionModel
@@ -21,6 +22,9 @@ from tauguard.detectors.observer import intervals, low_pass
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
+
+#: Share of a joint's torque that a calibration may leave: a good one leaves a tenth or less.
+UNEXPLAINED = 0.5
 
 
 def residual_rms(
@@ -41,6 +45,30 @@ def residual_rms(
     left = estimator.run(trace.t, trace.q, trace.qd, trace.current).left
     level: Array = np.sqrt((left[moving_span(trace)] ** 2).mean(axis=0))
     return level
+
+
+def require_explained(arm: ArmModel, recordings: Sequence[Recording], rms: Array) -> None:
+    """Refuse a calibration that leaves most of a moving joint's torque unexplained.
+
+    Args:
+        arm: identified.
+        recordings: that it was identified from.
+        rms: of what is left [N m], shape (n,).
+
+    Raises:
+        ValueError: names the joint that is explained least, and what may be wrong.
+    """
+    rows = [moving_span(r.trace) for r in recordings]
+    torque = np.concatenate([r.trace.current[m] for r, m in zip(recordings, rows, strict=True)])
+    level = np.sqrt(((torque * arm.drive_gain) ** 2).mean(axis=0))
+    share = rms / np.maximum(level, 1e-12)
+    worst = int(np.argmax(share))
+    if share[worst] > UNEXPLAINED:
+        raise ValueError(
+            f"the motion explains hardly any of the current of {arm.robot.joint_names[worst]} "
+            f"({rms[worst]:.2f} of {level[worst]:.2f} N m rms are left): check the order of the "
+            "joints, the signs and units of currents, the robot file and the gains"
+        )
 
 
 def left_out(
@@ -68,7 +96,8 @@ def left_out(
         )
         arm = ArmModel(arm.robot, whole.arm.drive_gain)
     found = []
-    for k, recording in enumerate(recordings):
+    turns = tqdm(recordings, desc="leave out", unit="log", disable=None, leave=False)
+    for k, recording in enumerate(turns):
         others = [*recordings[:k], *recordings[k + 1 :]]
         part = identify(arm, others, friction=friction, beliefs=beliefs, rate=rate)
         found.append(residual_rms(part.arm, recording.trace, rate))

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from tauguard.detectors.allowance import (
     AT_REST,
@@ -65,7 +66,10 @@ class FreeMotionSettings:
     spike: bool = True
     """Take the median of three successive currents, or of five where it jumps: a controller's kick,
     as at a commanded stop, says nothing about contact. It costs one sample of delay or two."""
-    unknowns: Unknowns = field(default_factory=lambda: Unknowns(offset=0.6))  #: what is tracked
+    unknowns: Unknowns = field(
+        default_factory=lambda: Unknowns(payload=3.0, moment=0.3, offset=0.6)
+    )
+    """What is tracked; a load that nobody told is more than the training logs show."""
     beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
 
 
@@ -149,7 +153,8 @@ class FreeMotionDetector:
 
         self.model = without(-1)
         assert self.model.friction is not None
-        judged = [self._judged(without(k), r.trace) for k, r in enumerate(recordings)]
+        turns = tqdm(recordings, desc="leave out", unit="log", disable=None, leave=False)
+        judged = [self._judged(without(k), r.trace) for k, r in enumerate(turns)]
         self._learn(judged, self.model.friction.coulomb())
         self.left_out = [self._alarms(part) for part in judged]
         return self
@@ -211,9 +216,7 @@ class FreeMotionDetector:
         gain = self.settings.observer_gain
         found = Estimator(model, gain, self.dt, self.settings.unknowns).run(t, q, qd, current)
         change = torque_change(model.robot, t, q, qd, gain)
-        return Judged(
-            found.left, terms(qd, shaken, change, self.dt), resting(q, qd, self.dt)
-        )
+        return Judged(found.left, terms(qd, shaken, change, self.dt), resting(q, qd, self.dt))
 
     @staticmethod
     def _jump(model: ArmModel) -> Array:

@@ -41,6 +41,7 @@ def read_logs(logs: Sequence[Path], columns: str | None, robot: RobotNumbers) ->
     """Traces by file name, joints in the robot's order; prints a line for each repair."""
     from tauguard.cli.detect import column_map, matched
     from tauguard.datasets import read_log
+    from tauguard.datasets.log_checks import saturated
 
     chosen = column_map(columns)
     traces = {}
@@ -48,5 +49,11 @@ def read_logs(logs: Sequence[Path], columns: str | None, robot: RobotNumbers) ->
         read = read_log(path, chosen)
         for note in read.notes:
             print(f"note: {path.name}: {note}")
+        for name, row, count, peak in saturated(read.trace):
+            raise ValueError(
+                f"{path}: the current of {name} stays at {peak:g} A for {count} samples, "
+                f"{read.trace.t[row] - read.trace.t[0]:.2f} s after the beginning: saturated, "
+                "which says nothing of the torque; leave this log out or cut it there"
+            )
         traces[path.name] = matched(read.trace, robot.joint_names)
     return traces

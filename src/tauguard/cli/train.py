@@ -111,6 +111,7 @@ def free_motion(
     from tauguard.cli.calibrate import loaded, start
     from tauguard.cli.real_logs import read_logs, robot_numbers
     from tauguard.detectors.arm_file import load_arm
+    from tauguard.detectors.assessment import require_explained
     from tauguard.detectors.free_motion import FreeMotionDetector, FreeMotionSettings
     from tauguard.detectors.free_motion_file import save_free_motion
 
@@ -122,6 +123,8 @@ def free_motion(
         arm, _ = start(numbers, recordings, columns, gains, "gains")
     settings = FreeMotionSettings(false_alarms_per_hour=rate)
     detector = FreeMotionDetector(settings).fit(recordings, arm)
+    assert detector.arm.noise is not None
+    require_explained(detector.arm, recordings, detector.arm.noise)
     save_free_motion(detector, model)
     report(detector, model, len(traces))
     if sensitivity:

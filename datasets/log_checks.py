@@ -1,0 +1,140 @@
+"""Faults of a log that no single number shows: gaps, units, order of columns, saturation.
+
+What a detector can live with is said in a note; what would make its figures mean something else is
+refused, with the row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tauguard.traces.trace import Array, Trace
+
+#: A pause longer than this many samples, and this many seconds, is a gap.
+GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
+#: No arm's joint turns faster [rad/s], and none turns further than two turns [rad]: degrees do.
+FASTEST, FURTHEST = 20.0, 4 * np.pi
+#: Seconds over which velocities are summed to be held against the change of position.
+SPAN = 0.1
+#: Samples in a row at the largest current that are called saturated, and how far it must stand out
+#: from the median.
+PLATEAU, ABOVE = 5, 3.0
+
+Where = Callable[[int], str]
+
+
+def checked(trace: Trace, where: Where) -> tuple[str, ...]:
+    """Notes on what is odd in a log but usable.
+
+    Args:
+        trace: as read.
+        where: names a row of it for a reader, such as "line 12".
+
+    Raises:
+        ValueError: a gap, degrees, velocities that are not those of the positions.
+    """
+    _refuse_degrees(trace, where)
+    notes = _timing(trace, where)
+    _refuse_strange_velocities(trace)
+    for name, row, count, peak in saturated(trace):
+        notes.append(
+            f"{where(row)}: the current of {name} stays at {peak:g} A for {count} samples: "
+            "saturated; an alarm or none there means nothing"
+        )
+    return tuple(notes)
+
+
+def _timing(trace: Trace, where: Where) -> list[str]:
+    steps = np.diff(trace.t)
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > max(GAP_SAMPLES * usual, GAP_SECONDS))
+    if len(steps) >= 20 and len(gaps):
+        row = int(gaps[0])
+        raise ValueError(
+            f"{where(row + 1)}: nothing for {steps[row]:.3g} s before it, where samples come every "
+            f"{1e3 * usual:.3g} ms ({len(gaps)} such gaps): cut the log there into two"
+        )
+    late = np.flatnonzero(steps > 2 * usual)
+    if len(steps) < 20 or not len(late):
+        return []
+    return [
+        f"samples come every {1e3 * usual:.3g} ms, {len(late)} later than twice that, by up to "
+        f"{1e3 * steps.max():.3g} ms; first: {where(int(late[0]) + 1)}"
+    ]
+
+
+def _refuse_degrees(trace: Trace, where: Where) -> None:
+    for what, x, most, unit, needed in (
+        ("velocity", trace.qd, FASTEST, "rad/s", 1),
+        ("position", trace.q, FURTHEST, "rad", min(2, trace.q.shape[1])),
+    ):
+        beyond = np.abs(x) > most
+        if beyond.any(axis=0).sum() >= needed:
+            row, joint = (int(v) for v in np.argwhere(beyond)[0])
+            raise ValueError(
+                f"{where(row)}: the {what} of {trace.joint_names[joint]} is {x[row, joint]:g} "
+                f'{unit}: if these are degrees, say so in the column map ("degrees": true)'
+            )
+
+
+def travelled(trace: Trace) -> tuple[Array, Array]:
+    """Change of position, and summed velocity, over pieces of ``SPAN`` s, each (pieces, n)."""
+    count = max(1, round(SPAN / trace.dt))
+    steps = np.diff(trace.t)[:, None] * (trace.qd[1:] + trace.qd[:-1]) / 2
+    whole = np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
+    return np.diff(trace.q[::count], axis=0), np.diff(whole[::count], axis=0)
+
+
+def _refuse_strange_velocities(trace: Trace) -> None:
+    if len(trace.t) < 100:
+        return
+    change, summed = travelled(trace)
+    moves = (np.sqrt((change**2).mean(axis=0)) > 1e-3) & (np.sqrt((summed**2).mean(axis=0)) > 1e-5)
+    for j in np.flatnonzero(moves):
+        name = trace.joint_names[j]
+        alike = [_alike(change[:, k], summed[:, j]) for k in range(change.shape[1])]
+        if abs(alike[j]) < 0.7:  # a sign is named below
+            best = int(np.argmax(alike))
+            other = trace.joint_names[best]
+            raise ValueError(
+                f"the velocity of {name} does not follow its position"
+                + (f" but that of {other}: columns in another order?" if alike[best] > 0.9 else "")
+            )
+        ratio = float(change[:, j] @ summed[:, j] / (summed[:, j] @ summed[:, j]))
+        if not 0.7 < ratio < 1.4:
+            raise ValueError(f"{_meaning(ratio, name)}: positions change {ratio:.3g} times as fast")
+
+
+def _meaning(ratio: float, name: str) -> str:
+    """What a wrong ratio of position's change to velocity says."""
+    if 40 < ratio < 80:
+        return f"{name}: positions in degrees, velocities in rad/s"
+    if 1 / 80 < ratio < 1 / 40:
+        return f"{name}: velocities in degrees/s, positions in rad"
+    if -1.4 < ratio < -0.7:
+        return f"{name}: the velocity has the other sign"
+    return f"{name}: the units of velocity, position and time do not fit (time in ms?)"
+
+
+def _alike(a: Array, b: Array) -> float:
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size > 0 else 0.0
+
+
+def saturated(trace: Trace) -> list[tuple[str, int, int, float]]:
+    """Joints whose current rests at its largest value: name, first row, longest run, value [A]."""
+    found = []
+    for name, current in zip(trace.joint_names, trace.current.T, strict=True):
+        size = np.abs(current)
+        peak = float(size.max(initial=0.0))
+        if peak == 0 or peak < ABOVE * float(np.median(size)):
+            continue
+        top = np.concatenate([[False], size == peak, [False]])
+        edges = np.flatnonzero(np.diff(top.astype(np.int8)))
+        starts, lengths = edges[::2], edges[1::2] - edges[::2]
+        long = np.flatnonzero(lengths >= PLATEAU)
+        if len(long):
+            found.append((name, int(starts[long[0]]), int(lengths[long].max()), peak))
+    return found

@@ -1,0 +1,94 @@
+"""Faults that single numbers do not show, each by name."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tauguard.datasets.log_checks import checked, saturated
+from tauguard.traces import Trace
+
+
+def log(rows=600, dt=0.01, seed=0):
+    rng = np.random.default_rng(seed)
+    t = np.arange(rows) * dt
+    w, phase = np.array([0.7, 1.3, 2.1]), rng.uniform(0, 6, 3)
+    arg = t[:, None] * w + phase
+    q, qd = 0.8 * np.sin(arg), 0.8 * w * np.cos(arg)
+    return Trace(("a", "b", "c"), t, q, qd, 5 * np.sin(1.7 * arg))
+
+
+def line(row):
+    return f"line {row + 1}"
+
+
+def test_a_good_log_says_nothing():
+    assert checked(log(), line) == ()
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**31), jitter=st.floats(0.0, 0.4))
+def test_jitter_is_no_fault(seed, jitter):
+    trace = log(seed=seed % 100)
+    moved = np.random.default_rng(seed).uniform(-jitter, jitter, len(trace.t)) * 0.01
+    assert checked(dataclasses.replace(trace, t=trace.t + moved), line) == ()
+
+
+def test_late_samples_are_told_and_gaps_refused():
+    trace = log()
+    late = dataclasses.replace(trace, t=trace.t + np.where(np.arange(600) >= 200, 0.02, 0.0))
+    (note,) = checked(late, line)
+    assert "1 later than twice that, by up to 30 ms; first: line 201" in note
+    gone = dataclasses.replace(trace, t=trace.t + np.where(np.arange(600) >= 200, 0.5, 0.0))
+    with pytest.raises(ValueError, match=r"line 201: nothing for 0.51 s .* cut the log there"):
+        checked(gone, line)
+
+
+def changed(**scales):
+    trace = log()
+    return dataclasses.replace(trace, **{k: getattr(trace, k) * v for k, v in scales.items()})
+
+
+SWAPPED = dataclasses.replace(log(), q=log().q[:, [1, 0, 2]])
+
+
+@pytest.mark.parametrize(
+    ("trace", "message"),
+    [
+        (changed(q=57.3, qd=57.3), r"line \d+: the velocity of . is .* say so in the column map"),
+        (changed(q=57.3), r"line \d+: the position of . is .*degrees"),
+        (changed(qd=8.0), "units of velocity, position and time do not fit"),
+        (changed(t=1000.0), "time in ms"),
+        (changed(qd=-1.0), "velocity has the other sign"),
+        (SWAPPED, "velocity of a does not follow its position but that of b: columns in another"),
+    ],
+    ids=["degrees", "degrees of positions", "units", "milliseconds", "sign", "order"],
+)
+def test_refused(trace, message):
+    with pytest.raises(ValueError, match=message):
+        checked(trace, line)
+
+
+def test_slow_velocities_in_degrees():
+    slow = changed(q=0.02, qd=0.02 * 57.3)
+    with pytest.raises(ValueError, match="velocities in degrees/s, positions in rad"):
+        checked(slow, line)
+
+
+def test_a_saturated_current_is_told_with_its_row():
+    trace = log()
+    current = trace.current.copy()
+    current[300:312, 1] = 25.0
+    clipped = dataclasses.replace(trace, current=current)
+    assert saturated(clipped) == [("b", 300, 12, 25.0)]
+    (note,) = checked(clipped, line)
+    assert "line 301: the current of b stays at 25 A for 12 samples" in note
+    assert saturated(trace) == []
+
+
+def test_standing_still_is_not_saturation():
+    trace = log()
+    still = dataclasses.replace(trace, current=np.full_like(trace.current, 2.24))
+    assert saturated(still) == []
