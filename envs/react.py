@@ -52,6 +52,8 @@ class React(Task):
         super().__init__(cell)
         self._speed = float(options["speed"])
         positive("speed", self._speed)
+        if not cell.world.regions:
+            raise ValueError("obstacles (): expected a body region to strike, such as 'chest'")
         self._approach = bool(options["approach"])
         self._scratch = mujoco.MjData(cell.world.scene.model)
         self._meeting = home_tool(cell.world)

@@ -26,7 +26,12 @@ STANDSTILL = 0.05
 
 
 class Detector(Protocol):
-    """What an environment asks of a detector."""
+    """What an environment asks of a detector.
+
+    One that also has ``steps(q, qd, current)`` for samples of shape (T, n), which returns residuals
+    (T, n) and alarms (T,), is called once an action; ``settings.settle`` [s] is how long it is
+    silent after a reset.
+    """
 
     def step(self, q: Array, qd: Array, current: Array) -> bool:
         """Judge one sample, arrays of shape (n,): whether the alarm is up."""
@@ -69,12 +74,20 @@ class ObserverDetector:
 
     def step(self, q: Array, qd: Array, current: Array) -> bool:
         """Judge one sample: whether a residual exceeds its threshold."""
+        return bool(self.steps(q[None], qd[None], current[None])[1][0])
+
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Judge samples of shape (T, n) in turn: residuals [N m], and alarms of shape (T,)."""
         tau = self._drive.gain * current
         friction = self._drive.friction
         if friction is not None:
             tau = tau - friction.coulomb * np.tanh(qd / STANDSTILL) - friction.viscous * qd
-        self._observer.step(q, qd, tau, out=self.residual)
-        return bool((np.abs(self.residual) > self.threshold).any())
+        residuals, step = np.empty_like(q), self._observer.step
+        for row in range(len(q)):
+            step(q[row], qd[row], tau[row], out=residuals[row])
+        self.residual = residuals[-1]
+        alarms: NDArray[np.bool_] = np.any(np.abs(residuals) > self.threshold, axis=1)
+        return residuals, alarms
 
 
 class _PerArm:
@@ -182,6 +195,10 @@ class Sensing:
         """Residual at the last sample [N m], and whether the alarm was up at any."""
         if self.detector is None:
             return self._none, False
+        steps = getattr(self.detector, "steps", None)
+        if steps is not None:  # all samples of the action in one call
+            self.residuals[:], self.alarms[:] = steps(q, qd, current)
+            return self.residuals[-1], bool(self.alarms.any())
         for row in range(len(q)):
             self.alarms[row] = self.detector.step(q[row], qd[row], current[row])
             self.residuals[row] = getattr(self.detector, "residual", self._none)

@@ -60,6 +60,8 @@ class Settings:
             raise ValueError(f"payload_g {self.payload_g}: expected 0 or more grams")
         if isinstance(self.mismatch, int):
             object.__setattr__(self, "mismatch", Mismatch(seed=self.mismatch))
+        if not (self.mismatch is None or isinstance(self.mismatch, Mismatch)):
+            raise ValueError(f"mismatch {self.mismatch!r}: expected a Mismatch, a seed, or None")
         for name in ("obstacles", "checkers"):
             value = getattr(self, name)
             object.__setattr__(self, name, (value,) if isinstance(value, str) else tuple(value))

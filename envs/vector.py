@@ -64,6 +64,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         """
         if num_envs < 1:
             raise ValueError(f"num_envs {num_envs}: expected 1 or more")
+        if threads < 0:
+            raise ValueError(f"threads {threads}: expected 0 (all processors) or more")
         if render_mode is not None:
             one_of("render_mode", render_mode, RENDER_MODES)
         self.num_envs, self.render_mode, self._threads = num_envs, render_mode, threads

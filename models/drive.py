@@ -113,8 +113,11 @@ class Sensors:
 
 def _rounded(signal: Array, quantum: Array | float) -> Array:
     """To the nearest multiple of ``quantum``; a quantum of 0 leaves the signal as it is."""
-    step = np.where(np.asarray(quantum) > 0, quantum, 1.0)
-    return np.where(np.asarray(quantum) > 0, np.round(signal / step) * step, signal)
+    given = np.asarray(quantum) > 0
+    if given.all():
+        return np.rint(signal / quantum) * quantum
+    step = np.where(given, quantum, 1.0)
+    return np.where(given, np.rint(signal / step) * step, signal)
 
 
 @dataclass(frozen=True)

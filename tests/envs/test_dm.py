@@ -14,6 +14,7 @@ from dm_control import composer, mjcf
 from dm_env import test_utils
 from dm_env.specs import DiscreteArray
 
+from tauguard.environments import ENVIRONMENTS
 from tauguard.envs.dm import ArmEntity, DmEnvironment
 from tauguard.models import SceneSpec, compose
 
@@ -130,6 +131,41 @@ def test_spaces_that_dm_env_has_no_word_for():
     env.action_space = spaces.Tuple([spaces.Discrete(2)])
     with pytest.raises(ValueError, match="expected Box, Discrete or Dict"):
         DmEnvironment(env)
+
+
+@pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
+def test_every_task_as_a_dm_environment(name):
+    environment = DmEnvironment(gymnasium.make(name), seed=1)
+    rng = np.random.default_rng(0)
+    spec = environment.action_spec()
+    step = environment.reset()
+    assert step.first()
+    for _ in range(5):
+        environment.observation_spec().validate(step.observation)
+        step = environment.step(rng.uniform(spec.minimum, spec.maximum).astype(spec.dtype))
+        environment.reward_spec().validate(np.asarray(step.reward))
+        assert step.mid()
+        assert environment.info["reason"] == ""
+    again = DmEnvironment(gymnasium.make(name), seed=1).reset()
+    assert np.array_equal(again.observation, DmEnvironment(gymnasium.make(name), 1).reset()[3])
+
+
+def test_the_entity_in_an_arena_beside_something_else():
+    """What a user of dm_control does: attach the arm, add a body, read the flange, draw."""
+    arena = composer.Arena()
+    entity = ArmEntity()
+    arena.attach(entity)
+    arena.mjcf_model.worldbody.add("geom", type="box", size=[0.1, 0.1, 0.1], pos=[0.8, 0, 0.1])
+    physics = mjcf.Physics.from_mjcf_model(arena.mjcf_model)
+    with physics.reset_context():
+        entity.initialize_episode(physics, None)
+    scene = compose(SceneSpec())
+    data = mujoco.MjData(scene.model)
+    data.qpos[scene.qpos_adr] = scene.home
+    mujoco.mj_kinematics(scene.model, data)
+    np.testing.assert_allclose(
+        physics.bind(entity.flange).xpos, data.site("flange").xpos, atol=1e-9
+    )
 
 
 def test_the_repair_is_still_needed():

@@ -83,11 +83,18 @@ def test_info_has_the_same_keys_types_and_shapes_at_every_step():
         ({"detector": 3}, "step"),
         ({"integrator": "magic"}, "implicitfast"),
         ({"max_speed": 0}, "above 0"),
+        ({"mismatch": "large"}, "a seed"),
+        ({"checkers": "magic"}, "rigid"),
     ],
 )
 def test_keywords_that_cannot_be_say_what_would_work(keywords, words):
     with pytest.raises(ValueError, match=words):
         gym.make(REACH, **keywords)
+
+
+def test_react_needs_somebody_to_strike():
+    with pytest.raises(ValueError, match="chest"):
+        gym.make("tauguard/React-v0", obstacles=())
 
 
 def test_a_robot_that_is_not_there():

@@ -78,6 +78,12 @@ def test_gymnasiums_own_vector_contract():
     vector.close()
 
 
+@pytest.mark.parametrize("keywords", [{"num_envs": 0}, {"num_envs": 2, "threads": -1}])
+def test_numbers_that_cannot_be(keywords):
+    with pytest.raises(ValueError, match="expected"):
+        gym.make_vec("tauguard/Reach-v0", **keywords)
+
+
 def test_reset_mask_begins_the_chosen_anew():
     vector = gym.make_vec("tauguard/Reach-v0", num_envs=3, autoreset_mode="Disabled")
     first, _ = vector.reset(seed=[5, 6, 7])

@@ -204,3 +204,17 @@ def test_a_recording_holds_what_the_environment_said(tmp_path):
     assert detection.alarms
     alarm = detection.alarm.reshape(-1, 10).any(axis=1)
     assert alarm.tolist() == [info["alarm"] for info in infos]
+
+
+def test_the_observer_judges_a_block_as_it_judges_sample_by_sample():
+    env = gym.make("tauguard/Reach-v0", detector="observer").unwrapped
+    env.reset(seed=1)
+    block = env.cell.sensing[0].detector
+    single = env.cell.sensing[0].detector.__class__(block._robot, block._drive, 1e-3)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        env.step(rng.uniform(-1, 1, 6))
+        measured = env.cell.sensing[0].measured
+        for row, sample in enumerate(zip(*measured, strict=True)):
+            assert single.step(*sample) == env.cell.sensing[0].alarms[row]
+            assert np.array_equal(single.residual, env.cell.sensing[0].residuals[row])
