@@ -40,7 +40,9 @@ INTEGRATORS = {
 class SceneSpec:
     """What a scene holds."""
 
-    timestep: float = 1e-3  #: [s]
+    timestep: float = 1e-3
+    """[s]. At 1 ms the peak force of a blow is within 2 % of the two-mass model, at 2 ms 7 % off at
+    half the cost: ``tauguard bench impact`` chose it, the integrator and the contact parameters."""
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  #: [m/s^2]
     mismatch: Mismatch | None = None  #: how the simulated arm differs from the nominal one
     payload: bool = False  #: a body at the flange whose mass ``set_payload`` changes
