@@ -39,6 +39,7 @@ def test_check_env_has_nothing_to_say(name, control):
     [
         {"detector": "observer"},
         {"noise": True},
+        {"detector": "observer", "checkers": ("mujoco", "cloth", "rigid")},
         {"payload_g": 3000, "mismatch": 3, "ideal_drive": False},
         {"obstacles": (), "labels": False, "ideal_drive": True},
         {"control_rate": 50, "timestep": 2e-3},

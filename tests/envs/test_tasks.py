@@ -33,6 +33,36 @@ def test_seven_joints_from_a_file(name, control, seven):
     assert len(env.reset(seed=0)[1]["tau_ext"]) == 7
 
 
+@pytest.fixture(scope="module")
+def urdf(tmp_path_factory):
+    """Seven joints in a row, axes in turn upright and level, as a URDF."""
+    parts = ['<link name="base"/>']
+    for k in range(1, 8):
+        parent = "base" if k == 1 else f"link{k - 1}"
+        axis = "0 0 1" if k % 2 else "0 1 0"
+        parts.append(
+            f'''<link name="link{k}"><inertial><origin xyz="0 0 0.1"/><mass value="{4 - 0.4 * k}"/>
+            <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+            <collision><origin xyz="0 0 0.1"/><geometry><cylinder radius="0.05" length="0.16"/>
+            </geometry></collision></link>
+            <joint name="joint{k}" type="revolute"><parent link="{parent}"/><child link="link{k}"/>
+            <origin xyz="0 0 0.2"/><axis xyz="{axis}"/>
+            <limit lower="-2.8" upper="2.8" effort="100" velocity="2"/></joint>'''
+        )
+    path = tmp_path_factory.mktemp("urdf") / "seven.urdf"
+    path.write_text(f'<robot name="seven">{"".join(parts)}</robot>')
+    return str(path)
+
+
+@pytest.mark.parametrize("name", ["Reach-v0", "React-v0"])
+def test_seven_joints_from_a_urdf(name, urdf):
+    env = gym.make(f"tauguard/{name}", robot=urdf)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(env.unwrapped, skip_render_check=True)
+    assert env.action_space.shape == (7,)
+
+
 def tool_velocity(env):
     model, data = env.world.scene.model, env.cell.datas[0]
     velocity = np.zeros(6)
