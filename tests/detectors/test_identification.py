@@ -1,11 +1,13 @@
 """Identification against the numbers that Pinocchio's inverse dynamics was run with."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from tauguard.detectors import ArmModel, gravity_torque, mass_matrix
 from tauguard.detectors.arm_file import load_arm, save_arm
-from tauguard.detectors.assessment import left_out, residual_rms, start_gains
+from tauguard.detectors.assessment import explained, left_out, residual_rms, start_gains
 from tauguard.detectors.consistent import is_consistent
 from tauguard.detectors.identification import Load, Recording, identify, moving_span
 from tauguard.detectors.numbers import RobotNumbers
@@ -53,6 +55,17 @@ def test_a_log_it_has_not_seen(found):
     nominal_rms = residual_rms(ArmModel(nominal(), GAIN), fresh)
     assert (residual_rms(found.arm, fresh) < [0.25, 0.4, 0.2]).all()
     assert (nominal_rms > 2).all()
+
+
+@pytest.mark.parametrize(("first", "second"), [(1, 2), (0, 1)])
+def test_currents_of_two_joints_exchanged(logs, found, first, second):
+    order = [0, 1, 2]
+    order[first], order[second] = order[second], order[first]
+    mixed = [Recording(dataclasses.replace(log, current=log.current[:, order])) for log in logs]
+    wrong = identify(ArmModel(nominal(), GAIN), mixed)
+    with pytest.raises(ValueError, match="check the order of the joints"):
+        explained(wrong.arm, [r.trace for r in mixed])
+    assert explained(found.arm, logs) == ()
 
 
 def test_each_log_left_out_once(logs, found):

@@ -49,15 +49,16 @@ def command(
     from tauguard.benchmarks.report import write_json
     from tauguard.cli.real_logs import read_logs, robot_numbers
     from tauguard.detectors.arm_file import save_arm
-    from tauguard.detectors.assessment import left_out, require_explained
-    from tauguard.detectors.identification import identify
+    from tauguard.detectors.assessment import explained, left_out
+    from tauguard.detectors.identification import Load, identify
 
     numbers = robot_numbers(robot)
     traces = read_logs(logs, columns, numbers)
     recordings = loaded(traces, payload)
     arm, chosen = start(numbers, recordings, columns, gains, scale)
     found = identify(arm, recordings, scale=chosen)
-    require_explained(found.arm, recordings, found.rms)
+    for note in explained(found.arm, [r.trace for r in recordings if r.load == Load()]):
+        print(f"note: {note}")
     held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
     target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=chosen, logs=list(traces))

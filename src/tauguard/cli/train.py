@@ -111,9 +111,10 @@ def free_motion(
     from tauguard.cli.calibrate import loaded, start
     from tauguard.cli.real_logs import read_logs, robot_numbers
     from tauguard.detectors.arm_file import load_arm
-    from tauguard.detectors.assessment import require_explained
+    from tauguard.detectors.assessment import explained
     from tauguard.detectors.free_motion import FreeMotionDetector, FreeMotionSettings
     from tauguard.detectors.free_motion_file import save_free_motion
+    from tauguard.detectors.identification import Load
 
     numbers = robot_numbers(robot)
     traces = read_logs(free, columns, numbers)
@@ -123,8 +124,8 @@ def free_motion(
         arm, _ = start(numbers, recordings, columns, gains, "gains")
     settings = FreeMotionSettings(false_alarms_per_hour=rate)
     detector = FreeMotionDetector(settings).fit(recordings, arm)
-    assert detector.arm.noise is not None
-    require_explained(detector.arm, recordings, detector.arm.noise)
+    for note in explained(detector.arm, [r.trace for r in recordings if r.load == Load()]):
+        print(f"note: {note}")
     save_free_motion(detector, model)
     report(detector, model, len(traces))
     if sensitivity:
