@@ -167,7 +167,7 @@ def report(result: dict[str, Any], found: Identified) -> None:
     print(table(rows))
     for name, rms in result["held_out_rms_nm"].items():
         load = result["loads_kg"][name]
-        carried = f" (load {load:.2f} kg)" if abs(load) > 0.01 else ""
+        carried = f" (with {load:.2f} kg, not told here)" if abs(load) > 0.01 else ""
         print(f"held out {name}{carried}: " + " ".join(f"{v:.2f}" for v in rms) + " N m rms")
     for note in found.notes:
         print(f"note: {note}")
