@@ -44,10 +44,12 @@ class Lower {
 double safe_step(const Lower& g, double at_zero, double limit) {
   double right = limit, value = g(limit);
   if (value >= 0) return limit;
-  double left = 0, left_value = at_zero;
+  double left = 0, left_value = at_zero, short_of = 8 * unit_roundoff;
   for (int i = 0; i < 8; ++i) {
-    // The chord of a concave function lies below it: its root is certified.
-    const double h = left + (right - left) * (left_value / (left_value - value)) * (1 - 8 * unit_roundoff);
+    // The chord of a concave function lies below it: its root is certified. Where G is all but a line, rounding
+    // hides the sign at the root: ever more is left out, or no step would remain.
+    const double h = left + (right - left) * (left_value / (left_value - value)) * (1 - short_of);
+    short_of *= 16;
     if (!(h > left) || !(h < right)) break;
     const double here = g(h);
     if (here < 0) {

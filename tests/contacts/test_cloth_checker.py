@@ -42,7 +42,8 @@ def test_a_ball_meets_flat_cloth_after_the_way_that_is_left(x, y, height, travel
     found = checker("cloth", model).check(before, State.of(model, data))
     left = height - 0.01 - RADIUS
     if travel > left + 1e-9:
-        assert found.time.min() == pytest.approx(left / travel, abs=1e-9)
+        # Shapes closer than 1e-10 of their size (below 0.2 m here) touch.
+        assert found.time.min() == pytest.approx(left / travel, abs=1e-9 + 0.2e-10 / travel)
         first = np.argmin(found.time)
         # A neighbour beyond the edge may be as early to 1e-9 and lean by the root of that.
         assert found.normal[first] == pytest.approx([0, 0, -side], abs=1e-3)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tauguard.contacts._contacts import simplices
@@ -28,6 +28,9 @@ def sweep(x_t0, x_t1, thickness):
 
 
 @given(st.integers(0, 10**9), st.sampled_from([0.0, 0.01, 0.2]))
+@example(14, 0.01)  # the certificate is a line: its root is hidden by rounding
+@example(991, 0.01)
+@example(1126, 0.0)
 @settings(deadline=None, max_examples=60)
 def test_the_first_time_is_never_late_and_nearly_exact(seed, thickness):
     rng = np.random.default_rng(seed)
