@@ -88,7 +88,7 @@ def _peers(axes: Any, rows: list[Row]) -> None:
         axes.bar_label(bars, fmt="%.3g", fontsize="xx-small")
     _name_scenes(axes, scenes)
     axes.set(title="The same frame by ipctk", ylabel="time over ab2pf's", yscale="log")
-    axes.set_ylim(1)
+    axes.set_ylim(1, 3 * max((row["speedup"] for row in rows), default=1))
     _plain(axes.yaxis)
     axes.legend(fontsize="x-small")
 
@@ -116,11 +116,12 @@ def _volumes(axes: Any, rows: list[Row]) -> None:
             k = [int(row["volume"].removeprefix(prefix)) for row in own]
             axes.semilogy(k, candidates, style, marker="o", color=f"C{i}", label=label)
     axes.set(
-        title="Candidates that a volume leaves (dashed: moving with the step)",
+        title="Candidates left (dashed: volumes that move)",
         xlabel="k of the k-DOP",
         ylabel="pairs",
         xticks=[6, 14, 18, 26],
     )
+    _plain(axes.yaxis)
     axes.legend(fontsize="x-small")
 
 
