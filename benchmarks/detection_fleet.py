@@ -12,8 +12,8 @@ from tauguard.benchmarks.detection_pool import SPEEDS, Conditions, free_pool
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.front_end import shared_front_ends
-from tauguard.detectors.zoo import make_detector
+from tauguard.detectors.zoo.front_end import shared_front_ends
+from tauguard.detectors.zoo.table import make_detector
 from tauguard.envs import simulate
 from tauguard.models import SceneSpec, compose, cura6_drive, pin_model
 from tauguard.traces import Trace

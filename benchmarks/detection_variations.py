@@ -34,8 +34,8 @@ from tauguard.benchmarks.detection_report import headline
 from tauguard.benchmarks.report import Row
 from tauguard.detectors import CollisionDetector, DetectorSettings
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.srq_svr import SvrDetector
-from tauguard.detectors.zoo import make_detector
+from tauguard.detectors.zoo.srq_svr import SvrDetector
+from tauguard.detectors.zoo.table import make_detector
 from tauguard.envs import PayloadPick, simulate
 from tauguard.traces import Trace
 

@@ -1,8 +1,8 @@
 """After the alarm: which link, which force, where, and what kind of event, against the truth.
 
 Four ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
-hypothesis (tauguard.detectors.diagnosis). ``exposed``: the same, told that nothing reaches link 1,
-the shoulder on its base. ``usual``: the link of the last joint with a significant
+hypothesis (tauguard.detectors.after_alarm.diagnosis). ``exposed``: the same, told that nothing
+reaches link 1, the shoulder on its base. ``usual``: the link of the last joint with a significant
 residual, and the damped least-squares force at the middle of that link. ``told``: as ``surface``,
 but with the true external torque instead of the observer's estimate: what is wrong then is not the
 observer's fault, other contacts explain the same torques.
@@ -27,11 +27,11 @@ from tauguard.benchmarks.diagnosis_pool import (
 )
 from tauguard.benchmarks.report import Row, measure, rate
 from tauguard.detectors import Diagnoser, Diagnosis, Thresholded, make_detector
-from tauguard.detectors.aftermath import Aftermath, AftermathOf
-from tauguard.detectors.classification import KINDS
-from tauguard.detectors.contact_force import link_poses, point_jacobians
-from tauguard.detectors.diagnosis import believed
-from tauguard.detectors.diagnosis_metrics import ContactErrors, contact_at
+from tauguard.detectors.after_alarm.aftermath import Aftermath, AftermathOf
+from tauguard.detectors.after_alarm.classification import KINDS
+from tauguard.detectors.after_alarm.contact_force import link_poses, point_jacobians
+from tauguard.detectors.after_alarm.diagnosis import believed
+from tauguard.detectors.after_alarm.diagnosis_metrics import ContactErrors, contact_at
 from tauguard.detectors.metrics import stratum
 from tauguard.detectors.operating_point import threshold_for_rate
 from tauguard.envs import STRATA, simulate

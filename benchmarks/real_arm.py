@@ -34,10 +34,11 @@ from tauguard.datasets import read_log
 from tauguard.datasets.drives import UR10E
 from tauguard.datasets.watch import watch
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers, Unknowns, poisson_rate
-from tauguard.detectors.assessment import left_out, residual_rms
-from tauguard.detectors.free_motion import FreeMotionDetector
-from tauguard.detectors.identification import Load, Recording, identify
-from tauguard.detectors.semi_real import moments, smallest_found
+from tauguard.detectors.real_arm.assessment import left_out, residual_rms
+from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
+from tauguard.detectors.real_arm.identification import identify
+from tauguard.detectors.real_arm.recording import Load, Recording
+from tauguard.detectors.real_arm.semi_real import moments, smallest_found
 from tauguard.models import pin_model
 from tauguard.traces import Trace
 

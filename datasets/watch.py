@@ -15,7 +15,7 @@ from tauguard.detectors import (
     observe,
 )
 from tauguard.detectors.filter import confirmation_samples
-from tauguard.detectors.free_motion import FreeMotionDetector
+from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
 from tauguard.traces.trace import Array, Detection, Trace
 
 GAIN = 20.0  # [1/s] of the observer: what 100 Hz and a real arm's friction allow

@@ -1,5 +1,7 @@
 """Momentum observer, features, collision detectors, event matching and metrics."""
 
+from tauguard.detectors.after_alarm.diagnosis import Diagnoser, Diagnosis, diagnose
+from tauguard.detectors.after_alarm.diagnosis_metrics import diagnosis_figures, judge_diagnoses
 from tauguard.detectors.calibrate import Calibration, Priors, calibrate
 from tauguard.detectors.conformal import (
     EpisodeLevels,
@@ -8,8 +10,6 @@ from tauguard.detectors.conformal import (
     promised,
 )
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.diagnosis import Diagnoser, Diagnosis, diagnose
-from tauguard.detectors.diagnosis_metrics import diagnosis_figures, judge_diagnoses
 from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.events import Matching, find_alarms, judge, match
 from tauguard.detectors.filter import Confirmation, confirmed
@@ -28,8 +28,8 @@ from tauguard.detectors.pipeline import CollisionDetector, DetectorSettings
 from tauguard.detectors.svr import SrqSVR, srq_kernel
 from tauguard.detectors.thresholded import Thresholded
 from tauguard.detectors.thresholds import QuietDetector, QuietThresholds
-from tauguard.detectors.zoo import DETECTORS, make_detector
-from tauguard.detectors.zoo_file import load_model, save_model
+from tauguard.detectors.zoo.file import load_model, save_model
+from tauguard.detectors.zoo.table import DETECTORS, make_detector
 
 __all__ = [
     "DETECTORS",

@@ -5,8 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors.allowance import TERMS, Allowance, held, peaks, quantile_bound, terms
 from tauguard.detectors.operating_point import followed
+from tauguard.detectors.real_arm.allowance import (
+    TERMS,
+    Allowance,
+    held,
+    peaks,
+    quantile_bound,
+    terms,
+)
 
 
 @settings(max_examples=30, deadline=None)

@@ -5,7 +5,7 @@ import pinocchio as pin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors.consistent import (
+from tauguard.detectors.real_arm.consistent import (
     coordinates,
     from_coordinates,
     inertial_numbers,

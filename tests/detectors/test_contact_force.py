@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors.contact_force import contact_belief, link_poses, point_jacobians
-from tauguard.detectors.isolation import isolate, last_joint, moments
+from tauguard.detectors.after_alarm.contact_force import contact_belief, link_poses, point_jacobians
+from tauguard.detectors.after_alarm.isolation import isolate, last_joint, moments
 from tauguard.detectors.numbers import RobotNumbers
 from tauguard.models import cura6, link_surface, pin_model
 

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tauguard.detectors.cusum import bounded_cusum
+from tauguard.detectors.zoo.cusum import bounded_cusum
 
 
 @settings(deadline=None)

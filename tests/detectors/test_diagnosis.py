@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 from tauguard.detectors import ArmModel, Diagnoser, RobotNumbers, Thresholded, diagnose
-from tauguard.detectors.aftermath import Aftermath, AftermathOf
-from tauguard.detectors.classification import KINDS, load, signs
-from tauguard.detectors.diagnosis import believed
+from tauguard.detectors.after_alarm.aftermath import Aftermath, AftermathOf
+from tauguard.detectors.after_alarm.classification import KINDS, load, signs
+from tauguard.detectors.after_alarm.diagnosis import believed
 from tauguard.envs import CollisionPlan, Episode, PayloadPick, simulate
 from tauguard.models import cura6, cura6_drive, link_surface, pin_model
 from tauguard.traces import Alarm

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import Diagnosis, diagnosis_figures, judge_diagnoses
-from tauguard.detectors.classification import Signs
-from tauguard.detectors.diagnosis_metrics import ContactErrors, contact_at
+from tauguard.detectors.after_alarm.classification import Signs
+from tauguard.detectors.after_alarm.diagnosis_metrics import ContactErrors, contact_at
 from tauguard.traces import Alarm, Collision, Trace, Truth
 
 T = np.arange(0, 3, 1e-3)

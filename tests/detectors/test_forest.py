@@ -5,7 +5,7 @@ import pytest
 from sklearn.ensemble import GradientBoostingRegressor
 
 from tauguard.detectors import _ranking
-from tauguard.detectors.forest import Forest
+from tauguard.detectors.zoo.forest import Forest
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import ArmModel
-from tauguard.detectors.free_motion import (
+from tauguard.detectors.real_arm.free_motion import (
     RELEASE,
     FreeMotionDetector,
     FreeMotionSettings,
@@ -15,8 +15,8 @@ from tauguard.detectors.free_motion import (
     resting,
     without_kicks,
 )
-from tauguard.detectors.free_motion_file import load_free_motion, save_free_motion
-from tauguard.detectors.semi_real import Added, add_contact, moments, smallest_found
+from tauguard.detectors.real_arm.free_motion_file import load_free_motion, save_free_motion
+from tauguard.detectors.real_arm.semi_real import Added, add_contact, moments, smallest_found
 from tests.detectors.synthetic_arm import GAIN, nominal, record
 
 

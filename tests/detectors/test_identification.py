@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import ArmModel, gravity_torque, mass_matrix
-from tauguard.detectors.arm_file import load_arm, save_arm
-from tauguard.detectors.assessment import explained, left_out, residual_rms, start_gains
-from tauguard.detectors.consistent import is_consistent
-from tauguard.detectors.identification import Load, Recording, identify, moving_span
 from tauguard.detectors.numbers import RobotNumbers
+from tauguard.detectors.real_arm.arm_file import load_arm, save_arm
+from tauguard.detectors.real_arm.assessment import explained, left_out, residual_rms, start_gains
+from tauguard.detectors.real_arm.consistent import is_consistent
+from tauguard.detectors.real_arm.identification import identify
+from tauguard.detectors.real_arm.recording import Load, Recording, moving_span
 from tests.detectors.synthetic_arm import (
     COULOMB,
     GAIN,

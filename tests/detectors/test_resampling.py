@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors.resampling import ALIKE, coarser, rows_known, samples_each
+from tauguard.detectors.real_arm.resampling import ALIKE, coarser, rows_known, samples_each
 from tauguard.traces import Trace
 
 

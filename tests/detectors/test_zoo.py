@@ -10,8 +10,8 @@ import skops.io
 from tauguard.detectors import ArmModel, CollisionDetector, calibrate, front_end, pipeline
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.thresholded import Thresholded
-from tauguard.detectors.zoo import DETECTORS, make_detector
-from tauguard.detectors.zoo_file import FORMAT, load_model, save_model
+from tauguard.detectors.zoo.file import FORMAT, load_model, save_model
+from tauguard.detectors.zoo.table import DETECTORS, make_detector
 from tauguard.traces import Trace
 
 

@@ -9,7 +9,8 @@ import tyro
 
 if TYPE_CHECKING:
     from tauguard.detectors import RobotNumbers
-    from tauguard.detectors.identification import Identified, Recording
+    from tauguard.detectors.real_arm.identification import Identified
+    from tauguard.detectors.real_arm.recording import Recording
 
 SOURCES = {
     "gains": "the gains that were given",
@@ -48,9 +49,10 @@ def command(
     """
     from tauguard.benchmarks.report import write_json
     from tauguard.cli.real_logs import read_logs, robot_numbers
-    from tauguard.detectors.arm_file import save_arm
-    from tauguard.detectors.assessment import explained, left_out
-    from tauguard.detectors.identification import Load, identify
+    from tauguard.detectors.real_arm.arm_file import save_arm
+    from tauguard.detectors.real_arm.assessment import explained, left_out
+    from tauguard.detectors.real_arm.identification import identify
+    from tauguard.detectors.real_arm.recording import Load
 
     numbers = robot_numbers(robot)
     traces = read_logs(logs, columns, numbers)
@@ -74,7 +76,7 @@ def loaded(traces: dict[str, Any], payload: tuple[str, ...]) -> list[Recording]:
     Raises:
         ValueError: a payload that cannot be read or belongs to no log.
     """
-    from tauguard.detectors.identification import Load, Recording
+    from tauguard.detectors.real_arm.recording import Load, Recording
 
     loads: dict[str, Load | None] = {}
     for text in payload:
@@ -109,7 +111,7 @@ def start(
     """
     from tauguard.datasets.drives import DRIVES
     from tauguard.detectors import ArmModel
-    from tauguard.detectors.assessment import start_gains
+    from tauguard.detectors.real_arm.assessment import start_gains
 
     preset = DRIVES.get(columns or "")
     known = any(r.load is not None and r.load.mass > 0 for r in recordings)

@@ -62,7 +62,7 @@ def command(
     from tauguard.datasets import read_log
     from tauguard.datasets.watch import watch, watch_free, watch_with
     from tauguard.detectors import CollisionDetector, RobotNumbers
-    from tauguard.detectors.free_motion_file import is_free_motion, load_free_motion
+    from tauguard.detectors.real_arm.free_motion_file import is_free_motion, load_free_motion
     from tauguard.models import pin_model
 
     if out is not None and out.exists() and not out.is_dir():

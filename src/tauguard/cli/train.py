@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tauguard.detectors.free_motion import FreeMotionDetector
+    from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
     from tauguard.traces import Trace
 
 
@@ -110,11 +110,11 @@ def free_motion(
     """Train on collision-free logs."""
     from tauguard.cli.calibrate import loaded, start
     from tauguard.cli.real_logs import read_logs, robot_numbers
-    from tauguard.detectors.arm_file import load_arm
-    from tauguard.detectors.assessment import explained
-    from tauguard.detectors.free_motion import FreeMotionDetector, FreeMotionSettings
-    from tauguard.detectors.free_motion_file import save_free_motion
-    from tauguard.detectors.identification import Load
+    from tauguard.detectors.real_arm.arm_file import load_arm
+    from tauguard.detectors.real_arm.assessment import explained
+    from tauguard.detectors.real_arm.free_motion import FreeMotionDetector, FreeMotionSettings
+    from tauguard.detectors.real_arm.free_motion_file import save_free_motion
+    from tauguard.detectors.real_arm.recording import Load
 
     numbers = robot_numbers(robot)
     traces = read_logs(free, columns, numbers)
@@ -150,7 +150,7 @@ def blows(detector: FreeMotionDetector, traces: list[Trace]) -> None:
     """The smallest semi-real blow on each joint that is found in 95 % of trials."""
     import numpy as np
 
-    from tauguard.detectors.semi_real import moments, smallest_found
+    from tauguard.detectors.real_arm.semi_real import moments, smallest_found
 
     quiet = [t for t in traces if not detector.detect(t).alarms]
     for joint, name in enumerate(detector.arm.robot.joint_names):

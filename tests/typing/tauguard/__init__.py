@@ -1,1 +1,16 @@
-../../../src/tauguard/__init__.py
+"""tauguard: a cobot-safety simulation environment on MuJoCo.
+
+The sub-packages are rooms of one house; import the one you need (``tauguard.cloth`` pulls in
+neither MuJoCo nor Pinocchio): ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
+``detectors``, ``contacts``, ``envs``, ``datasets``, ``replay``, ``benchmarks``.
+
+tauguard is a research tool, not a certified safety function.
+"""
+
+from importlib.metadata import version
+
+from tauguard.environments import register_environments
+
+__version__ = version("tauguard")
+
+register_environments()

@@ -1,1 +1,5 @@
-../../../src/tauguard/__main__.py
+"""``python -m tauguard``: the command line."""
+
+from tauguard.cli import main
+
+main()

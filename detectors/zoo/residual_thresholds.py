@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.detector import check_trace
 from tauguard.detectors.estimator import Estimate
-from tauguard.detectors.front_end import FrontEnd
-from tauguard.detectors.per_joint import PerJoint
 from tauguard.detectors.thresholded import plain_residual
+from tauguard.detectors.zoo.front_end import FrontEnd
+from tauguard.detectors.zoo.per_joint import PerJoint
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.estimator import ArmModel, Estimate
-from tauguard.detectors.front_end import FrontEnd
+from tauguard.detectors.zoo.front_end import FrontEnd
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.contact_force import ContactBelief, contact_belief
+from tauguard.detectors.after_alarm.contact_force import ContactBelief, contact_belief
 from tauguard.detectors.numbers import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 

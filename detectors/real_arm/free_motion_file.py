@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.detectors.allowance import TERMS, Allowance
 from tauguard.detectors.estimator import ArmModel, Unknowns
-from tauguard.detectors.free_motion import FreeMotionDetector, FreeMotionSettings
 from tauguard.detectors.friction import FrictionModel
-from tauguard.detectors.identification import Beliefs
 from tauguard.detectors.numbers import RobotNumbers
+from tauguard.detectors.real_arm.allowance import TERMS, Allowance
+from tauguard.detectors.real_arm.free_motion import FreeMotionDetector, FreeMotionSettings
+from tauguard.detectors.real_arm.identification import Beliefs
 
 FORMAT = "tauguard free-motion detector 1"
 

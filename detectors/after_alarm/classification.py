@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from tauguard.detectors.aftermath import Aftermath
+from tauguard.detectors.after_alarm.aftermath import Aftermath
 
 Array = NDArray[np.float64]
 

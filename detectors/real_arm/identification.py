@@ -3,7 +3,8 @@
 The residual of the nominal observer is linear in the errors of the inertial numbers and of the
 reflected rotor inertias, in the weights of the friction columns, in the drives' torque per ampere
 and in the payloads. All pass through the detector's own causal filter, so no acceleration is
-needed. The solution is restricted to bodies that can exist (:mod:`~tauguard.detectors.consistent`).
+needed. The solution is restricted to bodies that can exist
+(:mod:`~tauguard.detectors.real_arm.consistent`).
 
 Currents alone tell torques only up to a factor a joint: if every gain, mass and friction shrinks
 together, every current is explained as well. Something from outside has to fix the scale, and
@@ -20,20 +21,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.calibrate import free_rows
-from tauguard.detectors.consistent import solve_consistent
 from tauguard.detectors.estimator import ArmModel
-from tauguard.detectors.filter import confirmed
 from tauguard.detectors.friction import FrictionModel
 from tauguard.detectors.numbers import (
     INERTIAL,
     RobotNumbers,
     mass_matrix,
-    momentum_regressor,
-    momentum_terms,
 )
-from tauguard.detectors.observer import intervals, low_pass
-from tauguard.traces.trace import Bools, Trace
+from tauguard.detectors.real_arm.consistent import solve_consistent
+from tauguard.detectors.real_arm.recording import Recording, is_told, known_load
+from tauguard.detectors.real_arm.regression import Filtered, System, filtered
 
 Array = NDArray[np.float64]
 
@@ -48,34 +45,6 @@ REAL_FRICTION = FrictionModel(
     saturation=True,
     modelled=True,
 )
-#: An axis slower than this in every sample of a log does not move in it [rad/s].
-MOVING = 0.01
-
-
-@dataclass(frozen=True)
-class Load:
-    """What the arm carried, as far as it was told."""
-
-    mass: float = 0.0  #: [kg]
-    centre: tuple[float, float, float] | None = None
-    """In the last link's frame [m]; None: not told, identified with the rest."""
-
-    def __post_init__(self) -> None:
-        """``ValueError`` for a mass below 0 or numbers that are not finite."""
-        if not (np.isfinite(self.mass) and self.mass >= 0):
-            raise ValueError(f"load: {self.mass} kg, expected 0 or more")
-        if self.centre is not None and not (
-            len(self.centre) == 3 and np.isfinite(self.centre).all()
-        ):
-            raise ValueError(f"load: centre {self.centre}, expected three finite numbers [m]")
-
-
-@dataclass(frozen=True)
-class Recording:
-    """A collision-free log and the load in it."""
-
-    trace: Trace
-    load: Load | None = Load()  #: None: something unknown was carried
 
 
 @dataclass(frozen=True)
@@ -114,157 +83,8 @@ class Identified:
     notes: tuple[str, ...]  #: what a reader should know
 
 
-def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
-    """Rows from the first motion of any joint to the last one, shape (T,).
-
-    Before and after, static friction takes an unknown share of the torque.
-
-    Args:
-        trace: the log.
-        margin: seconds at the log's beginning that are left out in any case.
-
-    Raises:
-        ValueError: no joint ever moves.
-    """
-    moves = np.flatnonzero((np.abs(trace.qd) > MOVING).any(axis=1))
-    if not len(moves):
-        raise ValueError(f"no joint moves faster than {MOVING} rad/s")
-    rows = np.zeros(len(trace.t), dtype=np.bool_)
-    rows[moves[0] : moves[-1] + 1] = True
-    return np.asarray(rows & (trace.t >= trace.t[0] + margin))
-
-
-@dataclass(frozen=True)
-class Filtered:
-    """Everything that the regression needs of one recording, behind the observer's filter."""
-
-    torque: Array  #: nominal rigid-body torque less payload [N m], (R, n)
-    current: Array  #: gain times current [N m], (R, n)
-    inertial: Array  #: (R, n, 10 n)
-    armature: Array  #: (R, n)
-    friction: Array  #: (R, n, columns)
-    weight: Array  #: of each row and joint, (R, n)
-
-
-def filtered(
-    recording: Recording,
-    robot: RobotNumbers,
-    gain: Array,
-    model: FrictionModel,
-    rate: float,
-    rest: float,
-    load: Array | None = None,
-) -> Filtered:
-    """Everything that the regression needs of a recording at these gains.
-
-    ``load`` is what it carries, shape (10,), for friction that depends on it (default: as told).
-    """
-    trace = recording.trace
-    stride = max(1, round(4e-3 / trace.dt))
-    count = len(trace.t) // stride
-    rows = count * stride
-
-    def mean(x: Array) -> Array:
-        out: Array = x[:rows].reshape(count, stride, *x.shape[1:]).mean(axis=1)
-        return out
-
-    tau = trace.current * gain
-    if model.modelled:
-        held = _carried(trace, robot, _known(recording) if load is None else load)
-        columns = mean(model.evaluate(trace.q, trace.qd, tau, held))
-    else:
-        columns = mean(model.evaluate(trace.q, trace.qd, tau))
-    drive = mean(tau)
-    q, qd, t = (x[:rows:stride] for x in (trace.q, trace.qd, trace.t))
-    dt = intervals(t, count)
-
-    def through(p: Array, beta: Array, held: Array | None = None) -> Array:
-        flat, other = p.reshape(count, -1), beta.reshape(count, -1)
-        driven = None if held is None else held.reshape(count, -1)
-        rates = np.full(flat.shape[1], rate)
-        return low_pass(rates, dt, flat, other, driven).reshape(p.shape)
-
-    nothing, no_columns = np.zeros_like(q), np.zeros_like(columns)
-    used = moving_span(trace) & free_rows(trace)
-    keep = np.flatnonzero(used[:rows:stride])[:: max(1, round(0.02 / (stride * trace.dt)))]
-    slow = np.abs(trace.qd) < MOVING
-    needed = max(1, round(rest / trace.dt))
-    still = np.column_stack([confirmed(column, needed) for column in slow.T])[:rows:stride]
-    return Filtered(
-        through(*momentum_terms(robot, q, qd))[keep],
-        -through(nothing, nothing, drive)[keep],
-        through(*momentum_regressor(robot, q, qd))[keep],
-        through(np.ascontiguousarray(qd), nothing)[keep],
-        -through(no_columns, no_columns, columns)[keep],
-        np.where(still, 0.0, 1.0)[keep],
-    )
-
-
-def _carried(trace: Trace, robot: RobotNumbers, load: Array) -> Array:
-    """What load-dependent friction grows with [N m], shape (T, n)."""
-    carrying = robot.inertial.copy()
-    carrying[-1] += load
-    return momentum_terms(robot.with_inertial(carrying), trace.q, trace.qd)[1]
-
-
-class _System:
-    """Normal equations over errors of inertia and armature, friction, gains and payloads.
-
-    ``current = torque (1 + s) - inertial dphi - armature da + friction w + load``, and the gain of
-    a joint is that of the round divided by 1 + s.
-    """
-
-    def __init__(self, robot: RobotNumbers, columns: int, recordings: int) -> None:
-        self.n, self.c, self.count = robot.joints, columns, recordings
-        self.friction = (INERTIAL + 1) * self.n
-        self.gain = self.friction + self.n * columns
-        self.load = self.gain + self.n
-        self.size = self.load + INERTIAL * recordings
-        self.matrix = np.zeros((self.size, self.size))
-        self.vector = np.zeros(self.size)
-
-    def places(self, joint: int, recording: int) -> NDArray[np.intp]:
-        own = np.arange(self.friction + joint * self.c, self.friction + (joint + 1) * self.c)
-        load = self.load + INERTIAL * recording + np.arange(INERTIAL)
-        body = np.arange(INERTIAL * self.n)
-        return np.concatenate([body, [INERTIAL * self.n + joint], own, [self.gain + joint], load])
-
-    def design(self, data: Filtered, joint: int, known: Array) -> Array:
-        """Columns of one joint; ``known`` is the load that the torque scales with."""
-        last = slice(INERTIAL * (self.n - 1), INERTIAL * self.n)
-        load = data.inertial[:, joint, last]
-        return np.column_stack(
-            [
-                -data.inertial[:, joint],
-                -data.armature[:, joint],
-                data.friction[:, joint],
-                data.torque[:, joint] + load @ known,
-                load,
-            ]
-        )
-
-    def target(self, data: Filtered, joint: int) -> Array:
-        out: Array = data.current[:, joint] - data.torque[:, joint]
-        return out
-
-    def add(self, data: Filtered, recording: int, weight: Array, known: Array) -> None:
-        for joint in range(self.n):
-            at, x = self.places(joint, recording), self.design(data, joint, known)
-            w = (weight[joint] * data.weight[:, joint])[:, None] ** 2
-            self.matrix[np.ix_(at, at)] += x.T @ (w * x)
-            self.vector[at] += x.T @ (w[:, 0] * self.target(data, joint))
-
-    def left(self, data: Filtered, recording: int, solution: Array, known: Array) -> Array:
-        """What the solution does not explain [N m], shape (R, n)."""
-        out = np.empty_like(data.current)
-        for joint in range(self.n):
-            fit = self.design(data, joint, known) @ solution[self.places(joint, recording)]
-            out[:, joint] = self.target(data, joint) - fit
-        return out
-
-
 def _deviations(
-    system: _System,
+    system: System,
     robot: RobotNumbers,
     recordings: Sequence[Recording],
     beliefs: Beliefs,
@@ -283,12 +103,12 @@ def _deviations(
     heaviest = np.diagonal(mass_matrix(robot, poses), axis1=1, axis2=2).max(axis=0)
     loads, means = [], []
     for recording in recordings:
-        load, told = recording.load, _told(recording)
+        load, told = recording.load, is_told(recording)
         loads += [1e-6 if load is not None else beliefs.payload]
         loads += [1e-6 if told else beliefs.moment] * 3
         nothing = load is not None and load.mass == 0
         loads += [1e-6 if nothing else beliefs.spread] * 6
-        means.append(_known(recording))
+        means.append(known_load(recording))
     deviations = np.concatenate(
         [
             body,
@@ -311,18 +131,6 @@ def _friction_beliefs(
         peaks = [np.abs(r.trace.current * gain).max(axis=0) for r in recordings]
         out[:, -1] = beliefs.saturation / np.maximum(np.max(peaks, axis=0), 1e-9)
     return out
-
-
-def _told(recording: Recording) -> bool:
-    load = recording.load
-    return load is not None and (load.mass == 0 or load.centre is not None)
-
-
-def _known(recording: Recording) -> Array:
-    load = recording.load or Load()
-    x, y, z = load.centre or (0.0, 0.0, 0.0)
-    spread = y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y
-    return load.mass * np.array([1.0, x, y, z, *spread])
 
 
 def identify(
@@ -384,21 +192,21 @@ def _fit(
     robot, held = arm.robot, scale == "gains"
     gain, error = arm.drive_gain.copy(), np.zeros(robot.joints)
     level: Array = np.ones(robot.joints)
-    known = [_known(recording) for recording in recordings]
+    known = [known_load(recording) for recording in recordings]
     loads = np.array(known)
     for turn in range(rounds):
         if data is None or not held:
             data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
         if turn and friction.modelled:  # loads that were not told are known by now
             data = [
-                d if _told(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)
+                d if is_told(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)
                 for d, r, load in zip(data, recordings, loads, strict=True)
             ]
         if turn == 0:
             if sum(len(d.current) for d in data) < 500:
                 raise ValueError("fewer than 10 s of motion in all: give 20 s or more")
             level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
-        system = _System(robot, friction.columns, len(recordings))
+        system = System(robot, friction.columns, len(recordings))
         loose = np.full(robot.joints, 0.0 if held else beliefs.gain)
         weights = _friction_beliefs(friction, beliefs, gain, recordings)
         deviations, means = _deviations(
@@ -437,7 +245,7 @@ def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> 
 
 def _result(
     arm: ArmModel,
-    system: _System,
+    system: System,
     solution: Array,
     gain: Array,
     rms: Array,

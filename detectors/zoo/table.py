@@ -5,15 +5,15 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable
 
-from tauguard.detectors.boosting import Boosting
-from tauguard.detectors.current_network import CurrentNetwork
-from tauguard.detectors.current_threshold import CurrentThreshold
-from tauguard.detectors.cusum import Cusum
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.one_class import OneClass
-from tauguard.detectors.residual_thresholds import MovingThresholds, ResidualThresholds
-from tauguard.detectors.srq_svr import SvrDetector
-from tauguard.detectors.window_network import WindowNetwork
+from tauguard.detectors.zoo.boosting import Boosting
+from tauguard.detectors.zoo.current_network import CurrentNetwork
+from tauguard.detectors.zoo.current_threshold import CurrentThreshold
+from tauguard.detectors.zoo.cusum import Cusum
+from tauguard.detectors.zoo.one_class import OneClass
+from tauguard.detectors.zoo.residual_thresholds import MovingThresholds, ResidualThresholds
+from tauguard.detectors.zoo.srq_svr import SvrDetector
+from tauguard.detectors.zoo.window_network import WindowNetwork
 
 #: Every detector, in the order that reports show them.
 DETECTORS: dict[str, Callable[[], Detector]] = {

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.calibrate import free_rows
-from tauguard.detectors.current_threshold import smoothed
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.model_parts import arm_from_parts, arm_parts
-from tauguard.detectors.network import Network
+from tauguard.detectors.zoo.current_threshold import smoothed
+from tauguard.detectors.zoo.network import Network
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]

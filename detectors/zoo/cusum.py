@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.detectors import _ranking
 from tauguard.detectors.estimator import Estimate
-from tauguard.detectors.per_joint import PerJoint
+from tauguard.detectors.zoo.per_joint import PerJoint
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]

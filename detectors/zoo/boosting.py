@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.forest import Forest
-from tauguard.detectors.windowed import Windowed
+from tauguard.detectors.zoo.forest import Forest
+from tauguard.detectors.zoo.windowed import Windowed
 
 Array = NDArray[np.float64]
 

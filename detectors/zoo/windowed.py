@@ -14,8 +14,8 @@ from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.estimator import ArmModel, Estimate
 from tauguard.detectors.features import Features, WindowShape
 from tauguard.detectors.filter import CONFIRMATION
-from tauguard.detectors.front_end import FrontEnd
 from tauguard.detectors.training import Prepared, draw_windows, peaks, severity_target
+from tauguard.detectors.zoo.front_end import FrontEnd
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]

@@ -21,7 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tauguard.detectors.allowance import (
+from tauguard.detectors.detector import check_joints
+from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
+from tauguard.detectors.events import MERGE_GAP, find_alarms
+from tauguard.detectors.filter import confirmation_samples, confirmed
+from tauguard.detectors.operating_point import followed, sustained
+from tauguard.detectors.real_arm.allowance import (
     AT_REST,
     IN_MOTION,
     Allowance,
@@ -30,19 +35,10 @@ from tauguard.detectors.allowance import (
     terms,
     torque_change,
 )
-from tauguard.detectors.detector import check_joints
-from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
-from tauguard.detectors.events import MERGE_GAP, find_alarms
-from tauguard.detectors.filter import confirmation_samples, confirmed
-from tauguard.detectors.identification import (
-    REAL_FRICTION,
-    Beliefs,
-    Recording,
-    filtered,
-    identify,
-)
-from tauguard.detectors.operating_point import followed, sustained
-from tauguard.detectors.resampling import coarser, rows_known, samples_each
+from tauguard.detectors.real_arm.identification import REAL_FRICTION, Beliefs, identify
+from tauguard.detectors.real_arm.recording import Recording
+from tauguard.detectors.real_arm.regression import filtered
+from tauguard.detectors.real_arm.resampling import coarser, rows_known, samples_each
 from tauguard.detectors.thresholds import still
 from tauguard.traces.trace import Bools, Detection, Trace
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tauguard.detectors.diagnosis import Diagnosis
+from tauguard.detectors.after_alarm.diagnosis import Diagnosis
 from tauguard.detectors.events import detection_window
 from tauguard.detectors.metrics import wilson
 from tauguard.traces.trace import Collision, Trace

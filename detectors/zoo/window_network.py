@@ -14,8 +14,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.network import Network
-from tauguard.detectors.windowed import Windowed
+from tauguard.detectors.zoo.network import Network
+from tauguard.detectors.zoo.windowed import Windowed
 
 Array = NDArray[np.float64]
 

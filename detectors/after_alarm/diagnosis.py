@@ -10,12 +10,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.aftermath import AFTER, Aftermath, AftermathOf
-from tauguard.detectors.classification import Signs, signs
-from tauguard.detectors.contact_force import contact_belief, link_poses, point_jacobians
+from tauguard.detectors.after_alarm.aftermath import AFTER, Aftermath, AftermathOf
+from tauguard.detectors.after_alarm.classification import Signs, signs
+from tauguard.detectors.after_alarm.contact_force import contact_belief, link_poses, point_jacobians
+from tauguard.detectors.after_alarm.isolation import Trust, isolate, last_joint, moments
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.features import Envelope
-from tauguard.detectors.isolation import Trust, isolate, last_joint, moments
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.traces.trace import Alarm, Detection, Trace
 
@@ -37,7 +37,7 @@ class Diagnosis:
     time: float  #: of the force [s]: its peak within the look
     force: Array  #: on the arm at that time, world frame [N], shape (3,)
     point: Array  #: where, at that time, world frame [m], shape (3,)
-    kind: str  #: the most likely of :data:`~tauguard.detectors.classification.KINDS`
+    kind: str  #: the most likely of :data:`~tauguard.detectors.after_alarm.classification.KINDS`
     kinds: dict[str, float]  #: probability of each kind
     signs: Signs  #: what the kind was decided by
 

@@ -17,7 +17,7 @@ from sklearn.svm import OneClassSVM
 from tauguard.detectors import _kernel
 from tauguard.detectors.svr import srq_kernel
 from tauguard.detectors.training import Prepared
-from tauguard.detectors.windowed import Windowed
+from tauguard.detectors.zoo.windowed import Windowed
 
 Array = NDArray[np.float64]
 

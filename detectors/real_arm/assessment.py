@@ -10,15 +10,10 @@ from tqdm import tqdm
 
 from tauguard.detectors.estimator import ArmModel, Estimator, Unknowns
 from tauguard.detectors.friction import FrictionModel
-from tauguard.detectors.identification import (
-    REAL_FRICTION,
-    Beliefs,
-    Recording,
-    identify,
-    moving_span,
-)
 from tauguard.detectors.numbers import RobotNumbers, momentum_terms
 from tauguard.detectors.observer import intervals, low_pass
+from tauguard.detectors.real_arm.identification import REAL_FRICTION, Beliefs, identify
+from tauguard.detectors.real_arm.recording import Recording, moving_span
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]

@@ -1,0 +1,75 @@
+"""Collision-free logs of a real arm, and what it carried in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.traces.trace import Bools, Trace
+
+Array = NDArray[np.float64]
+
+#: An axis slower than this in every sample of a log does not move in it [rad/s].
+MOVING = 0.01
+
+
+@dataclass(frozen=True)
+class Load:
+    """What the arm carried, as far as it was told."""
+
+    mass: float = 0.0  #: [kg]
+    centre: tuple[float, float, float] | None = None
+    """In the last link's frame [m]; None: not told, identified with the rest."""
+
+    def __post_init__(self) -> None:
+        """``ValueError`` for a mass below 0 or numbers that are not finite."""
+        if not (np.isfinite(self.mass) and self.mass >= 0):
+            raise ValueError(f"load: {self.mass} kg, expected 0 or more")
+        if self.centre is not None and not (
+            len(self.centre) == 3 and np.isfinite(self.centre).all()
+        ):
+            raise ValueError(f"load: centre {self.centre}, expected three finite numbers [m]")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A collision-free log and the load in it."""
+
+    trace: Trace
+    load: Load | None = Load()  #: None: something unknown was carried
+
+
+def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
+    """Rows from the first motion of any joint to the last one, shape (T,).
+
+    Before and after, static friction takes an unknown share of the torque.
+
+    Args:
+        trace: the log.
+        margin: seconds at the log's beginning that are left out in any case.
+
+    Raises:
+        ValueError: no joint ever moves.
+    """
+    moves = np.flatnonzero((np.abs(trace.qd) > MOVING).any(axis=1))
+    if not len(moves):
+        raise ValueError(f"no joint moves faster than {MOVING} rad/s")
+    rows = np.zeros(len(trace.t), dtype=np.bool_)
+    rows[moves[0] : moves[-1] + 1] = True
+    return np.asarray(rows & (trace.t >= trace.t[0] + margin))
+
+
+def is_told(recording: Recording) -> bool:
+    """Whether mass and centre of what was carried are known."""
+    load = recording.load
+    return load is not None and (load.mass == 0 or load.centre is not None)
+
+
+def known_load(recording: Recording) -> Array:
+    """Inertial numbers of the load as far as it was told, as in ``Identified.loads``, (10,)."""
+    load = recording.load or Load()
+    x, y, z = load.centre or (0.0, 0.0, 0.0)
+    spread = y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y
+    return load.mass * np.array([1.0, x, y, z, *spread])
