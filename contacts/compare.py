@@ -71,18 +71,23 @@ def compare(
     judging = Referee(model) if referee else None
     judged = judging.covers if judging is not None else None
     run = _simulate(model, data, scene, duration, {**chosen, "mujoco": yardstick}, judging, keep)
-    outcomes = judge(model, run.times, run.verdicts, run.contacts["mujoco"])
     scores = tuple(score(model, name, one.covers, judged, run) for name, one in chosen.items())
     first = _first_contact(scene, model.opt.timestep / fine, duration) if fine else None
     if first is not None:
         scores = tuple(_beside(s, first, chosen[s.checker].covers) for s in scores)
+    return _report(scene, run, scores, first[0] if first is not None else None, keep)
+
+
+def _report(
+    scene: ContactScene, run: Run, scores: tuple[Score, ...], first: float | None, keep: bool
+) -> Report:
     return Report(
         scene=scene.name,
-        timestep=float(model.opt.timestep),
+        timestep=float(run.model.opt.timestep),
         steps=len(run.step_seconds),
         scores=scores,
-        outcomes=outcomes,
-        first_contact=first[0] if first is not None else None,
+        outcomes=judge(run.model, run.times, run.verdicts, run.contacts["mujoco"]),
+        first_contact=first,
         disagreements=tuple(d for s in scores for d in s.disagreements),
         step_us=1e6 * float(np.median(run.step_seconds)),
         state_us=1e6 * float(np.median(run.state_seconds)),

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauguard.detectors import (
-    CollisionDetector,
     RobotNumbers,
+    Thresholded,
     confirmed,
     find_alarms,
     observe,
 )
 from tauguard.detectors.filter import confirmation_samples
 from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
-from tauguard.traces.trace import Array, Detection, Trace
+from tauguard.detectors.zoo.srq_svr import SvrDetector
+from tauguard.traces.trace import Array, Bools, Detection, Trace
 
 GAIN = 20.0  # [1/s] of the observer: what 100 Hz and a real arm's friction allow
 CONFIRMATION = 0.05  # [s]
@@ -65,17 +66,8 @@ def watch(
         ValueError: joints that the robot does not have; too few quiet seconds, or more than the
             log has.
     """
-    settled = trace.t[0] + SETTLING / gain
+    learning = _learning(trace, gain, quiet)
     until = trace.t[0] + quiet
-    learning = (trace.t >= settled) & (trace.t < until)
-    if not quiet < trace.t[-1] - trace.t[0]:
-        length = trace.t[-1] - trace.t[0]
-        raise ValueError(f"quiet: {quiet} s, but the log is {length:.1f} s long; nothing to watch")
-    if learning.sum() < 10:
-        raise ValueError(
-            f"quiet: {quiet} s leave {learning.sum()} samples after the observer has settled "
-            f"({SETTLING / gain:.2f} s); expected at least 10"
-        )
     if not (np.isfinite(factor) and factor > 0):
         raise ValueError(f"factor: {factor}, expected above 0")
     residual = observe(robot, trace.t, trace.q, trace.qd, tau, gain)
@@ -100,6 +92,21 @@ def watch(
     return Watch(detection, thresholds, float(until), (note,))
 
 
+def _learning(trace: Trace, gain: float, quiet: float) -> Bools:
+    """The quiet rows after the observer has settled, shape (T,)."""
+    settled = trace.t[0] + SETTLING / gain
+    learning: Bools = (trace.t >= settled) & (trace.t < trace.t[0] + quiet)
+    if not quiet < trace.t[-1] - trace.t[0]:
+        length = trace.t[-1] - trace.t[0]
+        raise ValueError(f"quiet: {quiet} s, but the log is {length:.1f} s long; nothing to watch")
+    if learning.sum() < 10:
+        raise ValueError(
+            f"quiet: {quiet} s leave {learning.sum()} samples after the observer has settled "
+            f"({SETTLING / gain:.2f} s); expected at least 10"
+        )
+    return learning
+
+
 def used(joints: Sequence[int] | None, count: int) -> np.ndarray:
     """Which of ``count`` joints are meant, shape (count,).
 
@@ -112,19 +119,21 @@ def used(joints: Sequence[int] | None, count: int) -> np.ndarray:
     return np.isin(np.arange(1, count + 1), list(chosen))
 
 
-def watch_with(detector: CollisionDetector, trace: Trace) -> Watch:
+def watch_with(watched: Thresholded, trace: Trace) -> Watch:
     """Look for collisions with a trained detector.
 
     Raises:
         ValueError: another number of joints or another sample rate than it was trained at.
     """
-    detection = detector.detect(trace)
-    assert detector.arm is not None
-    joints = detector.arm.robot.joints
-    noise = detector.arm.noise if detector.arm.noise is not None else np.ones(joints)
-    thresholds = np.where(used(detector.settings.joints, joints), noise, np.inf)
-    settled = float(trace.t[0] + detector.settings.settle)
-    return Watch(detection, thresholds, settled, detector.notes)
+    detector = watched.detector
+    noise = detector.arm.noise
+    thresholds = np.ones(detector.arm.robot.joints) if noise is None else noise
+    notes: tuple[str, ...] = ()
+    if isinstance(detector, SvrDetector):
+        chosen = used(detector.chain.settings.joints, len(thresholds))
+        thresholds, notes = np.where(chosen, thresholds, np.inf), detector.chain.notes
+    settled = float(trace.t[0] + detector.settle)
+    return Watch(watched.detect(trace), thresholds, settled, notes)
 
 
 def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:

@@ -57,7 +57,11 @@ class Thresholded:
         return self.detector.settle + (self._samples(trace) - 1.5) * trace.dt
 
 
+#: Rate of the observer without unknowns [1/s].
+PLAIN_GAIN = 100.0
+
+
 def plain_residual(arm: ArmModel, trace: Trace) -> Array:
     """The momentum observer's estimate of tau_ext at 100/s with no unknowns [N m], shape (T, n)."""
-    estimator = Estimator(arm, 100.0, trace.dt, Unknowns.none())
+    estimator = Estimator(arm, PLAIN_GAIN, trace.dt, Unknowns.none())
     return estimator.run(trace.t, trace.q, trace.qd, trace.current).residual

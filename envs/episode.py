@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,8 +48,10 @@ class CollisionPlan:
             raise ValueError(f"kind {self.kind!r}: expected one of {', '.join(KINDS)}")
         if self.link < 1:
             raise ValueError(f"link {self.link}: links are counted from 1")
-        if self.duration <= 0:
+        if not 0 < self.duration < math.inf:
             raise ValueError(f"duration {self.duration}: expected seconds above 0")
+        if self.strength is not None and not math.isfinite(self.strength):
+            raise ValueError(f"strength {self.strength}: expected a finite number")
         for name, unit in (("severity", "N m"), ("force", "N")):
             span = getattr(self, name)
             if span is not None and not 0 < span[0] < span[1]:
@@ -80,11 +83,16 @@ class Episode:
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names what is wrong and what would work."""
-        if not self.seconds > 0:
-            raise ValueError(f"seconds {self.seconds}: expected more than 0")
+        for name in ("seconds", "timestep"):
+            value = getattr(self, name)
+            if not 0 < value < math.inf:
+                raise ValueError(f"{name} {value}: expected more than 0 and finite")
+        if self.temperature is not None and not math.isfinite(self.temperature):
+            raise ValueError(f"temperature {self.temperature}: expected a finite number of degC")
         if not 0 < self.speed <= 100:
             raise ValueError(f"speed {self.speed}: expected a percentage above 0 and at most 100")
-        if self.payload_g < 0 or any(pick.payload_g < 0 for pick in self.picks):
+        loads = [self.payload_g, *(pick.payload_g for pick in self.picks)]
+        if not all(0 <= load < math.inf for load in loads):
             raise ValueError("payload_g: expected 0 or more grams")
         times = [plan.time for plan in self.collisions] + [pick.time for pick in self.picks]
         for time in times:

@@ -126,7 +126,7 @@ def make_detector(world: World, wanted: object) -> Detector | None:
         wanted = CollisionDetector.load(wanted)
     if not (hasattr(wanted, "step") and hasattr(wanted, "reset")):
         raise ValueError(
-            f"detector {wanted!r}: expected {', '.join(DETECTORS)}, the path of a trained "
+            f"detector {wanted!r}: expected {', '.join(DETECTORS)}, the path of a trained srq-svr "
             "detector, or an object with step(q, qd, current) and reset()"
         )
     if isinstance(wanted, CollisionDetector):

@@ -1,5 +1,5 @@
 // Conservative advancement (Mirtich 1996; Zhang, Lee and Kim 2006) on support functions, with directions that
-// turn, as rigid/src/motion_impact.cpp has it for vertices. For any unit n, any rate r and n(h) = n + h r, the
+// turn, as rigid/src/first_contact.cpp has it for vertices. For any unit n, any rate r and n(h) = n + h r, the
 // separation of the cores along n(h) at time t + h is at least
 //   G(h) = -(tangent of b along -n(h)) - (tangent of a along n(h)) - K h^2 / 2,
 // where a tangent is the largest of the vertices' own tangents (one support call) and K bounds their second

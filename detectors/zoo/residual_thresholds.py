@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.detector import check_trace
 from tauguard.detectors.estimator import Estimate
-from tauguard.detectors.thresholded import plain_residual
+from tauguard.detectors.thresholded import PLAIN_GAIN, plain_residual
 from tauguard.detectors.zoo.front_end import FrontEnd
 from tauguard.detectors.zoo.per_joint import PerJoint
 from tauguard.traces.trace import Trace
@@ -26,7 +26,9 @@ class ResidualThresholds(PerJoint):
     the score is what training showed free motion to reach in one sample of a thousand.
     """
 
-    front: FrontEnd = field(default_factory=lambda: FrontEnd(adapt=False, settle=0.5))
+    front: FrontEnd = field(
+        default_factory=lambda: FrontEnd(gain=PLAIN_GAIN, adapt=False, settle=0.5)
+    )
     name: ClassVar[str] = "residual-thresholds"
 
     def deviation(self, trace: Trace, estimate: Estimate) -> Array:

@@ -1,9 +1,9 @@
 """The command line as a user meets it: help, one-line errors, and the whole way."""
 
 import json
+import resource
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -25,11 +25,12 @@ def fails(capsys, *args: str) -> str:
 
 
 def test_help_is_quick_and_names_every_command():
-    started = time.perf_counter()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     out = subprocess.run(
         [sys.executable, "-m", "tauguard", "--help"], capture_output=True, text=True, check=True
     )
-    assert time.perf_counter() - started < 3.0
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert after.ru_utime - before.ru_utime < 1.0  # of processor: others may be busy
     for name in COMMANDS:
         assert name in out.stdout
 
@@ -141,4 +142,4 @@ def test_detect_with_a_trained_model(tmp_path, capsys):
     names = [f"q{i}" for i in range(1, 7)]
     columns.write_text(json.dumps({"t": "time", "q": names, "qd": names, "current": names}))
     line = fails(capsys, "detect", str(log), *flags, "--columns", str(columns))
-    assert "trained at 1 ms" in line
+    assert "works at 1 ms" in line

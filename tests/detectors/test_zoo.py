@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 import skops.io
 
-from tauguard.detectors import ArmModel, CollisionDetector, calibrate, front_end, pipeline
+from tauguard.detectors import ArmModel, CollisionDetector, calibrate, pipeline
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.thresholded import Thresholded
+from tauguard.detectors.zoo import front_end
 from tauguard.detectors.zoo.file import FORMAT, load_model, save_model
 from tauguard.detectors.zoo.table import DETECTORS, make_detector
 from tauguard.traces import Trace

@@ -70,13 +70,17 @@ def command(
             **detector_timing(detector, judged, detected - fitted),
         },
     }
-    showcase = simulate(plan.showcase)
-    leave(out, showcase, detector)
+    leave(out, simulate(plan.showcase), detector)
     draw(out / "summary.png", summary, matchings)
     summary["timing"]["total_s"] = time.perf_counter() - started
     for path in filter(None, (out / "summary.json", json)):
         write_json(path, summary)
     print(text(summary))
+    closing(out)
+
+
+def closing(out: Path) -> None:
+    """Say what lies where."""
     print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
     print(f"look at the recording with: rerun {out / 'demo.rrd'}")
 

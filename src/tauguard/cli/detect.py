@@ -60,9 +60,8 @@ def command(
     """
     from tauguard.benchmarks.report import write_json
     from tauguard.datasets import read_log
-    from tauguard.datasets.watch import watch, watch_free, watch_with
-    from tauguard.detectors import CollisionDetector, RobotNumbers
-    from tauguard.detectors.real_arm.free_motion_file import is_free_motion, load_free_motion
+    from tauguard.datasets.watch import watch
+    from tauguard.detectors import RobotNumbers
     from tauguard.models import pin_model
 
     if out is not None and out.exists() and not out.is_dir():
@@ -73,26 +72,14 @@ def command(
     said: Sequence[Diagnosis] = ()
     notes: tuple[str, ...] = ()
     if model is not None:
-        detector: Any
-        if is_free_motion(model):
-            detector = load_free_motion(model)
-            found = watch_free(detector, trace)
-        else:
-            detector = CollisionDetector.load(model)
-            found = watch_with(detector, trace)
+        detector, found = watched(model, trace)
         said, notes = explained(detector, trace, found, robot)
     else:
         drive = drive_numbers(columns, gains, viscous, coulomb, len(trace.joint_names))
-        found = watch(
-            trace,
-            numbers,
-            drive.tau(trace.current, trace.qd),
-            quiet,
-            gain=observer_gain,
-            confirmation=confirmation,
-            factor=factor,
-            joints=joints or range(1, min(4, numbers.joints) + 1),
-        )
+        tau = drive.tau(trace.current, trace.qd)
+        terms = {"gain": observer_gain, "confirmation": confirmation, "factor": factor}
+        first_four = range(1, min(4, numbers.joints) + 1)
+        found = watch(trace, numbers, tau, quiet, joints=joints or first_four, **terms)
     for note in (*read.notes, *found.notes, *notes):
         print(f"note: {note}")
     result = summary(log, trace, found, said)
@@ -101,6 +88,19 @@ def command(
         write_json(json, result)
     if out is not None:
         leave(out, trace, found, result, robot)
+
+
+def watched(model: Path, trace: Trace) -> tuple[Any, Watch]:
+    """The detector of a model file, of any kind that ``tauguard train`` writes, and what it saw."""
+    from tauguard.datasets.watch import watch_free, watch_with
+    from tauguard.detectors import load_model
+    from tauguard.detectors.real_arm.free_motion_file import is_free_motion, load_free_motion
+
+    if is_free_motion(model):
+        free = load_free_motion(model)
+        return free, watch_free(free, trace)
+    detector = load_model(model)
+    return detector, watch_with(detector, trace)
 
 
 def column_map(columns: str | None) -> ColumnMap | str | None:
