@@ -163,6 +163,12 @@ def blows(detector: FreeMotionDetector, traces: list[Trace]) -> None:
             )
         if found:
             peak = float(np.quantile(found, 0.95, method="higher"))
+            if not np.isfinite(peak):
+                print(
+                    f"  {name}: WARNING: no blow tried is found in 95 % of {len(found)} trials; "
+                    "was a load not told (--payload)?"
+                )
+                continue
             print(
                 f"  {name}: a semi-real blow of 0.1 s in motion is found from {peak:.1f} N m on "
                 f"(95 % of {len(found)} trials)"
