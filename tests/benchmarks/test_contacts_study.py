@@ -36,6 +36,6 @@ def test_rows_of_a_scene_and_the_figure():
 
     figure = plt.figure()
     study.draw(rows, figure)
-    assert len(figure.axes) == 2
+    assert len(figure.axes) == 3
     assert all(np.isfinite(axis.get_xlim()).all() for axis in figure.axes)
     plt.close(figure)
