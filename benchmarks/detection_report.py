@@ -298,9 +298,9 @@ def _draw_strata(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None
     axis.set(
         xlabel="achieved peak |tau_ext| over joints 1-4 [N m]",
         ylabel="sensitivity, all speeds",
-        title="At one false alarm per hour (threshold from training motion)",
+        title="At one false alarm per hour",
     )
-    axis.legend(fontsize=7)
+    axis.legend(fontsize=6, framealpha=0.5)
     axis.grid(alpha=0.3)
 
 
@@ -315,7 +315,7 @@ def _draw_hourly(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None
     axis.set(
         xlabel="speed [% of the maximum]",
         ylabel="tau98 [N m]",
-        title="Smallest torque above which 98 % are found",
+        title="Torque above which 98 % are found",
     )
     axis.grid(alpha=0.3)
 
@@ -330,7 +330,7 @@ def _draw_delay(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None:
     axis.set(
         xlabel="speed [% of the maximum]",
         ylabel="delay [ms]",
-        title="From 16 N m up: median (line), 95th percentile (dots)",
+        title="Delay: median, 95th percentile dotted",
     )
     axis.set_yscale("log")
     axis.grid(alpha=0.3)

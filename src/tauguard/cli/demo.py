@@ -82,7 +82,7 @@ def command(
 def closing(out: Path) -> None:
     """Say what lies where."""
     print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
-    print(f"look at the recording with: rerun {out / 'demo.rrd'}")
+    print(f"look at the recording with: .uv/bin/uv run rerun {out / 'demo.rrd'}")
 
 
 def leave(out: Path, showcase: Trace, detector: CollisionDetector) -> None:
