@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -128,12 +128,14 @@ def watch_with(watched: Thresholded, trace: Trace) -> Watch:
     detector = watched.detector
     noise = detector.arm.noise
     thresholds = np.ones(detector.arm.robot.joints) if noise is None else noise
-    notes: tuple[str, ...] = ()
-    if isinstance(detector, SvrDetector):
-        chosen = used(detector.chain.settings.joints, len(thresholds))
-        thresholds, notes = np.where(chosen, thresholds, np.inf), detector.chain.notes
     settled = float(trace.t[0] + detector.settle)
-    return Watch(watched.detect(trace), thresholds, settled, notes)
+    if not isinstance(detector, SvrDetector):
+        return Watch(watched.detect(trace), thresholds, settled, ())
+    # One pass; its residual is what payload, offsets and friction leave, and names the joint.
+    chain = detector.chain.at(watched.threshold, watched.confirmation)
+    chosen = used(chain.settings.joints, len(thresholds))
+    found = replace(chain.detect(trace), detector=detector.name)
+    return Watch(found, np.where(chosen, thresholds, np.inf), settled, chain.notes)
 
 
 def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -99,6 +100,14 @@ class CollisionDetector:
         if self.arm is None or self.features is None or self.regressor is None:
             raise ValueError("this detector is not fitted: call fit or load first")
         return self.arm, self.features, self.regressor
+
+    def at(self, threshold: float, confirmation: float) -> CollisionDetector:
+        """The same detector with another threshold and confirmation [s]; nothing is copied."""
+        other = copy.copy(self)
+        other.settings = replace(self.settings, confirmation=confirmation)
+        other.threshold = float(threshold)
+        other.reset()
+        return other
 
     # -- training ---------------------------------------------------------------------------------
 

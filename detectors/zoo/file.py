@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 from typing import Any, Protocol
 
@@ -33,10 +32,16 @@ def save_model(watched: Thresholded, path: str | os.PathLike[str]) -> None:
     Raises:
         ValueError: it is not fitted, or the folder cannot be written.
     """
-    if _is_chain(watched):
-        _save_chain(watched, path)
+    own = watched.detector
+    # The form that all commands and the environments read, where it can hold the detector.
+    if (
+        isinstance(own, SvrDetector)
+        and own.name == "srq-svr"
+        and own.chain.settings.confirmation == watched.confirmation
+    ):
+        own.chain.at(watched.threshold, watched.confirmation).save(path)
         return
-    detector: Storable = watched.detector  # type: ignore[assignment]
+    detector: Storable = own  # type: ignore[assignment]
     content = {
         "format": FORMAT,
         "detector": detector.name,
@@ -45,23 +50,6 @@ def save_model(watched: Thresholded, path: str | os.PathLike[str]) -> None:
         "parts": detector.parts(),
     }
     write_archive(path, content)
-
-
-def _is_chain(watched: Thresholded) -> bool:
-    """Whether the file of ``CollisionDetector.save``, which all commands read, can hold it."""
-    detector = watched.detector
-    return (
-        isinstance(detector, SvrDetector)
-        and detector.name == "srq-svr"
-        and detector.chain.settings.confirmation == watched.confirmation
-    )
-
-
-def _save_chain(watched: Thresholded, path: str | os.PathLike[str]) -> None:
-    assert isinstance(watched.detector, SvrDetector)
-    chain = copy.copy(watched.detector.chain)
-    chain.threshold = float(watched.threshold)
-    chain.save(path)
 
 
 def load_model(path: str | os.PathLike[str]) -> Thresholded:

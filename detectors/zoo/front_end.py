@@ -169,3 +169,20 @@ def shared_front_ends(detectors: Iterable[object]) -> list[FrontEnd]:
             else:
                 detector.front = known  # type: ignore[attr-defined]
     return fronts
+
+
+@dataclass
+class OnFrontEnd:
+    """A detector that starts from a front end, and takes arm and settling time from it."""
+
+    front: FrontEnd = field(default_factory=FrontEnd)
+
+    @property
+    def settle(self) -> float:
+        """Seconds at the beginning of a trace whose scores mean nothing yet."""
+        return self.front.settle
+
+    @property
+    def arm(self) -> ArmModel:
+        """The calibrated arm."""
+        return self.front.fitted()[0]

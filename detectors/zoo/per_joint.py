@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -12,30 +12,19 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.estimator import ArmModel, Estimate
-from tauguard.detectors.zoo.front_end import FrontEnd
+from tauguard.detectors.zoo.front_end import FrontEnd, OnFrontEnd
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
 
 @dataclass
-class PerJoint(ABC):
+class PerJoint(OnFrontEnd, ABC):
     """A detector that compares each joint's deviation with what free motion seldom exceeds."""
 
-    front: FrontEnd = field(default_factory=FrontEnd)
     limits: Array | None = None  #: deviation that counts one, shape (joints,)
     name: ClassVar[str] = "per-joint"
     share: ClassVar[float] = 0.999  #: of free motion that stays below a limit
-
-    @property
-    def settle(self) -> float:
-        """Seconds at the beginning of a trace whose scores mean nothing yet."""
-        return self.front.settle
-
-    @property
-    def arm(self) -> ArmModel:
-        """The calibrated arm."""
-        return self.front.fitted()[0]
 
     @abstractmethod
     def deviation(self, trace: Trace, estimate: Estimate) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,7 +15,7 @@ from tauguard.detectors.estimator import ArmModel, Estimate
 from tauguard.detectors.features import Features, WindowShape
 from tauguard.detectors.filter import CONFIRMATION
 from tauguard.detectors.training import Prepared, draw_windows, peaks, severity_target
-from tauguard.detectors.zoo.front_end import FrontEnd
+from tauguard.detectors.zoo.front_end import FrontEnd, OnFrontEnd
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
@@ -27,30 +27,19 @@ CHUNK = 20_000
 
 
 @dataclass
-class Windowed(ABC):
+class Windowed(OnFrontEnd, ABC):
     """A regressor on windows of the residual over its envelope, compressed by asinh.
 
     Training windows are drawn from collisions and from free motion; then, twice, the free moments
     that score highest are added as negatives.
     """
 
-    front: FrontEnd = field(default_factory=FrontEnd)
     windows: int = 20_000  #: training windows, a fifth of them from collisions
     mined: int = 2_000  #: free moments added in each of two rounds
     units: float = 5.0  #: envelopes that count one before the asinh
     seed: int = 0
     features: Features | None = None
     name: ClassVar[str] = "windowed"
-
-    @property
-    def settle(self) -> float:
-        """Seconds at the beginning of a trace whose scores mean nothing yet."""
-        return self.front.settle
-
-    @property
-    def arm(self) -> ArmModel:
-        """The calibrated arm."""
-        return self.front.fitted()[0]
 
     @abstractmethod
     def _learn(self, x: Array, y: Array) -> None:

@@ -142,4 +142,4 @@ def test_detect_with_a_trained_model(tmp_path, capsys):
     names = [f"q{i}" for i in range(1, 7)]
     columns.write_text(json.dumps({"t": "time", "q": names, "qd": names, "current": names}))
     line = fails(capsys, "detect", str(log), *flags, "--columns", str(columns))
-    assert "works at 1 ms" in line
+    assert "trained at 1 ms" in line
