@@ -224,20 +224,42 @@ Factory = Callable[..., Checker]
 _FACTORIES: dict[str, Factory] = {}
 
 
-def register(name: str, factory: Factory) -> None:
-    """Make a checker known by ``name``; a later one of that name takes its place.
+def asked(one: Checker, before: State, after: State) -> Contacts:
+    """What ``one`` says of the step.
+
+    Raises:
+        TypeError: its ``check`` returned something else than :class:`Contacts`.
+    """
+    found: object = one.check(before, after)
+    if not isinstance(found, Contacts):
+        raise TypeError(
+            f"checker {one.name!r}: check returned {type(found).__name__}, expected Contacts "
+            "(Contacts.empty() where nothing touches)"
+        )
+    return found
+
+
+def register(name: str, factory: Factory, *, replace: bool = False) -> None:
+    """Make a checker known by ``name``.
 
     Args:
         name: Not empty.
         factory: ``factory(model, **options)`` returns a :class:`Checker`.
+        replace: Take the place of another factory of that name.
 
     Raises:
-        ValueError: an empty name, or a factory that cannot be called.
+        ValueError: an empty name, a name that another factory has, or a factory that cannot be
+            called.
     """
     if not name:
         raise ValueError("name: empty, expected the name of a checker")
     if not callable(factory):
         raise ValueError(f"factory: {factory!r} cannot be called; expected factory(model, ...)")
+    if not replace and _FACTORIES.get(name, factory) is not factory:
+        raise ValueError(
+            f"checker {name!r}: there is one of that name already; choose another name, or say "
+            "replace=True"
+        )
     _FACTORIES[name] = factory
 
 

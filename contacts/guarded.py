@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tauguard.contacts.approach import Approach
 from tauguard.contacts.balance import Balance, Books
-from tauguard.contacts.checker import Checker, Contacts, State, checker
+from tauguard.contacts.checker import Checker, Contacts, State, asked, checker
 from tauguard.contacts.stiffening import Pair, Stiffening
 
 Array = NDArray[np.float64]
@@ -200,7 +200,7 @@ class GuardedStepper:
         new = [
             one
             for checker in self.checkers
-            for one in self._new(checker.check(before, after), held, before, after)
+            for one in self._new(asked(checker, before, after), held, before, after)
         ]
         return min(new) if new else self._sinking(held, before, after)
 

@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tauguard.contacts.checker import Checker, Contacts, State, checker
+from tauguard.contacts.checker import Array, Checker, Contacts, State, asked, checker
 from tauguard.traces import CheckedContacts
 
 
@@ -28,37 +28,32 @@ def watch(
     """
     made = [checker(c, model) if isinstance(c, str) else c for c in checkers]
     found: list[list[Contacts]] = [[] for _ in made]
+    times: list[list[Array]] = [[np.empty(0)] for _ in made]
     before: State | None = None
     for state in states:
         if before is not None and state is not None:
-            for own, list_ in zip(made, found, strict=True):
-                contacts = own.check(before, state)
-                if len(contacts):
-                    times = before.time + contacts.time * (state.time - before.time)
-                    list_.append(_at(contacts, times))
+            for k, own in enumerate(made):
+                contacts = asked(own, before, state)
+                times[k].append(before.time + contacts.time * (state.time - before.time))
+                found[k].append(contacts)
         before = state
     return tuple(
-        _checked(model, own.name, Contacts.concatenate(list_))
-        for own, list_ in zip(made, found, strict=True)
+        _checked(model, own.name, Contacts.concatenate(found[k]), np.concatenate(times[k]))
+        for k, own in enumerate(made)
     )
 
 
-def _at(contacts: Contacts, times: Any) -> Contacts:
-    """The same rows with ``times`` [s], by time."""
+def _checked(model: Any, name: str, contacts: Contacts, times: Array) -> CheckedContacts:
+    """The rows by time [s], and by the names of their bodies and flexes."""
     order = np.argsort(times, kind="stable")
-    rest = (getattr(contacts, name)[order] for name in Contacts.__dataclass_fields__)
-    return Contacts(times[order], *list(rest)[1:])
-
-
-def _checked(model: Any, name: str, contacts: Contacts) -> CheckedContacts:
-    """The rows by the names of their bodies and flexes."""
+    contacts, times = contacts.where(order), times[order]
     body = np.where(contacts.geom >= 0, model.geom_bodyid[contacts.geom], -1)
     keys = np.where(body >= 0, body, model.nbody + contacts.flex)
     used, pair = np.unique(keys, return_inverse=True)
     return CheckedContacts(
         checker=name,
         partners=tuple(_name(model, int(key)) for key in used),
-        t=np.maximum.accumulate(contacts.time),
+        t=times,
         pair=pair.reshape(-1, 2).astype(np.int64),
         point=contacts.point,
         normal=contacts.normal,

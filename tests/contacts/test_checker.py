@@ -13,6 +13,7 @@ from tauguard.contacts import (
     pair_kind,
     register,
     registered,
+    watch,
 )
 
 SCENE = """<mujoco><option timestep="0.002"/><worldbody>
@@ -98,6 +99,28 @@ def test_anyone_registers_a_checker_and_options_reach_it():
     assert mine.word == "yes"
     assert mine.covers == {("plane", "sphere")}
     assert geom_kinds(model) == ["plane", "box", "sphere"]
+
+
+def test_a_name_is_taken_once():
+    register("nothing", Nothing)
+    with pytest.raises(ValueError, match="'nothing': there is one of that name already"):
+        register("nothing", lambda model: Nothing(model))
+    with pytest.raises(ValueError, match="'cloth': there is one"):
+        register("cloth", Nothing)
+    register("nothing", Nothing, replace=True)
+
+
+def test_a_checker_that_returns_no_contacts_is_named():
+    class Mute(Nothing):
+        name = "mute"
+
+        def check(self, before, after):
+            return None
+
+    model = mujoco.MjModel.from_xml_string(SCENE)
+    state = State.of(model, mujoco.MjData(model))
+    with pytest.raises(TypeError, match="'mute': check returned NoneType, expected Contacts"):
+        watch(model, [state, state], [Mute(model)])
 
 
 def test_bad_names_say_what_there_is():
