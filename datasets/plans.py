@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from tauguard.envs import STRATA, CollisionPlan, Episode, PayloadPick
+from tauguard.envs import CollisionPlan, Episode, PayloadPick
 from tauguard.models import Mismatch
+from tauguard.traces import STRATA
 
 #: Payloads of the dissertation's 15 training slices [g]: 3 without, 2 of each of six.
 TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757, 2757, 4039, 4039)
@@ -60,6 +62,17 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
     return begin + SLOT * collisions + 0.5
 
 
+def pairing(i: int, speeds: Sequence[float], payloads: Sequence[float]) -> tuple[float, float]:
+    """Speed and payload of episode ``i``: both are gone through in turn, and every pair comes.
+
+    Where the two lengths have a common factor the payloads move on by one each time the pairs
+    would repeat; otherwise a speed would always carry the same payloads.
+    """
+    pairs = math.lcm(len(speeds), len(payloads))
+    moved = i // pairs % math.gcd(len(speeds), len(payloads))
+    return float(speeds[i % len(speeds)]), float(payloads[(i + moved) % len(payloads)])
+
+
 def struck_episodes(
     seed: int,
     count: int,
@@ -68,17 +81,18 @@ def struck_episodes(
     payloads: Sequence[float] = (0.0,),
     mismatch: Mismatch | None = None,
 ) -> list[Episode]:
-    """Episodes with ``collisions`` each; speeds [%] and payloads [g] are gone through in turn."""
+    """Episodes with ``collisions`` each; speeds [%] and payloads [g] as :func:`pairing` has it."""
     children = np.random.SeedSequence([seed, 1]).spawn(count)
     episodes = []
     for i, child in enumerate(children):
         rng = np.random.default_rng(child)
+        speed, payload = pairing(i, speeds, payloads)
         episodes.append(
             Episode(
                 seed=int(rng.integers(2**62)),
                 seconds=episode_seconds(collisions),
-                speed=float(speeds[i % len(speeds)]),
-                payload_g=float(payloads[i % len(payloads)]),
+                speed=speed,
+                payload_g=payload,
                 collisions=collision_plans(rng, collisions),
                 mismatch=mismatch,
                 temperature=float(rng.uniform(25, 45)),
@@ -101,11 +115,11 @@ def free_episodes(
     episodes = []
     for i, child in enumerate(children):
         rng = np.random.default_rng(child)
-        payload = float(payloads[i % len(payloads)])
+        speed, payload = pairing(i, speeds, payloads)
         episode = Episode(
             seed=int(rng.integers(2**62)),
             seconds=seconds,
-            speed=float(speeds[i % len(speeds)]),
+            speed=speed,
             payload_g=payload,
             mismatch=mismatch,
             temperature=float(rng.uniform(25, 45)),
