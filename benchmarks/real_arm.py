@@ -32,13 +32,13 @@ from tqdm import tqdm
 from tauguard.benchmarks.report import Row
 from tauguard.datasets import read_log
 from tauguard.datasets.drives import UR10E
-from tauguard.datasets.watch import watch
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers, Unknowns, poisson_rate
 from tauguard.detectors.real_arm.assessment import left_out, residual_rms
 from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
 from tauguard.detectors.real_arm.identification import identify
 from tauguard.detectors.real_arm.recording import Load, Recording
 from tauguard.detectors.real_arm.semi_real import moments, smallest_found
+from tauguard.detectors.real_arm.watch import watch
 from tauguard.models import pin_model
 from tauguard.traces import Trace
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
     from tauguard.datasets import ColumnMap
     from tauguard.datasets.drives import DriveNumbers
-    from tauguard.datasets.watch import Watch
     from tauguard.detectors import Diagnosis
+    from tauguard.detectors.real_arm.watch import Watch
     from tauguard.traces import Trace
 
 
@@ -60,8 +60,8 @@ def command(
     """
     from tauguard.benchmarks.report import write_json
     from tauguard.datasets import read_log
-    from tauguard.datasets.watch import watch
     from tauguard.detectors import RobotNumbers
+    from tauguard.detectors.real_arm.watch import watch
     from tauguard.models import pin_model
 
     if out is not None and out.exists() and not out.is_dir():
@@ -92,9 +92,9 @@ def command(
 
 def watched(model: Path, trace: Trace) -> tuple[Any, Watch]:
     """The detector of a model file, of any kind that ``tauguard train`` writes, and what it saw."""
-    from tauguard.datasets.watch import watch_free, watch_with
     from tauguard.detectors import load_model
     from tauguard.detectors.real_arm.free_motion_file import is_free_motion, load_free_motion
+    from tauguard.detectors.real_arm.watch import watch_free, watch_with
 
     if is_free_motion(model):
         free = load_free_motion(model)
@@ -196,8 +196,8 @@ def summary(
     """The figures of a run, ready for JSON."""
     import numpy as np
 
-    from tauguard.datasets.watch import loudest_joint
     from tauguard.detectors import poisson_rate
+    from tauguard.detectors.real_arm.watch import loudest_joint
 
     watched = float(trace.t[-1] - found.quiet_until)
     events: list[dict[str, Any]] = []
