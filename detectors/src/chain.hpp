@@ -15,9 +15,12 @@
 #include <cstddef>
 #include <vector>
 
-#include "vec3.hpp"
+#include "tauguard/geometry/vec3.hpp"
 
 namespace tauguard::detectors {
+
+using geometry::Mat3;
+using geometry::Vec3;
 
 constexpr int kInertial = 10;  // m, m c (3), Ixx Ixy Iyy Ixz Iyz Izz about the link's origin
 

@@ -14,13 +14,12 @@
 
 namespace nb = nanobind;
 using namespace tauguard::detectors;
+using tauguard::geometry::load;
 using tauguard::geometry::ThreadPool;
 
 constexpr std::size_t kGrain = 512;  // samples a chunk
 
 namespace {
-
-Vec3 vec(const double* v) { return {v[0], v[1], v[2]}; }
 
 // Rotation about `axis` by q, in the parent's axes: R (a a^T) + cos q R (1 - a a^T) + sin q R [a].
 void fill_rotation(Joint& joint, const double* placement) {
@@ -52,7 +51,7 @@ Chain make_chain(Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 a
                     inertial.shape(1) == kInertial && armature.shape(0) == n && gravity.shape(0) == 3;
   if (!fits) throw std::invalid_argument("Chain: array lengths differ");
   Chain chain;
-  chain.gravity = vec(gravity.data());
+  chain.gravity = load(gravity.data());
   chain.joints.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     if (parent.data()[i] < -1 || parent.data()[i] >= static_cast<std::int64_t>(i))
@@ -60,11 +59,11 @@ Chain make_chain(Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 a
     Joint& joint = chain.joints[i];
     joint.parent = static_cast<int>(parent.data()[i]);
     joint.prismatic = prismatic.data()[i] != 0;
-    joint.axis = vec(axis.data() + 3 * i);
-    joint.offset = vec(translation.data() + 3 * i);
+    joint.axis = load(axis.data() + 3 * i);
+    joint.offset = load(translation.data() + 3 * i);
     fill_rotation(joint, rotation.data() + 9 * i);
     const double* b = inertial.data() + kInertial * i;
-    joint.inertial = {b[0], vec(b + 1), b[4], b[5], b[6], b[7], b[8], b[9]};
+    joint.inertial = {b[0], load(b + 1), b[4], b[5], b[6], b[7], b[8], b[9]};
     joint.armature = armature.data()[i];
   }
   return chain;

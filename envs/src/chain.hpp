@@ -8,20 +8,12 @@
 #include <cstddef>
 #include <vector>
 
+#include "tauguard/geometry/vec3.hpp"
+
 namespace tauguard::envs {
 
-struct Vec3 {
-  double x = 0, y = 0, z = 0;
-};
-inline Vec3 load(const double* p) { return {p[0], p[1], p[2]}; }
-inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Vec3 operator*(double s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
-inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec3 cross(Vec3 a, Vec3 b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-inline double norm(Vec3 a) { return std::sqrt(dot(a, a)); }
+using geometry::load;
+using geometry::Vec3;
 
 // Joint i moves link i; the joints of one arm are consecutive, base to tip.
 struct Chain {

@@ -1,12 +1,15 @@
 // Plain 3-vectors and 3x3 matrices in row-major order.
 #pragma once
 
-namespace tauguard::detectors {
+#include <cmath>
+
+namespace tauguard::geometry {
 
 struct Vec3 {
   double x = 0, y = 0, z = 0;
 };
 
+inline Vec3 load(const double* p) { return {p[0], p[1], p[2]}; }
 inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec3 operator*(double s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
@@ -15,6 +18,7 @@ inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec3 cross(Vec3 a, Vec3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
+inline double norm(Vec3 a) { return std::sqrt(dot(a, a)); }
 
 struct Mat3 {
   double m[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -31,4 +35,4 @@ inline Vec3 transposed(const Mat3& a, Vec3 v) {
           a.m[2] * v.x + a.m[5] * v.y + a.m[8] * v.z};
 }
 
-}  // namespace tauguard::detectors
+}  // namespace tauguard::geometry
