@@ -39,7 +39,8 @@ from tauguard.benchmarks.detection_pool import (
 )
 from tauguard.benchmarks.report import Row
 from tauguard.benchmarks.workers import Workers
-from tauguard.envs import STRATA, simulate
+from tauguard.envs import simulate
+from tauguard.traces import STRATA
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,9 +21,9 @@ from tauguard.datasets.plans import (
     free_episodes,
 )
 from tauguard.detectors.events import detection_window
-from tauguard.envs import STRATA, CollisionPlan, Episode, simulate
+from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.models import Mismatch
-from tauguard.traces import Collision, Trace
+from tauguard.traces import STRATA, Collision, Trace
 
 #: Percent of the joints' maximum speed that detectors are judged at.
 SPEEDS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)

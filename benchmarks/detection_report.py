@@ -18,7 +18,8 @@ from tauguard.benchmarks.detection_judge import (
     Thresholds,
 )
 from tauguard.benchmarks.report import Row
-from tauguard.detectors.metrics import HEADLINE, poisson_rate, stratum, wilson
+from tauguard.detectors.metrics import HEADLINE, poisson_rate, wilson
+from tauguard.traces import stratum
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

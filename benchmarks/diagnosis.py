@@ -32,11 +32,10 @@ from tauguard.detectors.after_alarm.classification import KINDS
 from tauguard.detectors.after_alarm.contact_force import link_poses, point_jacobians
 from tauguard.detectors.after_alarm.diagnosis import believed
 from tauguard.detectors.after_alarm.diagnosis_metrics import ContactErrors, contact_at
-from tauguard.detectors.metrics import stratum
 from tauguard.detectors.operating_point import threshold_for_rate
-from tauguard.envs import STRATA, simulate
+from tauguard.envs import simulate
 from tauguard.models import LinkSurface, cura6, link_surface
-from tauguard.traces import Collision
+from tauguard.traces import STRATA, Collision, stratum
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,8 +12,8 @@ from tauguard.datasets.plans import BEGIN, collision_plans, episode_seconds
 from tauguard.detectors import Thresholded
 from tauguard.detectors.after_alarm.aftermath import AFTER
 from tauguard.detectors.events import detection_window
-from tauguard.envs import STRATA, Episode, PayloadPick, simulate
-from tauguard.traces import Alarm, Collision, Trace
+from tauguard.envs import Episode, PayloadPick, simulate
+from tauguard.traces import STRATA, Alarm, Collision, Trace
 
 #: Seconds at the end of the look in which a lasting contact must touch without a break.
 END = 0.03

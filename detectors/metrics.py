@@ -9,9 +9,8 @@ import numpy as np
 from scipy import stats
 
 from tauguard.detectors.events import Matching
+from tauguard.traces.severity import STRATA, stratum
 
-#: Severity strata by achieved peak ``|tau_ext|`` over joints 1-4 [N m]: [low, high).
-STRATA = ((4.0, 8.0), (8.0, 16.0), (16.0, 32.0), (32.0, 64.0), (64.0, 128.0))
 #: The headline is over collisions from here up [N m].
 HEADLINE = 16.0
 
@@ -51,16 +50,6 @@ def poisson_rate(count: int, hours: float) -> Rate:
         "n": count,
         "hours": hours,
     }
-
-
-def stratum(peak_tau: float) -> str:
-    """Name of the severity stratum that ``peak_tau`` [N m] falls into."""
-    if peak_tau < STRATA[0][0]:
-        return f"0-{STRATA[0][0]:g}"
-    for low, high in STRATA:
-        if low <= peak_tau < high:
-            return f"{low:g}-{high:g}"
-    return f"{STRATA[-1][1]:g}-"
 
 
 def delay_figures(delays: Iterable[float | None]) -> dict[str, Any]:

@@ -12,9 +12,6 @@ from typing import Any
 from tauguard.models import Mismatch
 from tauguard.traces import KINDS
 
-#: Severity strata of the achieved peak |tau_ext| over joints 1-4 [N m].
-STRATA = ((4.0, 8.0), (8.0, 16.0), (16.0, 32.0), (32.0, 64.0), (64.0, 128.0))
-
 
 @dataclass(frozen=True)
 class CollisionPlan:

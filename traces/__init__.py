@@ -2,10 +2,12 @@
 
 from tauguard.traces.contacts import CheckedContacts
 from tauguard.traces.mcap import read_mcap, write_mcap
+from tauguard.traces.severity import STRATA, stratum
 from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
 
 __all__ = [
     "KINDS",
+    "STRATA",
     "Alarm",
     "CheckedContacts",
     "Collision",
@@ -13,5 +15,6 @@ __all__ = [
     "Trace",
     "Truth",
     "read_mcap",
+    "stratum",
     "write_mcap",
 ]

@@ -31,8 +31,8 @@ from tauguard.benchmarks.detection_pool import (
 )
 from tauguard.benchmarks.detection_variations import every
 from tauguard.detectors.events import find_alarms
-from tauguard.envs import STRATA, simulate
-from tauguard.traces import Collision, Trace
+from tauguard.envs import simulate
+from tauguard.traces import STRATA, Collision, Trace
 
 DT = 1e-3
 

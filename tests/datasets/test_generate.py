@@ -11,8 +11,7 @@ from tauguard.datasets import (
     struck_episodes,
     write_dataset,
 )
-from tauguard.envs import STRATA
-from tauguard.traces import read_mcap
+from tauguard.traces import STRATA, read_mcap
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from tauguard.detectors.events import match
-from tauguard.detectors.metrics import delay_figures, figures, poisson_rate, stratum, wilson
+from tauguard.detectors.metrics import delay_figures, figures, poisson_rate, wilson
+from tauguard.traces import stratum
 from tauguard.traces.trace import Alarm, Collision
 
 

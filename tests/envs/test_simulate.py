@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from tauguard.envs import STRATA, CollisionPlan, Episode, PayloadPick, Simulation, labels, simulate
+from tauguard.envs import CollisionPlan, Episode, PayloadPick, Simulation, labels, simulate
 from tauguard.models import Mismatch
+from tauguard.traces import STRATA
 
 KINDS = ("strike", "pulse", "clamp")
 
