@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 
+#include "apart.hpp"
+
 namespace tauguard::cloth {
 namespace {
 
@@ -249,7 +251,11 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
                                   std::int32_t* left) {                                                        \
     return vf ? not_apart<true>(x0, x1, rows, n, left) : not_apart<false>(x0, x1, rows, n, left);              \
   }                                                                                                            \
-  constexpr BatchKernels name{not_apart_##name, gather_##name, at_roots_##name};
+  attributes int not_apart_on_seven_##name(bool vf, const float* points, const std::int32_t* rows, int n,        \
+                                           std::int32_t* left) {                                               \
+    return vf ? not_apart_on_seven<true>(points, rows, n, left) : not_apart_on_seven<false>(points, rows, n, left);  \
+  }                                                                                                            \
+  constexpr BatchKernels name{not_apart_##name, not_apart_on_seven_##name, gather_##name, at_roots_##name};
 
 TAUGUARD_VARIANT(portable, )
 #if defined(__x86_64__)

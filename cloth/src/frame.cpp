@@ -81,7 +81,7 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const double* x_t0,
     const auto solve = kind == MeshCcd::Kind::vf ? solve_vf : solve_ee;
     solve(x_t0, x_t1, block.rows.data(), block.size, method, min_distance, answers.hit.data(),
           {answers.toi.data(), answers.point.data(), answers.normal.data(), answers.weights.data()},
-          part.stats, !ccd.volume().moving);  // what moves has been seen from x, y and z
+          part.stats, {!ccd.volume().moving});  // what moves has been seen from x, y and z
     for (std::size_t i = 0; i < block.size; ++i)
       if (answers.hit[i])
         append_row(part, &block.pairs[2 * i], &answers.toi[i], &answers.point[3 * i],

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "apart.hpp"
 #include "batch.hpp"
 #include "frame.hpp"
 #include "mesh_ccd.hpp"
@@ -207,8 +208,14 @@ NB_MODULE(_mesh, m) {
     {
       const nb::gil_scoped_release release;
       const tauguard::geometry::RoundToNearest guard;
+      Projection points;
+      AxisFilter axes;
+      if (Method(method) == Method::ab2pf && rows.shape(0) >= x_t0.shape(0)) {
+        points.set(x_t0.data(), x_t1.data(), x_t0.shape(0), seven_axes, 0, 1);
+        axes.points = &points;
+      }
       (vf ? solve_vf : solve_ee)(x_t0.data(), x_t1.data(), rows.data(), rows.shape(0), Method(method), min_distance,
-                                 hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats, true);
+                                 hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
     }
     nb::dict counts;
     add_counts(counts, stats);

@@ -196,16 +196,17 @@ void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, 
 
 // A block: what no axis keeps apart goes on in batches.
 template <bool vf>
-void in_batches(const double* x0, const double* x1, const std::int32_t* rows, int n, bool on_axes, double* toi,
+void in_batches(const double* x0, const double* x1, const std::int32_t* rows, int n, AxisFilter axes, double* toi,
                 Stats& stats) {
-  if (!on_axes) {
+  if (!axes.look) {
     for (int first = 0; first < n; first += batch)
       ab2pf<vf>(x0, x1, rows + 4 * first, std::min(batch, n - first), toi + first, stats);
     return;
   }
   std::int32_t left[block], part[4 * batch];
   double found[batch];
-  const int count = batch_kernels().not_apart(vf, x0, x1, rows, n, left);
+  const int count = axes.points ? batch_kernels().not_apart_on_seven(vf, axes.points->of(0), rows, n, left)
+                                : batch_kernels().not_apart(vf, x0, x1, rows, n, left);
   stats.axes += n - count;
   std::fill(toi, toi + n, never);
   for (int first = 0; first < count; first += batch) {
@@ -265,13 +266,13 @@ void compare(const double* x0, const double* x1, const std::int32_t* rows, int n
 
 template <bool vf>
 void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n, Method method,
-           double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats, bool on_axes) {
+           double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats, AxisFilter axes) {
   double toi[block];
   for (std::size_t first = 0; first < n; first += block) {
     const int count = static_cast<int>(std::min<std::size_t>(block, n - first));
     const std::int32_t* part = rows + 4 * first;
     if (method == Method::ab2pf && distance == 0) {
-      in_batches<vf>(x0, x1, part, count, on_axes, toi, stats);
+      in_batches<vf>(x0, x1, part, count, axes, toi, stats);
     } else if (method == Method::ab2pf || method == Method::exact) {
       one_by_one<vf>(x0, x1, part, count, method, distance, toi, stats);
     } else {
@@ -288,11 +289,11 @@ void solve(const double* x0, const double* x1, const std::int32_t* rows, std::si
 }  // namespace
 
 void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, bool on_axes) {
-  solve<true>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, on_axes);
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, AxisFilter axes) {
+  solve<true>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, axes);
 }
 void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, bool on_axes) {
-  solve<false>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, on_axes);
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, AxisFilter axes) {
+  solve<false>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, axes);
 }
 }  // namespace tauguard::cloth

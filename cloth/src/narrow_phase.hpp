@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "k_dop.hpp"
+
 namespace tauguard::cloth {
 
 // ab2pf is right and so is exact, its reference in exact arithmetic throughout; the others are comparators
@@ -33,12 +35,19 @@ struct Stats {
   }
 };
 
-// rows: (n, 4) indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge. on_axes: some may be apart on
-// x, y or z at both ends of the step; false spares ab2pf the look. Callable from several threads. Needs
-// round-to-nearest.
+// How ab2pf first leaves out queries that an axis keeps apart at both ends of the step: by comparing x, y and z; by
+// `points` of the same positions on `seven_axes` (apart.hpp), which pays from about a query a vertex on; or not at
+// all, where the broad phase has. What is left is answered the same whichever it is.
+struct AxisFilter {
+  bool look = true;
+  const Projection* points = nullptr;
+};
+
+// rows: (n, 4) indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge. Callable from several threads.
+// Needs round-to-nearest.
 void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, bool on_axes);
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, AxisFilter axes);
 void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, bool on_axes);
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, AxisFilter axes);
 
 }  // namespace tauguard::cloth

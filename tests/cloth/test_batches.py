@@ -78,3 +78,34 @@ def test_queries_apart_on_an_axis_are_left_out_and_no_others(kind):
     assert ours.counts["axes"] == apart.sum() > 1_000
     assert np.array_equal(ours.hit, exact.hit)
     assert not exact.hit[apart].any()
+
+
+@pytest.mark.parametrize("kind", QUERIES)
+@pytest.mark.parametrize("scene", ["soft", "flat", "lattice", "far", "tiny", "huge", "wide"])
+def test_long_lists_on_shared_positions_are_answered_alike(kind, scene, fastest_after):
+    """They are seen from seven axes in float32 first: no bit of an answer may tell."""
+    rng = np.random.default_rng(5)
+    x = rng.normal(size=(2, 300, 3))
+    x[1] = x[0] + rng.uniform(0, 1, size=(300, 1)) * x[1]
+    if scene == "flat":  # apart by less than float32 can tell, or not at all
+        x[:, :, 2] *= 1e-8
+    if scene == "lattice":
+        x = np.round(x)
+    x = {"far": 1e10 + x, "tiny": 1e-290 * x, "huge": 1e290 * x}.get(scene, x)
+    if scene == "wide":
+        x[:, 0] = 1e200
+    rows = rng.permuted(np.tile(np.arange(300, dtype=np.int32), (6_000, 1)), axis=1)[:, :4].copy()
+    call = solver(Queries(kind == "vf", x[0], x[1], rows), "ab2pf")
+    plain = QUERIES[kind](x[0, rows], x[1, rows])
+    assert plain.hit.any()
+    assert not plain.hit.all()
+    counts = []
+    for name in ("portable", "avx2", ""):
+        if not _mesh.force_batch_kernels(name) and name:
+            continue
+        ours = call()
+        counts.append(ours.counts)
+        assert np.array_equal(ours.hit, plain.hit)
+        assert ours.toi[ours.hit].tobytes() == plain.toi[plain.hit].tobytes()
+    assert all(found == counts[0] for found in counts)
+    assert (counts[0]["axes"] > 1_000) == (scene != "wide")
