@@ -1,4 +1,6 @@
-// Single queries seen from the seven axes of a 14-DOP, in float32: the first filter of long lists on shared positions.
+// The first filter of single queries: which are apart on an axis, on the same side at both ends of the step and so in
+// between. By comparing x, y and z, which is exact; or, where many queries share positions, by the seven axes of a
+// 14-DOP in float32, beyond rounding.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +11,43 @@
 
 namespace tauguard::cloth {
 
-// What it looks at: both ends of the step on 7 axes, 64 bytes a vertex (a cache line).
+inline constexpr int ahead = 8;  // queries between asking for positions and using them
+
+TAUGUARD_INLINE void prefetch(const double* x0, const double* x1, const std::int32_t* row) {
+  for (int v = 0; v < 4; ++v) {
+    __builtin_prefetch(x0 + 3 * std::ptrdiff_t(row[v]));
+    __builtin_prefetch(x1 + 3 * std::ptrdiff_t(row[v]));
+  }
+}
+
+TAUGUARD_INLINE Wide point(const double* x, std::int32_t v) {
+  const double* p = x + 3 * std::ptrdiff_t(v);
+  return Wide{p[0], p[1], p[2], p[2]};
+}
+
+// The queries of n that are not: their numbers go to `left`. rows: (n, 4) vertices.
+template <bool vf>
+TAUGUARD_INLINE int not_apart(const double* x0, const double* x1, const std::int32_t* rows, int n,
+                              std::int32_t* left) {
+  int count = 0;
+  for (int i = 0; i < n; ++i) {
+    prefetch(x0, x1, rows + 4 * std::min(i + ahead, n - 1));
+    const std::int32_t* row = rows + 4 * i;
+    Choice above{-1, -1, -1, -1}, below = above;
+    for (int e = 0; e < 2; ++e) {
+      const double* x = e ? x1 : x0;
+      const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]), d = point(x, row[3]);
+      above &= (vf ? a : min(a, b)) > (vf ? max(max(b, c), d) : max(c, d));
+      below &= (vf ? a : max(a, b)) < (vf ? min(min(b, c), d) : min(c, d));
+    }
+    const Choice apart = above | below;
+    left[count] = i;
+    count += (apart[0] | apart[1] | apart[2]) == 0;
+  }
+  return count;
+}
+
+// What the other looks at: both ends of the step on 7 axes, 64 bytes a vertex (a cache line).
 inline constexpr VolumeKind seven_axes{14, true};
 
 // One end of the step on eight axis slots.
@@ -39,11 +77,10 @@ TAUGUARD_INLINE Sides sides(Eight a, Eight b, Eight c, Eight d) {
   return {above(min(a, b), max(c, d)), above(min(c, d), max(a, b))};
 }
 
-// The queries of n that no axis keeps apart, on the same side at both ends of the step and so in between: their
-// numbers go to `left`. points: of `seven_axes`; rows: (n, 4) vertices.
+// The same on `points`: of `seven_axes`.
 template <bool vf>
 TAUGUARD_INLINE int not_apart_on_seven(const float* points, const std::int32_t* rows, int n, std::int32_t* left) {
-  constexpr int slots = 8, ahead = 12;  // queries between asking for a vertex and using it
+  constexpr int slots = 8;
   const auto place = [points](std::int32_t v) { return points + 2 * slots * std::ptrdiff_t(v); };
   int count = 0;
   for (int i = 0; i < n; ++i) {

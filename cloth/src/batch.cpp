@@ -28,13 +28,9 @@ TAUGUARD_INLINE Wide inverse_power(Wide x) {
 // product: 108 u M, and with 48 u M of the other and the sums, divided by three: 64 u M for each coefficient,
 // which is at most 6 M. Each of three cuts adds 54 u M, a value of the polynomial 60 u M, its argument's own
 // rounding 324 u M: 610 u M in all, below the 1024 u M = 2^-43 M in use. Underflow adds less than 2^-1000.
-TAUGUARD_INLINE void finish(Group& g) {
-  Wide3 p[2], q[2], r[2];
+TAUGUARD_INLINE void finish(const Wide3* p, const Wide3* q, const Wide3* r, Group& g) {
   Wide sizes[3] = {splat(0), splat(0), splat(0)};
   for (int e = 0; e < 2; ++e) {
-    p[e] = field(g, Group::p + 3 * e);
-    q[e] = field(g, Group::q + 3 * e);
-    r[e] = field(g, Group::r + 3 * e);
     sizes[0] = max(sizes[0], size(p[e]));
     sizes[1] = max(sizes[1], size(q[e]));
     sizes[2] = max(sizes[2], size(r[e]));
@@ -43,13 +39,14 @@ TAUGUARD_INLINE void finish(Group& g) {
   const Choice fair = (big > 0x1p-900) & (big < 0x1p900);
   const Wide s = inverse_power(big);
   for (int e = 0; e < 2; ++e) {
-    set(g, Group::p + 3 * e, p[e] = s * p[e]);
-    set(g, Group::q + 3 * e, q[e] = s * q[e]);
-    set(g, Group::r + 3 * e, r[e] = s * r[e]);
+    set(g, Group::p + 3 * e, s * p[e]);
+    set(g, Group::q + 3 * e, s * q[e]);
+    set(g, Group::r + 3 * e, s * r[e]);
   }
-  const Wide3 c00 = cross(q[0], r[0]), c11 = cross(q[1], r[1]), mixed = cross(q[0], r[1]) + cross(q[1], r[0]);
-  const Wide b0 = dot(p[0], c00), b1 = (1.0 / 3) * (dot(p[1], c00) + dot(p[0], mixed)),
-             b2 = (1.0 / 3) * (dot(p[0], c11) + dot(p[1], mixed)), b3 = dot(p[1], c11);
+  const Wide3 p0 = s * p[0], p1 = s * p[1], q0 = s * q[0], q1 = s * q[1], r0 = s * r[0], r1 = s * r[1];
+  const Wide3 c00 = cross(q0, r0), c11 = cross(q1, r1), mixed = cross(q0, r1) + cross(q1, r0);
+  const Wide b0 = dot(p0, c00), b1 = (1.0 / 3) * (dot(p1, c00) + dot(p0, mixed)),
+             b2 = (1.0 / 3) * (dot(p0, c11) + dot(p1, mixed)), b3 = dot(p1, c11);
   const Wide error = 0x1p-43 * ((s * sizes[0]) * (s * sizes[1]) * (s * sizes[2])) + 0x1p-1000;
   const Wide least = min(min(b0, b1), min(b2, b3)), most = max(max(b0, b1), max(b2, b3));
   // One variation: the ends have different signs, and not both coefficients between them the other end's.
@@ -66,59 +63,36 @@ TAUGUARD_INLINE void finish(Group& g) {
   store(g.value[Group::big], s * big);
 }
 
-constexpr int ahead = 8;  // queries between asking for positions and using them
-
-TAUGUARD_INLINE void prefetch(const double* x0, const double* x1, const std::int32_t* row) {
-  for (int v = 0; v < 4; ++v) {
-    __builtin_prefetch(x0 + 3 * std::ptrdiff_t(row[v]));
-    __builtin_prefetch(x1 + 3 * std::ptrdiff_t(row[v]));
-  }
-}
-
-TAUGUARD_INLINE Wide point(const double* x, std::int32_t v) {
-  const double* p = x + 3 * std::ptrdiff_t(v);
-  return Wide{p[0], p[1], p[2], p[2]};
-}
-
+// Of one query, at one end of the step.
+struct Differences { Wide p, q, r; };
 template <bool vf>
-TAUGUARD_INLINE int not_apart(const double* x0, const double* x1, const std::int32_t* rows, int n,
-                              std::int32_t* left) {
-  int count = 0;
-  for (int i = 0; i < n; ++i) {
-    prefetch(x0, x1, rows + 4 * std::min(i + ahead, n - 1));
-    const std::int32_t* row = rows + 4 * i;
-    Choice above{-1, -1, -1, -1}, below = above;
-    for (int e = 0; e < 2; ++e) {
-      const double* x = e ? x1 : x0;
-      const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]), d = point(x, row[3]);
-      above &= (vf ? a : min(a, b)) > (vf ? max(max(b, c), d) : max(c, d));
-      below &= (vf ? a : max(a, b)) < (vf ? min(min(b, c), d) : min(c, d));
-    }
-    const Choice apart = above | below;
-    left[count] = i;
-    count += (apart[0] | apart[1] | apart[2]) == 0;
-  }
-  return count;
+TAUGUARD_INLINE Differences differences(const double* x, const std::int32_t* row) {
+  const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]), d = point(x, row[3]);
+  if (vf) return {a - b, c - b, d - b};
+  return {c - a, b - a, d - c};
+}
+TAUGUARD_INLINE Wide3 transposed(Wide a, Wide b, Wide c, Wide d) {
+  const Wide ab = __builtin_shufflevector(a, b, 0, 4, 2, 6), cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+  const Wide y_ab = __builtin_shufflevector(a, b, 1, 5, 3, 7), y_cd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+  return {__builtin_shufflevector(ab, cd, 0, 1, 4, 5), __builtin_shufflevector(y_ab, y_cd, 0, 1, 4, 5),
+          __builtin_shufflevector(ab, cd, 2, 3, 6, 7)};
 }
 
 template <bool vf>
 TAUGUARD_INLINE void gather(const double* x0, const double* x1, const std::int32_t* rows, int n, Group* groups) {
   for (int first = 0; first < n; first += width, ++groups) {
-    for (int i = 0; i < width; ++i) {
-      const std::int32_t* row = rows + 4 * std::min(first + i, n - 1);
-      prefetch(x0, x1, rows + 4 * std::min(first + i + ahead, n - 1));
-      for (int e = 0; e < 2; ++e) {
-        const double* x = e ? x1 : x0;
-        const double *a = x + 3 * std::ptrdiff_t(row[0]), *b = x + 3 * std::ptrdiff_t(row[1]),
-                     *c = x + 3 * std::ptrdiff_t(row[2]), *d = x + 3 * std::ptrdiff_t(row[3]);
-        for (int k = 0; k < 3; ++k) {
-          groups->value[Group::p + 3 * e + k][i] = vf ? a[k] - b[k] : c[k] - a[k];
-          groups->value[Group::q + 3 * e + k][i] = vf ? c[k] - b[k] : b[k] - a[k];
-          groups->value[Group::r + 3 * e + k][i] = vf ? d[k] - b[k] : d[k] - c[k];
-        }
-      }
+    const auto row = [&](int i) { return rows + 4 * std::min(first + i, n - 1); };
+    for (int i = 0; i < width; ++i) prefetch(x0, x1, row(i + ahead));
+    Wide3 p[2], q[2], r[2];
+    for (int e = 0; e < 2; ++e) {
+      const double* x = e ? x1 : x0;
+      const Differences a = differences<vf>(x, row(0)), b = differences<vf>(x, row(1)),
+                        c = differences<vf>(x, row(2)), d = differences<vf>(x, row(3));
+      p[e] = transposed(a.p, b.p, c.p, d.p);
+      q[e] = transposed(a.q, b.q, c.q, d.q);
+      r[e] = transposed(a.r, b.r, c.r, d.r);
     }
-    finish(*groups);
+    finish(p, q, r, *groups);
   }
 }
 

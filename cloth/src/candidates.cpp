@@ -1,5 +1,6 @@
 #include "candidates.hpp"
 
+#include "lanes.hpp"
 #include "overlap.hpp"
 
 namespace tauguard::cloth {
@@ -12,7 +13,7 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
   for (int j = 0; j < ArityA; ++j) a[j] = va[j * lanes + i];
   static const auto lanes_sharing = overlap_kernels().lanes_sharing;
   const Mask shared = hits & lanes_sharing(a, ArityA, vb, ArityB);
-  out.adjacent += __builtin_popcount(shared);
+  out.adjacent += count_of(shared);
   hits &= ~shared;
   std::int32_t *row = out.rows.data() + 4 * out.size, *pair = out.pairs.data() + 2 * out.size;
   // Every hit is written; the place is taken only by those that count (no branch to mispredict).

@@ -12,11 +12,39 @@ using Instant = std::chrono::steady_clock::time_point;
 
 double seconds(Instant from, Instant to) { return std::chrono::duration<double>(to - from).count(); }
 
+// One collision, and those of one chunk of candidates.
+struct Row {
+  std::int32_t pair[2];
+  double toi, point[3], normal[3], weights[4];
+};
+struct Part {
+  std::vector<Row> rows;
+  Stats stats;
+  double narrow_s = 0;
+};
+
 // Where a collision lies before sorting.
 struct Place {
   std::uint64_t key;
-  std::uint32_t part, index;
+  const Row* row;
 };
+
+// By key, a digit at a time from the last (radix sort); digits that are zero in all keys are passed over.
+void sort(std::vector<Place>& places) {
+  constexpr int digit = 11;
+  std::vector<Place> other(places.size());
+  std::uint64_t used = 0;
+  for (const auto& at : places) used |= at.key;
+  for (int shift = 0; shift < 64; shift += digit) {
+    const auto value = [shift](std::uint64_t key) { return key >> shift & ((1u << digit) - 1); };
+    if (value(used) == 0) continue;
+    std::size_t start[(1 << digit) + 1] = {};
+    for (const auto& at : places) ++start[value(at.key) + 1];
+    for (int i = 0; i < 1 << digit; ++i) start[i + 1] += start[i];
+    for (const auto& at : places) other[start[value(at.key)]++] = at;
+    places.swap(other);
+  }
+}
 
 // What the narrow phase writes for a block of candidates.
 struct Answers {
@@ -26,43 +54,30 @@ struct Answers {
                       normal = std::vector<double>(3 * n), weights = std::vector<double>(4 * n);
 };
 
-template <class T>
-void append(std::vector<T>& to, const T* from, std::size_t n) {
-  to.insert(to.end(), from, from + n);
-}
-
-void append_row(Collisions& to, const std::int32_t* pair, const double* toi, const double* point,
-                const double* normal, const double* weights) {
-  append(to.pairs, pair, 2);
-  append(to.toi, toi, 1);
-  append(to.point, point, 3);
-  append(to.normal, normal, 3);
-  append(to.weights, weights, 4);
-}
-
 // One list in the order of the pairs. A pair occurs once, so that the order is unique.
-Collisions sorted(const std::vector<Collisions>& parts) {
+Collisions sorted(const std::vector<Part>& parts) {
   Collisions all;
   std::vector<Place> places;
-  for (std::size_t p = 0; p < parts.size(); ++p) {
-    for (std::size_t i = 0; i < parts[p].size(); ++i) {
-      const std::int32_t* pair = &parts[p].pairs[2 * i];
-      const auto key = std::uint64_t(std::uint32_t(pair[0])) << 32 | std::uint32_t(pair[1]);
-      places.push_back({key, std::uint32_t(p), std::uint32_t(i)});
-    }
-    all.stats += parts[p].stats;
-    all.narrow_s += parts[p].narrow_s;
+  for (const auto& part : parts) {
+    for (const auto& row : part.rows)
+      places.push_back({std::uint64_t(std::uint32_t(row.pair[0])) << 32 | std::uint32_t(row.pair[1]), &row});
+    all.stats += part.stats;
+    all.narrow_s += part.narrow_s;
   }
-  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.key < b.key; });
-  all.pairs.reserve(2 * places.size());
-  all.toi.reserve(places.size());
-  all.point.reserve(3 * places.size());
-  all.normal.reserve(3 * places.size());
-  all.weights.reserve(4 * places.size());
-  for (const auto& at : places) {
-    const Collisions& c = parts[at.part];
-    append_row(all, &c.pairs[2 * at.index], &c.toi[at.index], &c.point[3 * at.index],
-               &c.normal[3 * at.index], &c.weights[4 * at.index]);
+  sort(places);
+  const std::size_t n = places.size();
+  all.pairs.resize(2 * n);
+  all.toi.resize(n);
+  all.point.resize(3 * n);
+  all.normal.resize(3 * n);
+  all.weights.resize(4 * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Row& row = *places[i].row;
+    std::copy_n(row.pair, 2, &all.pairs[2 * i]);
+    all.toi[i] = row.toi;
+    std::copy_n(row.point, 3, &all.point[3 * i]);
+    std::copy_n(row.normal, 3, &all.normal[3 * i]);
+    std::copy_n(row.weights, 4, &all.weights[4 * i]);
   }
   return all;
 }
@@ -71,21 +86,26 @@ Collisions sorted(const std::vector<Collisions>& parts) {
 
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const double* x_t0, const double* x_t1,
                            Method method, double min_distance) {
-  std::vector<Collisions> parts(ccd.chunks(kind));
+  std::vector<Part> parts(ccd.chunks(kind));
   const auto start = std::chrono::steady_clock::now();
   ccd.for_each_block(kind, [&](const CandidateBlock& block, std::size_t chunk) {
     const geometry::RoundToNearest guard;  // of this thread
     static thread_local Answers answers;
-    Collisions& part = parts[chunk];
+    Part& part = parts[chunk];
     const auto begin = std::chrono::steady_clock::now();
     const auto solve = kind == MeshCcd::Kind::vf ? solve_vf : solve_ee;
     solve(x_t0, x_t1, block.rows.data(), block.size, method, min_distance, answers.hit.data(),
           {answers.toi.data(), answers.point.data(), answers.normal.data(), answers.weights.data()},
           part.stats, {!ccd.volume().moving});  // what moves has been seen from x, y and z
-    for (std::size_t i = 0; i < block.size; ++i)
-      if (answers.hit[i])
-        append_row(part, &block.pairs[2 * i], &answers.toi[i], &answers.point[3 * i],
-                   &answers.normal[3 * i], &answers.weights[4 * i]);
+    for (std::size_t i = 0; i < block.size; ++i) {
+      if (!answers.hit[i]) continue;
+      Row& row = part.rows.emplace_back();
+      std::copy_n(&block.pairs[2 * i], 2, row.pair);
+      row.toi = answers.toi[i];
+      std::copy_n(&answers.point[3 * i], 3, row.point);
+      std::copy_n(&answers.normal[3 * i], 3, row.normal);
+      std::copy_n(&answers.weights[4 * i], 4, row.weights);
+    }
     part.narrow_s += seconds(begin, std::chrono::steady_clock::now());
   });
   Collisions all = sorted(parts);

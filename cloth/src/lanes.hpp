@@ -25,9 +25,15 @@ TAUGUARD_INLINE Wide abs(Wide x) { return (Wide)((Choice)x & INT64_MAX); }
 TAUGUARD_INLINE Wide max(Wide x, Wide y) { return x > y ? x : y; }
 TAUGUARD_INLINE Wide min(Wide x, Wide y) { return x < y ? x : y; }
 TAUGUARD_INLINE unsigned bits(Choice c) {
-  unsigned all = 0;
-  for (int i = 0; i < width; ++i) all |= unsigned(c[i] & 1) << i;
-  return all;
+  const Choice x = c & Choice{1, 2, 4, 8};
+  return unsigned(x[0] | x[1] | x[2] | x[3]);
+}
+
+// How many bits of a mask of 16 (the builtin is a call where the processor's own instruction may be missing).
+TAUGUARD_INLINE unsigned count_of(unsigned x) {
+  x -= x >> 1 & 0x5555;
+  x = (x & 0x3333) + (x >> 2 & 0x3333);
+  return (((x + (x >> 4)) & 0x0f0f) * 0x0101) >> 8 & 0x1f;
 }
 
 struct Wide3 { Wide x, y, z; };

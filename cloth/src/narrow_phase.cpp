@@ -134,7 +134,7 @@ int make_pieces(Batch& b, int n, Stats& stats) {
     const Group& group = b.groups[g];
     const unsigned present = (1u << std::min(width, n - g * width)) - 1;
     rest[g] = static_cast<std::uint8_t>(present & ~group.no_root & ~group.one_root);
-    stats.cubic_sign += __builtin_popcount(present & group.no_root);
+    stats.cubic_sign += count_of(present & group.no_root);
     for (unsigned lanes = present & group.one_root; lanes; lanes &= lanes - 1) {
       const int lane = __builtin_ctz(lanes);
       Piece& piece = b.pieces[b.count++];
