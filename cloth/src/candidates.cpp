@@ -43,15 +43,13 @@ void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves
   static const OverlapKernels& kernels = overlap_kernels();
   const bool edges = &a == &b;
   const float *block_a = a.block(leaves.a), *block_b = b.block(leaves.b);
-  Mask rows = a.occupied(leaves.a), columns = b.occupied(leaves.b);
+  Mask rows = a.occupied(leaves.a);
   const bool same = edges && leaves.a == leaves.b;
-  if (!same) {
+  if (!same)
     rows = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), block_a, a.axes(), a.times(), rows);
-    columns = kernels.lanes_of_node(a.node(a.leaves() + leaves.a), a.slots(), block_b, a.axes(), a.times(), columns);
-    if (rows == 0 || columns == 0) return;
-  }
+  if (rows == 0) return;
   std::uint16_t masks[lanes];
-  kernels.rows_of_block(block_a, rows, block_b, a.axes(), a.times(), columns, masks);
+  rows = kernels.rows_of_block(block_a, rows, block_b, a.axes(), a.times(), b.occupied(leaves.b), masks);
   const std::int32_t *ids_a = a.ids(leaves.a), *ids_b = b.ids(leaves.b);
   const std::int32_t *va = a.vertices(leaves.a), *vb = b.vertices(leaves.b);
   for (; rows; rows &= rows - 1) {

@@ -145,6 +145,37 @@ struct Row {
   }
 };
 
+// The ends of the step changed round.
+template <int slots>
+Row<slots> other_end(const Row<slots>& row) {
+  Row<slots> other;
+  for (int i = 0; i < row.fours; ++i) other.value[i] = row.value[(i + row.fours / 2) % row.fours];
+  return other;
+}
+
+// One side of 16 volumes into a block, four lanes by four axis slots at a time.
+template <int slots>
+void write_lanes(const Row<slots>* rows, int axes, int times, float* block) {
+  for (int r = 0; r < times * slots; r += 4) {
+    const int t = r / slots;
+    for (int lane = 0; lane < lanes; lane += 4) {
+      const auto a = rows[lane].value[r / 4], b = rows[lane + 1].value[r / 4], c = rows[lane + 2].value[r / 4],
+                 d = rows[lane + 3].value[r / 4];
+      const auto ab = __builtin_shufflevector(a, b, 0, 4, 1, 5);
+      const auto cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+      const auto later_ab = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+      const auto later_cd = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+      const typename Row<slots>::Four columns[] = {
+          __builtin_shufflevector(ab, cd, 0, 1, 4, 5), __builtin_shufflevector(ab, cd, 2, 3, 6, 7),
+          __builtin_shufflevector(later_ab, later_cd, 0, 1, 4, 5), __builtin_shufflevector(later_ab, later_cd, 2, 3, 6, 7)};
+      for (int j = 0; j < 4; ++j) {
+        const int axis = r % slots + j;
+        if (axis < axes) std::memcpy(block + (axis * times + t) * 2 * lanes + lane, columns + j, sizeof columns[j]);
+      }
+    }
+  }
+}
+
 template <int slots>
 void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
   const std::int32_t* v = vertices(leaf);
@@ -156,31 +187,32 @@ void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
   node_low.fill(infinity);
   node_high.fill(-infinity);
   for (int lane = 0; lane < lanes; ++lane) {
-    low[lane].fill(infinity);
-    high[lane].fill(-infinity);
-    if (!(occupied_[leaf] >> lane & 1)) continue;
-    for (int j = 0; j < arity_; ++j) {
-      point.load(points.of(v[j * lanes + lane]));
-      low[lane].lower_to(point);
-      high[lane].raise_to(point);
+    if (!(occupied_[leaf] >> lane & 1)) {
+      low[lane].fill(infinity);
+      high[lane].fill(-infinity);
+      continue;
     }
-    if (times_ == 1)
-      for (int k = 0; k < slots; ++k) {
-        low[lane][k] = std::min(low[lane][k], low[lane][slots + k]);
-        high[lane][k] = std::max(high[lane][k], high[lane][slots + k]);
-      }
-    low[lane].add(pad, -1);
-    high[lane].add(pad, 1);
-    node_low.lower_to(low[lane]);
-    node_high.raise_to(high[lane]);
+    point.load(points.of(v[lane]));
+    Row<slots> least = point, most = point;
+    for (int j = 1; j < arity_; ++j) {
+      point.load(points.of(v[j * lanes + lane]));
+      least.lower_to(point);
+      most.raise_to(point);
+    }
+    if (times_ == 1) {
+      least.lower_to(other_end(least));
+      most.raise_to(other_end(most));
+    }
+    least.add(pad, -1);
+    most.add(pad, 1);
+    node_low.lower_to(least);
+    node_high.raise_to(most);
+    low[lane] = least;
+    high[lane] = most;
   }
   float* out = blocks_.data() + leaf * block_stride();
-  for (int k = 0; k < axes_; ++k)
-    for (int t = 0; t < times_; ++t, out += 2 * lanes)
-      for (int lane = 0; lane < lanes; ++lane) {
-        out[lane] = low[lane][t * slots + k];
-        out[lanes + lane] = high[lane][t * slots + k];
-      }
+  write_lanes(low, axes_, times_, out);
+  write_lanes(high, axes_, times_, out + lanes);
   float* node = nodes_.data() + (leaves_ + std::size_t(leaf)) * node_stride();
   for (int t = 0; t < times_; ++t, node += 2 * slots)
     for (int k = 0; k < slots; ++k) {

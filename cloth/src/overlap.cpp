@@ -43,12 +43,15 @@ Mask node_portable(const float* node, int slots, const float* block, int axes, i
                          Mask wanted) {
   return apart_portable(node, in_node(slots), block, axes, times, wanted);
 }
-void rows_portable(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
+Mask rows_portable(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
                    std::uint16_t* out) {
+  Mask found = 0;
   for (; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
     out[row] = static_cast<std::uint16_t>(apart_portable(a + row, in_block(times), b, axes, times, wanted));
+    found |= Mask(out[row] != 0) << row;
   }
+  return found;
 }
 Mask sharing_portable(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
   std::int32_t equal[lanes] = {};
@@ -89,12 +92,15 @@ TAUGUARD_AVX2 Mask node_avx2(const float* node, int slots, const float* block, i
                          Mask wanted) {
   return overlap_avx2(node, in_node(slots), block, axes, times, wanted);
 }
-TAUGUARD_AVX2 void rows_avx2(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
+TAUGUARD_AVX2 Mask rows_avx2(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
                              std::uint16_t* out) {
+  Mask found = 0;
   for (; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
     out[row] = static_cast<std::uint16_t>(overlap_avx2(a + row, in_block(times), b, axes, times, wanted));
+    found |= Mask(out[row] != 0) << row;
   }
+  return found;
 }
 TAUGUARD_AVX2 Mask sharing_avx2(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
   __m256i left = _mm256_setzero_si256(), right = left;
@@ -109,37 +115,69 @@ TAUGUARD_AVX2 Mask sharing_avx2(const std::int32_t* a, int arity_a, const std::i
          Mask(_mm256_movemask_ps(_mm256_castsi256_ps(right))) << 8;
 }
 
-TAUGUARD_AVX512 TAUGUARD_INLINE __mmask16 apart16(const float* row, RowStride s, const float* b, int times) {
-  __mmask16 below = _mm512_cmp_ps_mask(_mm512_set1_ps(row[s.side]), _mm512_loadu_ps(b), _CMP_LT_OQ);
-  __mmask16 above = _mm512_cmp_ps_mask(_mm512_loadu_ps(b + lanes), _mm512_set1_ps(row[0]), _CMP_LT_OQ);
-  if (times == 1) return below | above;
-  row += s.end;
-  b += 2 * lanes;
-  below = _mm512_mask_cmp_ps_mask(below, _mm512_set1_ps(row[s.side]), _mm512_loadu_ps(b), _CMP_LT_OQ);
-  above = _mm512_mask_cmp_ps_mask(above, _mm512_loadu_ps(b + lanes), _mm512_set1_ps(row[0]), _CMP_LT_OQ);
-  return below | above;
-}
+// Of 16 volumes on one axis.
+template <int times>
+struct Axis16 {
+  __m512 low[times], high[times];
+  TAUGUARD_AVX512 TAUGUARD_INLINE static Axis16 load(const float* b) {
+    Axis16 axis;
+    for (int t = 0; t < times; ++t, b += 2 * lanes) {
+      axis.low[t] = _mm512_loadu_ps(b);
+      axis.high[t] = _mm512_loadu_ps(b + lanes);
+    }
+    return axis;
+  }
+  TAUGUARD_AVX512 TAUGUARD_INLINE Mask apart(const float* row, RowStride s) const {
+    __mmask16 below = 0xffff, above = 0xffff;
+    for (int t = 0; t < times; ++t, row += s.end) {
+      below = _mm512_mask_cmp_ps_mask(below, _mm512_set1_ps(row[s.side]), low[t], _CMP_LT_OQ);
+      above = _mm512_mask_cmp_ps_mask(above, high[t], _mm512_set1_ps(row[0]), _CMP_LT_OQ);
+    }
+    return Mask(below | above);
+  }
+};
 
+template <int times>
 TAUGUARD_AVX512 TAUGUARD_INLINE Mask overlap_avx512(const float* row, RowStride s, const float* b, int axes,
-                                                    int times, Mask wanted) {
-  const int step = 2 * lanes * times;
-  const Mask box = apart16(row, s, b, times) | apart16(row + s.axis, s, b + step, times) |
-                   apart16(row + 2 * s.axis, s, b + 2 * step, times);
-  wanted &= ~box;
-  for (int k = 3; k < axes && wanted; ++k) wanted &= ~Mask(apart16(row + k * s.axis, s, b + k * step, times));
+                                                    Mask wanted) {
+  for (int k = 0; k < axes; ++k, row += s.axis, b += 2 * lanes * times)
+    wanted &= ~Axis16<times>::load(b).apart(row, s);
   return wanted;
 }
 
 TAUGUARD_AVX512 Mask node_avx512(const float* node, int slots, const float* block, int axes, int times,
                          Mask wanted) {
-  return overlap_avx512(node, in_node(slots), block, axes, times, wanted);
+  return times == 1 ? overlap_avx512<1>(node, in_node(slots), block, axes, wanted)
+                    : overlap_avx512<2>(node, in_node(slots), block, axes, wanted);
 }
-TAUGUARD_AVX512 void rows_avx512(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
-                                 std::uint16_t* out) {
+
+// On x, y and z for all rows, then on the other axes for those with lanes left: few branches to mispredict.
+template <int times>
+TAUGUARD_AVX512 TAUGUARD_INLINE Mask rows_avx512(const float* a, Mask rows, const float* b, int axes, Mask wanted,
+                                                 std::uint16_t* out) {
+  constexpr int step = 2 * lanes * times;
+  const auto x = Axis16<times>::load(b), y = Axis16<times>::load(b + step), z = Axis16<times>::load(b + 2 * step);
+  const RowStride s = in_block(times);
+  int some[lanes], n = 0;
   for (; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
-    out[row] = static_cast<std::uint16_t>(overlap_avx512(a + row, in_block(times), b, axes, times, wanted));
+    const float* at = a + row;
+    const Mask left = wanted & ~(x.apart(at, s) | y.apart(at + s.axis, s) | z.apart(at + 2 * s.axis, s));
+    out[row] = static_cast<std::uint16_t>(left);
+    some[n] = row;
+    n += left != 0;
   }
+  Mask found = 0;
+  for (int i = 0; i < n; ++i) {
+    const Mask left = overlap_avx512<times>(a + some[i] + 3 * s.axis, s, b + 3 * step, axes - 3, out[some[i]]);
+    out[some[i]] = static_cast<std::uint16_t>(left);
+    found |= Mask(left != 0) << some[i];
+  }
+  return found;
+}
+TAUGUARD_AVX512 Mask rows_avx512(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
+                                 std::uint16_t* out) {
+  return times == 1 ? rows_avx512<1>(a, rows, b, axes, wanted, out) : rows_avx512<2>(a, rows, b, axes, wanted, out);
 }
 TAUGUARD_AVX512 Mask sharing_avx512(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
   Mask mask = 0;

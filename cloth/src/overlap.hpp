@@ -15,8 +15,8 @@ struct OverlapKernels {
   Mask (*lanes_of_node)(const float* node, int slots, const float* block, int axes, int times,
                         Mask candidates);
   // For every row in `rows` (a lane of `a`): out[row] = the lanes of `b`, of `candidates`, that it does
-  // not stand apart from.
-  void (*rows_of_block)(const float* a, Mask rows, const float* b, int axes, int times, Mask candidates,
+  // not stand apart from. The rows that have any.
+  Mask (*rows_of_block)(const float* a, Mask rows, const float* b, int axes, int times, Mask candidates,
                         std::uint16_t* out);
   // The lanes of `b`, 16 features as [vertex][lane], that share a vertex with one feature, `a`.
   Mask (*lanes_sharing)(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b);
