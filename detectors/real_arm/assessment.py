@@ -26,7 +26,11 @@ FAST_ENOUGH = 0.05
 
 
 def residual_rms(
-    arm: ArmModel, trace: Trace, rate: float = 20.0, unknowns: Unknowns | None = None
+    arm: ArmModel,
+    trace: Trace,
+    rate: float = 20.0,
+    unknowns: Unknowns | None = None,
+    stop: float = 0.0,
 ) -> Array:
     """Root mean square of the observer's residual from the first motion to the last one.
 
@@ -35,13 +39,15 @@ def residual_rms(
         trace: collision-free.
         rate: of the observer [1/s].
         unknowns: what is tracked meanwhile (default: nothing, the plain observer).
+        stop: seconds before the last motion that do not count, see
+            :func:`~tauguard.detectors.real_arm.recording.moving_span`.
 
     Returns:
         [N m], shape (n,).
     """
     estimator = Estimator(arm, rate, trace.dt, unknowns or Unknowns.none())
     left = estimator.run(trace.t, trace.q, trace.qd, trace.current).left
-    level: Array = np.sqrt((left[moving_span(trace)] ** 2).mean(axis=0))
+    level: Array = np.sqrt((left[moving_span(trace, stop=stop)] ** 2).mean(axis=0))
     return level
 
 
@@ -83,11 +89,12 @@ def left_out(
     friction: FrictionModel = REAL_FRICTION,
     beliefs: Beliefs | None = None,
     rate: float = 20.0,
+    stop: float = 0.0,
 ) -> list[Array]:
     """Residual RMS of each recording under the calibration from all the others [N m], (n,) each.
 
     With gains that are identified, the gains of all recordings are used for all, so that the
-    figures are in the same newton metres.
+    figures are in the same newton metres. ``stop``: as in :func:`residual_rms`.
 
     Raises:
         ValueError: fewer than two recordings, or what :func:`identify` raises.
@@ -104,7 +111,7 @@ def left_out(
     for k, recording in enumerate(turns):
         others = [*recordings[:k], *recordings[k + 1 :]]
         part = identify(arm, others, friction=friction, beliefs=beliefs, rate=rate)
-        found.append(residual_rms(part.arm, recording.trace, rate))
+        found.append(residual_rms(part.arm, recording.trace, rate, stop=stop))
     return found
 
 

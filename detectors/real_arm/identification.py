@@ -34,13 +34,14 @@ from tauguard.detectors.real_arm.regression import Filtered, System, filtered
 
 Array = NDArray[np.float64]
 
-#: Columns that a real geared joint needs: presliding of several lengths, Stribeck, load-dependent
-#: friction, and a torque per ampere that changes with the current.
+#: Columns that a real geared joint needs: presliding of several lengths, Stribeck, viscous friction
+#: that flattens at speed, load-dependent friction, and a torque per ampere that changes with the
+#: current.
 REAL_FRICTION = FrictionModel(
     bristles=(),
     stops=(1e-3, 3e-3, 1e-2, 3e-2),
     stribeck=(0.02, 0.05),
-    slopes=(0.01, 0.05, 0.1, 0.3),
+    slopes=(0.01, 0.05, 0.1, 0.3, 1.0),
     loaded=(0.02, 0.1, 0.3),
     saturation=True,
     modelled=True,

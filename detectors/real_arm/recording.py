@@ -41,7 +41,7 @@ class Recording:
     load: Load | None = Load()  #: None: something unknown was carried
 
 
-def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
+def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
     """Rows from the first motion of any joint to the last one, shape (T,).
 
     Before and after, static friction takes an unknown share of the torque.
@@ -49,6 +49,8 @@ def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
     Args:
         trace: the log.
         margin: seconds at the log's beginning that are left out in any case.
+        stop: seconds before the last motion that are left out: a program that is cut off brakes all
+            joints within a sample or two, which the log does not resolve.
 
     Raises:
         ValueError: no joint ever moves.
@@ -58,7 +60,8 @@ def moving_span(trace: Trace, margin: float = 1.0) -> Bools:
         raise ValueError(f"no joint moves faster than {MOVING} rad/s")
     rows = np.zeros(len(trace.t), dtype=np.bool_)
     rows[moves[0] : moves[-1] + 1] = True
-    return np.asarray(rows & (trace.t >= trace.t[0] + margin))
+    within = (trace.t >= trace.t[0] + margin) & (trace.t <= trace.t[moves[-1]] - stop)
+    return np.asarray(rows & within)
 
 
 def is_told(recording: Recording) -> bool:

@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.detectors.after_alarm.contact_force import link_poses, point_jacobians
+from tauguard.detectors.numbers import RobotNumbers
 from tauguard.traces.trace import Array, Bools, Trace
 
 #: Time course of a contact over its duration, 0 to 1, by name.
@@ -56,8 +58,46 @@ def add_contact(trace: Trace, drive_gain: Array, contact: Added) -> Trace:
     phase = (trace.t - contact.start) / contact.seconds
     inside = (phase >= 0) & (phase <= 1)
     course = np.where(inside, SHAPES[contact.shape](np.clip(phase, 0, 1)), 0.0)
-    current = trace.current - np.outer(course, np.asarray(contact.torque) / drive_gain)
+    return add_torque(trace, drive_gain, np.outer(course, contact.torque))
+
+
+def add_torque(trace: Trace, drive_gain: Array, torque: Array) -> Trace:
+    """The trace with external torques [N m], shape (T, n), in its currents; labelled semi-real."""
+    current = trace.current - torque / drive_gain
     return replace(trace, current=current, meta={**trace.meta, "collisions": "semi-real"})
+
+
+@dataclass(frozen=True)
+class Push:
+    """A hand's push on the last link: half a sine in a direction that the room holds fixed."""
+
+    start: float  #: [s]
+    seconds: float  #: how long
+    force: tuple[float, float, float]  #: at its peak, world frame [N]
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: in the last link's frame [m]
+
+
+def push_torque(robot: RobotNumbers, trace: Trace, push: Push) -> Array:
+    """What a push does to the joints along the recorded motion [N m], shape (T, n).
+
+    Args:
+        robot: the arm.
+        trace: whose positions say where the force acts.
+        push: what acts; outside of the trace it adds nothing.
+
+    Raises:
+        ValueError: a push that does not last.
+    """
+    if not push.seconds > 0:
+        raise ValueError(f"push of {push.seconds} s: expected more than 0 s")
+    phase = (trace.t - push.start) / push.seconds
+    out: Array = np.zeros_like(trace.q)
+    for k in np.flatnonzero((phase >= 0) & (phase <= 1)):
+        poses = link_poses(robot, trace.q[k])
+        point = poses.origin[-1] + poses.rotation[-1] @ np.asarray(push.point)
+        jacobian = point_jacobians(robot, poses, np.array([robot.joints - 1]), point[None])[0]
+        out[k] = np.sin(np.pi * phase[k]) * np.asarray(push.force) @ jacobian
+    return out
 
 
 def smallest_found(
