@@ -60,7 +60,7 @@ def pushed(
             continue
         rng = np.random.default_rng([seed, k])
         false = peer(trace) if trace.t[-1] > trace.t[0] + learned + 1 else np.zeros(0, np.bool_)
-        still = detector.rests(trace).all(axis=1)
+        still = np.asarray(detector.rests(trace).all(axis=1))
         for start in moments(np.ones(len(trace.t), np.bool_), trace.t, count, seed + k):
             direction = rng.normal(size=3)
             size, seconds = rng.uniform(*NEWTONS), rng.uniform(*SECONDS)
