@@ -29,7 +29,7 @@ from tauguard.detectors.numbers import (
     mass_matrix,
 )
 from tauguard.detectors.real_arm.consistent import solve_consistent
-from tauguard.detectors.real_arm.recording import Recording, is_told, known_load
+from tauguard.detectors.real_arm.recording import Recording, is_told, known_load, moving_span
 from tauguard.detectors.real_arm.regression import Filtered, System, filtered
 
 Array = NDArray[np.float64]
@@ -59,7 +59,10 @@ class Beliefs:
     """Relative to the joint's largest entry of the mass matrix, or to a twentieth of the arm's
     largest: the rotor of a wrist weighs more, through its gear, than all that it turns."""
     gain: float = 0.5  #: relative, where gains are identified
-    friction: float = 30.0  #: of a friction weight [N m per unit], but for the following
+    friction: float = 0.3
+    """Of a friction weight, per median torque of the joint in the log that asks most of it, but for
+    the following: columns that are alike at the logged speeds share what they explain, and do not
+    cancel each other beyond."""
     loaded: float = 0.3  #: of friction per load [1]
     saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
     payload: float = 5.0  #: of a load that was not told [kg]
@@ -126,7 +129,9 @@ def _friction_beliefs(
     friction: FrictionModel, beliefs: Beliefs, gain: Array, recordings: Sequence[Recording]
 ) -> Array:
     """Standard deviations of the friction weights, shape (n, columns)."""
-    out = np.full((len(gain), friction.columns), beliefs.friction)
+    sizes = [np.abs(r.trace.current * gain)[moving_span(r.trace)] for r in recordings]
+    usual = np.max([np.median(size, axis=0) for size in sizes], axis=0)
+    out = np.repeat(np.maximum(beliefs.friction * usual, 1e-6)[:, None], friction.columns, axis=1)
     out[:, friction.load_columns] = beliefs.loaded
     if friction.saturation:
         peaks = [np.abs(r.trace.current * gain).max(axis=0) for r in recordings]
