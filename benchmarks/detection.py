@@ -1,34 +1,29 @@
 """The dissertation's experiment on simulated arms: detectors, speeds, operating points.
 
 Every arm differs from the nominal one within the measured magnitudes; its detectors are trained on
-its own 15 slices with the dissertation's payloads, and judged on motions with payloads that no
-slice had and nobody tells.
+its own 15 slices with the dissertation's payloads, get their thresholds from other motion of that
+arm, and are judged on motions with payloads that no slice had and nobody tells.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tauguard.benchmarks import detection_report as report
 from tauguard.benchmarks import detection_table
 from tauguard.benchmarks import detection_variations as variations
 from tauguard.benchmarks.detection_fleet import (
+    NETWORK,
     TEST,
-    Fleet,
     Training,
-    common_thresholds,
+    calibration_pieces,
     stream,
     train,
 )
-from tauguard.benchmarks.detection_judge import (
-    Tallies,
-    Thresholds,
-    judge_free,
-    judge_struck,
-    merged,
-)
+from tauguard.benchmarks.detection_judge import Tallies, judge_free, judge_struck, merged
+from tauguard.benchmarks.detection_oracle import ORACLE, oracle
 from tauguard.benchmarks.detection_pool import (
     FAINT,
     FAINT_FORCES,
@@ -37,8 +32,10 @@ from tauguard.benchmarks.detection_pool import (
     free_pool,
     struck_pool,
 )
+from tauguard.benchmarks.detection_thresholds import Fleet, Pieces, watched
 from tauguard.benchmarks.report import Row
 from tauguard.benchmarks.workers import Workers
+from tauguard.detectors.detector import Detector
 from tauguard.envs import simulate
 from tauguard.traces import STRATA
 
@@ -55,7 +52,7 @@ class Size:
     training: Training
     calibration_hours: float  #: collision-free, for the thresholds, of each arm
     hours: float  #: collision-free, judged, all speeds and arms together
-    short: float  #: of them, those that all detectors judge; the rest only the first one
+    short: float  #: of them, those that all detectors judge; the rest only the thorough ones
     per_stratum: int  #: judged collisions of a stratum at one speed
     faint: int  #: the same below the judged strata
     target: float = 0.5  #: false alarms per hour that the third threshold aims at
@@ -76,7 +73,9 @@ ALL = (
 )
 #: Those whose need for collisions is compared.
 LEARNERS = ("srq-svr", "window-network", "boosting")
-PARTS = ("conditions", "training_size", "sigma", "sample_rate")
+#: Those that judge all of the collision-free motion.
+THOROUGH = ("srq-svr", "boosting")
+PARTS = ("training_size", "conditions", "sigma", "sample_rate")
 FULL = Size(3, ALL, Training(), 0.5, 10.0, 1.0, 13, 5, variations=True)
 QUICK = Size(
     1,
@@ -99,64 +98,76 @@ def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
     """Train, judge, report; the result does not depend on the number of ``workers``."""
     arms = [1000 * (seed + 1) + k for k in range(size.arms)]
     with Workers(workers) as each:
-        fleets = list(each(_train, [(size, seed, arm) for arm in arms]))
-        thresholds = common_thresholds(fleets, size.target)
-        jobs = [(size, seed, speed, arm) for speed in SPEEDS for arm in (*arms, 0)]
-        tallies = dict(
-            zip(
-                [(job[2], job[3]) for job in jobs],
-                each(_judge, [(job, fleets, thresholds) for job in jobs]),
-                strict=True,
-            )
-        )
+        trained = dict(zip(arms, each(_train, [(size, seed, arm) for arm in arms]), strict=True))
+        fleets = _calibrated(size, seed, trained, each)
+        parts = [(part, arms[0], fleets[arms[0]], seed) for part in PARTS]
+        more = each(_vary, parts if size.variations else [])  # runs beside the judging
+        jobs = [(size, seed, speed, arm) for speed in SPEEDS for arm in (0, *arms)]
+        tallies = list(each(_judge, [(job, fleets) for job in jobs]))
         by_speed = {
-            speed: merged(t for (own, _), t in tallies.items() if own == speed) for speed in SPEEDS
+            speed: merged(t for (*_, own, _), t in zip(jobs, tallies, strict=True) if own == speed)
+            for speed in SPEEDS
         }
-        rows = report.rows(by_speed, thresholds)
+        rows = report.rows(by_speed, report.spread(list(fleets.values())))
         rows += detection_table.headline(rows)
-        if size.variations:
-            jobs_more = [(part, fleets, thresholds, seed) for part in PARTS]
-            for more in each(_vary, jobs_more):
-                rows += more
-    return rows
+        return rows + [row for found in more for row in found]
 
 
-def _train(job: tuple[Size, int, int]) -> Fleet:
+def _train(job: tuple[Size, int, int]) -> dict[str, Detector]:
     size, seed, arm = job
-    return train(seed, arm, size.detectors, size.training, size.calibration_hours)
+    return train(seed, arm, size.detectors, size.training)
 
 
-def _vary(job: tuple[str, Sequence[Fleet], Thresholds, int]) -> list[Row]:
-    part, fleets, thresholds, seed = job
+def _calibrated(
+    size: Size,
+    seed: int,
+    trained: Mapping[int, dict[str, Detector]],
+    each: Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]],
+) -> dict[int, Fleet]:
+    """Every arm's detectors with levels and thresholds from that arm's own motion."""
+    hours = size.calibration_hours / len(SPEEDS)
+    jobs = [(seed, arm, own, speed, hours) for arm, own in trained.items() for speed in SPEEDS]
+    pieces: dict[int, dict[float, dict[str, Pieces]]] = {arm: {} for arm in trained}
+    for (_, arm, _, speed, _), found in zip(jobs, each(_calibrate, jobs), strict=True):
+        pieces[arm][speed] = found
+    network = NETWORK if NETWORK in size.detectors else None
+    return {arm: watched(own, pieces[arm], network, size.target) for arm, own in trained.items()}
+
+
+def _calibrate(job: tuple[int, int, dict[str, Detector], float, float]) -> dict[str, Pieces]:
+    return calibration_pieces(*job)
+
+
+def _vary(job: tuple[str, int, Fleet, int]) -> list[Row]:
+    part, arm, fleet, seed = job
     extent = variations.Extent()
     if part == "conditions":
-        return variations.conditions(fleets, thresholds, seed, extent)
-    bench = variations.Bench(seed, fleets[0].arm, extent)
+        return variations.conditions(fleet, arm, seed, extent)
+    bench = variations.Bench(seed, arm, extent)
     if part == "training_size":
         return variations.training_size(bench, LEARNERS)
     return {"sigma": variations.sigmas, "sample_rate": variations.sample_rate}[part](bench)
 
 
-def _judge(job: tuple[tuple[Size, int, float, int], Sequence[Fleet], Thresholds]) -> Tallies:
+def _judge(job: tuple[tuple[Size, int, float, int], Mapping[int, Fleet]]) -> Tallies:
     """One speed: an arm's free motion, or (arm 0) the collisions of all arms."""
-    (size, seed, speed, arm), fleets, thresholds = job
+    (size, seed, speed, arm), fleets = job
     test = stream(seed, TEST)
-    by_arm = {fleet.arm: fleet.detectors for fleet in fleets}
     if arm:
         share = 1 / len(SPEEDS) / size.arms
         pool = free_pool(test, speed, (arm,), share * size.hours)
         early = len(free_pool(test, speed, (arm,), share * size.short))
-        first = {name: d for name, d in list(by_arm[arm].items())[:1]}
+        thorough = {name: own for name, own in fleets[arm].items() if name in THOROUGH}
         return merged(
-            judge_free(by_arm[arm] if k < early else first, thresholds, simulate(episode))
+            judge_free(fleets[arm] if k < early else thorough, simulate(episode))
             for k, (_, episode) in enumerate(pool)
         )
     pools = [(STRATA, size.per_stratum, FORCES), (FAINT, size.faint, FAINT_FORCES)]
     return merged(
-        judge_struck(by_arm[struck.arm], thresholds, struck)
+        judge_struck({**fleets[struck.arm], ORACLE: oracle()}, struck)
         for k, (strata, count, forces) in enumerate(pools)
         if count
-        for struck in struck_pool(test + k, speed, list(by_arm), count, strata, forces)
+        for struck in struck_pool(test + k, speed, list(fleets), count, strata, forces)
     )
 
 

@@ -1,4 +1,4 @@
-"""The detectors of one arm: its training set, their training, their thresholds."""
+"""The detectors of one arm: its training set, their training, the motion for their thresholds."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauguard.benchmarks.detection_judge import Peaks, Thresholds, free_peaks, set_thresholds
-from tauguard.benchmarks.detection_pool import SPEEDS, Conditions, free_pool
+from tauguard.benchmarks.detection_pool import Conditions, free_pool
+from tauguard.benchmarks.detection_thresholds import Pieces, free_pieces
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
 from tauguard.detectors.detector import Detector
@@ -54,15 +54,6 @@ class Training:
         return [simulate(under.applied(episode)) for episode in [*struck, *free]]
 
 
-@dataclass(frozen=True)
-class Fleet:
-    """Trained detectors of one arm by name, and their collision-free peaks by speed and name."""
-
-    arm: int
-    detectors: dict[str, Detector]
-    peaks: dict[float, dict[str, Peaks]]
-
-
 def nominal() -> ArmModel:
     """What is believed of every arm before training: nominal numbers, friction of weight 0.
 
@@ -76,8 +67,8 @@ def nominal() -> ArmModel:
     return ArmModel(robot, drive.gain, friction)
 
 
-def train(seed: int, arm: int, names: Sequence[str], training: Training, hours: float) -> Fleet:
-    """Train on the arm's slices, then look at ``hours`` of other collision-free motion of it."""
+def train(seed: int, arm: int, names: Sequence[str], training: Training) -> dict[str, Detector]:
+    """The detectors of one arm, trained on its slices."""
     traces = training.traces(seed, arm)
     robot = nominal()
     detectors: dict[str, Detector] = {name: make_detector(name) for name in names}
@@ -86,26 +77,14 @@ def train(seed: int, arm: int, names: Sequence[str], training: Training, hours: 
         detector.fit(traces, robot)
     for front in fronts:
         front.forget()
-    return Fleet(arm, detectors, calibration_peaks(seed, arm, detectors, hours))
+    return detectors
 
 
-def calibration_peaks(
-    seed: int, arm: int, detectors: dict[str, Detector], hours: float
-) -> dict[float, dict[str, Peaks]]:
-    """Peaks over collision-free motion with the training payloads, by speed and detector."""
+def calibration_pieces(
+    seed: int, arm: int, detectors: dict[str, Detector], speed: float, hours: float
+) -> dict[str, Pieces]:
+    """What detectors say of the arm's collision-free motion with the training payloads."""
     under = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
-    peaks = {}
-    for speed in SPEEDS:
-        pool = free_pool(stream(seed, CALIBRATE), speed, (arm,), hours / len(SPEEDS), under)
-        found = [free_peaks(detectors, simulate(episode)) for _, episode in pool]
-        peaks[speed] = {name: Peaks.joined([f[name] for f in found]) for name in detectors}
-    return peaks
-
-
-def common_thresholds(fleets: Sequence[Fleet], per_hour: float) -> Thresholds:
-    """One threshold for all arms: their detectors' peaks are put together."""
-    joined = {
-        speed: {name: Peaks.joined([f.peaks[speed][name] for f in fleets]) for name in own}
-        for speed, own in fleets[0].peaks.items()
-    }
-    return set_thresholds(joined, NETWORK, per_hour)
+    pool = free_pool(stream(seed, CALIBRATE), speed, (arm,), hours, under)
+    found = [free_pieces(detectors, simulate(episode)) for _, episode in pool]
+    return {name: Pieces.joined([f[name] for f in found]) for name in detectors}

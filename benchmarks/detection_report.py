@@ -8,15 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import stats
 
-from tauguard.benchmarks.detection_judge import (
-    AMPERES,
-    HOURLY,
-    POINTS,
-    Outcome,
-    Tallies,
-    Tally,
-    Thresholds,
-)
+from tauguard.benchmarks.detection_judge import Outcome, Tallies, Tally
+from tauguard.benchmarks.detection_oracle import LEVELS, ORACLE, at_level
+from tauguard.benchmarks.detection_thresholds import AMPERES, HOURLY, POINTS, Fleet
 from tauguard.benchmarks.report import Row
 from tauguard.detectors.metrics import HEADLINE, poisson_rate, wilson
 from tauguard.traces import stratum
@@ -40,14 +34,31 @@ LOWEST = 4.0
 TAU_SHARE = 0.98
 
 BySpeed = Mapping[float, Tallies]
+#: Every arm's threshold of a detector at a point.
+Spread = Mapping[str, Mapping[str, Sequence[float]]]
 
 
-def rows(by_speed: BySpeed, thresholds: Thresholds) -> list[Row]:
-    """All rows: ``speed``, ``hourly``, ``strata``, ``dissertation``, ``mcnemar``, ``output``."""
+def spread(fleets: Sequence[Fleet]) -> Spread:
+    """The thresholds by detector and point, arm by arm."""
+    return {
+        name: {p: [fleet[name].thresholds[p] for fleet in fleets] for p in own.thresholds}
+        for name, own in fleets[0].items()
+    }
+
+
+def _threshold(values: Sequence[float]) -> Row:
+    """Of the levelled score (the network's first two: amperes): median over arms and range."""
+    low, high = float(min(values)), float(max(values))
+    return {"threshold": float(np.median(values)), "threshold_low": low, "threshold_high": high}
+
+
+def rows(by_speed: BySpeed, thresholds: Spread) -> list[Row]:
+    """All rows: speed, hourly, floor, strata, dissertation, mcnemar, output."""
     names = list(thresholds)
     return [
         *cells(by_speed, thresholds, names),
         *hourly(by_speed, thresholds, names),
+        *floor(by_speed),
         *strata(by_speed, names),
         *dissertation(by_speed, names),
         *mcnemar(by_speed, names),
@@ -121,7 +132,7 @@ def headline(tally: Tally) -> Row:
     }
 
 
-def cells(by_speed: BySpeed, thresholds: Thresholds, names: Sequence[str]) -> list[Row]:
+def cells(by_speed: BySpeed, thresholds: Spread, names: Sequence[str]) -> list[Row]:
     """``speed``: a row per detector, speed and ampere point."""
     return [
         {
@@ -129,7 +140,7 @@ def cells(by_speed: BySpeed, thresholds: Thresholds, names: Sequence[str]) -> li
             "detector": name,
             "speed": speed,
             "threshold_a": amperes,
-            "threshold": thresholds[name][str(amperes)],
+            **_threshold(thresholds[name][str(amperes)]),
             **_figures(tallies[name, str(amperes)]),
         }
         for name in names
@@ -138,7 +149,7 @@ def cells(by_speed: BySpeed, thresholds: Thresholds, names: Sequence[str]) -> li
     ]
 
 
-def hourly(by_speed: BySpeed, thresholds: Thresholds, names: Sequence[str]) -> list[Row]:
+def hourly(by_speed: BySpeed, thresholds: Spread, names: Sequence[str]) -> list[Row]:
     """``hourly``: the same at one false alarm an hour; speed 0 is all speeds together."""
     found_rows: list[Row] = []
     for name in names:
@@ -151,12 +162,35 @@ def hourly(by_speed: BySpeed, thresholds: Thresholds, names: Sequence[str]) -> l
                 "study": "hourly",
                 "detector": name,
                 "speed": speed,
-                "threshold": thresholds[name][HOURLY],
+                **_threshold(thresholds[name][HOURLY]),
                 **_figures(tally),
                 "hours": tally.free_seconds / 3600,
             }
             for speed, tally in [*each, (0.0, whole)]
         ]
+    return found_rows
+
+
+def floor(by_speed: BySpeed) -> list[Row]:
+    """``floor``: what an oracle of the true torque finds and when; all speeds are together."""
+    found_rows: list[Row] = []
+    for level in LEVELS:
+        whole = Tally()
+        for tallies in by_speed.values():
+            whole.add(tallies.get((ORACLE, at_level(level)), Tally()))
+        if whole.outcomes:
+            hard = [o for o in whole.outcomes if o.collision.peak_tau >= HEADLINE]
+            found_rows.append(
+                {
+                    "study": "floor",
+                    "detector": f"oracle, true torque above {at_level(level)}",
+                    "sensitivity": found(hard),
+                    "median_ms": delays(hard)["median"],
+                    "p95_ms": delays(hard)["p95"],
+                    "median_ms from 4 N m": delays(judged(whole))["median"],
+                    "p95_ms from 4 N m": delays(judged(whole))["p95"],
+                }
+            )
     return found_rows
 
 

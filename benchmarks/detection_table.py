@@ -77,6 +77,7 @@ def shown(rows: Sequence[Row]) -> list[Row]:
         by_study.setdefault(row["study"], []).append(row)
     found = _cells(by_study.pop("speed", []))
     found += _hourly(by_study.pop("hourly", []))
+    found += by_study.pop("floor", [])
     found += _strata(by_study.pop("strata", []))
     found += _outputs(by_study.pop("output", []))
     last = by_study.pop("headline", [])
@@ -100,7 +101,7 @@ def _cells(rows: Sequence[Row]) -> list[Row]:
             "study": "speed",
             "detector": name,
             "threshold_a": point,
-            "threshold": own[0]["threshold"],
+            "threshold": _range(own[0]),
             "sensitivity / specificity": "",
             **{f"{r['speed']:g} %": "{:.3f} / {:.3f}".format(*_values(r)) for r in own},
         }
@@ -118,7 +119,7 @@ def _hourly(rows: Sequence[Row]) -> list[Row]:
             {
                 "study": "hourly",
                 "detector": name,
-                "threshold": whole["threshold"],
+                "threshold": _range(whole),
                 "sensitivity": whole["sensitivity"],
                 "from 4 N m": whole["sensitivity_all"],
                 "median_ms": whole["delay_ms"]["median"],
@@ -130,6 +131,13 @@ def _hourly(rows: Sequence[Row]) -> list[Row]:
             }
         )
     return found
+
+
+def _range(row: Row) -> str:
+    """A threshold's median over arms and its range."""
+    low, high = row["threshold_low"], row["threshold_high"]
+    middle = f"{row['threshold']:.3g}"
+    return middle if low == high else f"{middle} [{low:.3g}, {high:.3g}]"
 
 
 def _strata(rows: Sequence[Row]) -> list[Row]:

@@ -14,23 +14,21 @@ from tauguard.benchmarks.detection_fleet import (
     CALIBRATE,
     TEST,
     TRAINING_SPEEDS,
-    Fleet,
     Training,
     nominal,
     stream,
 )
-from tauguard.benchmarks.detection_judge import (
-    HOURLY,
-    Peaks,
-    Tally,
-    Thresholds,
-    free_peaks,
-    judge_free,
-    judge_struck,
-    merged,
-)
+from tauguard.benchmarks.detection_judge import Tally, judge_free, judge_struck, merged
 from tauguard.benchmarks.detection_pool import Conditions, Struck, free_pool, struck_pool
 from tauguard.benchmarks.detection_report import headline
+from tauguard.benchmarks.detection_thresholds import (
+    HOURLY,
+    Fleet,
+    Pieces,
+    Watched,
+    free_pieces,
+    watched,
+)
 from tauguard.benchmarks.report import Row
 from tauguard.detectors import CollisionDetector, DetectorSettings
 from tauguard.detectors.detector import Detector
@@ -68,26 +66,24 @@ def pools(seed: int, speed: float, arms: Sequence[int], extent: Extent, under: C
     return struck, free
 
 
-def judged(detectors: dict[str, Detector], thresholds: Thresholds, both: Pools) -> dict[str, Tally]:
+def judged(fleet: Fleet, both: Pools) -> dict[str, Tally]:
     """Tallies at the third operating point, by detector."""
     struck, free = both
-    parts = [judge_struck(detectors, thresholds, s) for s in struck]
-    parts += [judge_free(detectors, thresholds, trace) for trace in free]
+    parts = [judge_struck(fleet, s) for s in struck]
+    parts += [judge_free(fleet, trace) for trace in free]
     return {name: t for (name, point), t in merged(parts).items() if point == HOURLY}
 
 
 def own_thresholds(
     detectors: dict[str, Detector], calibration: Iterable[Trace], target: float
-) -> Thresholds:
-    """The third operating point of detectors that are not in the table."""
-    found = [free_peaks(detectors, trace) for trace in calibration]
-    joined = {name: Peaks.joined([f[name] for f in found]) for name in detectors}
-    return {name: {HOURLY: peaks.at_rate(target)} for name, peaks in joined.items()}
+) -> dict[str, Watched]:
+    """Detectors that are not in the table, with their third operating point."""
+    found = [free_pieces(detectors, trace) for trace in calibration]
+    joined = {name: Pieces.joined([f[name] for f in found]) for name in detectors}
+    return watched(detectors, {0.0: joined}, None, target)
 
 
-def conditions(
-    fleets: Sequence[Fleet], thresholds: Thresholds, seed: int, extent: Extent
-) -> list[Row]:
+def conditions(fleet: Fleet, arm: int, seed: int, extent: Extent) -> list[Row]:
     """``conditions``: payload, temperature, arm and speed outside of what was trained on."""
     cases: dict[str, tuple[float, Conditions]] = {
         "as trained": (SPEED, Conditions()),
@@ -98,24 +94,23 @@ def conditions(
         "mismatch doubled since training": (SPEED, Conditions(scale=2.0)),
         "speed 80 %": (FAST, Conditions()),
     }
-    arm = fleets[0]
     rows = []
     for name, (speed, under) in cases.items():
-        both = pools(seed, speed, [arm.arm], extent, under)
-        tallies = judged(arm.detectors, thresholds, both)
+        both = pools(seed, speed, [arm], extent, under)
+        tallies = judged(fleet, both)
         rows += [_row("conditions", {"condition": name}, d, t) for d, t in tallies.items()]
-    rows += _picks(arm, thresholds, seed, extent)
+    rows += _picks(fleet, arm, seed, extent)
     return rows
 
 
-def _picks(arm: Fleet, thresholds: Thresholds, seed: int, extent: Extent) -> list[Row]:
+def _picks(fleet: Fleet, arm: int, seed: int, extent: Extent) -> list[Row]:
     """A payload taken up half-way: whatever alarm it raises is false."""
-    pool = free_pool(stream(seed, TEST, 8), SPEED, [arm.arm], extent.hours)
+    pool = free_pool(stream(seed, TEST, 8), SPEED, [arm], extent.hours)
     parts = []
     for k, (_, episode) in enumerate(pool):
         pick = PayloadPick(episode.seconds / 2, (1500.0, 2500.0, 3500.0)[k % 3])
         trace = simulate(replace(episode, payload_g=0.0, picks=(pick,)))
-        parts.append(judge_free(arm.detectors, thresholds, trace))
+        parts.append(judge_free(fleet, trace))
     tallies = {n: t for (n, point), t in merged(parts).items() if point == HOURLY}
     case = {"condition": f"payload taken up, {len(pool)} times"}
     return [_row("conditions", case, d, t) for d, t in tallies.items()]
@@ -157,8 +152,8 @@ def training_size(bench: Bench, names: Sequence[str]) -> list[Row]:
         traces = bench.training(Training(collisions=count))
         for name in names:
             own: dict[str, Detector] = {name: make_detector(name).fit(traces, nominal())}
-            thresholds = own_thresholds(own, calibration, bench.extent.target)
-            tally = judged(own, thresholds, both)[name]
+            fleet = own_thresholds(own, calibration, bench.extent.target)
+            tally = judged(fleet, both)[name]
             rows.append(_row("training_size", {"collisions": 15 * count}, name, tally))
     return rows
 
@@ -176,8 +171,8 @@ def sigmas(bench: Bench) -> list[Row]:
     for name, settings in cases:
         detector = SvrDetector(CollisionDetector(settings))
         own: dict[str, Detector] = {name: detector.fit(traces, nominal())}
-        thresholds = own_thresholds(own, calibration, bench.extent.target)
-        tally = judged(own, thresholds, both)[name]
+        fleet = own_thresholds(own, calibration, bench.extent.target)
+        tally = judged(fleet, both)[name]
         rows.append(_row("sigma", {"sigma": settings.sigma}, name, tally))
     return rows
 
@@ -190,12 +185,10 @@ def sample_rate(bench: Bench) -> list[Row]:
     for stride in (1, CURA6_STRIDE):
         detector = SvrDetector().fit([every(t, stride) for t in traces], nominal())
         own: dict[str, Detector] = {"srq-svr": detector}
-        thresholds = own_thresholds(
-            own, [every(t, stride) for t in calibration], bench.extent.target
-        )
+        fleet = own_thresholds(own, [every(t, stride) for t in calibration], bench.extent.target)
         struck = [replace(s, trace=every(s.trace, stride)) for s in both[0]]
         free = [every(t, stride) for t in both[1]]
-        tally = judged(own, thresholds, (struck, free))["srq-svr"]
+        tally = judged(fleet, (struck, free))["srq-svr"]
         rows.append(_row("sample_rate", {"hz": 1000 / stride}, "srq-svr", tally))
     return rows
 

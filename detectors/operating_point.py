@@ -74,3 +74,44 @@ def followed(peaks: Array, allowed: float, count: int) -> float:
     mean_excess = float(np.mean(peaks[:count] - base)) if count else 0.0
     level = base + mean_excess * float(np.log(max(count, 1) / allowed))
     return max(level, float(np.nextafter(peaks[0], np.inf)))
+
+
+#: Bounds of the tail's shape: no finite end closer than that of a triangle's, no heavier tail than
+#: a few dozen peaks can tell from an exponential.
+SHAPES = (-0.5, 0.2)
+
+
+def tail_level(peaks: Array, allowed: float, count: int) -> float:
+    """The level that ``allowed`` peaks are expected to exceed, along a generalised Pareto tail.
+
+    The excesses of the ``count`` largest peaks over the next one tell scale and shape by
+    probability-weighted moments (Hosking & Wallis 1987). Unlike an exponential tail it can end: a
+    score that has a highest value is not extrapolated far beyond it.
+
+    Args:
+        peaks: in descending order, shape (N,), N >= 1.
+        allowed: above 0; at or above ``count`` it is the peak that so many exceed.
+        count: at most N - 1 are used.
+
+    Raises:
+        ValueError: no peaks, or a number allowed that is not above 0.
+    """
+    if not (len(peaks) and allowed > 0):
+        raise ValueError(f"{len(peaks)} peaks, {allowed} allowed: expected some, and above 0")
+    count = min(count, len(peaks) - 1)
+    if allowed >= max(count, 1):
+        return float(peaks[min(int(allowed), len(peaks) - 1)])
+    if count < 2:
+        return float(peaks[0])
+    base = float(peaks[count])
+    excess = peaks[:count] - base
+    mean = float(excess.mean())
+    # The largest comes first: its probability of being exceeded is the smallest.
+    exceeded = (np.arange(1, count + 1) - 0.65) / count
+    weighted = float(np.mean(excess * exceeded))
+    if not mean - 2 * weighted > 1e-12 * max(mean, 1e-300):
+        return float(peaks[0])
+    shape = float(np.clip(2 - mean / (mean - 2 * weighted), *SHAPES))
+    scale, ratio = mean * (1 - shape), count / allowed
+    grown = np.log(ratio) if abs(shape) < 1e-9 else (ratio**shape - 1) / shape
+    return base + scale * float(grown)

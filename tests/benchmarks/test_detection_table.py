@@ -17,6 +17,8 @@ def cell(name: str, speed: float, point: float, hits: int, quiet: int) -> dict[s
         "speed": speed,
         "threshold_a": point,
         "threshold": 1.0,
+        "threshold_low": 0.5,
+        "threshold_high": 2.0,
         "sensitivity": wilson(hits, 100),
         "specificity": wilson(quiet, 100),
     }
