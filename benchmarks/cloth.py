@@ -10,6 +10,7 @@ import numpy as np
 
 from tauguard.benchmarks import (
     cloth_adversarial,
+    cloth_check,
     cloth_frames,
     cloth_queries,
     cloth_scaling,
@@ -42,6 +43,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     if data:
         rows += cloth_truth.on_listed_frames(Path(data) / "ccd")
         rows += cloth_queries.on_hard_sets(Path(data) / "ccd", 20 if quick else 60)
+        rows += cloth_check.on_labels(Path(data) / "ccd")
     rows += cloth_adversarial.adversarial(12_000 if quick else 1_000_000, seed)
     rows += cloth_scaling.volumes(triangles, seed, repeats)
     rows += cloth_scaling.front(triangles, seed, 15 if quick else 60)

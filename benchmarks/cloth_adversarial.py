@@ -1,7 +1,7 @@
 """Queries made to break a narrow phase: ab2pf against exact arithmetic, query by query.
 
-``method="exact"`` decides every one of them; that itself is held against integer arithmetic of
-another make by the tests. The same queries come again scaled by powers of two, with their vertices
+``method="exact"`` decides every one of them, and so do referees that share no code with it
+(:mod:`.cloth_check`). The same queries come again scaled by powers of two, with their vertices
 in another order, backwards in time and under other rounding modes.
 """
 
@@ -14,8 +14,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.benchmarks.cloth_check import judged
 from tauguard.benchmarks.cloth_queries import Answer, Queries, solver
 from tauguard.benchmarks.report import Row
+from tauguard.benchmarks.workers import Workers
 
 Positions = NDArray[np.float64]  # (n, 2, 4, 3): both ends of the step, four vertices
 Make = Callable[[np.random.Generator, int, bool], Positions]
@@ -115,30 +117,39 @@ def adversarial(total: int, seed: int) -> list[Row]:
     """At least ``total`` queries of either kind, spread evenly over :data:`KINDS`."""
     n = -(-total // len(KINDS))
     rows: list[Row] = []
-    for name, make in KINDS.items():
-        for vertex in (True, False):
-            x = make(np.random.default_rng([seed, len(rows)]), n, vertex)
-            rows.append({"study": "adversarial", "set": name, **_row(x, vertex)})
+    checked: list[Row] = []
+    with Workers() as run:
+        for name, make in KINDS.items():
+            for vertex in (True, False):
+                x = make(np.random.default_rng([seed, len(rows)]), n, vertex)
+                ours = _answer(x, vertex)
+                here = {"set": name, "kind": "vf" if vertex else "ee"}
+                rows.append({"study": "adversarial", **here, **_row(x, vertex, ours)})
+                found = judged(x, vertex, ours.toi, run)
+                checked.append({"study": "independent check", **here, **found})
+    return [*_with_sums(rows), *_with_sums(checked)]
+
+
+def _with_sums(rows: list[Row]) -> list[Row]:
+    """The rows, and one a kind for all sets: sums, and the largest of ``early_most``."""
+    added: list[Row] = []
     for kind in ("vf", "ee"):
         own = [row for row in rows if row["kind"] == kind]
-        sums = {key: sum(row[key] for row in own) for key in own[0] if key in _SUMMED}
-        rows.append({**own[0], "set": "all", **sums})
-        rows[-1]["early_most"] = max(row["early_most"] for row in own)
-    return rows
+        most = max(row["early_most"] for row in own)
+        sums = {
+            key: sum(row[key] for row in own)
+            for key, value in own[0].items()
+            if isinstance(value, int | float)
+        }
+        added.append({**own[0], "set": "all", **sums, "early_most": most})
+    return rows + added
 
 
-_SUMMED = {
-    "n", "hits", "misses", "false_hits", "late", "decided_exactly",
-    "scaled", "turned", "backwards", "modes",
-}  # fmt: skip
-
-
-def _row(x: Positions, vertex: bool) -> Row:
-    ours, exact = _answer(x, vertex), _answer(x, vertex, "exact")
+def _row(x: Positions, vertex: bool, ours: Answer) -> Row:
+    exact = _answer(x, vertex, "exact")
     early = exact.toi[ours.hit & exact.hit] - ours.toi[ours.hit & exact.hit]
     order = [0, 3, 1, 2] if vertex else [3, 2, 0, 1]
     return {
-        "kind": "vf" if vertex else "ee",
         "n": len(x),
         "hits": int(exact.hit.sum()),
         "misses": int((exact.hit & ~ours.hit).sum()),

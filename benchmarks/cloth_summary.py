@@ -41,7 +41,10 @@ def _errors(rows: list[Row]) -> list[Row]:
         count = sum(row[key] for row in made for key in changes)
         what = f"adversarial: answers changed by {', '.join(changes)}"
         found.append(answer(what, "0", str(count), count == 0))
-    errors = [row["toi_error_most"] for row in whole] + [row["early_most"] for row in made]
+    checked = [row for row in _of(rows, "independent check") if row["set"] == "all"]
+    found += _checked(checked)
+    errors = [row["toi_error_most"] for row in whole]
+    errors += [row["early_most"] for row in made + checked]
     if errors:
         most = max(errors)
         found.append(answer("error of the time, most", "1e-9", f"{most:.2g}", most <= 1e-9))
@@ -50,6 +53,23 @@ def _errors(rows: list[Row]) -> list[Row]:
         found.append(
             answer("hard sets, exact decisions included [us a query]", "-", f"{price:.2g}")
         )
+    return found
+
+
+def _checked(rows: list[Row]) -> list[Row]:
+    """What referees that share no code with ab2pf found."""
+    found: list[Row] = []
+    n = sum(row["n"] for row in rows)
+    for key in ("contradictions", "misses", "false_hits", "late") if rows else ():
+        count = sum(row[key] for row in rows)
+        what = f"certified by independent check, {n} queries: {key.replace('_', ' ')}"
+        found.append(answer(what, "0", str(count), count == 0))
+    for row in rows:
+        sure = row["clear_certified"] + row["hit_certified"]
+        tight = row["clear_tight"]
+        text = f"{sure / row['n']:.1%} by intervals"
+        text += "" if tight is None else f", {tight / row['n']:.1%} by Tight-Inclusion too"
+        found.append(answer(f"certified, {row['kind']}, beside all by integers", "-", text))
     return found
 
 

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from tauguard.benchmarks.cloth_integers import first_contact
 from tauguard.benchmarks.cloth_queries import Queries, solver
 from tauguard.cloth import edge_edge, vertex_face
-from tests.cloth.rational import first_contact
 
 QUERIES = {"vf": vertex_face, "ee": edge_edge}
 
