@@ -33,10 +33,14 @@ class Mesh:
         self, faces: NDArray[np.int32], ids: NDArray[np.int32], meets: NDArray[np.uint8]
     ) -> dict[str, Any]: ...
 
-def overlap_rows(
-    variant: str, a: NDArray[np.float32], b: NDArray[np.float32]
+def leaf_pair(
+    variant: str,
+    a: NDArray[np.float32],
+    b: NDArray[np.float32],
+    vertices_a: NDArray[np.int32],
+    vertices_b: NDArray[np.int32],
+    same: bool,
 ) -> NDArray[np.int32]: ...
-def lanes_sharing(variant: str, a: NDArray[np.int32], b: NDArray[np.int32]) -> int | None: ...
 def solve(
     vf: bool,
     x_t0: NDArray[np.float64],

@@ -1,6 +1,5 @@
 #include "candidates.hpp"
 
-#include "lanes.hpp"
 #include "overlap.hpp"
 
 namespace tauguard::cloth {
@@ -11,10 +10,6 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
           const std::int32_t* vb, Mask hits, const Groups& groups, CandidateBlock& out) {
   std::int32_t a[ArityA];
   for (int j = 0; j < ArityA; ++j) a[j] = va[j * lanes + i];
-  static const auto lanes_sharing = overlap_kernels().lanes_sharing;
-  const Mask shared = hits & lanes_sharing(a, ArityA, vb, ArityB);
-  out.adjacent += count_of(shared);
-  hits &= ~shared;
   std::int32_t *row = out.rows.data() + 4 * out.size, *pair = out.pairs.data() + 2 * out.size;
   // Every hit is written; the place is taken only by those that count (no branch to mispredict).
   for (; hits; hits &= hits - 1) {
@@ -41,22 +36,20 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
 void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves, const Groups& groups,
                      CandidateBlock& out) {
   static const OverlapKernels& kernels = overlap_kernels();
-  const bool edges = &a == &b;
-  const float *block_a = a.block(leaves.a), *block_b = b.block(leaves.b);
-  Mask rows = a.occupied(leaves.a);
-  const bool same = edges && leaves.a == leaves.b;
+  const bool edges = &a == &b, same = edges && leaves.a == leaves.b;
+  LeafLanes left = a.lanes_of(leaves.a);
+  const LeafLanes right = b.lanes_of(leaves.b);
   if (!same)
-    rows = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), block_a, a.axes(), a.times(), rows);
-  if (rows == 0) return;
-  std::uint16_t masks[lanes];
-  rows = kernels.rows_of_block(block_a, rows, block_b, a.axes(), a.times(), b.occupied(leaves.b), masks);
+    left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block, a.axes(), a.times(),
+                                          left.occupied);
+  Overlaps found;
+  kernels.leaf_pair(left, right, a.axes(), a.times(), same, found);
+  out.adjacent += found.adjacent;
   const std::int32_t *ids_a = a.ids(leaves.a), *ids_b = b.ids(leaves.b);
-  const std::int32_t *va = a.vertices(leaves.a), *vb = b.vertices(leaves.b);
-  for (; rows; rows &= rows - 1) {
+  const std::int32_t *va = left.vertices, *vb = right.vertices;
+  for (Mask rows = found.rows; rows; rows &= rows - 1) {
     const int i = __builtin_ctz(rows);
-    Mask hits = masks[i];
-    if (same) hits &= ~Mask(0) << i << 1;  // each unordered pair once
-    if (hits == 0) continue;
+    const Mask hits = found.lanes_of[i];
     if (edges) {
       emit<2, 2>(ids_a, va, i, ids_b, vb, hits, groups, out);
     } else {

@@ -48,7 +48,7 @@ class FeatureTree {
   bool is_leaf(std::int32_t node) const { return node >= leaves_; }
   const float* node(std::int32_t i) const { return nodes_.data() + std::size_t(i) * node_stride(); }
   const float* block(std::int32_t leaf) const { return blocks_.data() + std::size_t(leaf) * block_stride(); }
-  Mask occupied(std::int32_t leaf) const { return occupied_[leaf]; }
+  LeafLanes lanes_of(std::int32_t leaf) const { return {block(leaf), vertices(leaf), arity_, occupied_[leaf]}; }
   const std::int32_t* ids(std::int32_t leaf) const { return ids_.data() + std::size_t(leaf) * lanes; }
   // [vertex of the feature][lane]
   const std::int32_t* vertices(std::int32_t leaf) const {

@@ -224,27 +224,23 @@ NB_MODULE(_mesh, m) {
   // For tests: the narrow phase's kernels from now on ("portable", "avx2"); another name: the fastest again.
   m.def("force_batch_kernels", [](const std::string& name) { return force_batch_kernels(name.c_str()); },
         nb::arg("name"));
-  // For tests: the lanes of each row that overlap, by the named variant; empty where it cannot run here.
-  m.def("overlap_rows", [](const std::string& variant,
-                           nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,
-                           nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> b) {
+  // For tests: of two leaves, the lanes that each row meets, then how many share a vertex with theirs; by the named
+  // variant, empty where it cannot run here.
+  m.def("leaf_pair", [](const std::string& variant, nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,
+                        nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> b,
+                        nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_a,
+                        nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_b, bool same) {
     const OverlapKernels* kernels = overlap_kernels(variant.c_str());
-    std::vector<std::int32_t> rows;
+    std::vector<std::int32_t> found;
     if (kernels) {
-      std::uint16_t out[lanes];
-      kernels->rows_of_block(a.data(), 0xffff, b.data(), static_cast<int>(a.shape(0)),
-                             static_cast<int>(a.shape(1)), 0xffff, out);
-      rows.assign(out, out + lanes);
+      Overlaps out;
+      kernels->leaf_pair({a.data(), vertices_a.data(), static_cast<int>(vertices_a.shape(0)), 0xffff},
+                         {b.data(), vertices_b.data(), static_cast<int>(vertices_b.shape(0)), 0xffff},
+                         static_cast<int>(a.shape(0)), static_cast<int>(a.shape(1)), same, out);
+      for (int i = 0; i < lanes; ++i) found.push_back(out.rows >> i & 1 ? out.lanes_of[i] : 0);
+      found.push_back(static_cast<std::int32_t>(out.adjacent));
     }
-    const std::size_t n = rows.size();
-    return array_of<nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1>>>(std::move(rows), {n});
-  });
-  // For tests: the lanes of `b` that share a vertex with `a`, by the named variant; None where it cannot run here.
-  m.def("lanes_sharing", [](const std::string& variant, nb::ndarray<const std::int32_t, nb::shape<-1>, nb::c_contig> a,
-                            nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> b) -> nb::object {
-    const OverlapKernels* kernels = overlap_kernels(variant.c_str());
-    if (!kernels) return nb::none();
-    return nb::int_(kernels->lanes_sharing(a.data(), static_cast<int>(a.shape(0)), b.data(),
-                                           static_cast<int>(b.shape(0))));
+    const std::size_t n = found.size();
+    return array_of<nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1>>>(std::move(found), {n});
   });
 }

@@ -18,7 +18,10 @@ struct RowStride {
 RowStride in_block(int times) { return {2 * lanes * times, 2 * lanes, lanes}; }
 RowStride in_node(int slots) { return {1, 2 * slots, slots}; }
 
-#define TAUGUARD_INLINE inline __attribute__((always_inline))
+// What a row looks at: all lanes in use, or of its own leaf those after it.
+TAUGUARD_INLINE Mask lanes_after(bool same, int row, const LeafLanes& b) {
+  return same ? b.occupied & ~Mask(0) << row << 1 : b.occupied;
+}
 
 TAUGUARD_INLINE Mask apart_portable(const float* row, RowStride s, const float* b, int axes, int times,
                                     Mask wanted) {
@@ -43,29 +46,27 @@ Mask node_portable(const float* node, int slots, const float* block, int axes, i
                          Mask wanted) {
   return apart_portable(node, in_node(slots), block, axes, times, wanted);
 }
-Mask rows_portable(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
-                   std::uint16_t* out) {
-  Mask found = 0;
-  for (; rows; rows &= rows - 1) {
-    const int row = __builtin_ctz(rows);
-    out[row] = static_cast<std::uint16_t>(apart_portable(a + row, in_block(times), b, axes, times, wanted));
-    found |= Mask(out[row] != 0) << row;
-  }
-  return found;
-}
-Mask sharing_portable(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
+// The lanes of b that share a vertex with one lane of a.
+Mask sharing_portable(const LeafLanes& a, int row, const LeafLanes& b) {
   std::int32_t equal[lanes] = {};
-  for (int j = 0; j < arity_a; ++j)
-    for (int k = 0; k < arity_b; ++k)
-      for (int i = 0; i < lanes; ++i) equal[i] |= a[j] == b[k * lanes + i];
+  for (int j = 0; j < a.arity; ++j)
+    for (int k = 0; k < b.arity; ++k)
+      for (int i = 0; i < lanes; ++i) equal[i] |= a.vertices[j * lanes + row] == b.vertices[k * lanes + i];
   Mask mask = 0;
   for (int i = 0; i < lanes; ++i) mask |= Mask(equal[i]) << i;
   return mask;
 }
 
+void pair_portable(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same, Overlaps& out) {
+  for (Mask rows = a.occupied; rows; rows &= rows - 1) {
+    const int row = __builtin_ctz(rows);
+    const Mask all = apart_portable(a.block + row, in_block(times), b.block, axes, times, lanes_after(same, row, b));
+    out.add(row, all, all ? sharing_portable(a, row, b) : 0);
+  }
+}
+
 #if defined(__x86_64__)
 #define TAUGUARD_AVX2 __attribute__((target("avx2")))
-#define TAUGUARD_AVX512 __attribute__((target("avx512f")))
 
 TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const float* b, int times) {
   const __m256 below = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
@@ -92,28 +93,27 @@ TAUGUARD_AVX2 Mask node_avx2(const float* node, int slots, const float* block, i
                          Mask wanted) {
   return overlap_avx2(node, in_node(slots), block, axes, times, wanted);
 }
-TAUGUARD_AVX2 Mask rows_avx2(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
-                             std::uint16_t* out) {
-  Mask found = 0;
-  for (; rows; rows &= rows - 1) {
-    const int row = __builtin_ctz(rows);
-    out[row] = static_cast<std::uint16_t>(overlap_avx2(a + row, in_block(times), b, axes, times, wanted));
-    found |= Mask(out[row] != 0) << row;
-  }
-  return found;
-}
-TAUGUARD_AVX2 Mask sharing_avx2(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
+TAUGUARD_AVX2 Mask sharing_avx2(const LeafLanes& a, int row, const LeafLanes& b) {
   __m256i left = _mm256_setzero_si256(), right = left;
-  for (int j = 0; j < arity_a; ++j)
-    for (int k = 0; k < arity_b; ++k) {
-      const auto* at = reinterpret_cast<const __m256i*>(b + k * lanes);
-      const __m256i v = _mm256_set1_epi32(a[j]);
+  for (int j = 0; j < a.arity; ++j)
+    for (int k = 0; k < b.arity; ++k) {
+      const auto* at = reinterpret_cast<const __m256i*>(b.vertices + k * lanes);
+      const __m256i v = _mm256_set1_epi32(a.vertices[j * lanes + row]);
       left = _mm256_or_si256(left, _mm256_cmpeq_epi32(v, _mm256_loadu_si256(at)));
       right = _mm256_or_si256(right, _mm256_cmpeq_epi32(v, _mm256_loadu_si256(at + 1)));
     }
   return Mask(_mm256_movemask_ps(_mm256_castsi256_ps(left))) |
          Mask(_mm256_movemask_ps(_mm256_castsi256_ps(right))) << 8;
 }
+TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same, Overlaps& out) {
+  for (Mask rows = a.occupied; rows; rows &= rows - 1) {
+    const int row = __builtin_ctz(rows);
+    const Mask all = overlap_avx2(a.block + row, in_block(times), b.block, axes, times, lanes_after(same, row, b));
+    out.add(row, all, all ? sharing_avx2(a, row, b) : 0);
+  }
+}
+
+#define TAUGUARD_AVX512 __attribute__((target("avx512f")))
 
 // Of 16 volumes on one axis.
 template <int times>
@@ -151,45 +151,51 @@ TAUGUARD_AVX512 Mask node_avx512(const float* node, int slots, const float* bloc
                     : overlap_avx512<2>(node, in_node(slots), block, axes, wanted);
 }
 
-// On x, y and z for all rows, then on the other axes for those with lanes left: few branches to mispredict.
-template <int times>
-TAUGUARD_AVX512 TAUGUARD_INLINE Mask rows_avx512(const float* a, Mask rows, const float* b, int axes, Mask wanted,
-                                                 std::uint16_t* out) {
+// On x, y and z for all rows; for those with lanes left that share no vertex, on the other axes: few branches to
+// mispredict.
+template <int times, int arity_a, int arity_b>
+TAUGUARD_AVX512 TAUGUARD_INLINE void pair_avx512(const LeafLanes& a, const LeafLanes& b, int axes, bool same,
+                                                 Overlaps& out) {
   constexpr int step = 2 * lanes * times;
-  const auto x = Axis16<times>::load(b), y = Axis16<times>::load(b + step), z = Axis16<times>::load(b + 2 * step);
+  const auto x = Axis16<times>::load(b.block), y = Axis16<times>::load(b.block + step),
+             z = Axis16<times>::load(b.block + 2 * step);
+  __m512i vertices[arity_b];
+  for (int k = 0; k < arity_b; ++k) vertices[k] = _mm512_loadu_si512(b.vertices + k * lanes);
   const RowStride s = in_block(times);
   int some[lanes], n = 0;
-  for (; rows; rows &= rows - 1) {
+  for (Mask rows = a.occupied; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
-    const float* at = a + row;
-    const Mask left = wanted & ~(x.apart(at, s) | y.apart(at + s.axis, s) | z.apart(at + 2 * s.axis, s));
-    out[row] = static_cast<std::uint16_t>(left);
+    const float* at = a.block + row;
+    const Mask near = lanes_after(same, row, b) &
+                      ~(x.apart(at, s) | y.apart(at + s.axis, s) | z.apart(at + 2 * s.axis, s));
+    Mask shared = 0;
+    for (int j = 0; j < arity_a; ++j)
+      for (int k = 0; k < arity_b; ++k)
+        shared |= _mm512_cmpeq_epi32_mask(vertices[k], _mm512_set1_epi32(a.vertices[j * lanes + row]));
+    out.adjacent += count_of(near & shared);
+    out.lanes_of[row] = static_cast<std::uint16_t>(near & ~shared);
     some[n] = row;
-    n += left != 0;
+    n += (near & ~shared) != 0;
   }
-  Mask found = 0;
   for (int i = 0; i < n; ++i) {
-    const Mask left = overlap_avx512<times>(a + some[i] + 3 * s.axis, s, b + 3 * step, axes - 3, out[some[i]]);
-    out[some[i]] = static_cast<std::uint16_t>(left);
-    found |= Mask(left != 0) << some[i];
+    const int row = some[i];
+    const Mask left = overlap_avx512<times>(a.block + row + 3 * s.axis, s, b.block + 3 * step, axes - 3,
+                                            out.lanes_of[row]);
+    out.lanes_of[row] = static_cast<std::uint16_t>(left);
+    out.rows |= Mask(left != 0) << row;
   }
-  return found;
 }
-TAUGUARD_AVX512 Mask rows_avx512(const float* a, Mask rows, const float* b, int axes, int times, Mask wanted,
-                                 std::uint16_t* out) {
-  return times == 1 ? rows_avx512<1>(a, rows, b, axes, wanted, out) : rows_avx512<2>(a, rows, b, axes, wanted, out);
-}
-TAUGUARD_AVX512 Mask sharing_avx512(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b) {
-  Mask mask = 0;
-  for (int k = 0; k < arity_b; ++k) {
-    const __m512i at = _mm512_loadu_si512(b + k * lanes);
-    for (int j = 0; j < arity_a; ++j) mask |= _mm512_cmpeq_epi32_mask(at, _mm512_set1_epi32(a[j]));
+TAUGUARD_AVX512 void pair_avx512(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
+                                 Overlaps& out) {
+  if (a.arity == 1) {
+    times == 1 ? pair_avx512<1, 1, 3>(a, b, axes, same, out) : pair_avx512<2, 1, 3>(a, b, axes, same, out);
+  } else {
+    times == 1 ? pair_avx512<1, 2, 2>(a, b, axes, same, out) : pair_avx512<2, 2, 2>(a, b, axes, same, out);
   }
-  return mask;
 }
-constexpr OverlapKernels avx2{node_avx2, rows_avx2, sharing_avx2}, avx512{node_avx512, rows_avx512, sharing_avx512};
+constexpr OverlapKernels avx2{node_avx2, pair_avx2}, avx512{node_avx512, pair_avx512};
 #endif
-constexpr OverlapKernels portable{node_portable, rows_portable, sharing_portable};
+constexpr OverlapKernels portable{node_portable, pair_portable};
 
 }  // namespace
 

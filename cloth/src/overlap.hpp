@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "lanes.hpp"
+
 namespace tauguard::cloth {
 
 inline constexpr int lanes = 16;
@@ -10,16 +12,34 @@ using Mask = std::uint32_t;  // a bit per lane
 
 // A block holds 16 volumes lane by lane: [axis][end of the step][low, high][lane]. A node holds one, axis
 // by axis: [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf) everywhere.
+
+// The 16 features of a leaf: their volumes, their vertices as [vertex of the feature][lane], the lanes in use.
+struct LeafLanes {
+  const float* block;
+  const std::int32_t* vertices;
+  int arity;
+  Mask occupied;
+};
+// Of lane i of one leaf, for every i in `rows`: the lanes of another that it meets, never none.
+struct Overlaps {
+  Mask rows = 0;
+  unsigned adjacent = 0;  // lanes left out because a vertex is shared
+  std::uint16_t lanes_of[lanes];
+
+  void add(int row, Mask all, Mask shared) {
+    adjacent += count_of(all & shared);
+    lanes_of[row] = static_cast<std::uint16_t>(all & ~shared);
+    rows |= Mask((all & ~shared) != 0) << row;
+  }
+};
+
 struct OverlapKernels {
   // Of `candidates`, the lanes of `block` that `node` does not stand apart from.
   Mask (*lanes_of_node)(const float* node, int slots, const float* block, int axes, int times,
                         Mask candidates);
-  // For every row in `rows` (a lane of `a`): out[row] = the lanes of `b`, of `candidates`, that it does
-  // not stand apart from. The rows that have any.
-  Mask (*rows_of_block)(const float* a, Mask rows, const float* b, int axes, int times, Mask candidates,
-                        std::uint16_t* out);
-  // The lanes of `b`, 16 features as [vertex][lane], that share a vertex with one feature, `a`.
-  Mask (*lanes_sharing)(const std::int32_t* a, int arity_a, const std::int32_t* b, int arity_b);
+  // Volumes that are not apart, of features that share no vertex. same: b is a; each unordered pair once. A shared
+  // vertex lies in both volumes, so that it does not matter which is looked at first.
+  void (*leaf_pair)(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same, Overlaps& out);
 };
 
 // The fastest that this processor runs. Comparisons only: every variant gives the same bits.

@@ -1,5 +1,7 @@
 """The broad phase against all pairs, its front against a fresh descent, its variants."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -144,36 +146,46 @@ def test_any_thread_count_gives_the_same_candidates():
         assert all(np.array_equal(a, b) for a, b in zip(one, many, strict=True))
 
 
+def leaf(rng, at, arity):
+    """16 features of the vertices (vertex, axis, end): [axis][end][low, high][lane] and indices."""
+    vertices = rng.integers(0, len(at), (arity, 16), dtype=np.int32)
+    volumes = np.stack([at[vertices].min(axis=0), at[vertices].max(axis=0)])
+    volumes[0, 3], volumes[1, 3], vertices[:, 3] = np.inf, -np.inf, -1  # an empty lane
+    return np.ascontiguousarray(volumes.transpose(2, 3, 0, 1), dtype=np.float32), vertices
+
+
+def pairs_by_definition(a, b, same):
+    (volumes_a, vertices_a), (volumes_b, vertices_b) = a, b
+    meets, adjacent = np.zeros((16, 16), dtype=bool), 0
+    for i, j in itertools.product(range(16), range(16)):
+        (low, high), (low_b, high_b) = volumes_a[..., i].T, volumes_b[..., j].T
+        apart = (high < low_b).all(axis=0).any() or (high_b < low).all(axis=0).any()
+        if not apart and not (same and j <= i):
+            shared = bool(set(vertices_a[:, i]) & set(vertices_b[:, j]))
+            meets[i, j] = not shared
+            adjacent += shared
+    return [*(meets @ (1 << np.arange(16))), adjacent]
+
+
 @pytest.mark.parametrize("times", [1, 2])
 @pytest.mark.parametrize("axes", [3, 7, 13])
-def test_vector_variants_give_the_portable_bits(axes, times):
+@pytest.mark.parametrize(
+    ("arity_a", "arity_b", "same"), [(1, 3, False), (2, 2, False), (2, 2, True)]
+)
+def test_every_variant_finds_the_pairs_of_two_leaves(axes, times, arity_a, arity_b, same):
     rng = np.random.default_rng(6)
-    tried = 0
-    for _ in range(20):
-        a, b = np.sort(rng.integers(-3, 4, (2, axes, times, 2, 16)) * 1.0, axis=3).astype(
-            np.float32
-        )
-        a[:, :, 0, 3], a[:, :, 1, 3] = np.inf, -np.inf  # an empty lane
-        want = _mesh.overlap_rows("portable", a, b)
-        for variant in ("avx2", "avx512"):
-            have = _mesh.overlap_rows(variant, a, b)
-            if len(have):
-                tried += 1
-                assert np.array_equal(want, have), variant
-    assert tried or not len(_mesh.overlap_rows("avx2", a, b))
-
-
-@pytest.mark.parametrize(("arity_a", "arity_b"), [(1, 3), (2, 2)])
-def test_every_variant_sees_the_same_shared_vertices(arity_a, arity_b):
-    rng = np.random.default_rng(8)
-    for _ in range(20):
-        a = rng.integers(0, 9, arity_a, dtype=np.int32)
-        b = rng.integers(0, 9, (arity_b, 16), dtype=np.int32)
-        want = [lane for lane in range(16) if set(a) & set(b[:, lane])]
+    found = 0
+    for _ in range(10):
+        at = rng.integers(-1, 2, (60, axes, times)).astype(np.float32)
+        a = leaf(rng, at, arity_a)
+        b = a if same else leaf(rng, at, arity_b)
+        want = pairs_by_definition(a, b, same)
+        found += want[-1]
         for variant in ("portable", "avx2", "avx512"):
-            have = _mesh.lanes_sharing(variant, a, b)
-            assert have is None or [i for i in range(16) if have >> i & 1] == want, variant
-        assert _mesh.lanes_sharing("portable", a, b) is not None
+            have = _mesh.leaf_pair(variant, a[0], b[0], a[1], b[1], bool(same))
+            assert len(have) or variant != "portable"
+            assert not len(have) or have.tolist() == want, variant
+    assert found > 0
 
 
 class TestGroups:
