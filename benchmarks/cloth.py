@@ -51,7 +51,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     rows += cloth_scaling.size(sizes, seed, repeats)
     rows += cloth_scaling.threads(triangles, seed, repeats)
     rows += cloth_scaling.topology(triangles, seed, repeats)
-    return rows + summary(rows)
+    return rows + summary(rows, quick)
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tauguard.benchmarks.report import Row, answer
+from tauguard.benchmarks.report import Row, answer, timed
 
 #: Times that a whole frame, and a query, of a peer or comparator is asked to take of ab2pf's.
 FRAME_MEANS = {"iccd": 2.3, "vcd": 1.34}
@@ -10,9 +10,9 @@ PEERS = {"ipctk AdditiveCCD": 10, "ipctk TightInclusionCCD": 100}
 FRAME_PEER = ("ipctk LBVH + AdditiveCCD", 10)
 
 
-def summary(rows: list[Row]) -> list[Row]:
+def summary(rows: list[Row], quick: bool) -> list[Row]:
     """One row a figure, from the rows of the other studies; those without the data are left out."""
-    return [*_errors(rows), *_queries(rows), *_frames(rows), *_growth(rows)]
+    return [*_errors(rows), *_queries(rows, quick), *_frames(rows, quick), *_growth(rows)]
 
 
 def _of(rows: list[Row], study: str) -> list[Row]:
@@ -73,7 +73,7 @@ def _checked(rows: list[Row]) -> list[Row]:
     return found
 
 
-def _queries(rows: list[Row]) -> list[Row]:
+def _queries(rows: list[Row], quick: bool) -> list[Row]:
     found: list[Row] = []
     for row in _of(rows, "query peer"):
         if "speedup" not in row:
@@ -81,7 +81,7 @@ def _queries(rows: list[Row]) -> list[Row]:
         bar = PEERS[row["peer"]]
         what = f"a clear query of {row['set']}, {row['kind']}: {row['peer']} over ab2pf"
         text = f"{row['speedup']:.3g} ({row['ns']:.3g} over {row['ab2pf_ns']:.3g} ns)"
-        found.append(answer(what, f"{bar}", text, row["speedup"] >= bar))
+        found.append(answer(what, f"{bar}", text, timed(row["speedup"] >= bar, quick)))
         if row["kind"] == "both":
             what = f"any query of {row['set']}, hits included: {row['peer']} over ab2pf"
             text = (
@@ -91,19 +91,21 @@ def _queries(rows: list[Row]) -> list[Row]:
     return found
 
 
-def _frames(rows: list[Row]) -> list[Row]:
+def _frames(rows: list[Row], quick: bool) -> list[Row]:
     found: list[Row] = []
     for row in _of(rows, "frame peer"):
         if row["scene"] == "cloth-ball" and row["peer"] == FRAME_PEER[0] and "speedup" in row:
             what = f"a frame of cloth-ball: {row['peer']} over ab2pf"
             ours = row["ab2pf_ms"]["median"]
             text = f"{row['speedup']:.3g} ({row['peer_ms']:.3g} over {ours:.3g} ms)"
-            found.append(answer(what, f"{FRAME_PEER[1]}", text, row["speedup"] >= FRAME_PEER[1]))
+            met = timed(row["speedup"] >= FRAME_PEER[1], quick)
+            found.append(answer(what, f"{FRAME_PEER[1]}", text, met))
             own = _frame_ms(rows, "iccd")
             if own is not None:
                 text = f"{own / row['peer_ms']:.2g}"
                 what = "a frame of cloth-ball: iccd over LBVH + AdditiveCCD"
-                found.append(answer(what, "at most 0.5", text, own <= 0.5 * row["peer_ms"]))
+                met = timed(own <= 0.5 * row["peer_ms"], quick)
+                found.append(answer(what, "at most 0.5", text, met))
     for row in _of(rows, "frame mean"):
         bar = FRAME_MEANS.get(row["method"])
         if bar is not None and row["volume"] == "k_dop18":
@@ -112,7 +114,8 @@ def _frames(rows: list[Row]) -> list[Row]:
                 f"{row['times_ab2pf_mean']:.3g} "
                 f"({row['times_ab2pf_least']:.3g} to {row['times_ab2pf_most']:.3g})"
             )
-            found.append(answer(what, f"{bar}", text, row["times_ab2pf_mean"] >= bar))
+            met = timed(row["times_ab2pf_mean"] >= bar, quick)
+            found.append(answer(what, f"{bar}", text, met))
     return found
 
 

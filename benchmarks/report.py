@@ -44,14 +44,19 @@ def rate(successes: int, trials: int) -> dict[str, float | int | None]:
     return {"value": p, "low": low, "high": high, "n": trials}
 
 
-def answer(question: str, asked: str, measured: str, met: bool | None = None) -> Row:
+def timed(met: bool, quick: bool) -> bool | str:
+    """Whether a timing meets its bar; few repeats of small cases can say yes, but not no."""
+    return "full run" if quick and not met else bool(met)
+
+
+def answer(question: str, asked: str, measured: str, met: bool | str | None = None) -> Row:
     """A line of a study's closing summary; ``met`` is ``None`` where a figure has no bar."""
     return {
         "study": "summary",
         "question": question,
         "asked": asked,
         "measured": measured,
-        "met": None if met is None else bool(met),
+        "met": met if met is None or isinstance(met, str) else bool(met),
     }
 
 

@@ -16,7 +16,7 @@ PARTS = (rigid_convex, rigid_mesh, rigid_volumes, rigid_impact)
 def run(quick: bool, seed: int) -> list[Row]:
     """The rows of every part, and what was asked of them beside what they measured."""
     rows = [row for part in PARTS for row in part.run(quick, seed)]
-    return rows + rigid_claims.claims(rows)
+    return rows + rigid_claims.claims(rows, quick)
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

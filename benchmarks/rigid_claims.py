@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from tauguard.benchmarks.report import Row
+from tauguard.benchmarks.report import Row, timed
 
 METHODS = ("abfme", "sat", "auto")
+#: Bars of errors; every other one is of a time, which a quick run may miss by chance.
+ERRORS = ("at most 0", "at most 1e-07")
 
 
-def claims(rows: list[Row], volume: str = "obb") -> list[Row]:
+def claims(rows: list[Row], quick: bool, volume: str = "obb") -> list[Row]:
     """One row a claim: asked, measured, met; ``volume`` is the mesh tree's that is judged."""
-    return [
+    found = [
         *wrong_answers(rows),
         *convex_ratios(rows),
         *mesh_ratios(rows, volume),
         *impacts(rows),
     ]
+    for row in found:
+        if row["met"] is False and row["asked"] not in ERRORS:
+            row["met"] = timed(False, quick)
+    return found
 
 
 def of(rows: Iterable[Row], study: str, **fields: object) -> list[Row]:

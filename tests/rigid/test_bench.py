@@ -167,3 +167,17 @@ def test_a_wrong_answer_or_a_slow_cell_breaks_a_claim():
     judged = rigid_claims.wrong_answers(rows) + rigid_claims.convex_ratios(rows)
     broken = {row["claim"] for row in judged if row["met"] is False}
     assert broken == {"sat: wrong of 100 pairs", "auto over tuned SAT, every cell"}
+
+
+def test_a_quick_run_says_no_to_errors_only(monkeypatch):
+    def judged(quick):
+        errors = [rigid_claims.at_most("wrong", 0, [1.0]), rigid_claims.at_most("t", 1e-7, [1e-6])]
+        times = [rigid_claims.at_most("ns", 10, [12.0]), rigid_claims.at_least("ratio", 4, [3.0])]
+        monkeypatch.setattr(rigid_claims, "wrong_answers", lambda rows: errors)
+        monkeypatch.setattr(rigid_claims, "convex_ratios", lambda rows: times)
+        monkeypatch.setattr(rigid_claims, "mesh_ratios", lambda rows, volume: [])
+        monkeypatch.setattr(rigid_claims, "impacts", lambda rows: [])
+        return [row["met"] for row in rigid_claims.claims([], quick)]
+
+    assert judged(quick=True) == [False, False, "full run", "full run"]
+    assert judged(quick=False) == [False] * 4

@@ -1,0 +1,49 @@
+"""The cloth study's closing summary: what the referees found, and what a quick run cannot deny."""
+
+from tauguard.benchmarks.cloth_summary import summary
+
+
+def checked(**changed):
+    row = {"study": "independent check", "set": "all", "kind": "vf", "n": 1000}
+    row |= {"clear_certified": 700, "hit_certified": 100, "clear_tight": 650}
+    row |= dict.fromkeys(("contradictions", "misses", "false_hits", "late"), 0)
+    return {**row, "early_most": 2e-10, **changed}
+
+
+def met(rows, quick=False):
+    return {row["question"]: row["met"] for row in summary(rows, quick)}
+
+
+def test_each_error_that_the_referees_find_breaks_a_claim():
+    sound = met([checked(), {"study": "independent check", "set": "lattice"}])
+    assert set(sound.values()) == {True, None}
+    for key in ("contradictions", "misses", "false_hits", "late"):
+        name = f"certified by independent check, 1000 queries: {key.replace('_', ' ')}"
+        assert sound[name] is True
+        for quick in (True, False):
+            assert met([checked(**{key: 1})], quick)[name] is False
+    assert met([checked(early_most=2e-9)])["error of the time, most"] is False
+
+
+def test_shares_of_the_referees():
+    (row,) = [r for r in summary([checked()], False) if r["question"].startswith("certified, vf")]
+    assert row["measured"] == "80.0% by intervals, 65.0% by Tight-Inclusion too"
+    (row,) = [
+        r
+        for r in summary([checked(clear_tight=None)], False)
+        if r["question"].startswith("certified, vf")
+    ]
+    assert row["measured"] == "80.0% by intervals"
+
+
+def test_a_slow_ratio_is_open_after_a_quick_run():
+    rows = [
+        {
+            "study": "query peer", "set": "s", "kind": "vf", "peer": "ipctk AdditiveCCD",
+            "ns": 90.0, "ab2pf_ns": 10.0, "speedup": 9.0,
+        }
+    ]  # fmt: skip
+    assert list(met(rows, quick=True).values()) == ["full run"]
+    assert list(met(rows).values()) == [False]
+    rows[0]["speedup"] = 11.0
+    assert list(met(rows, quick=True).values()) == [True]
