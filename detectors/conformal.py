@@ -102,12 +102,7 @@ def calibrate_threshold(
     Raises:
         ValueError: bad arguments, or too few episodes for the promise; says how many would do.
     """
-    if not per_hour > 0:
-        raise ValueError(f"per_hour: {per_hour}, expected above 0")
-    if not 0 < confidence < 1:
-        raise ValueError(f"confidence: {confidence}, expected between 0 and 1")
-    if not episodes:
-        raise ValueError("no episodes to calibrate on")
+    check_promise([e.seconds for e in episodes], per_hour, confidence)
     count = len(episodes)
     hours = sum(e.seconds for e in episodes) / 3600
     peaks = np.sort([e.peak for e in episodes])[::-1]
@@ -119,13 +114,45 @@ def calibrate_threshold(
         allowed = allowed_episodes(count, alpha, confidence)
         counted = max(counted, allowed)
     if allowed < 0:
-        needed = int(np.ceil(np.log(1 - confidence) / np.log1p(-alpha)))
-        raise ValueError(
-            f"{count} episodes ({hours:.2g} h) cannot promise {per_hour:g} false alarms per hour "
-            f"with confidence {confidence:g}: give {needed} ({hours * needed / count:.2g} h), "
-            "or ask for more alarms or less confidence"
-        )
+        raise _too_few(count, hours, alpha, per_hour, confidence)
     return Promise(float(peaks[allowed]), per_hour, confidence, count, hours, allowed, several)
+
+
+def check_promise(seconds: Sequence[float], per_hour: float, confidence: float) -> None:
+    """Whether episodes of these lengths can promise at all, whatever the detector.
+
+    Each alarm is taken to be in an episode of its own; where one episode alarms more than once,
+    :func:`calibrate_threshold` needs more of them.
+
+    Args:
+        seconds: length of each collision-free episode [s].
+        per_hour: false alarms per hour to accept, above 0.
+        confidence: between 0 and 1.
+
+    Raises:
+        ValueError: they cannot, or bad arguments; says how many would do.
+    """
+    if not per_hour > 0:
+        raise ValueError(f"per_hour: {per_hour}, expected above 0")
+    if not 0 < confidence < 1:
+        raise ValueError(f"confidence: {confidence}, expected between 0 and 1")
+    if not seconds:
+        raise ValueError("no episodes to calibrate on")
+    count, hours = len(seconds), sum(seconds) / 3600
+    alpha = min(1.0, per_hour * hours / count)
+    if allowed_episodes(count, alpha, confidence) < 0:
+        raise _too_few(count, hours, alpha, per_hour, confidence)
+
+
+def _too_few(
+    count: int, hours: float, alpha: float, per_hour: float, confidence: float
+) -> ValueError:
+    needed = int(np.ceil(np.log(1 - confidence) / np.log1p(-alpha)))
+    return ValueError(
+        f"{count} episodes ({hours:.2g} h) cannot promise {per_hour:g} false alarms per hour "
+        f"with confidence {confidence:g}: give {needed} ({hours * needed / count:.2g} h), "
+        "or ask for more alarms or less confidence"
+    )
 
 
 def allowed_episodes(count: int, alpha: float, confidence: float) -> int:

@@ -16,6 +16,7 @@ from tauguard.detectors import (
 )
 from tauguard.detectors.filter import confirmation_samples
 from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
+from tauguard.detectors.real_arm.plausible import drive_torque, plausible
 from tauguard.detectors.zoo.srq_svr import SvrDetector
 from tauguard.traces.trace import Array, Bools, Detection, Trace
 
@@ -64,12 +65,13 @@ def watch(
 
     Raises:
         ValueError: joints that the robot does not have; too few quiet seconds, or more than the
-            log has.
+            log has; torques that the motion of those seconds does not explain.
     """
     learning = _learning(trace, gain, quiet)
     until = trace.t[0] + quiet
     if not (np.isfinite(factor) and factor > 0):
         raise ValueError(f"factor: {factor}, expected above 0")
+    doubts = plausible(robot, trace, tau, learning, gain)
     residual = observe(robot, trace.t, trace.q, trace.qd, tau, gain)
     thresholds = factor * np.abs(residual[learning]).max(axis=0)
     thresholds[~used(joints, robot.joints)] = np.inf
@@ -89,7 +91,7 @@ def watch(
         alarm=alarm,
         alarms=find_alarms(trace.t, alarm),
     )
-    return Watch(detection, thresholds, float(until), (note,))
+    return Watch(detection, thresholds, float(until), (note, *doubts))
 
 
 def _learning(trace: Trace, gain: float, quiet: float) -> Bools:
@@ -143,7 +145,8 @@ def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
 
     Raises:
         ValueError: another number of joints or another sample rate than it was trained at, or a
-            log that ends before the detector has settled.
+            log that ends before the detector has settled, or torques that its motion does not
+            explain.
     """
     detection = detector.detect(trace)
     assert detector.moving is not None
@@ -157,8 +160,9 @@ def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
             f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector watches from "
             f"{detector.settle:g} s on"
         )
-    notes = [note]
-    if detection.alarm[trace.t >= settled].mean() > STRANGE:
+    tau, rows = drive_torque(detector.arm, trace), trace.t >= settled
+    notes = [note, *plausible(detector.arm.robot, trace, tau, rows, GAIN)]
+    if detection.alarm[rows].mean() > STRANGE:
         notes.append(
             "alarms fill much of this log: this is not the arm, the joints' order, the sign or the "
             "unit of the currents that the detector was trained on, or it is held all the time"

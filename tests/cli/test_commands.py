@@ -105,6 +105,9 @@ def test_train_any_detector_with_a_promise(tmp_path, capsys):
     line = fails(capsys, *train, *flags, "--false-alarms-per-hour", "1")
     assert "cannot promise 1 false alarms per hour" in line
     assert "give " in line
+    line = fails(capsys, *train, *flags, "--false-alarms-per-hour", "600", "--confidence", "0.999")
+    assert "with confidence 0.999" in line
+    assert "--calibration makes" in fails(capsys, *train, "--confidence", "0.9")
     run(*train, *flags, "--false-alarms-per-hour", "600")
     assert "at most 600 false alarms per hour" in capsys.readouterr().out
     run("evaluate", "--traces", str(struck), "--model", model)

@@ -88,6 +88,12 @@ def test_a_coarse_rate_is_said_aloud(log, capsys):
         (("--gains", "8", "5", "--factor", "0"), "factor: 0.0, expected above 0"),
         (("--gains", "8", "5", "--columns", "ur10e"), "line 1: 7 columns, expected 31"),
         (("--gains", "8", "5", "--robot", "no.urdf"), "no.urdf: no such robot file"),
+        (("--gains", "8000", "5000"), "milliamperes?"),
+        (("--gains", "-8", "-5"), "check the unit of the currents"),
+        (
+            ("--model", "m.json", "--quiet", "5", "--gains", "8", "5"),
+            "--quiet, --gains: not beside",
+        ),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(log, capsys, flags, message):

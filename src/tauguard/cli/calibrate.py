@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 if TYPE_CHECKING:
-    from tauguard.detectors import RobotNumbers
     from tauguard.detectors.real_arm.identification import Identified
-    from tauguard.detectors.real_arm.recording import Recording
 
 SOURCES = {
     "gains": "the gains that were given",
+    "preset": "the gains of the preset",
     "payload": "the known payload",
     "masses": "the robot file's masses",
 }
@@ -43,12 +42,13 @@ def command(
         columns: of CSV files: a preset (ur10e, ur_rtde) or a JSON file (see `tauguard detect`).
         gains: N m per ampere, one a joint.
         payload: loads that were carried, as LOG=KG, LOG=KG,X,Y,Z (centre in the last link's frame,
-            m) or LOG=unknown; LOG is a file's name. Other logs are taken as without a load.
+            m) or LOG=unknown; LOG is a file's name, with or without .csv. Other logs are taken as
+            without a load.
         scale: what fixes the scale of the torques.
         json: write the figures here as JSON.
     """
     from tauguard.benchmarks.report import write_json
-    from tauguard.cli.real_logs import read_logs, robot_numbers
+    from tauguard.cli.real_logs import loaded, read_logs, robot_numbers, start
     from tauguard.detectors.real_arm.arm_file import save_arm
     from tauguard.detectors.real_arm.assessment import explained, left_out
     from tauguard.detectors.real_arm.identification import identify
@@ -57,77 +57,18 @@ def command(
     numbers = robot_numbers(robot)
     traces = read_logs(logs, columns, numbers)
     recordings = loaded(traces, payload)
-    arm, chosen = start(numbers, recordings, columns, gains, scale)
+    arm, source = start(numbers, recordings, columns, gains, scale)
+    chosen = "gains" if source == "preset" else source
     found = identify(arm, recordings, scale=chosen)
     for note in explained(found.arm, [r.trace for r in recordings if r.load == Load()]):
         print(f"note: {note}")
     held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
     target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=chosen, logs=list(traces))
-    result = summary(list(traces), found, held, target)
+    result = summary(list(traces), found, held, target) | {"scale": source}
     report(result, found)
     if json is not None:
         write_json(json, result)
-
-
-def loaded(traces: dict[str, Any], payload: tuple[str, ...]) -> list[Recording]:
-    """Traces with their loads.
-
-    Raises:
-        ValueError: a payload that cannot be read or belongs to no log.
-    """
-    from tauguard.detectors.real_arm.recording import Load, Recording
-
-    loads: dict[str, Load | None] = {}
-    for text in payload:
-        name, _, value = text.partition("=")
-        if name not in traces:
-            raise ValueError(f"--payload {text}: no log {name!r}; there are {', '.join(traces)}")
-        if value == "unknown":
-            loads[name] = None
-            continue
-        try:
-            parts = [float(v) for v in value.split(",")]
-        except ValueError:
-            parts = []
-        if len(parts) not in (1, 4):
-            raise ValueError(f"--payload {text}: expected LOG=KG, LOG=KG,X,Y,Z or LOG=unknown")
-        centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
-        loads[name] = Load(parts[0], centre)
-    return [Recording(trace, loads.get(name, Load())) for name, trace in traces.items()]
-
-
-def start(
-    numbers: RobotNumbers,
-    recordings: list[Recording],
-    columns: str | None,
-    gains: tuple[float, ...],
-    scale: str,
-) -> tuple[Any, str]:
-    """The arm to begin with, and what fixes the scale.
-
-    Raises:
-        ValueError: not one gain a joint.
-    """
-    from tauguard.datasets.drives import DRIVES
-    from tauguard.detectors import ArmModel
-    from tauguard.detectors.real_arm.assessment import start_gains
-
-    preset = DRIVES.get(columns or "")
-    known = any(r.load is not None and r.load.mass > 0 for r in recordings)
-    if scale == "auto":
-        otherwise = "payload" if known else "masses"
-        scale = "gains" if gains or (preset and not known) else otherwise
-    if not gains and preset is not None:
-        gains = preset.gain
-    if gains and len(gains) != numbers.joints:
-        raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
-    if not gains and scale == "gains":
-        raise ValueError(f"--gains: give {numbers.joints} numbers, N m of torque per ampere")
-    import numpy as np
-
-    begin = np.array(gains) if gains else start_gains(numbers, [r.trace for r in recordings])
-    return ArmModel(numbers, begin), scale
 
 
 def summary(names: list[str], found: Identified, held: list[Any], target: Path) -> dict[str, Any]:
@@ -153,6 +94,7 @@ def report(result: dict[str, Any], found: Identified) -> None:
     from tauguard.benchmarks.report import table
 
     print(f"scale of the torques: from {SOURCES[result['scale']]}")
+    held = "preset" if result["scale"] == "preset" else "given"
     rows = []
     for k, name in enumerate(result["joints"]):
         spread = result["gain_relative_sd"][k]
@@ -160,17 +102,21 @@ def report(result: dict[str, Any], found: Identified) -> None:
             {
                 "joint": name,
                 "gain N m/A": f"{result['drive_gain'][k]:.2f}",
-                "+-": f"{100 * spread:.0f} %" if spread else "given",
+                "+-": f"{100 * spread:.0f} %" if spread else held,
                 "mass kg": f"{result['mass'][k]:.2f}",
                 "rotor kg m2": f"{result['armature'][k]:.3f}",
                 "rms N m": f"{result['rms_nm'][k]:.2f}",
             }
         )
     print(table(rows))
+    held_out = []
     for name, rms in result["held_out_rms_nm"].items():
         load = result["loads_kg"][name]
-        carried = f" (with {load:.2f} kg, not told here)" if abs(load) > 0.01 else ""
-        print(f"held out {name}{carried}: " + " ".join(f"{v:.2f}" for v in rms) + " N m rms")
+        carried = f"{load:.2f} kg" if abs(load) > 0.01 else ""
+        values = {f"{j} N m": f"{v:.2f}" for j, v in zip(result["joints"], rms, strict=True)}
+        held_out.append({"held out (rms)": name, "load, not told": carried} | values)
+    if held_out:
+        print(table(held_out))
     for note in found.notes:
         print(f"note: {note}")
     print(f"{result['robot']}: written")

@@ -11,11 +11,40 @@ import tyro
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tauguard.datasets import ColumnMap
-    from tauguard.datasets.drives import DriveNumbers
     from tauguard.detectors import Diagnosis
     from tauguard.detectors.real_arm.watch import Watch
     from tauguard.traces import Trace
+
+
+@dataclasses.dataclass(frozen=True)
+class Plain:
+    """Without --model: the momentum observer, and thresholds from the log's own beginning.
+
+    The file of --robot brings gains and friction if `tauguard calibrate` wrote it.
+    """
+
+    quiet: float = 10.0
+    """seconds from the beginning that you vouch for"""
+    joints: tuple[int, ...] = ()
+    """whose residuals are looked at, counted from 1 (default: the first four)"""
+    gains: tuple[float, ...] = ()
+    """N m per ampere, one a joint (known for the preset ur10e)"""
+    viscous: tuple[float, ...] = ()
+    """friction in N m s/rad, one a joint"""
+    coulomb: tuple[float, ...] = ()
+    """friction in N m, one a joint"""
+    observer_gain: float = 20.0
+    """rate of the momentum observer in 1/s"""
+    confirmation: float = 0.05
+    """seconds above the threshold before an alarm"""
+    factor: float = 1.5
+    """threshold over the largest residual of the quiet seconds"""
+
+    def given(self) -> list[str]:
+        """Flags that are not as they are without being given."""
+        names = [field.name for field in dataclasses.fields(self)]
+        own = [name for name in names if getattr(self, name) != getattr(Plain(), name)]
+        return [f"--{name.replace('_', '-')}" for name in own]
 
 
 def command(
@@ -24,14 +53,7 @@ def command(
     robot: Path,
     columns: str | None = None,
     model: Path | None = None,
-    quiet: float = 10.0,
-    joints: tuple[int, ...] = (),
-    gains: tuple[float, ...] = (),
-    viscous: tuple[float, ...] = (),
-    coulomb: tuple[float, ...] = (),
-    observer_gain: float = 20.0,
-    confirmation: float = 0.05,
-    factor: float = 1.5,
+    plain: Annotated[Plain, tyro.conf.arg(name="")] = Plain(),
     out: Path | None = None,
     json: Path | None = None,
 ) -> None:
@@ -39,48 +61,34 @@ def command(
 
     With --model a trained detector watches the log. Without one, every joint's threshold is learned
     from the first --quiet seconds, in which nothing may touch the arm, and the rest is watched.
+    Torques that the motion does not explain are refused: a wrong unit, sign or order of currents.
 
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
         robot: URDF or MJCF file of the arm alone.
         columns: of a CSV file: a preset (ur10e, ur_rtde) or a JSON file with the fields of
-            tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], ...}.
+            tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], ...}; numbers
+            instead of names count columns from 0.
         model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
-        quiet: seconds from the beginning that you vouch for.
-        joints: whose residuals are looked at, counted from 1 (default: the first four; a model
-            brings its own).
-        gains: N m per ampere, one a joint (known for the preset ur10e).
-        viscous: friction in N m s/rad, one a joint.
-        coulomb: friction in N m, one a joint.
-        observer_gain: rate of the momentum observer in 1/s.
-        confirmation: seconds above the threshold before an alarm.
-        factor: threshold over the largest residual of the quiet seconds.
+        plain: what goes without a model.
         out: folder for events.json, detect.mcap and detect.rrd.
         json: write the figures here as JSON.
     """
     from tauguard.benchmarks.report import write_json
-    from tauguard.datasets import read_log
-    from tauguard.detectors import RobotNumbers
-    from tauguard.detectors.real_arm.watch import watch
-    from tauguard.models import pin_model
+    from tauguard.cli.real_logs import read_matched, robot_numbers
 
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
-    read = read_log(log, column_map(columns))
-    numbers = RobotNumbers.from_pin(pin_model(robot))
-    trace = matched(read.trace, numbers.joint_names)
+    if model is not None and plain.given():
+        raise ValueError(f"{', '.join(plain.given())}: not beside --model, which brings its own")
     said: Sequence[Diagnosis] = ()
-    notes: tuple[str, ...] = ()
     if model is not None:
+        trace = read_matched(log, columns, robot_numbers(robot))
         detector, found = watched(model, trace)
         said, notes = explained(detector, trace, found, robot)
     else:
-        drive = drive_numbers(columns, gains, viscous, coulomb, len(trace.joint_names))
-        tau = drive.tau(trace.current, trace.qd)
-        terms = {"gain": observer_gain, "confirmation": confirmation, "factor": factor}
-        first_four = range(1, min(4, numbers.joints) + 1)
-        found = watch(trace, numbers, tau, quiet, joints=joints or first_four, **terms)
-    for note in (*read.notes, *found.notes, *notes):
+        trace, found, notes = plainly(log, robot, columns, plain)
+    for note in (*found.notes, *notes):
         print(f"note: {note}")
     result = summary(log, trace, found, said)
     report(result)
@@ -103,77 +111,27 @@ def watched(model: Path, trace: Trace) -> tuple[Any, Watch]:
     return detector, watch_with(detector, trace)
 
 
-def column_map(columns: str | None) -> ColumnMap | str | None:
-    """A preset's name as it is; a map from a JSON file."""
-    if columns is None or not columns.endswith(".json"):
-        return columns
-    import json
+def plainly(
+    log: Path, robot: Path, columns: str | None, plain: Plain
+) -> tuple[Trace, Watch, tuple[str, ...]]:
+    """The log, what a detector that nobody trained saw in it, and where its numbers come from."""
+    from tauguard.cli.real_logs import read_matched, robot_numbers, watched_arm
+    from tauguard.detectors.real_arm.plausible import drive_torque
+    from tauguard.detectors.real_arm.watch import watch
 
-    from tauguard.datasets import ColumnMap
-
-    try:
-        fields = json.loads(Path(columns).read_text())
-    except json.JSONDecodeError as error:
-        raise ValueError(f"{columns}: not JSON ({error})") from error
-    known = [field.name for field in dataclasses.fields(ColumnMap)]
-    if not isinstance(fields, dict) or set(fields) - set(known):
-        raise ValueError(f"{columns}: expected an object with some of {', '.join(known)}")
-    fields = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
-    if "repair" in fields:
-        fields["repair"] = frozenset(fields["repair"])
-    try:
-        return ColumnMap(**fields)
-    except TypeError as error:
-        raise ValueError(f"{columns}: {error}") from error
-
-
-def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
-    """The trace with the robot's joints in the robot's order.
-
-    Raises:
-        ValueError: joints that do not match.
-    """
-    given = trace.joint_names
-    if len(given) != len(names):
-        raise ValueError(
-            f"the log has {len(given)} joints ({', '.join(given)}), "
-            f"the robot {len(names)} ({', '.join(names)})"
-        )
-    if given == tuple(f"joint_{i}" for i in range(1, len(given) + 1)) or given == names:
-        return dataclasses.replace(trace, joint_names=names)
-    if set(given) != set(names):
-        raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
-    order = [given.index(name) for name in names]
-    tables = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
-    moved: dict[str, Any] = {
-        name: getattr(trace, name)[:, order] for name in tables if getattr(trace, name) is not None
-    }
-    return dataclasses.replace(trace, joint_names=names, **moved)
-
-
-def drive_numbers(
-    columns: str | None,
-    gains: tuple[float, ...],
-    viscous: tuple[float, ...],
-    coulomb: tuple[float, ...],
-    joints: int,
-) -> DriveNumbers:
-    """The user's numbers, or those of the preset.
-
-    Raises:
-        ValueError: no gains, or not one a joint.
-    """
-    from tauguard.datasets.drives import DRIVES, DriveNumbers
-
-    preset = DRIVES.get(columns or "")
-    if not gains and preset is None:
-        raise ValueError(f"--gains: give {joints} numbers, N m of joint torque per ampere")
-    if not gains and preset is not None:
-        gains = preset.gain
-        viscous, coulomb = viscous or preset.viscous, coulomb or preset.coulomb
-    if len(gains) != joints:
-        raise ValueError(f"--gains: {len(gains)} numbers for {joints} joints")
-    return DriveNumbers(gains, viscous, coulomb)
+    trace = read_matched(log, columns, robot_numbers(robot))
+    arm, source = watched_arm(robot, columns, plain.gains, plain.viscous, plain.coulomb)
+    found = watch(
+        trace,
+        arm.robot,
+        drive_torque(arm, trace),
+        plain.quiet,
+        gain=plain.observer_gain,
+        confirmation=plain.confirmation,
+        factor=plain.factor,
+        joints=plain.joints or range(1, min(4, arm.robot.joints) + 1),
+    )
+    return trace, found, (f"gains and friction are those of {source}",)
 
 
 def explained(

@@ -1,13 +1,16 @@
-"""Reading logs of a real arm for the commands, with every repair said aloud."""
+"""What the commands for real arms share: logs, their joints, loads and gains, and what was said."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tauguard.detectors import RobotNumbers
+    from tauguard.datasets import ColumnMap
+    from tauguard.detectors import ArmModel, RobotNumbers
+    from tauguard.detectors.real_arm.recording import Load, Recording
     from tauguard.traces import Trace
 
 
@@ -17,6 +20,67 @@ def robot_numbers(robot: Path) -> RobotNumbers:
     from tauguard.models import pin_model
 
     return RobotNumbers.from_pin(pin_model(robot))
+
+
+# -- logs -----------------------------------------------------------------------------------------
+
+
+def column_map(columns: str | None) -> ColumnMap | str | None:
+    """A preset's name as it is; a map from a JSON file."""
+    if columns is None or not columns.endswith(".json"):
+        return columns
+    import json
+
+    from tauguard.datasets import ColumnMap
+
+    try:
+        fields = json.loads(Path(columns).read_text())
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{columns}: not JSON ({error})") from error
+    known = [field.name for field in dataclasses.fields(ColumnMap)]
+    if not isinstance(fields, dict) or set(fields) - set(known):
+        raise ValueError(f"{columns}: expected an object with some of {', '.join(known)}")
+    fields = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
+    if "repair" in fields:
+        fields["repair"] = frozenset(fields["repair"])
+    try:
+        return ColumnMap(**fields)
+    except TypeError as error:
+        raise ValueError(f"{columns}: {error}") from error
+
+
+def read_matched(log: Path, columns: str | None, robot: RobotNumbers) -> Trace:
+    """One log, joints in the robot's order; prints a line for each repair."""
+    from tauguard.datasets import read_log
+
+    read = read_log(log, column_map(columns))
+    for note in read.notes:
+        print(f"note: {log.name}: {note}")
+    return matched(read.trace, robot.joint_names)
+
+
+def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
+    """The trace with the robot's joints in the robot's order.
+
+    Raises:
+        ValueError: joints that do not match.
+    """
+    given = trace.joint_names
+    if len(given) != len(names):
+        raise ValueError(
+            f"the log has {len(given)} joints ({', '.join(given)}), "
+            f"the robot {len(names)} ({', '.join(names)})"
+        )
+    if given == tuple(f"joint_{i}" for i in range(1, len(given) + 1)) or given == names:
+        return dataclasses.replace(trace, joint_names=names)
+    if set(given) != set(names):
+        raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
+    order = [given.index(name) for name in names]
+    tables = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
+    moved: dict[str, Any] = {
+        name: getattr(trace, name)[:, order] for name in tables if getattr(trace, name) is not None
+    }
+    return dataclasses.replace(trace, joint_names=names, **moved)
 
 
 def log_files(logs: Sequence[Path]) -> list[Path]:
@@ -38,22 +102,138 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
 
 
 def read_logs(logs: Sequence[Path], columns: str | None, robot: RobotNumbers) -> dict[str, Trace]:
-    """Traces by file name, joints in the robot's order; prints a line for each repair."""
-    from tauguard.cli.detect import column_map, matched
-    from tauguard.datasets import read_log
+    """Traces to learn from, by file name.
+
+    Raises:
+        ValueError: a current that is saturated, besides what reading raises.
+    """
     from tauguard.datasets.log_checks import saturated
 
-    chosen = column_map(columns)
     traces = {}
     for path in log_files(logs):
-        read = read_log(path, chosen)
-        for note in read.notes:
-            print(f"note: {path.name}: {note}")
-        for name, row, count, peak in saturated(read.trace):
+        trace = read_matched(path, columns, robot)
+        for name, row, count, peak in saturated(trace):
             raise ValueError(
                 f"{path}: the current of {name} stays at {peak:g} A for {count} samples, "
-                f"{read.trace.t[row] - read.trace.t[0]:.2f} s after the beginning: saturated, "
+                f"{trace.t[row] - trace.t[0]:.2f} s after the beginning: saturated, "
                 "which says nothing of the torque; leave this log out or cut it there"
             )
-        traces[path.name] = matched(read.trace, robot.joint_names)
+        traces[path.name] = trace
     return traces
+
+
+# -- loads and gains ------------------------------------------------------------------------------
+
+
+def loaded(traces: dict[str, Trace], payload: tuple[str, ...]) -> list[Recording]:
+    """Traces with their loads, each told as LOG=KG, LOG=KG,X,Y,Z or LOG=unknown.
+
+    Raises:
+        ValueError: a payload that cannot be read or belongs to no log.
+    """
+    from tauguard.detectors.real_arm.recording import Load, Recording
+
+    loads: dict[str, Load | None] = {}
+    for text in payload:
+        name, _, value = text.rpartition("=")
+        loads[_log_named(name, text, list(traces))] = _load(text, value)
+    return [Recording(trace, loads.get(name, Load())) for name, trace in traces.items()]
+
+
+def _log_named(name: str, text: str, logs: list[str]) -> str:
+    """The log of this file name, or of this name without its ending."""
+    found = [log for log in logs if name == log] or [log for log in logs if name == Path(log).stem]
+    if len(found) != 1:
+        there = f"two are called {name!r}" if found else f"no log {name!r}"
+        raise ValueError(f"--payload {text}: {there}; there are {', '.join(logs)}")
+    return found[0]
+
+
+def _load(text: str, value: str) -> Load | None:
+    from tauguard.detectors.real_arm.recording import Load
+
+    if value == "unknown":
+        return None
+    try:
+        parts = [float(v) for v in value.split(",")]
+    except ValueError:
+        parts = []
+    if len(parts) not in (1, 4):
+        raise ValueError(f"--payload {text}: expected LOG=KG, LOG=KG,X,Y,Z or LOG=unknown")
+    centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
+    return Load(parts[0], centre)
+
+
+def start(
+    numbers: RobotNumbers,
+    recordings: list[Recording],
+    columns: str | None,
+    gains: tuple[float, ...],
+    scale: str,
+) -> tuple[ArmModel, str]:
+    """The arm to begin with, and what fixes the scale: "gains", "preset", "payload" or "masses".
+
+    Raises:
+        ValueError: not one gain a joint.
+    """
+    import numpy as np
+
+    from tauguard.datasets.drives import DRIVES
+    from tauguard.detectors import ArmModel
+    from tauguard.detectors.real_arm.assessment import start_gains
+
+    preset = DRIVES.get(columns or "")
+    known = any(r.load is not None and r.load.mass > 0 for r in recordings)
+    if scale == "auto":
+        otherwise = "payload" if known else "masses"
+        scale = "gains" if gains or (preset and not known) else otherwise
+    if not gains and preset is not None:
+        gains = preset.gain
+        scale = "preset" if scale == "gains" else scale
+    if gains and len(gains) != numbers.joints:
+        raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
+    if not gains and scale == "gains":
+        raise ValueError(f"--gains: give {numbers.joints} numbers, N m of torque per ampere")
+    begin = np.array(gains) if gains else start_gains(numbers, [r.trace for r in recordings])
+    return ArmModel(numbers, begin), scale
+
+
+def watched_arm(
+    robot: Path,
+    columns: str | None,
+    gains: tuple[float, ...],
+    viscous: tuple[float, ...],
+    coulomb: tuple[float, ...],
+) -> tuple[ArmModel, str]:
+    """The arm of a log that no model is given for, and where its gains and friction come from.
+
+    Raises:
+        ValueError: no gains, not one a joint, or some beside those of a calibrated robot file.
+    """
+    import numpy as np
+
+    from tauguard.datasets.drives import DRIVES, REVERSAL, DriveNumbers
+    from tauguard.detectors import ArmModel, FrictionModel
+    from tauguard.detectors.real_arm.arm_file import load_arm
+
+    calibrated = load_arm(robot)
+    if calibrated is not None:
+        if gains or viscous or coulomb:
+            raise ValueError(
+                f"{robot.name} is calibrated and brings its own gains and friction: leave out "
+                "--gains, --viscous and --coulomb, or give the robot's own file"
+            )
+        return calibrated, f"the calibration in {robot.name}"
+    numbers = robot_numbers(robot)
+    preset, source = DRIVES.get(columns or ""), "the flags"
+    if not gains and preset is None:
+        raise ValueError(f"--gains: give {numbers.joints} numbers, N m of joint torque per ampere")
+    if not gains and preset is not None:
+        gains, source = preset.gain, f"the preset {columns}"
+        viscous, coulomb = viscous or preset.viscous, coulomb or preset.coulomb
+    if len(gains) != numbers.joints:
+        raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
+    drive = DriveNumbers(gains, viscous, coulomb)
+    coulomb, viscous = (x or (0.0,) * numbers.joints for x in (drive.coulomb, drive.viscous))
+    friction = FrictionModel.coulomb_viscous(coulomb, viscous, width=REVERSAL)
+    return ArmModel(numbers, np.array(drive.gain), friction), source

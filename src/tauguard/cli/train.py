@@ -16,6 +16,7 @@ def command(
     detector: str = "srq-svr",
     calibration: Path | None = None,
     false_alarms_per_hour: float | None = None,
+    confidence: float | None = None,
     free: tuple[Path, ...] = (),
     robot: Path | None = None,
     columns: str | None = None,
@@ -38,6 +39,7 @@ def command(
         calibration: folder of collision-free recordings that are not in --traces.
         false_alarms_per_hour: what the threshold aims at on collision-free training motion
             (default: 10, or 1 with --free), or promises with --calibration.
+        confidence: with --calibration, how sure the promise is to be (default: 0.95).
         free: collision-free logs of a real arm, files or a folder.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains.
         columns: of CSV files, see `tauguard detect`.
@@ -50,9 +52,12 @@ def command(
     target = model or Path("model.json" if free else "model.skops")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
+    if confidence is not None and calibration is None:
+        raise ValueError("--confidence is of the promise that --calibration makes")
     if traces is not None:
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
-        labelled_motion(traces, target, detector, calibration, rate)
+        sure = 0.95 if confidence is None else confidence
+        labelled_motion(traces, target, detector, calibration, rate, sure)
         return
     if calibration is not None or detector != "srq-svr":
         raise ValueError("--detector and --calibration go with --traces, not with --free")
@@ -63,12 +68,13 @@ def command(
 
 
 def labelled_motion(
-    traces: Path, model: Path, name: str, calibration: Path | None, rate: float
+    traces: Path, model: Path, name: str, calibration: Path | None, rate: float, confidence: float
 ) -> None:
     """Train on labelled recordings."""
     from tauguard.cli.fitting import fitted
     from tauguard.cli.folder import labelled
     from tauguard.detectors import DETECTORS, make_detector, promised, save_model
+    from tauguard.detectors.conformal import check_promise
 
     if name not in DETECTORS:
         make_detector(name)  # says which there are
@@ -77,12 +83,14 @@ def labelled_motion(
             f"--detector {name} needs --calibration, a folder of collision-free recordings "
             "(`tauguard simulate --collisions 0` writes some)"
         )
-    # Read first: a folder that cannot be used is better named before training than after.
+    # First: what cannot be used, or cannot promise, is better named before training than after.
     free = labelled(calibration) if calibration is not None else []
+    if free:
+        check_promise([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
     recordings = labelled(traces)
     watched = fitted(name, recordings, rate)
     if free:
-        watched, promise = promised(watched, free, rate)
+        watched, promise = promised(watched, free, rate, confidence)
     save_model(watched, model)
     collisions = sum(len(t.truth.collisions) for t in recordings if t.truth)
     print(
@@ -108,8 +116,7 @@ def free_motion(
     sensitivity: bool,
 ) -> None:
     """Train on collision-free logs."""
-    from tauguard.cli.calibrate import loaded, start
-    from tauguard.cli.real_logs import read_logs, robot_numbers
+    from tauguard.cli.real_logs import loaded, read_logs, robot_numbers, start
     from tauguard.detectors.real_arm.arm_file import load_arm
     from tauguard.detectors.real_arm.assessment import explained
     from tauguard.detectors.real_arm.free_motion import FreeMotionDetector, FreeMotionSettings
@@ -143,7 +150,10 @@ def report(detector: FreeMotionDetector, model: Path, logs: int) -> None:
     names = detector.arm.robot.joint_names
     pairs = zip(names, detector.moving.weights, detector.resting.weights, strict=True)
     for name, moving, rest in pairs:
-        print(f"  {name}: allows {moving[0]:.1f} N m in slow motion, {rest[0]:.1f} N m at rest")
+        print(f"  {name}: its residual may be {moving[0]:.1f} N m in motion, {rest[0]:.1f} at rest")
+    print(
+        "  more with speed and acceleration; a contact has to add more than is free: --sensitivity"
+    )
 
 
 def blows(detector: FreeMotionDetector, traces: list[Trace]) -> None:

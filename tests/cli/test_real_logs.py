@@ -1,0 +1,124 @@
+"""From logs of an arm to a calibrated file, and detection with it; what is refused and named."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tauguard.cli import main, real_logs
+from tauguard.detectors.real_arm.arm_file import load_arm
+from tauguard.detectors.real_arm.recording import Load
+from tests.detectors.synthetic_arm import GAIN, XML, record
+
+COLUMNS = {"t": 0, "q": [1, 2, 3], "qd": [4, 5, 6], "current": [7, 8, 9]}
+GAINS = [str(g) for g in GAIN]
+
+
+def written(folder, name, trace, scale=1.0):
+    table = np.column_stack([trace.t, trace.q, trace.qd, scale * trace.current])
+    np.savetxt(folder / name, table, delimiter=",", fmt="%.9g")
+    return str(folder / name)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm")
+    (folder / "arm.xml").write_text(XML)
+    (folder / "columns.json").write_text(json.dumps(COLUMNS))
+    for seed in range(3):
+        written(folder, f"log{seed}.csv", record(seed))
+    return folder
+
+
+def flags(folder, robot="arm.xml"):
+    return ["--robot", str(folder / robot), "--columns", str(folder / "columns.json")]
+
+
+def fails(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main(list(arguments))
+    assert stop.value.code == 2
+    return capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def calibrated(folder):
+    logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
+    out = folder / "calibrated.xml"
+    main(["calibrate", *logs, *flags(folder), "--gains", *GAINS, "--out", str(out)])
+    return out
+
+
+def test_calibrated_file_brings_gains_and_friction(folder, calibrated, capsys):
+    log = written(folder, "fresh.csv", record(9))
+    plain = ["detect", log, *flags(folder, calibrated.name), "--joints", "1", "2", "3"]
+    main([*plain, "--json", str(folder / "own.json")])
+    assert "those of the calibration in calibrated.xml" in capsys.readouterr().out
+    raw = ["detect", log, *flags(folder), "--joints", "1", "2", "3", "--gains", *GAINS]
+    main([*raw, "--json", str(folder / "raw.json")])
+    assert "those of the flags" in capsys.readouterr().out
+    own, other = (
+        json.loads((folder / name).read_text())["thresholds_nm"]
+        for name in ("own.json", "raw.json")
+    )
+    # Friction of 6, 5 and 2 N m that the file knows no longer has to be allowed.
+    assert (np.array(own) < 0.5 * np.array(other)).all()
+    assert "leave out --gains" in fails(capsys, *plain, "--gains", *GAINS)
+
+
+def test_held_out_residuals_have_the_joints_names(folder, capsys):
+    logs = [str(folder / f"log{seed}.csv") for seed in range(2)]
+    target = ["--out", str(folder / "two.xml")]
+    told = ["--payload", "log1=unknown"]
+    main(["calibrate", *logs, *flags(folder), "--gains", *GAINS, *target, *told])
+    out = capsys.readouterr().out
+    header = next(line for line in out.splitlines() if line.startswith("held out"))
+    assert all(name in header for name in ("a N m", "b N m", "c N m"))
+    assert "from the gains that were given" in out
+
+
+@pytest.mark.parametrize(
+    ("scale", "order"), [(1000.0, (0, 1, 2)), (1.0, (2, 0, 1)), (-1.0, (0, 1, 2))]
+)
+def test_strange_currents_are_refused(folder, calibrated, capsys, scale, order):
+    trace = record(7)
+    trace.current[:] = trace.current[:, order]
+    log = written(folder, "strange.csv", trace, scale)
+    line = fails(capsys, "detect", log, *flags(folder, calibrated.name))
+    assert "of the torque is not explained" in line
+
+
+def test_a_model_refuses_strange_currents_too(folder, calibrated, capsys):
+    logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
+    model = str(folder / "model.json")
+    robot = flags(folder, calibrated.name)
+    main(["train", "--free", *logs, *robot, "--model", model])
+    assert "its residual may be" in capsys.readouterr().out
+    log = written(folder, "milli.csv", record(8), 1000.0)
+    assert "milliamperes?" in fails(capsys, "detect", log, *robot, "--model", model)
+    log = written(folder, "right.csv", record(8))
+    main(["detect", log, *robot, "--model", model])
+    assert "0 alarms" in capsys.readouterr().out
+
+
+def test_payloads_by_file_name_or_stem():
+    traces = {"a.csv": record(0, 12.0), "b.x.csv": record(1, 12.0), "b.x.mcap": record(2, 12.0)}
+    found = real_logs.loaded(traces, ("a=2.6", "b.x.mcap=unknown"))
+    assert [r.load for r in found] == [Load(2.6), Load(), None]
+    for text, said in (
+        ("b.x=1", "two are called 'b.x'"),
+        ("c=1", "no log 'c'"),
+        ("a=1,2", "LOG=KG"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            real_logs.loaded(traces, (text,))
+
+
+def test_where_the_scale_comes_from_is_said(folder):
+    numbers = real_logs.robot_numbers(folder / "arm.xml")
+    recordings = real_logs.loaded({"a": record(0, 12.0)}, ())
+    assert real_logs.start(numbers, recordings, None, tuple(GAIN), "auto")[1] == "gains"
+    assert real_logs.start(numbers, recordings, None, (), "auto")[1] == "masses"
+    with pytest.raises(ValueError, match="6 numbers for 3 joints"):
+        real_logs.start(numbers, recordings, "ur10e", (), "auto")
+    assert load_arm(folder / "arm.xml") is None
