@@ -39,8 +39,8 @@ void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves
   const bool edges = &a == &b, same = edges && leaves.a == leaves.b;
   LeafLanes left = a.lanes_of(leaves.a);
   const LeafLanes right = b.lanes_of(leaves.b);
-  if (!same)
-    left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block, a.axes(), a.times(),
+  if (!same)  // x, y and z leave out nearly all rows that can be
+    left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block, 3, a.times(),
                                           left.occupied);
   Overlaps found;
   kernels.leaf_pair(left, right, a.axes(), a.times(), same, found);

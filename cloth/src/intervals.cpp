@@ -87,7 +87,7 @@ double first_contact(const Query& k, bool vf, Stats& stats) {
   stack[top++] = {0, 1, cubic(k)};
   const double* c = stack[0].c.b;
   const bool flat = std::max({std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2]), std::fabs(c[3])}) < error;
-  const int most = k.distance > 0 ? 4000 : flat ? 2 : 40;
+  const int most = k.distance > 0 ? 4000 : flat ? 0 : 40;
   for (int count = 0; top > 0; ++count) {
     const Piece piece = stack[--top];
     ++stats.intervals;

@@ -23,6 +23,17 @@ TAUGUARD_INLINE Mask lanes_after(bool same, int row, const LeafLanes& b) {
   return same ? b.occupied & ~Mask(0) << row << 1 : b.occupied;
 }
 
+// Rows that still have lanes after x, y and z.
+struct Remaining {
+  int rows[lanes], count = 0;
+  TAUGUARD_INLINE void add(int row, Mask near, Mask shared, Overlaps& out) {
+    out.adjacent += count_of(near & shared);
+    out.lanes_of[row] = static_cast<std::uint16_t>(near & ~shared);
+    rows[count] = row;
+    count += (near & ~shared) != 0;
+  }
+};
+
 TAUGUARD_INLINE Mask apart_portable(const float* row, RowStride s, const float* b, int axes, int times,
                                     Mask wanted) {
   std::int32_t apart[lanes] = {};
@@ -61,7 +72,9 @@ void pair_portable(const LeafLanes& a, const LeafLanes& b, int axes, int times, 
   for (Mask rows = a.occupied; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
     const Mask all = apart_portable(a.block + row, in_block(times), b.block, axes, times, lanes_after(same, row, b));
-    out.add(row, all, all ? sharing_portable(a, row, b) : 0);
+    const Mask shared = all ? all & sharing_portable(a, row, b) : 0;
+    out.adjacent += count_of(shared);
+    out.set(row, all & ~shared);
   }
 }
 
@@ -105,11 +118,19 @@ TAUGUARD_AVX2 Mask sharing_avx2(const LeafLanes& a, int row, const LeafLanes& b)
   return Mask(_mm256_movemask_ps(_mm256_castsi256_ps(left))) |
          Mask(_mm256_movemask_ps(_mm256_castsi256_ps(right))) << 8;
 }
+// On x, y and z for all rows; for those with lanes left that share no vertex, on the other axes: few branches to
+// mispredict.
 TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same, Overlaps& out) {
+  const RowStride s = in_block(times);
+  Remaining rest;
   for (Mask rows = a.occupied; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
-    const Mask all = overlap_avx2(a.block + row, in_block(times), b.block, axes, times, lanes_after(same, row, b));
-    out.add(row, all, all ? sharing_avx2(a, row, b) : 0);
+    const Mask near = overlap_avx2(a.block + row, s, b.block, 3, times, lanes_after(same, row, b));
+    rest.add(row, near, sharing_avx2(a, row, b), out);
+  }
+  for (int i = 0; i < rest.count; ++i) {
+    const int row = rest.rows[i];
+    out.set(row, overlap_avx2(a.block + row + 3 * s.axis, s, b.block + 3 * s.axis, axes - 3, times, out.lanes_of[row]));
   }
 }
 
@@ -151,8 +172,6 @@ TAUGUARD_AVX512 Mask node_avx512(const float* node, int slots, const float* bloc
                     : overlap_avx512<2>(node, in_node(slots), block, axes, wanted);
 }
 
-// On x, y and z for all rows; for those with lanes left that share no vertex, on the other axes: few branches to
-// mispredict.
 template <int times, int arity_a, int arity_b>
 TAUGUARD_AVX512 TAUGUARD_INLINE void pair_avx512(const LeafLanes& a, const LeafLanes& b, int axes, bool same,
                                                  Overlaps& out) {
@@ -162,7 +181,7 @@ TAUGUARD_AVX512 TAUGUARD_INLINE void pair_avx512(const LeafLanes& a, const LeafL
   __m512i vertices[arity_b];
   for (int k = 0; k < arity_b; ++k) vertices[k] = _mm512_loadu_si512(b.vertices + k * lanes);
   const RowStride s = in_block(times);
-  int some[lanes], n = 0;
+  Remaining rest;
   for (Mask rows = a.occupied; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
     const float* at = a.block + row;
@@ -172,17 +191,11 @@ TAUGUARD_AVX512 TAUGUARD_INLINE void pair_avx512(const LeafLanes& a, const LeafL
     for (int j = 0; j < arity_a; ++j)
       for (int k = 0; k < arity_b; ++k)
         shared |= _mm512_cmpeq_epi32_mask(vertices[k], _mm512_set1_epi32(a.vertices[j * lanes + row]));
-    out.adjacent += count_of(near & shared);
-    out.lanes_of[row] = static_cast<std::uint16_t>(near & ~shared);
-    some[n] = row;
-    n += (near & ~shared) != 0;
+    rest.add(row, near, shared, out);
   }
-  for (int i = 0; i < n; ++i) {
-    const int row = some[i];
-    const Mask left = overlap_avx512<times>(a.block + row + 3 * s.axis, s, b.block + 3 * step, axes - 3,
-                                            out.lanes_of[row]);
-    out.lanes_of[row] = static_cast<std::uint16_t>(left);
-    out.rows |= Mask(left != 0) << row;
+  for (int i = 0; i < rest.count; ++i) {
+    const int row = rest.rows[i];
+    out.set(row, overlap_avx512<times>(a.block + row + 3 * s.axis, s, b.block + 3 * step, axes - 3, out.lanes_of[row]));
   }
 }
 TAUGUARD_AVX512 void pair_avx512(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,

@@ -26,10 +26,9 @@ struct Overlaps {
   unsigned adjacent = 0;  // lanes left out because a vertex is shared
   std::uint16_t lanes_of[lanes];
 
-  void add(int row, Mask all, Mask shared) {
-    adjacent += count_of(all & shared);
-    lanes_of[row] = static_cast<std::uint16_t>(all & ~shared);
-    rows |= Mask((all & ~shared) != 0) << row;
+  TAUGUARD_INLINE void set(int row, Mask which) {
+    lanes_of[row] = static_cast<std::uint16_t>(which);
+    rows |= Mask(which != 0) << row;
   }
 };
 
