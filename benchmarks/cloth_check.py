@@ -133,6 +133,7 @@ def _tight_inclusion() -> Any:
         import ipctk
     except ImportError:
         return None
+    ipctk.set_logger_level(ipctk.LoggerLevel.error)  # it warns of each pair that starts in contact
     return ipctk.TightInclusionCCD(max_iterations=BOXES, conservative_rescaling=1.0)
 
 

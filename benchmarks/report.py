@@ -1,4 +1,4 @@
-"""What every study shares: rates with intervals, timings with spread, the table, the JSON form."""
+"""What every study shares: rates with intervals, timings with spread, the run of a study, JSON."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import json
 import os
 import platform
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tauguard.benchmarks import STUDIES
+from tauguard.benchmarks.text_table import table
 
 Row = dict[str, Any]
 
@@ -106,48 +107,6 @@ def versions() -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             continue
     return found
-
-
-def cell(value: object) -> str:
-    """One value as the table shows it: three digits, a rate as value [low, high]."""
-    if value is None:
-        return "-"
-    if isinstance(value, Mapping) and "value" in value:
-        if value["value"] is None:
-            return "-"
-        return f"{value['value']:.3f} [{value['low']:.3f}, {value['high']:.3f}]"
-    if isinstance(value, Mapping) and "median" in value:
-        if value["median"] is None:
-            return "-"
-        return f"{value['median']:.3g} [{value['low']:.3g}, {value['high']:.3g}]"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, np.floating):
-        value = float(value)
-    if isinstance(value, float):
-        return f"{value:.3g}" if abs(value) < 1e5 else f"{value:.2e}"
-    return str(value)
-
-
-def table(rows: Sequence[Row]) -> str:
-    """Rows of one study as aligned columns; rows with the same keys share a header."""
-    blocks: list[str] = []
-    start = 0
-    while start < len(rows):
-        keys = list(rows[start])
-        stop = start
-        while stop < len(rows) and list(rows[stop]) == keys:
-            stop += 1
-        cells = [keys] + [[cell(row[key]) for key in keys] for row in rows[start:stop]]
-        widths = [max(len(line[i]) for line in cells) for i in range(len(keys))]
-        lines = [
-            "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip()
-            for line in cells
-        ]
-        lines.insert(1, "  ".join("-" * w for w in widths))
-        blocks.append("\n".join(lines))
-        start = stop
-    return "\n\n".join(blocks)
 
 
 def write_json(path: Path, payload: Mapping[str, object]) -> None:

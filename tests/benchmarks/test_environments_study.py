@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tauguard.benchmarks import STUDIES, environments
-from tauguard.benchmarks.report import table
+from tauguard.benchmarks.text_table import table
 
 KNOWN = {"contact": None, "observer": "observer"}
 

@@ -91,7 +91,7 @@ def summary(names: list[str], found: Identified, held: list[Any], target: Path) 
 
 def report(result: dict[str, Any], found: Identified) -> None:
     """The figures for a reader."""
-    from tauguard.benchmarks.report import table
+    from tauguard.benchmarks.text_table import table
 
     print(f"scale of the torques: from {SOURCES[result['scale']]}")
     held = "preset" if result["scale"] == "preset" else "given"
