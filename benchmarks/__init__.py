@@ -5,7 +5,8 @@ A study is a module ``tauguard.benchmarks.<name>`` with two functions::
     def run(quick: bool, seed: int) -> list[dict[str, object]]   # flat rows
     def draw(rows: list[dict[str, object]], figure: matplotlib.figure.Figure) -> None
 
-and, where the rows are too many to print, ``shown(rows) -> rows``: what is printed instead.
+and, where the rows are too many to print, ``shown(rows) -> rows``: what is printed instead. Its
+``NOTES: dict[str, str]`` say above each table (by the rows' ``study``) what the columns mean.
 """
 
 #: Every study and its one-line description, in the order of ``tauguard bench list``.

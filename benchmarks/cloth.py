@@ -22,6 +22,37 @@ from tauguard.benchmarks.report import Row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: What the columns of each table mean.
+NOTES = {
+    "frame": "all collisions of one step, one thread. times_ab2pf: time over ab2pf's; missed and "
+    "added: hits that ab2pf has and the method has not, and the reverse.",
+    "frame mean": "times_ab2pf of the table above over its scenes.",
+    "frame peer": "the same step by ipctk: broad phase, then its candidates (vf_ns and ee_ns "
+    "each); peer_ms is both, speedup is that over ab2pf's whole frame.",
+    "query": "n candidates of ipctk's broad phase (of so many). ns: a query, gather included; "
+    "late: times after the exact one.",
+    "query clear": "ab2pf on the candidates without contact (ab2pf_ns), and on all of them.",
+    "query peer": "ns: a query without contact, inside ipctk's own loop; all_ns: with the hits' "
+    "share; misses and false_hits of the asked ones; us_a_hit: a hit, asked from Python.",
+    "truth": "whole frames beside the collisions that are listed with the data.",
+    "hard query": "public queries with exact labels; decided_exactly: left to exact arithmetic.",
+    "integers on labels": "the integers of 'independent check' on the same public queries.",
+    "adversarial": "ab2pf beside method exact. early_most: largest error of a time that is not "
+    "late; scaled, turned, backwards, modes: answers that change by 2^+-300, another order of "
+    "vertices, time reversed, other rounding modes.",
+    "independent check": "the same queries, all decided by integers in Python; clear_ and "
+    "hit_certified: certain by intervals too; clear_tight: the former that Tight-Inclusion "
+    "confirms; integers_only: the rest; contradictions: referees that differ; seconds: of all "
+    "referees.",
+    "volume": "frame time and candidates by kind of bounding volume, one thread.",
+    "front": "tests and time a frame with the front kept, beside a fresh descent; frame_saved: of "
+    "the whole frame.",
+    "size": "one frame of growing meshes. exponent: slope of log frame_ms over log triangles, by "
+    "scene.",
+    "threads": "the same frame with two threads; same_bits: nothing in the answer changes.",
+    "topology": "update_topology after so many faces changed, beside a new MeshCCD (rebuild_ms).",
+}
+
 
 def run(quick: bool, seed: int) -> list[Row]:
     """Rows of every part; the real scene joins in where ``TAUGUARD_DATA`` says where it is."""

@@ -27,6 +27,18 @@ CHECKERS = ("mujoco", "cloth", "rigid")
 #: Seconds of a scene in a quick run, where its own time is long.
 QUICK_SECONDS = {"sleeve_arm": 0.3, "arm_boxes": 1.2, "two_arms": 1.2}
 
+#: What the columns of each table mean.
+NOTES = {
+    "scenes": "recall: of the referee's contacts, steps_recall: of its contact steps, precision: "
+    "of the checker's reports. lead_ms: before MuJoCo's first contact; first_error_ms: beside "
+    "MuJoCo in far shorter steps. share: of mj_step's time. not_generated, not_held: MuJoCo "
+    "alone.",
+    "crossing": "starts spread over one step's travel. mujoco_generates: it makes a contact; "
+    "mujoco_holds: the ball never crosses the cloth; cloth_time_error [s]: against the closed "
+    "form.",
+    "cost": "what a checker adds to a step; state_us: the copy of the state that it needs.",
+}
+
 
 def run(quick: bool, seed: int) -> list[Row]:
     """Rows of the three studies; the scenes have no random input, so ``seed`` changes nothing."""

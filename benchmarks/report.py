@@ -140,7 +140,7 @@ def run_study(
     study = importlib.import_module(f"tauguard.benchmarks.{name}")
     rows: list[Row] = study.run(quick=quick, seed=seed)
     shown: Callable[[list[Row]], list[Row]] | None = getattr(study, "shown", None)
-    print(table(shown(rows) if shown else rows))
+    print(table(shown(rows) if shown else rows, notes=getattr(study, "NOTES", {})))
 
     import matplotlib
 

@@ -12,6 +12,22 @@ if TYPE_CHECKING:
 
 PARTS = (rigid_convex, rigid_mesh, rigid_volumes, rigid_impact)
 
+#: What the columns of each table mean; a table without a line has its file's docstring.
+NOTES = {
+    "table 2.1 static": "ns a pair in one pose, one thread. coal_net: without the loop and the "
+    "call; a_vs_b: b's time over a's; published: the printed ratio; wrong: of all pairs.",
+    "table 2.1 dynamic": "ns a pair that moves by a constant translation; a_vs_b: b's time over "
+    "a's.",
+    "hard cases": "false_hit and false_clear count wrong answers, exact_share is what was left to "
+    "exact arithmetic.",
+    "mesh build": "times_faster: coal's time over ours.",
+    "table 2.2 static": "first hit of two copies in random poses [us]; times_faster: coal's mean, "
+    "net of its call, over ours; disagree: answers that differ from coal's.",
+    "figure 1.1 volumes": "tightness: volume over the hull's; false_hits: of the pairs whose "
+    "hulls are apart, those that the volumes cannot tell apart.",
+    "claims": "the worst figure of each kind beside what was asked of it.",
+}
+
 
 def run(quick: bool, seed: int) -> list[Row]:
     """The rows of every part, and what was asked of them beside what they measured."""

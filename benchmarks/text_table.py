@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,12 +20,16 @@ TEXT = 56
 Column = list[list[str]]
 
 
-def table(rows: Sequence[Mapping[str, Any]], width: int = WIDTH) -> str:
+def table(
+    rows: Sequence[Mapping[str, Any]],
+    width: int = WIDTH,
+    notes: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """Rows as aligned columns; neighbours of one study with the same keys share a heading.
 
-    The study stands above. Where a line would be longer than ``width``, headings and long texts are
-    broken first, then intervals are left out, and then the columns that do not fit follow below,
-    each part with the first columns again.
+    The study stands above, with what ``notes`` says of it. Where a line would be longer than
+    ``width``, headings and long texts are broken first, then intervals are left out, and then the
+    columns that do not fit follow below, each part with the first columns again.
     """
     blocks: list[str] = []
     start = 0
@@ -35,7 +40,10 @@ def table(rows: Sequence[Mapping[str, Any]], width: int = WIDTH) -> str:
             stop += 1
         study, keys = kind
         parts = _block(keys, rows[start:stop], width)
-        blocks += parts if study is None else [f"{study}\n\n{parts[0]}", *parts[1:]]
+        if study is not None:
+            title = f"{study}: {notes[study]}" if study in notes else str(study)
+            blocks.append("\n".join(textwrap.wrap(title, width)))
+        blocks += parts
         start = stop
     return "\n\n".join(blocks)
 

@@ -1,9 +1,15 @@
 """Tables that fit a terminal and lose no column, and of a value its interval at most."""
 
+import importlib
+from pathlib import Path
+
 import pytest
 
+from tauguard.benchmarks import STUDIES
 from tauguard.benchmarks.report import rate
 from tauguard.benchmarks.text_table import WIDTH, cell, table
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
 
 def test_a_table_that_fits_shows_everything():
@@ -22,6 +28,22 @@ def test_another_study_or_other_columns_begin_another_table():
     rows = [{"study": "a", "n": 1}, {"study": "b", "n": 2}, {"study": "b", "m": 3}, {"m": 4}]
     heads = ["a\n\nn\n-\n1", "b\n\nn\n-\n2", "b\n\nm\n-\n3", "m\n-\n4"]
     assert table(rows) == "\n\n".join(heads)
+
+
+def test_a_note_stands_beside_its_study():
+    rows = [{"study": "a", "n": 1}, {"study": "b", "n": 2}]
+    text = table(rows, notes={"b": "n: how many."})
+    assert text == "a\n\nn\n-\n1\n\nb: n: how many.\n\nn\n-\n2"
+    long = table(rows, width=40, notes={"a": "words " * 30})
+    assert max(map(len, long.splitlines())) <= 40
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_notes_are_of_tables_that_there_are(name):
+    study = importlib.import_module(f"tauguard.benchmarks.{name}")
+    parts = "".join(path.read_text() for path in FOLDER.glob(f"{name.split('_')[0]}*.py"))
+    for title in getattr(study, "NOTES", {}):
+        assert parts.count(f'"{title}"') >= 2, title
 
 
 def test_headings_break_before_intervals_go_and_these_before_columns_do():
