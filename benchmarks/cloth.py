@@ -36,14 +36,13 @@ NOTES = {
     "share; misses and false_hits of the asked ones; us_a_hit: a hit, asked from Python.",
     "truth": "whole frames beside the collisions that are listed with the data.",
     "hard query": "public queries with exact labels; decided_exactly: left to exact arithmetic.",
-    "integers on labels": "the integers of 'independent check' on the same public queries.",
     "adversarial": "ab2pf beside method exact. early_most: largest error of a time that is not "
     "late; scaled, turned, backwards, modes: answers that change by 2^+-300, another order of "
     "vertices, time reversed, other rounding modes.",
-    "independent check": "the same queries, all decided by integers in Python; clear_ and "
-    "hit_certified: certain by intervals too; clear_tight: the former that Tight-Inclusion "
-    "confirms; integers_only: the rest; contradictions: referees that differ; seconds: of all "
-    "referees.",
+    "independent check": "the same queries and the public ones, all decided by integers in "
+    "Python; clear_ and hit_certified: certain by intervals too; clear_tight: the former that "
+    "Tight-Inclusion confirms; integers_only: the rest; contradictions: referees that differ; "
+    "labels_differ: published labels that do; seconds: of all referees.",
     "volume": "frame time and candidates by kind of bounding volume, one thread.",
     "front": "tests and time a frame with the front kept, beside a fresh descent; frame_saved: of "
     "the whole frame.",
@@ -74,8 +73,9 @@ def run(quick: bool, seed: int) -> list[Row]:
     if data:
         rows += cloth_truth.on_listed_frames(Path(data) / "ccd")
         rows += cloth_queries.on_hard_sets(Path(data) / "ccd", 20 if quick else 60)
-        rows += cloth_check.on_labels(Path(data) / "ccd")
     rows += cloth_adversarial.adversarial(12_000 if quick else 1_000_000, seed)
+    if data:
+        rows += cloth_check.on_labels(Path(data) / "ccd", map)
     rows += cloth_scaling.volumes(triangles, seed, repeats)
     rows += cloth_scaling.front(triangles, seed, 15 if quick else 60)
     sizes = [1_000, 10_000] if quick else [1_000, 10_000, 100_000, 1_000_000]

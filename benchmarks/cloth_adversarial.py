@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.benchmarks.cloth_check import judged
+from tauguard.benchmarks.cloth_check import Job, judged
 from tauguard.benchmarks.cloth_queries import Answer, Queries, solver
 from tauguard.benchmarks.report import Row
 from tauguard.benchmarks.workers import Workers
@@ -125,7 +125,7 @@ def adversarial(total: int, seed: int) -> list[Row]:
                 ours = _answer(x, vertex)
                 here = {"set": name, "kind": "vf" if vertex else "ee"}
                 rows.append({"study": "adversarial", **here, **_row(x, vertex, ours)})
-                found = judged(x, vertex, ours.toi, run)
+                found = judged(Job(x, vertex, ours.toi), run)
                 checked.append({"study": "independent check", **here, **found})
     return [*_with_sums(rows), *_with_sums(checked)]
 

@@ -41,7 +41,12 @@ def _errors(rows: list[Row]) -> list[Row]:
         count = sum(row[key] for row in made for key in changes)
         what = f"adversarial: answers changed by {', '.join(changes)}"
         found.append(answer(what, "0", str(count), count == 0))
-    checked = [row for row in _of(rows, "independent check") if row["set"] == "all"]
+    # A set of made queries is in the row "all"; the labelled sets stand for themselves.
+    checked = [
+        row
+        for row in _of(rows, "independent check")
+        if row["set"] == "all" or row["labels_differ"] is not None
+    ]
     found += _checked(checked)
     errors = [row["toi_error_most"] for row in whole]
     errors += [row["early_most"] for row in made + checked]
@@ -60,11 +65,12 @@ def _checked(rows: list[Row]) -> list[Row]:
     """What referees that share no code with ab2pf found."""
     found: list[Row] = []
     n = sum(row["n"] for row in rows)
-    for key in ("contradictions", "misses", "false_hits", "late") if rows else ():
-        count = sum(row[key] for row in rows)
+    errors = ("contradictions", "labels_differ", "misses", "false_hits", "late")
+    for key in errors if rows else ():
+        count = sum(row[key] or 0 for row in rows)
         what = f"certified by independent check, {n} queries: {key.replace('_', ' ')}"
         found.append(answer(what, "0", str(count), count == 0))
-    for row in rows:
+    for row in (row for row in rows if row["set"] == "all"):
         sure = row["clear_certified"] + row["hit_certified"]
         tight = row["clear_tight"]
         text = f"{sure / row['n']:.1%} by intervals"
