@@ -11,7 +11,6 @@ Every axis is first scaled by a power of two of its own; contact does not change
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +63,7 @@ class Certificate(NamedTuple):
     by: Floats  # a time until which a certain hit has happened; else NaN
 
 
-def certify(x: Floats, vertex: bool, depth: int = 8) -> Certificate:
+def certify(x: Floats, vertex: bool, depth: int = 6) -> Certificate:
     """Decide what can be decided with certainty.
 
     Args:
@@ -160,30 +159,26 @@ def _hits(x: Floats, vertex: bool) -> Floats:
     p, q, r = ((0, 1), (2, 1), (3, 1)) if vertex else ((2, 0), (1, 0), (3, 2))
     d = _scaled(np.stack([x[:, :, i] - x[:, :, j] for i, j in (p, q, r)], axis=2))
     found = np.full(len(x), np.nan)
-    for query, time in _crossings(d):
-        for width in (2.0**-8, 2.0**-18, 2.0**-28, 2.0**-38):
-            low, high = np.maximum(time - width, 0), np.minimum(time + width, 1)
-            known = _crosses(d[query], low, high) & _inside(d[query], low, high, vertex)
-            best = np.fmin(found[query], high)
-            found[query] = np.where(known, best, found[query])
+    query, time = _crossings(d)
+    for width in (2.0**-8, 2.0**-18, 2.0**-28, 2.0**-38):
+        low, high = np.maximum(time - width, 0), np.minimum(time + width, 1)
+        known = _crosses(d[query], low, high) & _inside(d[query], low, high, vertex)
+        np.fmin.at(found, query[known], high[known])
     return found
 
 
-def _crossings(d: Floats, samples: int = 16) -> Iterator[tuple[NDArray[np.int64], Floats]]:
+def _crossings(d: Floats, samples: int = 16) -> tuple[NDArray[np.int64], Floats]:
     """Queries and times, not certain, at which the volume changes its sign between samples."""
     times = np.linspace(0, 1, samples + 1)
-    before = _volume(d, np.zeros(len(d)))
-    for i in range(samples):
-        after = _volume(d, np.full(len(d), times[i + 1]))
-        query = np.flatnonzero((before < 0) != (after < 0))
-        low, high = np.full(len(query), times[i]), np.full(len(query), times[i + 1])
-        below = before[query] < 0
-        for _ in range(45):
-            middle = (low + high) / 2
-            left = (_volume(d[query], middle) < 0) == below
-            low, high = np.where(left, middle, low), np.where(left, high, middle)
-        yield query, (low + high) / 2
-        before = after
+    below = np.stack([_volume(d, np.full(len(d), t)) < 0 for t in times], axis=1)
+    query, sample = np.nonzero(below[:, 1:] != below[:, :-1])
+    before = below[query, sample]
+    low, high = times[sample], times[sample + 1]
+    for _ in range(45):
+        middle = (low + high) / 2
+        left = (_volume(d[query], middle) < 0) == before
+        low, high = np.where(left, middle, low), np.where(left, high, middle)
+    return query, (low + high) / 2
 
 
 def _volume(d: Floats, t: Floats) -> Floats:
