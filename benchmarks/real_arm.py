@@ -20,8 +20,8 @@ The data (see the documentation) are those of Mamedov et al. 2020; set TAUGUARD_
 that holds ``ur10e/``. Chosen by looking at these same logs, so that the figures are a little better
 than a fresh arm's would be: the columns of the friction model (the slope of 1 rad/s among 0.6, 1
 and 1.5), the terms of the allowances, the gain of the detector's observer, its confirmation, how
-far its tracked offset may go, its prior of the payload. The numbers in them, thresholds included,
-come from the training logs alone.
+far and how fast (1, 3, 5 and 10 s were compared) its tracked offset may go, its prior of the
+payload. The numbers in them, thresholds included, come from the training logs alone.
 """
 
 from __future__ import annotations

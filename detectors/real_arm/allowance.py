@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 TERMS = 5
 #: Terms that count for a joint at rest, and for one in motion, whose friction is known.
 AT_REST, IN_MOTION = (0, 1, 2, 3), (0, 2, 4)
-#: Rate at which a change of torque is forgotten, as the tracked offset follows it [1/s].
+#: Rate at which a change of torque is forgotten, while static friction gives way [1/s].
 FORGET = 1.0
 #: How long accelerations and slowness count [s].
 HELD = 0.2

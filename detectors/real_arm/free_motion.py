@@ -63,9 +63,10 @@ class FreeMotionSettings:
     """Take the median of three successive currents, or of five where it jumps: a controller's kick,
     as at a commanded stop, says nothing about contact. It costs one sample of delay or two."""
     unknowns: Unknowns = field(
-        default_factory=lambda: Unknowns(payload=3.0, moment=0.3, offset=0.6)
+        default_factory=lambda: Unknowns(payload=3.0, moment=0.3, offset=0.6, fast=5.0)
     )
-    """What is tracked; a load that nobody told is more than the training logs show."""
+    """What is tracked; a load that nobody told is more than the training logs show. The offset's
+    time constant is longer than a hand's push: what is followed faster than that vanishes."""
     beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
 
 
@@ -125,7 +126,10 @@ class FreeMotionDetector:
         """
         recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
         if len(recordings) < 3:
-            raise ValueError(f"{len(recordings)} logs: give three or more, to leave each out once")
+            raise ValueError(
+                f"{len(recordings)} logs: give three or more, to leave each out once "
+                "(a long one can be cut)"
+            )
         check_joints([r.trace for r in recordings], robot)
         self.dt = max(r.trace.dt for r in recordings)
         recordings = [
