@@ -63,6 +63,7 @@ class Estimator:
         noise: list[float],
         clip: float,
         every: int,
+        doubt: float,
         fusion: list[float],
     ) -> None: ...
     @property

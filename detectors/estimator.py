@@ -45,6 +45,20 @@ class Unknowns:
     fast: float = 1.0  #: time constant of the offset [s]
     clip: float = 3.0  #: an innovation z above this many standard deviations c counts c^2/z
     every: float = 0.01  #: time between two corrections [s]
+    doubt: float = 0.0
+    """What is left of joint j counts noise_j / sqrt(noise_j^2 + doubt s_j^2), with s_j the
+    deviation that the uncertain payload gives its residual: until fast motion has shown it, a
+    payload is a guess. 0: all of it counts; above 1 where a model's errors outlast ``every``."""
+
+    def __post_init__(self) -> None:
+        """Check the doubt: ``ValueError``."""
+        if not (np.isfinite(self.doubt) and self.doubt >= 0):
+            raise ValueError(f"doubt {self.doubt}: expected a number, 0 or more")
+
+    @classmethod
+    def wary(cls) -> Unknowns:
+        """For detectors: errors of the model last some 0.2 s, twenty corrections long."""
+        return cls(doubt=20.0)
 
     @classmethod
     def none(cls) -> Unknowns:
@@ -135,6 +149,7 @@ class Estimator:
             [float(s) for s in arm.noise],
             self.unknowns.clip,
             max(1, round(self.unknowns.every / self.dt)),
+            self.unknowns.doubt,
             arm.sensors.fusion_gains(self.dt) if arm.sensors else [],
         )
 

@@ -178,7 +178,7 @@ class CollisionDetector:
 
     def _estimate(self, trace: Trace) -> Estimate:
         assert self.arm is not None
-        unknowns = None if self.settings.adapt else Unknowns.none()
+        unknowns = Unknowns.wary() if self.settings.adapt else Unknowns.none()
         estimator = Estimator(self.arm, self.settings.observer_gain, self.dt, unknowns)
         return estimator.run(trace.t, trace.q, trace.qd, trace.current)
 
@@ -369,7 +369,7 @@ class _Online:
     def __init__(self, detector: CollisionDetector) -> None:
         arm, features, regressor = detector._fitted()
         settings = detector.settings
-        unknowns = None if settings.adapt else Unknowns.none()
+        unknowns = Unknowns.wary() if settings.adapt else Unknowns.none()
         self._estimator = Estimator(arm, settings.observer_gain, detector.dt, unknowns)
         self._sliding = features.sliding(regressor.kernel_sum())
         self._filter = Confirmation(detector._samples())

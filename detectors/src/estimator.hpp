@@ -9,6 +9,10 @@
 //
 // An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is, the less
 // it says about the model, and the sooner it is a collision.
+//
+// What is left counts less where the payload is still a guess: with s the deviation that its covariance
+// gives the residual, `doubt` times the variance s^2 is added to the noise's. More than 1, because errors of
+// the model last longer than the time between two corrections, each of which takes them for news.
 #pragma once
 
 #include <cmath>
@@ -34,6 +38,7 @@ struct EstimatorSettings {
   std::vector<double> noise;         // standard deviation of the residual [N m], n
   double clip = 3.0;
   int every = 10;                    // samples between two corrections
+  double doubt = 0.0;                // see above; 0: all of what is left counts
   std::vector<double> fusion;        // of position and velocity, 6 n; empty: velocity as measured
 };
 
@@ -88,7 +93,7 @@ class Estimator {
       acceleration[j] = kAccelerationRate * (qd[j] - smooth_[j]);
     }
     if (adapts_) {
-      for (std::size_t j = 0; j < n_; ++j) left[j] -= expected(j);
+      for (std::size_t j = 0; j < n_; ++j) left[j] = (left[j] - expected(j)) * certainty(j);
       if (started_ && ++since_ >= set_.every) correct(dt * since_);
     }
     started_ = true;
@@ -165,6 +170,16 @@ class Estimator {
     for (int a = 0; a < kPerJoint; ++a)
       sum += own_[kPerJoint * j + a] * theta_[kPayload + kPerJoint * j + a];
     return sum;
+  }
+
+  double certainty(std::size_t j) const {
+    if (!(set_.doubt > 0)) return 1.0;
+    const double* h = &load_[kPayload * j];
+    const double noise = set_.noise[j] * set_.noise[j];
+    double payload = 0.0;
+    for (int a = 0; a < kPayload; ++a)
+      for (int b = 0; b < kPayload; ++b) payload += h[a] * covariance_[a * m_ + b] * h[b];
+    return payload > 0 ? std::sqrt(noise / (noise + set_.doubt * payload)) : 1.0;
   }
 
   // The Kalman filter: time update over `elapsed` seconds, then one scalar update per joint.

@@ -89,7 +89,7 @@ void bind_estimator(nb::module_& m) {
       .def("__init__",
            [](Estimator* self, const Chain& chain, const FrictionBasis& basis, const Numbers& drive_gain,
               const Numbers& gain, const Numbers& weights, const Numbers& deviation,
-              const Numbers& persistence, const Numbers& noise, double clip, int every,
+              const Numbers& persistence, const Numbers& noise, double clip, int every, double doubt,
               const Numbers& fusion) {
              const std::size_t n = chain.joints.size(), unknown = kPayload + kPerJoint * n;
              require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
@@ -98,7 +98,7 @@ void bind_estimator(nb::module_& m) {
                          (fusion.empty() || fusion.size() == n * VelocityFusion::kGains),
                      "Estimator: array lengths differ");
              new (self) Estimator(chain, basis,
-                                  {drive_gain, gain, weights, deviation, persistence, noise, clip, every, fusion});
+                                  {drive_gain, gain, weights, deviation, persistence, noise, clip, every, doubt, fusion});
            })
       .def_prop_ro("started", &Estimator::started)
       .def("theta",

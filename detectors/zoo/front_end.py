@@ -118,7 +118,7 @@ class FrontEnd:
         return found
 
     def _run(self, arm: ArmModel, trace: Trace) -> Estimate:
-        unknowns = None if self.adapt else Unknowns.none()
+        unknowns = Unknowns.wary() if self.adapt else Unknowns.none()
         estimator = Estimator(arm, self.gain, self.dt, unknowns)
         return estimator.run(trace.t, trace.q, trace.qd, trace.current)
 

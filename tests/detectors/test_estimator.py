@@ -53,6 +53,24 @@ def test_a_payload_never_told_is_tracked(training, detector):
     assert masses[1] - masses[0] == pytest.approx(4.0, abs=0.6)
 
 
+def test_doubt_makes_less_of_what_an_unknown_payload_could_explain(training, detector):
+    trace = next(t for t in training if not t.truth.collisions)
+    plain, wary = (
+        Estimator(detector.arm, unknowns=u).run(
+            trace.t, trace.q, trace.qd, trace.current, keep=True
+        )
+        for u in (Unknowns(), Unknowns.wary())
+    )
+    np.testing.assert_array_equal(plain.unknowns, wary.unknowns)
+    np.testing.assert_array_equal(np.sign(plain.left), np.sign(wary.left))
+    share = np.abs(wary.left) / np.maximum(np.abs(plain.left), 1e-12)
+    assert share.max() <= 1
+    # A payload's part is a guess in the beginning and known once the arm has moved.
+    assert share[2:9, 1].max() < 0.2 < np.median(share[5000:, 1])
+    with pytest.raises(ValueError, match="doubt -1"):
+        Unknowns(doubt=-1)
+
+
 def test_bad_samples_leave_the_state_alone(training, detector):
     trace = training[0]
     good, bad = Estimator(detector.arm), Estimator(detector.arm)
