@@ -21,6 +21,7 @@ from tauguard.benchmarks.detection_fleet import (
     calibration_pieces,
     stream,
     train,
+    training_groups,
 )
 from tauguard.benchmarks.detection_judge import Tallies, judge_free, judge_struck, merged
 from tauguard.benchmarks.detection_oracle import ORACLE, oracle
@@ -41,6 +42,10 @@ from tauguard.traces import STRATA
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
+Trained = Mapping[int, dict[str, Detector]]
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,7 @@ FULL = Size(3, ALL, Training(), 0.75, 10.0, 1.0, 13, 5, variations=True)
 QUICK = Size(
     1,
     ("srq-svr", "srq-svr-plain", "current-network", "residual-thresholds"),
-    Training(free=10, free_seconds=30.0),
+    Training(slices=10, free=8, free_seconds=25.0),
     0.1,
     0.1,
     0.1,
@@ -98,7 +103,7 @@ def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
     """Train, judge, report; the result does not depend on the number of ``workers``."""
     arms = [1000 * (seed + 1) + k for k in range(size.arms)]
     with Workers(workers) as each:
-        trained = dict(zip(arms, each(_train, [(size, seed, arm) for arm in arms]), strict=True))
+        trained = _trained(size, seed, arms, each)
         fleets = _calibrated(size, seed, trained, each)
         parts = [(part, arms[0], fleets[arms[0]], seed) for part in PARTS]
         jobs = [(size, seed, speed, arm) for speed in SPEEDS for arm in (0, *arms)]
@@ -114,17 +119,22 @@ def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
         return rows + [row for found in more for row in found]
 
 
-def _train(job: tuple[Size, int, int]) -> dict[str, Detector]:
-    size, seed, arm = job
-    return train(seed, arm, size.detectors, size.training)
+def _trained(size: Size, seed: int, arms: Sequence[int], each: Each) -> Trained:
+    """Every arm's detectors, in the order of their names."""
+    groups = training_groups(size.detectors)
+    jobs = [(size, seed, arm, group) for arm in arms for group in groups]
+    found: dict[int, dict[str, Detector]] = {arm: {} for arm in arms}
+    for (_, _, arm, _), own in zip(jobs, each(_train, jobs), strict=True):
+        found[arm].update(own)
+    return {arm: {name: own[name] for name in size.detectors} for arm, own in found.items()}
 
 
-def _calibrated(
-    size: Size,
-    seed: int,
-    trained: Mapping[int, dict[str, Detector]],
-    each: Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]],
-) -> dict[int, Fleet]:
+def _train(job: tuple[Size, int, int, tuple[str, ...]]) -> dict[str, Detector]:
+    size, seed, arm, group = job
+    return train(seed, arm, group, size.training)
+
+
+def _calibrated(size: Size, seed: int, trained: Trained, each: Each) -> dict[int, Fleet]:
     """Every arm's detectors with levels and thresholds from that arm's own motion."""
     hours = size.calibration_hours / len(SPEEDS)
     jobs = [(seed, arm, own, speed, hours) for arm, own in trained.items() for speed in SPEEDS]

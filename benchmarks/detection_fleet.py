@@ -12,7 +12,7 @@ from tauguard.benchmarks.detection_thresholds import Pieces, free_pieces
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.zoo.front_end import shared_front_ends
+from tauguard.detectors.zoo.front_end import FrontEnd, shared_front_ends
 from tauguard.detectors.zoo.table import make_detector
 from tauguard.envs import simulate
 from tauguard.models import SceneSpec, compose, cura6_drive, pin_model
@@ -65,6 +65,13 @@ def nominal() -> ArmModel:
     robot = RobotNumbers.from_pin(pin_model(scene.arm_xml))
     friction = replace(columns, weights=np.zeros((robot.joints, columns.columns)))
     return ArmModel(robot, drive.gain, friction)
+
+
+def training_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Detectors that are trained together: those with one front end, then the rest in two parts."""
+    together = tuple(n for n in names if getattr(make_detector(n), "front", None) == FrontEnd())
+    rest = [n for n in names if n not in together]
+    return [group for group in (together, tuple(rest[::2]), tuple(rest[1::2])) if group]
 
 
 def train(seed: int, arm: int, names: Sequence[str], training: Training) -> dict[str, Detector]:

@@ -10,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tauguard.benchmarks import detection_report as report
-from tauguard.benchmarks.detection_fleet import CALIBRATE, TEST, TRAIN, stream
+from tauguard.benchmarks.detection import ALL
+from tauguard.benchmarks.detection_fleet import (
+    CALIBRATE,
+    TEST,
+    TRAIN,
+    stream,
+    training_groups,
+)
 from tauguard.benchmarks.detection_judge import (
     Outcome,
     Tally,
@@ -76,6 +83,12 @@ def test_free_pools_hold_the_hours_and_no_collision():
 def test_purposes_draw_from_different_seeds():
     seeds = {stream(seed, key) for seed in range(50) for key in (TRAIN, CALIBRATE, TEST)}
     assert len(seeds) == 150
+
+
+def test_every_detector_is_trained_once_and_those_with_one_front_end_together():
+    groups = training_groups(ALL)
+    assert sorted(name for group in groups for name in group) == sorted(ALL)
+    assert any({"boosting", "cusum", "moving-thresholds"} <= set(group) for group in groups)
 
 
 def test_conditions_scale_the_mismatch_and_set_the_temperature():
