@@ -276,8 +276,13 @@ bool FeatureTree::update(const Features& features, const std::vector<std::int32_
 
   for (std::int32_t leaf = 0; leaf < leaves_; ++leaf)
     for (int lane = 0; lane < lanes; ++lane) {
-      const std::int32_t old = ids_[std::size_t(leaf) * lanes + lane];
-      if (old >= 0) put(leaf, lane, new_id[old], features);
+      std::int32_t& id = ids_[std::size_t(leaf) * lanes + lane];
+      if (id < 0) continue;
+      if (new_id[id] < 0) {
+        put(leaf, lane, -1, features);
+      } else {
+        id = new_id[id];  // its vertices are the same
+      }
     }
   for (std::int32_t i = leaves_ - 1; i >= 1; --i) free_[i] = free_[2 * i] + free_[2 * i + 1];
 

@@ -36,7 +36,7 @@ struct Stats {
 };
 
 // How ab2pf first leaves out queries that an axis keeps apart at both ends of the step: by comparing x, y and z; by
-// `points` of the same positions on `seven_axes` (apart.hpp), which pays from about a query a vertex on; or not at
+// `points` of the same positions on `seven_axes` (apart.hpp), which pays from a few queries a vertex on; or not at
 // all, where the broad phase has. What is left is answered the same whichever it is.
 struct AxisFilter {
   bool look = true;
