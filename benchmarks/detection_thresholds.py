@@ -165,7 +165,8 @@ def watched(
     the lowest threshold with which it is, at every speed, at least as specific on that motion as
     the network: rows then compare speed by speed, and no detector buys sensitivity with alarms that
     the network does not raise. The third is for a rate over all speeds, which the levelled score
-    spreads evenly.
+    spreads evenly. It bounds the other two: where the network alarms in no case at all, one
+    outlier among a few hundred cases would set a threshold for far rarer alarms than the third's.
 
     Args:
         detectors: trained, by name.
@@ -184,13 +185,13 @@ def watched(
         levels = Pieces.joined([own[name] for own in pieces.values()]).levels()
         peaks = {speed: own[name].peaks(levels) for speed, own in pieces.items()}
         thresholds = {}
+        hourly = Peaks.joined(list(peaks.values())).at_rate(per_hour)
         for amperes in AMPERES if network else ():
             if name == network:
                 thresholds[str(amperes)] = amperes
             else:
-                thresholds[str(amperes)] = max(
-                    p.at_specificity(quiet[amperes, speed]) for speed, p in peaks.items()
-                )
-        thresholds[HOURLY] = Peaks.joined(list(peaks.values())).at_rate(per_hour)
+                matched = (p.at_specificity(quiet[amperes, s]) for s, p in peaks.items())
+                thresholds[str(amperes)] = min(max(matched), hourly)
+        thresholds[HOURLY] = hourly
         found[name] = Watched(detector, levels, thresholds, name == network)
     return found

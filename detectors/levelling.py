@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d
 from sklearn.isotonic import IsotonicRegression
 
+from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.events import MERGE_GAP
@@ -149,17 +150,19 @@ class Levelled:
     levels: SpeedLevels
 
     @classmethod
-    def on(cls, detector: Detector, free: Sequence[Trace]) -> Levelled:
-        """Level a detector on collision-free motion that it was not trained on.
+    def on(cls, detector: Detector, traces: Sequence[Trace]) -> Levelled:
+        """Level a detector on the collision-free rows of ``traces``.
+
+        Motion that it was not trained on tells more of what free motion reaches.
 
         Raises:
             ValueError: no motion is left after the detector has settled.
         """
         peaks, speeds = [], []
-        for trace in free:
-            settled = trace.t - trace.t[0] >= detector.settle
-            score = detector.scores(trace)[settled]
-            speed = recent_speed(trace.qd, trace.dt)[settled]
+        for trace in traces:
+            free = free_rows(trace, detector.settle)
+            score = detector.scores(trace)[free]
+            speed = recent_speed(trace.qd, trace.dt)[free]
             if len(score):
                 high, where = block_maxima(score, max(1, round(MERGE_GAP / trace.dt)))
                 peaks.append(high)
@@ -184,9 +187,8 @@ class Levelled:
         return self.detector.arm
 
     def fit(self, traces: Sequence[Trace], robot: ArmModel) -> Levelled:
-        """Train the detector anew; the levels are then those of its free training motion."""
-        fitted = self.detector.fit(traces, robot)
-        return Levelled.on(fitted, [t for t in traces if not (t.truth and t.truth.collisions)])
+        """Train the detector anew; the levels are then those of its free training rows."""
+        return Levelled.on(self.detector.fit(traces, robot), traces)
 
     def scores(self, trace: Trace) -> Array:
         """The levelled score, shape (T,)."""

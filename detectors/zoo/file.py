@@ -6,13 +6,14 @@ import os
 from typing import Any, Protocol
 
 from tauguard.detectors.detector import Detector
+from tauguard.detectors.levelling import Levelled, SpeedLevels
 from tauguard.detectors.model_file import FORMAT as CHAIN_FORMAT
 from tauguard.detectors.model_file import read_archive, rebuilt, write_archive
 from tauguard.detectors.thresholded import Thresholded
 from tauguard.detectors.zoo.srq_svr import SvrDetector
 from tauguard.detectors.zoo.table import make_detector
 
-FORMAT = "tauguard ranking detector 1"
+FORMAT = "tauguard ranking detector 2"
 
 
 class Storable(Detector, Protocol):
@@ -41,13 +42,15 @@ def save_model(watched: Thresholded, path: str | os.PathLike[str]) -> None:
     ):
         own.chain.at(watched.threshold, watched.confirmation).save(path)
         return
-    detector: Storable = own  # type: ignore[assignment]
+    levels = own.levels if isinstance(own, Levelled) else None
+    detector: Storable = own.detector if isinstance(own, Levelled) else own  # type: ignore
     content = {
         "format": FORMAT,
         "detector": detector.name,
         "threshold": float(watched.threshold),
         "confirmation": float(watched.confirmation),
         "parts": detector.parts(),
+        "levels": vars(levels) if levels else {},
     }
     write_archive(path, content)
 
@@ -68,6 +71,8 @@ def load_model(path: str | os.PathLike[str]) -> Thresholded:
             return Thresholded(SvrDetector(chain), chain.threshold, chain.settings.confirmation)
         kind: type[Storable] = type(make_detector(content["detector"]))  # type: ignore[assignment]
         detector = kind.from_parts(content["parts"])
+        if content["levels"]:
+            detector = Levelled(detector, SpeedLevels(**content["levels"]))
         return Thresholded(detector, float(content["threshold"]), float(content["confirmation"]))
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         raise ValueError(f"{path}: a detector file with a part missing ({error})") from None

@@ -107,8 +107,8 @@ def test_train_any_detector_with_a_promise(tmp_path, capsys):
     assert "give " in line
     line = fails(capsys, *train, *flags, "--false-alarms-per-hour", "600", "--confidence", "0.999")
     assert "with confidence 0.999" in line
-    assert "--calibration makes" in fails(capsys, *train, "--confidence", "0.9")
-    run(*train, *flags, "--false-alarms-per-hour", "600")
+    assert "give --calibration" in fails(capsys, *train, "--confidence", "0.9")
+    run(*train, *flags, "--false-alarms-per-hour", "600", "--levelled")
     assert "at most 600 false alarms per hour" in capsys.readouterr().out
     run("evaluate", "--traces", str(struck), "--model", model)
     assert "sensitivity from 16 N m up" in capsys.readouterr().out

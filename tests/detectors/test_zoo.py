@@ -9,6 +9,7 @@ import skops.io
 
 from tauguard.detectors import ArmModel, CollisionDetector, calibrate, pipeline
 from tauguard.detectors.calibrate import free_rows
+from tauguard.detectors.levelling import Levelled, SpeedLevels
 from tauguard.detectors.thresholded import Thresholded
 from tauguard.detectors.zoo import front_end
 from tauguard.detectors.zoo.file import FORMAT, load_model, save_model
@@ -147,6 +148,16 @@ def test_a_file_gives_equal_scores_and_holds_nothing_to_distrust(fitted, unseen,
     np.testing.assert_array_equal(
         again.detect(trace).residual, Thresholded(fitted, 0.25).detect(trace).residual
     )
+
+
+def test_a_levelled_detector_comes_back_from_its_file(fitted, unseen, tmp_path):
+    own = Levelled(fitted, SpeedLevels(np.array([0.0, 2.0]), np.array([1.0, 3.0]), np.ones(2)))
+    save_model(Thresholded(own, 7.0), tmp_path / "model.skops")
+    again = load_model(tmp_path / "model.skops")
+    assert (again.threshold, again.detector.name) == (7.0, fitted.name)
+    trace = first(unseen[0], 4_000)
+    scores = again.detector.scores(trace)
+    assert scores.tobytes() == own.scores(trace).tobytes() != fitted.scores(trace).tobytes()
 
 
 def test_damaged_and_foreign_files_are_named(tmp_path):

@@ -17,6 +17,7 @@ def command(
     calibration: Path | None = None,
     false_alarms_per_hour: float | None = None,
     confidence: float | None = None,
+    levelled: bool = False,
     free: tuple[Path, ...] = (),
     robot: Path | None = None,
     columns: str | None = None,
@@ -40,6 +41,8 @@ def command(
         false_alarms_per_hour: what the threshold aims at on collision-free training motion
             (default: 10, or 1 with --free), or promises with --calibration.
         confidence: with --calibration, how sure the promise is to be (default: 0.95).
+        levelled: with --calibration, count the score from what free motion reaches at the speed of
+            the moment: slow motion is then watched more closely. For evaluate and detect.
         free: collision-free logs of a real arm, files or a folder.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains.
         columns: of CSV files, see `tauguard detect`.
@@ -52,12 +55,12 @@ def command(
     target = model or Path("model.json" if free else "model.skops")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
-    if confidence is not None and calibration is None:
-        raise ValueError("--confidence is of the promise that --calibration makes")
+    if calibration is None and (levelled or confidence is not None):
+        raise ValueError("--confidence and --levelled go with a promise: give --calibration")
     if traces is not None:
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
         sure = 0.95 if confidence is None else confidence
-        labelled_motion(traces, target, detector, calibration, rate, sure)
+        labelled_motion(traces, target, detector, calibration, rate, sure, levelled)
         return
     if calibration is not None or detector != "srq-svr":
         raise ValueError("--detector and --calibration go with --traces, not with --free")
@@ -68,13 +71,22 @@ def command(
 
 
 def labelled_motion(
-    traces: Path, model: Path, name: str, calibration: Path | None, rate: float, confidence: float
+    traces: Path,
+    model: Path,
+    name: str,
+    calibration: Path | None,
+    rate: float,
+    confidence: float,
+    levelled: bool,
 ) -> None:
     """Train on labelled recordings."""
+    from dataclasses import replace
+
     from tauguard.cli.fitting import fitted
     from tauguard.cli.folder import labelled
     from tauguard.detectors import DETECTORS, make_detector, promised, save_model
     from tauguard.detectors.conformal import check_promise
+    from tauguard.detectors.levelling import Levelled
 
     if name not in DETECTORS:
         make_detector(name)  # says which there are
@@ -89,6 +101,8 @@ def labelled_motion(
         check_promise([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
     recordings = labelled(traces)
     watched = fitted(name, recordings, rate)
+    if levelled:
+        watched = replace(watched, detector=Levelled.on(watched.detector, recordings))
     if free:
         watched, promise = promised(watched, free, rate, confidence)
     save_model(watched, model)
