@@ -30,8 +30,9 @@ const std::int8_t (*axes_of(int k))[3];
 //
 // Coordinates are first brought into [-1, 1] by z = (x 2^a - c) 2^b, sums of m coordinates are divided by
 // 2^(m - 1); both make every magnitude here at most 1. Errors, absolute, against the exact image of x:
-// scaling by powers of two is exact but for underflow (< 2^-1000 here), the subtraction rounds by 2^-53,
-// the sums by 2^-52, the conversion to float32 by 2^-25: less than 2^-24 in all. Adding `pad` to an
+// scaling by powers of two is exact but for underflow (x 2^a is off by 2^-1075 at most, and b is at most 1000:
+// 2^-75), the subtraction rounds by 2^-53, which m coordinates and their sum bring to 2^-52, the conversion to
+// float32 by 2^-25: less than 2^-24 in all. Adding `pad` to an
 // interval's end rounds once more, by at most 2^-24 (1 + pad). With a true margin m (half of the minimum
 // distance, as seen on the axis) pad = m (1 + 2^-20) + 2^-22 covers m and both errors:
 // 2^-22 + m 2^-20 > 2^-24 + 2^-24 (1 + 2^-22 + m (1 + 2^-20)).

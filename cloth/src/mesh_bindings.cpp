@@ -211,7 +211,7 @@ NB_MODULE(_mesh, m) {
       Projection points;
       AxisFilter axes;
       constexpr std::size_t pays = 4;  // queries a vertex: one costs 18 ns to project, a query saves 6
-      if (Method(method) == Method::ab2pf && rows.shape(0) >= pays * x_t0.shape(0)) {
+      if (Method(method) == Method::ab2pf && min_distance == 0 && rows.shape(0) >= pays * x_t0.shape(0)) {
         points.set(x_t0.data(), x_t1.data(), x_t0.shape(0), seven_axes, 0, 1);
         axes.points = &points;
       }

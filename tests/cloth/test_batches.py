@@ -81,7 +81,9 @@ def test_queries_apart_on_an_axis_are_left_out_and_no_others(kind):
 
 
 @pytest.mark.parametrize("kind", QUERIES)
-@pytest.mark.parametrize("scene", ["soft", "flat", "lattice", "far", "tiny", "huge", "wide"])
+@pytest.mark.parametrize(
+    "scene", ["soft", "flat", "brink", "lattice", "far", "tiny", "huge", "uneven", "wide"]
+)
 def test_long_lists_on_shared_positions_are_answered_alike(kind, scene, fastest_after):
     """They are seen from seven axes in float32 first: no bit of an answer may tell."""
     rng = np.random.default_rng(5)
@@ -89,9 +91,12 @@ def test_long_lists_on_shared_positions_are_answered_alike(kind, scene, fastest_
     x[1] = x[0] + rng.uniform(0, 1, size=(300, 1)) * x[1]
     if scene == "flat":  # apart by less than float32 can tell, or not at all
         x[:, :, 2] *= 1e-8
+    if scene == "brink":  # apart by about what float32 can just tell
+        x[:, :, 2] = 2.0**-21 * np.round(4 * x[:, :, 2])
     if scene == "lattice":
         x = np.round(x)
-    x = {"far": 1e10 + x, "tiny": 1e-290 * x, "huge": 1e290 * x}.get(scene, x)
+    sizes = {"tiny": 1e-290, "huge": 1e290, "uneven": [2.0**300, 1, 2.0**-300]}
+    x = (1e10 if scene == "far" else 0.0) + np.asarray(sizes.get(scene, 1.0)) * x
     if scene == "wide":
         x[:, 0] = 1e200
     rows = rng.permuted(np.tile(np.arange(300, dtype=np.int32), (6_000, 1)), axis=1)[:, :4].copy()
