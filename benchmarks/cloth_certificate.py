@@ -129,8 +129,10 @@ def _separated(d: Floats, start: Floats, width: float) -> Mask:
     points = (part + rest).reshape(-1, k, 3)
     sizes = (np.abs(part) + np.abs(rest)).reshape(-1, k, 3)
     normal = _normal(points)
-    # A term of the sum below is off by five roundings of its own size at most: the difference,
-    # its product with the time, the sum of both ends, the product, and (twice) the sum.
+    # A term of the sum below is off by six roundings of its own size at most: the difference, its
+    # product with the time, the sum of both ends, the product, and (twice) the sum. The error's own
+    # sum, of terms that are rounded alike, is short by fewer: 16 is more than twice what is needed.
+    # What underflows is less than 2^-1070 a term: the scaling, the products.
     value = np.einsum("npk,nk->np", points, normal)
     error = 16 * UNIT * np.einsum("npk,nk->np", sizes, np.abs(normal)) + 2.0**-900
     return np.asarray((value > error).all(axis=1))
