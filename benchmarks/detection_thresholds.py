@@ -32,6 +32,8 @@ POINTS = ("1.6", "2.0", HOURLY)
 PIECE = 0.02
 #: Share of the blocks whose peaks are the tail that is followed to rarer alarms.
 TAIL = 0.02
+#: The same of the cases, which are fewer.
+CASE_TAIL = 0.1
 
 
 @dataclass(frozen=True)
@@ -51,15 +53,17 @@ class Peaks:
             sum(p.hours for p in parts),
         )
 
-    def specificity(self, threshold: float) -> float:
-        """Share of the cases that stay at or below ``threshold``."""
-        return float(np.mean(self.cases <= threshold))
+    def expected(self, threshold: float) -> float:
+        """The share of cases expected above ``threshold``: that of N seen, Jeffreys' prior.
 
-    def at_specificity(self, share: float) -> float:
-        """The lowest threshold at which at least ``share`` of the cases stay quiet."""
-        ordered = np.sort(self.cases)
-        index = int(np.ceil(share * len(ordered) - 1e-9)) - 1
-        return float(ordered[max(index, 0)])
+        None of N says that fewer than about one in 2 N are.
+        """
+        return (float(np.sum(self.cases > threshold)) + 0.5) / (len(self.cases) + 1)
+
+    def at_share(self, share: float) -> float:
+        """The threshold that a ``share`` of the cases is expected to exceed, along their tail."""
+        ordered = np.sort(self.cases)[::-1]
+        return tail_level(ordered, share * len(ordered), max(2, round(CASE_TAIL * len(ordered))))
 
     def at_rate(self, per_hour: float) -> float:
         """The threshold that ``per_hour`` blocks an hour exceed, along the tail of the blocks."""
@@ -162,11 +166,10 @@ def watched(
     """Detectors with their levels and their thresholds at the operating points.
 
     The network's first two thresholds are its residual current. Every other detector gets at each
-    the lowest threshold with which it is, at every speed, at least as specific on that motion as
-    the network: rows then compare speed by speed, and no detector buys sensitivity with alarms that
+    the lowest threshold with which it is expected, at every speed, to be as specific as the
+    network: rows then compare speed by speed, and no detector buys sensitivity with alarms that
     the network does not raise. The third is for a rate over all speeds, which the levelled score
-    spreads evenly. It bounds the other two: where the network alarms in no case at all, one
-    outlier among a few hundred cases would set a threshold for far rarer alarms than the third's.
+    spreads evenly. It bounds the other two, which ask for more alarms.
 
     Args:
         detectors: trained, by name.
@@ -176,7 +179,7 @@ def watched(
     """
     found = {}
     quiet = {
-        (amperes, speed): own[network].peaks().specificity(amperes)
+        (amperes, speed): own[network].peaks().expected(amperes)
         for amperes in AMPERES
         for speed, own in pieces.items()
         if network
@@ -190,7 +193,7 @@ def watched(
             if name == network:
                 thresholds[str(amperes)] = amperes
             else:
-                matched = (p.at_specificity(quiet[amperes, s]) for s, p in peaks.items())
+                matched = (p.at_share(quiet[amperes, s]) for s, p in peaks.items())
                 thresholds[str(amperes)] = min(max(matched), hourly)
         thresholds[HOURLY] = hourly
         found[name] = Watched(detector, levels, thresholds, name == network)
