@@ -60,7 +60,7 @@ class Size:
     short: float  #: of them, those that all detectors judge; the rest only the thorough ones
     per_stratum: int  #: judged collisions of a stratum at one speed
     faint: int  #: the same below the judged strata
-    target: float = 0.5  #: false alarms per hour that the third threshold aims at
+    target: float = 0.25  #: false alarms per hour that the third threshold aims at
     variations: bool = False  #: also training size, sigma, conditions, sample rate
 
 

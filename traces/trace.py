@@ -118,7 +118,12 @@ class Detection:
 
     detector: str  #: the detector's name
     t: Array  #: [s], shape (T,)
-    residual: Array  #: the observer's estimate of ``tau_ext`` [N m], shape (T, n)
+    residual: Array
+    """The observer's estimate of ``tau_ext`` [N m], shape (T, n).
+
+    Without the payload, offsets and friction errors that ``srq-svr`` and the free-motion detector
+    track; of any other detector, all that an observer sees.
+    """
     score: Array  #: the detector's output; above ``threshold`` is a raw alarm, shape (T,)
     threshold: float
     alarm: Bools  #: after the output filter, shape (T,)
