@@ -53,7 +53,7 @@ def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
             joints within a sample or two, which the log does not resolve.
 
     Raises:
-        ValueError: no joint ever moves.
+        ValueError: no joint ever moves, or only in what is left out.
     """
     moves = np.flatnonzero((np.abs(trace.qd) > MOVING).any(axis=1))
     if not len(moves):
@@ -61,7 +61,13 @@ def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
     rows = np.zeros(len(trace.t), dtype=np.bool_)
     rows[moves[0] : moves[-1] + 1] = True
     within = (trace.t >= trace.t[0] + margin) & (trace.t <= trace.t[moves[-1]] - stop)
-    return np.asarray(rows & within)
+    rows &= within
+    if not rows.any():
+        raise ValueError(
+            f"no motion is left without the first {margin:g} s of the log and the last {stop:g} s "
+            "of its motion: give a longer log"
+        )
+    return rows
 
 
 def is_told(recording: Recording) -> bool:

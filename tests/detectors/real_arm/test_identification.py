@@ -123,6 +123,10 @@ def test_first_guess_of_the_gains(logs):
 def test_standstill_at_both_ends_is_trimmed():
     log = record(3, dwell=(-1.0, 4.0))
     assert not moving_span(log)[:300].any()
+    with pytest.raises(ValueError, match="without the first 1000 s"):
+        moving_span(log, margin=1000)
+    with pytest.raises(ValueError, match="last 1000 s of its motion"):
+        moving_span(log, stop=1000)
 
 
 def test_file_and_back(tmp_path, found):
