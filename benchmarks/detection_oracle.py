@@ -1,8 +1,8 @@
 """The floor of delays: an oracle that is given the true external torque.
 
 A collision's torque takes its time to rise, softly clamped ones most of all. The oracle alarms t_c
-after the truth has passed a level, which no detector can do before it: what is left above its delay
-is the detector's own.
+after the truth has passed a level: a detector that needs as much torque cannot do so before it, and
+what is left above its delay is the detector's own. One that needs less torque can be sooner.
 """
 
 from __future__ import annotations

@@ -102,7 +102,11 @@ class Pieces:
         return SpeedLevels.fit(np.concatenate([high for high, _ in found]), np.concatenate(speeds))
 
     def peaks(self, levels: SpeedLevels | None = None) -> Peaks:
-        """Peaks of the levelled score, or of the score itself."""
+        """Peaks of the levelled score, or of the score itself.
+
+        Levelled is what a piece's highest score becomes: the recent speed hardly changes within a
+        piece, so that this is nearly the piece's highest levelled score.
+        """
         cases, blocks = [], []
         for level, speed in zip(self.level, self.speed, strict=True):
             score = levels(level, speed) if levels else level
@@ -167,9 +171,10 @@ def watched(
 
     The network's first two thresholds are its residual current. Every other detector gets at each
     the lowest threshold with which it is expected, at every speed, to be as specific as the
-    network: rows then compare speed by speed, and no detector buys sensitivity with alarms that
-    the network does not raise. The third is for a rate over all speeds, which the levelled score
-    spreads evenly. It bounds the other two, which ask for more alarms.
+    network: rows then compare speed by speed. Where the network raises none in N cases, the others
+    may raise one in 2 N. The third is for a rate over all speeds, which the levelled score spreads
+    evenly. It bounds the other two, which ask for more alarms over all speeds; at a single one that
+    can leave a detector less specific than the network.
 
     Args:
         detectors: trained, by name.
