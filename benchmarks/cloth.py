@@ -17,25 +17,38 @@ from tauguard.benchmarks import (
     cloth_truth,
 )
 from tauguard.benchmarks.cloth_summary import summary
+from tauguard.benchmarks.cloth_truth import SCENES as LISTED
 from tauguard.benchmarks.report import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+UNSET = (
+    "TAUGUARD_DATA is not set: no recorded scenes, no listed collisions, no public queries "
+    "(docs/cloth.md says where they come from)"
+)
+
 #: What the columns of each table mean.
 NOTES = {
-    "frame": "all collisions of one step, one thread. times_ab2pf: time over ab2pf's; missed and "
+    "cloth": "what is run. Times in all tables are medians of so many repeats [least, most]; "
+    "where a table says no other, they are the processor's, of one thread.",
+    "frame": "all collisions of one step. volume: the broad phase's, (moving_)k_dopK has K/2 axes "
+    "and sweeps the step (moves with it); first what each method was published with, then iccd "
+    "and vcd on ab2pf's. frame_ms: broad and narrow phase; times_ab2pf: over ab2pf's; missed and "
     "added: hits that ab2pf has and the method has not, and the reverse.",
     "frame mean": "times_ab2pf of the table above over its scenes.",
     "frame peer": "the same step by ipctk: broad phase, then its candidates (vf_ns and ee_ns "
     "each); peer_ms is both, speedup is that over ab2pf's whole frame.",
     "query": "n candidates of ipctk's broad phase (of so many). ns: a query, gather included; "
-    "late: times after the exact one.",
+    "misses of so many hits, false_hits of so many others; late: times after the exact one.",
     "query clear": "ab2pf on the candidates without contact (ab2pf_ns), and on all of them.",
-    "query peer": "ns: a query without contact, inside ipctk's own loop; all_ns: with the hits' "
-    "share; misses and false_hits of the asked ones; us_a_hit: a hit, asked from Python.",
-    "truth": "whole frames beside the collisions that are listed with the data.",
-    "hard query": "public queries with exact labels; decided_exactly: left to exact arithmetic.",
+    "query peer": "ns: one of n queries without contact, inside ipctk's own loop (3 repeats); "
+    "all_ns: with the hits' share; misses and false_hits of so many among the queries that it was "
+    "asked from Python; us_a_hit: microseconds of a hit, asked so.",
+    "truth": "whole frames beside the collisions that are listed with the data: misses and "
+    "false_hits are counts.",
+    "hard query": "n public queries with exact labels. us: microseconds a query; misses and "
+    "false_hits are counts; decided_exactly: left to exact arithmetic.",
     "adversarial": "ab2pf beside method exact. early_most: largest error of a time that is not "
     "late; scaled, turned, backwards, modes: answers that change by 2^+-300, another order of "
     "vertices, time reversed, other rounding modes.",
@@ -43,23 +56,38 @@ NOTES = {
     "Python; clear_ and hit_certified: certain by intervals too; clear_tight: the former that "
     "Tight-Inclusion confirms; integers_only: the rest; contradictions: referees that differ; "
     "labels_differ: published labels that do; seconds: of all referees.",
-    "volume": "frame time and candidates by kind of bounding volume, one thread.",
+    "volume": "frame time and candidates by kind of bounding volume.",
     "front": "tests and time a frame with the front kept, beside a fresh descent; frame_saved: of "
-    "the whole frame.",
-    "size": "one frame of growing meshes. exponent: slope of log frame_ms over log triangles, by "
-    "scene.",
-    "threads": "the same frame with two threads; same_bits: nothing in the answer changes.",
-    "topology": "update_topology after so many faces changed, beside a new MeshCCD (rebuild_ms).",
+    "the whole frame. Wall time: means nothing on a loaded machine.",
+    "size": "one frame of growing meshes, 3 repeats at most from 300,000 triangles. exponent: "
+    "slope of log frame_ms over log triangles, by scene.",
+    "threads": "the same frame with two threads; same_bits: nothing in the answer changes. Wall "
+    "time: means nothing on a loaded machine.",
+    "topology": "update_topology after so many faces changed, beside a new MeshCCD (rebuild_ms), "
+    "the frame after it included; frame_ms: a frame alone. Wall time: means nothing on a loaded "
+    "machine.",
 }
 
 
 def run(quick: bool, seed: int) -> list[Row]:
-    """Rows of every part; the real scene joins in where ``TAUGUARD_DATA`` says where it is."""
-    data = os.environ.get("TAUGUARD_DATA")
+    """Rows of every part; the recorded ones join in where ``TAUGUARD_DATA`` says where they are.
+
+    Raises:
+        ValueError: recorded scenes or query sets are not in the folder that it names.
+    """
+    data = recorded()
     triangles = 4_000 if quick else 40_000
     repeats = 3 if quick else 7
-    frames = cloth_frames.frames(triangles, seed, Path(data) if data else None)
-    rows: list[Row] = []
+    frames = cloth_frames.frames(triangles, seed, data)
+    rows: list[Row] = [
+        {
+            "study": "cloth",
+            "run": "quick" if quick else "full",
+            "triangles": triangles,
+            "repeats": repeats,
+            "recorded": UNSET if data is None else "TAUGUARD_DATA: scenes and query sets are there",
+        }
+    ]
     for frame in frames:
         few = 1 if quick and len(frame.faces) > 50_000 else repeats
         rows += cloth_frames.methods(frame, few)
@@ -71,11 +99,11 @@ def run(quick: bool, seed: int) -> list[Row]:
             most = (40_000, 2_000) if quick else (10**7, 20_000)
             rows += cloth_queries.on_recording(frame, seed, *most, repeats)
     if data:
-        rows += cloth_truth.on_listed_frames(Path(data) / "ccd")
-        rows += cloth_queries.on_hard_sets(Path(data) / "ccd", 20 if quick else 60)
+        rows += cloth_truth.on_listed_frames(data / "ccd")
+        rows += cloth_queries.on_hard_sets(data / "ccd", 20 if quick else 60)
     rows += cloth_adversarial.adversarial(12_000 if quick else 1_000_000, seed)
     if data:
-        rows += cloth_check.on_labels(Path(data) / "ccd", map)
+        rows += cloth_check.on_labels(data / "ccd", map)
     rows += cloth_scaling.volumes(triangles, seed, repeats)
     rows += cloth_scaling.front(triangles, seed, 15 if quick else 60)
     sizes = [1_000, 10_000] if quick else [1_000, 10_000, 100_000, 1_000_000]
@@ -83,6 +111,37 @@ def run(quick: bool, seed: int) -> list[Row]:
     rows += cloth_scaling.threads(triangles, seed, repeats)
     rows += cloth_scaling.topology(triangles, seed, repeats)
     return rows + summary(rows, quick)
+
+
+def recorded() -> Path | None:
+    """The folder of ``TAUGUARD_DATA``, ``None`` where that is not set.
+
+    Raises:
+        ValueError: the variable names a folder that lacks scenes or query sets.
+    """
+    named = os.environ.get("TAUGUARD_DATA")
+    if not named:
+        return None
+    folder = Path(named) / "ccd"
+    needed = [f"{name}/frames" for name in LISTED] + list(cloth_queries.HARD_SETS)
+    lacks = [name for name in needed if not (folder / name).is_dir()]
+    if lacks:
+        raise ValueError(
+            f"TAUGUARD_DATA: {folder} lacks {', '.join(lacks)}; "
+            "docs/cloth.md says where they come from; unset, the bench runs without them"
+        )
+    return Path(named)
+
+
+def shown(rows: list[Row]) -> list[Row]:
+    """Rows for the printed tables: rates as counts, ``k of n``."""
+    return [{key: _count(value) for key, value in row.items()} for row in rows]
+
+
+def _count(value: object) -> object:
+    if not isinstance(value, dict) or "n" not in value:
+        return value
+    return f"{round((value['value'] or 0) * value['n'])} of {value['n']}"
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

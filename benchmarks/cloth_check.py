@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from tauguard.benchmarks.cloth_certificate import certify
 from tauguard.benchmarks.cloth_integers import HALVINGS, first_contact
+from tauguard.benchmarks.cloth_ipctk import load_ipctk
 from tauguard.benchmarks.cloth_queries import HARD_SETS, load_hard, solver
 from tauguard.benchmarks.report import Row
 
@@ -129,20 +130,18 @@ def _error(job: Job, i: int, time: tuple[Fraction, Fraction]) -> Fraction:
 
 
 def _tight_inclusion() -> Any:
-    try:
-        import ipctk
-    except ImportError:
+    ipctk = load_ipctk()
+    if ipctk is None:
         return None
-    ipctk.set_logger_level(ipctk.LoggerLevel.error)  # it warns of each pair that starts in contact
     return ipctk.TightInclusionCCD(max_iterations=BOXES, conservative_rescaling=1.0)
 
 
 def _confirmed(job: Job, clear: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Of the queries chosen those that Tight-Inclusion calls clear."""
     confirmed = np.zeros(len(clear), dtype=bool)
-    peer = _tight_inclusion()
-    if peer is not None:
-        call = peer.point_triangle_ccd if job.vertex else peer.edge_edge_ccd
+    tight = _tight_inclusion()
+    if tight is not None:
+        call = tight.point_triangle_ccd if job.vertex else tight.edge_edge_ccd
         for i in np.flatnonzero(clear):
             confirmed[i] = not call(*job.x[i, 0], *job.x[i, 1])[0]
     return confirmed

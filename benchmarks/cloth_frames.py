@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.benchmarks.cloth_ipctk import load_ipctk
 from tauguard.benchmarks.cloth_scaling import Step, bound, scaled, scenes, step_at
 from tauguard.benchmarks.report import Row, measure
 from tauguard.cloth import Groups, MeshCCD
@@ -121,11 +122,9 @@ def peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row]
     query is taken times the number of candidates; hits cost it more than that. Both sides test
     everything against everything (no groups), so that they have the same work.
     """
-    try:
-        import ipctk
-    except ImportError:
+    ipctk = load_ipctk()
+    if ipctk is None:
         return [{"study": "frame peer", "scene": frame.name, "peer": "ipctk is not installed"}]
-    ipctk.set_num_threads(1)
     ccd = MeshCCD(frame.faces)
     answer = ccd.find(*frame.step)
     x_t0, x_t1 = (np.asfortranarray(x) for x in frame.step)

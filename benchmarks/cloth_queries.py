@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.benchmarks.cloth_frames import Frame
+from tauguard.benchmarks.cloth_ipctk import load_ipctk
 from tauguard.benchmarks.cloth_scaling import bound
 from tauguard.benchmarks.report import Row, measure, rate
 from tauguard.cloth import MeshCCD, _mesh
@@ -79,11 +80,9 @@ def on_recording(frame: Frame, seed: int, limit: int, calls: int, repeats: int) 
         calls: Candidates of each kind for the peers' answers, asked call by call.
         repeats: Of each timing.
     """
-    try:
-        import ipctk
-    except ImportError:
+    ipctk = load_ipctk()
+    if ipctk is None:
         return [{"study": "query", "set": frame.name, "peer": "ipctk is not installed"}]
-    ipctk.set_num_threads(1)
     ccd = MeshCCD(frame.faces)
     mesh = ipctk.CollisionMesh(np.asfortranarray(frame.step[0]), ccd.edges, frame.faces)
     found = ipctk.Candidates()
@@ -273,7 +272,7 @@ def _peers(
                 "all_ns": float(all_ns),
                 "ab2pf_all_ns": ours["ab2pf_all_ns"],
                 "speedup_all": float(all_ns) / ours["ab2pf_all_ns"],
-                "asked": len(asked),
+                "queries": len(asked),
                 "misses": rate(int((real & ~hit).sum()), int(real.sum())),
                 "false_hits": rate(int((hit & ~real).sum()), int((~real).sum())),
                 "toi_error_median": float(np.median(np.abs(early))) if both.any() else None,
@@ -300,9 +299,8 @@ def _ask(method: Any, queries: Queries) -> tuple[NDArray[np.bool_], NDArray[np.f
 def _hard_peers(
     name: str, kind: str, queries: Queries, truth: NDArray[np.bool_], calls: int
 ) -> list[Row]:
-    try:
-        import ipctk
-    except ImportError:
+    ipctk = load_ipctk()
+    if ipctk is None:
         return []
     few = np.arange(0, len(truth), 1 + len(truth) // calls)
     rows: list[Row] = []

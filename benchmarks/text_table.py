@@ -63,6 +63,8 @@ def cell(value: object, brief: bool = False) -> str:
             return "-"
         if brief:
             return f"{middle:.1e}" if 0 < middle < 5e-4 else f"{middle:{form}}"
+        if "median" in value and value["low"] == value["high"]:
+            return f"{middle:{form}}"  # of one repeat
         return f"{middle:{form}} [{value['low']:{form}}, {value['high']:{form}}]"
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -67,7 +67,8 @@ def load_recording(folder: str | Path, pattern: str = "*") -> Recording:
         (p for p in Path(folder).glob(pattern) if p.suffix.lower() in (".ply", ".obj")), key=_order
     )
     if not files:
-        raise ValueError(f"{folder}: no .ply or .obj file matches {pattern!r}")
+        missing = "" if Path(folder).is_dir() else ": there is no such folder"
+        raise ValueError(f"{folder}: no .ply or .obj file matches {pattern!r}{missing}")
     return Recording(read_mesh(files[0])[1], tuple(files))
 
 

@@ -48,3 +48,18 @@ def test_a_slow_ratio_is_open_after_a_quick_run():
     assert list(met(rows).values()) == [False]
     rows[0]["speedup"] = 11.0
     assert list(met(rows, quick=True).values()) == [True]
+
+
+def test_frames_are_compared_on_each_ones_own_volume_and_on_the_same():
+    own, same = (
+        {
+            "study": "frame mean", "method": "iccd", "volume": volume, "scenes": 6,
+            "times_ab2pf_mean": mean, "times_ab2pf_least": 1.0, "times_ab2pf_most": 6.0,
+        }
+        for volume, mean in (("k_dop18", 2.2), ("moving_k_dop14", 1.4))
+    )  # fmt: skip
+    name = "a frame, mean of 6 scenes: iccd over ab2pf, "
+    assert met([own, same]) == {
+        name + "each on its own volume": False,
+        name + "both on moving_k_dop14": None,
+    }

@@ -78,3 +78,8 @@ def test_a_small_rate_is_not_shown_as_none():
     assert cell({"median": 12.345, "low": 1.0, "high": 20.0}, brief=True) == "12.3"
     assert cell({"median": -12.345, "low": -20.0, "high": 1.0}, brief=True) == "-12.3"
     assert cell({"median": 12.345, "low": 1.0, "high": 20.0}) == "12.3 [1, 20]"
+
+
+def test_a_time_of_one_repeat_has_no_interval():
+    assert cell({"median": 2.0, "low": 2.0, "high": 2.0}) == "2"
+    assert cell({"median": 2.0, "low": 1.5, "high": 2.0}) == "2 [1.5, 2]"
