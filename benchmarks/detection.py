@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from tauguard.benchmarks import detection_chart, detection_table
 from tauguard.benchmarks import detection_report as report
-from tauguard.benchmarks import detection_table
 from tauguard.benchmarks import detection_variations as variations
 from tauguard.benchmarks.detection_fleet import (
     NETWORK,
@@ -188,5 +188,5 @@ def shown(rows: list[Row]) -> list[Row]:
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
-    """See :func:`tauguard.benchmarks.detection_report.draw`."""
-    report.draw(rows, figure)
+    """See :func:`tauguard.benchmarks.detection_chart.draw`."""
+    detection_chart.draw(rows, figure)

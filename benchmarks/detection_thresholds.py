@@ -16,8 +16,8 @@ from tauguard.datasets.plans import BEGIN
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.events import CASE_SECONDS, MERGE_GAP
 from tauguard.detectors.filter import CONFIRMATION, confirmation_samples
-from tauguard.detectors.levelling import SpeedLevels, block_maxima, recent_speed
-from tauguard.detectors.operating_point import sustained, tail_level
+from tauguard.detectors.levelling import SpeedLevels, recent_speed
+from tauguard.detectors.operating_point import block_maxima, sustained, tail_level
 from tauguard.traces import Trace
 
 Array = NDArray[np.float64]

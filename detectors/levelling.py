@@ -8,7 +8,6 @@ their mean excess beyond that, so that one threshold asks for one rate at every 
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,6 +20,7 @@ from tauguard.detectors.calibrate import free_rows
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.events import MERGE_GAP
+from tauguard.detectors.operating_point import block_maxima
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
@@ -51,27 +51,6 @@ def recent_speed(qd: ArrayLike, dt: float, memory: float = MEMORY) -> Array:
     return found
 
 
-class RecentSpeed:
-    """:func:`recent_speed` sample by sample, in memory that does not grow."""
-
-    def __init__(self, dt: float, memory: float = MEMORY) -> None:
-        """Begin at rest."""
-        self._samples = _samples(dt, memory)
-        self._falling: deque[tuple[int, float]] = deque(maxlen=self._samples)
-        self._now = -1
-
-    def step(self, qd: ArrayLike) -> float:
-        """The value after a sample of velocities [rad/s], shape (n,)."""
-        total = float(np.abs(qd).sum())
-        self._now += 1
-        while self._falling and self._falling[-1][1] <= total:
-            self._falling.pop()
-        if self._falling and self._falling[0][0] <= self._now - self._samples:
-            self._falling.popleft()
-        self._falling.append((self._now, total))
-        return self._falling[0][1]
-
-
 def _samples(dt: float, memory: float) -> int:
     if not (dt > 0 and np.isfinite(memory) and memory >= 0):
         raise ValueError(f"dt {dt}, memory {memory} s: expected above 0, and 0 or more")
@@ -88,6 +67,12 @@ class SpeedLevels:
     speed: Array  #: rising [rad/s], shape (K,)
     base: Array  #: of the score: seldom exceeded by a block's peak, shape (K,)
     unit: Array  #: of the score, above 0: mean excess of those that do exceed it, shape (K,)
+
+    def __post_init__(self) -> None:
+        """Check the shapes: ``ValueError`` says what they are."""
+        shapes = [np.shape(value) for value in (self.speed, self.base, self.unit)]
+        if len(shapes[0]) != 1 or not shapes[0][0] or len(set(shapes)) != 1:
+            raise ValueError(f"speed, base, unit: shapes {shapes}, expected (K,) each, K > 0")
 
     @classmethod
     def fit(cls, peaks: ArrayLike, speeds: ArrayLike) -> SpeedLevels:
@@ -193,12 +178,3 @@ class Levelled:
     def scores(self, trace: Trace) -> Array:
         """The levelled score, shape (T,)."""
         return self.levels(self.detector.scores(trace), recent_speed(trace.qd, trace.dt))
-
-
-def block_maxima(level: Array, rows: int) -> tuple[Array, NDArray[np.intp]]:
-    """The maximum of each block of ``rows`` samples and where it is (the last may be shorter)."""
-    where = np.array(
-        [k + int(np.argmax(level[k : k + rows])) for k in range(0, len(level), max(1, rows))],
-        dtype=np.intp,
-    )
-    return level[where], where

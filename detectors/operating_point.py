@@ -23,7 +23,15 @@ def sustained(score: Array, samples: int) -> Array:
 
 def block_peaks(level: Array, rows: int) -> Array:
     """The maximum of each block of ``rows`` samples (the last may be shorter)."""
-    return np.maximum.reduceat(level, np.arange(0, len(level), max(1, rows)))
+    return block_maxima(level, rows)[0]
+
+
+def block_maxima(level: Array, rows: int) -> tuple[Array, NDArray[np.intp]]:
+    """:func:`block_peaks`, and the first row where each stands."""
+    rows = max(1, rows)
+    padded = np.append(level, np.full(-len(level) % rows, -np.inf)).reshape(-1, rows)
+    where = padded.argmax(axis=1) + rows * np.arange(len(padded))
+    return level[where], where
 
 
 def threshold_for_rate(

@@ -43,7 +43,7 @@ def save_model(watched: Thresholded, path: str | os.PathLike[str]) -> None:
         own.chain.at(watched.threshold, watched.confirmation).save(path)
         return
     levels = own.levels if isinstance(own, Levelled) else None
-    detector: Storable = own.detector if isinstance(own, Levelled) else own  # type: ignore
+    detector: Storable = own.detector if isinstance(own, Levelled) else own  # type: ignore[assignment]
     content = {
         "format": FORMAT,
         "detector": detector.name,

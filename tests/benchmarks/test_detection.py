@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from tauguard.benchmarks import detection_chart
 from tauguard.benchmarks import detection_report as report
 from tauguard.benchmarks.detection import ALL
 from tauguard.benchmarks.detection_fleet import (
@@ -268,7 +269,7 @@ def test_rows_have_the_twelve_cells_of_every_detector():
     assert [r["hours"] for r in whole] == [6.0, 6.0]
     assert whole[0]["false_alarms_per_hour"]["value"] == pytest.approx(1.0)
     figure = pytest.importorskip("matplotlib.figure").Figure()
-    report.draw(rows, figure)
+    detection_chart.draw(rows, figure)
     assert len(figure.axes) == 6
 
 

@@ -1,4 +1,4 @@
-"""Levelling: causal, the same online, and one rate at every speed where the tails grow with it."""
+"""Levelling: causal, and one rate at every speed where the tails grow with it."""
 
 from dataclasses import replace
 
@@ -9,12 +9,10 @@ from hypothesis import strategies as st
 
 from tauguard.detectors.levelling import (
     Levelled,
-    RecentSpeed,
     SpeedLevels,
-    block_maxima,
     recent_speed,
 )
-from tauguard.detectors.operating_point import tail_level
+from tauguard.detectors.operating_point import block_maxima, tail_level
 from tauguard.traces import Trace
 
 
@@ -22,15 +20,13 @@ from tauguard.traces import Trace
     st.lists(st.floats(-5, 5), min_size=1, max_size=80),
     st.floats(0, 0.05),
 )
-def test_recent_speed_is_the_maximum_of_the_last_moments_also_online(speeds, memory):
+def test_recent_speed_is_the_maximum_of_the_last_moments(speeds, memory):
     dt = 2e-3
     qd = np.column_stack([speeds, np.roll(speeds, 1)])
     total = np.abs(qd).sum(axis=1)
     count = max(1, round(memory / dt))
     expected = [total[max(0, k - count + 1) : k + 1].max() for k in range(len(total))]
     np.testing.assert_array_equal(recent_speed(qd, dt, memory), expected)
-    online = RecentSpeed(dt, memory)
-    assert [online.step(row) for row in qd] == expected
 
 
 def test_one_level_is_passed_as_often_at_every_speed():
