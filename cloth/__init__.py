@@ -2,10 +2,11 @@
 
 from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
-from tauguard.cloth.impacts import Impacts, edge_edge, vertex_face
+from tauguard.cloth.impacts import METHODS, Impacts, edge_edge, vertex_face
 from tauguard.cloth.mesh import VOLUMES, MeshCCD
 
 __all__ = [
+    "METHODS",
     "VOLUMES",
     "Frame",
     "FrameStats",

@@ -39,7 +39,7 @@ class FrameStats:
     bytes: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """Every collision of one step.
 

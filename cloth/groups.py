@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.geometry import indices
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Groups:
     """A group for every vertex and a table of the groups that meet.
 
@@ -22,7 +22,8 @@ class Groups:
             itself.
 
     Raises:
-        ValueError: the table is not square or not symmetric, or an id has no row in it.
+        ValueError: the table is not square, not symmetric or not of bools (or 0 and 1), or an id
+            has no row in it.
 
     Example:
         A cloth (group 0) that meets itself and a rigid body (group 1) that meets the cloth only::
@@ -35,9 +36,7 @@ class Groups:
 
     def __init__(self, ids: ArrayLike, meets: ArrayLike) -> None:
         """Check and convert both arrays."""
-        table = np.ascontiguousarray(meets, dtype=bool)
-        if table.ndim != 2 or table.shape[0] != table.shape[1]:
-            raise ValueError(f"meets: shape {table.shape}, expected (G, G)")
+        table = _table(meets)
         if (table != table.T).any():
             a, b = np.argwhere(table != table.T)[0]
             raise ValueError(f"meets: [{a}, {b}] is {table[a, b]} but [{b}, {a}] is {table[b, a]}")
@@ -56,3 +55,15 @@ class Groups:
         if mixed.any():
             row = int(np.argmax(mixed))
             raise ValueError(f"faces: row {row} has vertices of groups {of_face[row].tolist()}")
+
+
+def _table(meets: ArrayLike) -> NDArray[np.bool_]:
+    try:
+        array = np.asarray(meets)
+    except ValueError as error:
+        raise ValueError(f"meets: rows of different lengths, expected (G, G) ({error})") from None
+    if array.ndim != 2 or array.shape[0] != array.shape[1]:
+        raise ValueError(f"meets: shape {array.shape}, expected (G, G)")
+    if array.dtype.kind not in "biuf" or not ((array == 0) | (array == 1)).all():
+        raise ValueError(f"meets: dtype {array.dtype}, expected bools, or 0 and 1 alone")
+    return np.ascontiguousarray(array, dtype=bool)

@@ -34,7 +34,7 @@ METHODS: dict[str, int] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Impacts:
     """First contacts, one a row.
 
@@ -42,10 +42,14 @@ class Impacts:
         hit: Shape (N,).
         toi: Time of impact in [0, 1] of the step, never late; inf without a hit. Shape (N,).
         point: Where, at that time; NaN where there is no hit. Shape (N, 3).
-        normal: Unit normal of the face, or of both edges; zeros where they have none (a face
-            without area, parallel edges), NaN where there is no hit. Shape (N, 3).
+        normal: Unit normal at that time of the face by its winding, (f1 - f0) x (f2 - f0), or of
+            both edges, (ea1 - ea0) x (eb1 - eb0): not of the side that the features come from,
+            nor the direction between them at a ``min_distance``. Zeros where they have none (a
+            face without area, parallel edges), NaN where there is no hit. Shape (N, 3).
         weights: Of the four vertices of a row: (1, w, w, w) of the vertex and the face's vertices,
             or (1 - s, s, 1 - t, t) of the two edges' ends. Shape (N, 4).
+
+    Where coordinates are beyond 1e75 or all below 1e-60, normal and weights can be zero or NaN.
     """
 
     hit: NDArray[np.bool_]
@@ -63,7 +67,7 @@ def vertex_face(
     Args:
         x_t0: Positions at the start of the step [any unit]: vertex, three of the face. (N, 4, 3).
         x_t1: At its end. Shape (N, 4, 3).
-        method: One of ``METHODS``.
+        method: One of :data:`tauguard.cloth.METHODS`.
         min_distance: Counts as contact, in the unit of the positions; conservative there. Only
             ab2pf has one.
 

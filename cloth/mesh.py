@@ -38,18 +38,24 @@ class MeshCCD:
     Args:
         faces: Shape (F, 3), three different vertices each. Only vertices that a face uses take
             part.
-        method: How the narrow phase decides, as for :func:`tauguard.cloth.vertex_face`.
+        method: How the narrow phase decides: one of :data:`tauguard.cloth.METHODS`.
         threads: 0 means all processors. Results do not depend on it.
         groups: Which parts meet; ``None``: everything meets everything, itself included.
         volume: One of :data:`VOLUMES`. Any of them finds the same collisions; they differ in cost.
+
+    Attributes:
+        faces: Rows of vertices, as given; ``Frame.vf`` counts them. Shape (F, 3).
+        edges: Their edges, each once, smaller vertex first; ``Frame.ee`` counts them. Shape (E, 2).
+        groups: As given.
+        broad_stats: Counts and seconds of the last :meth:`candidates`; empty before.
 
     The hierarchy is built in the first frame and kept; a call is one step of a motion in which
     every vertex moves linearly. Calls from several Python threads on one object wait for each
     other.
 
     Raises:
-        ValueError: a face repeats a vertex, an index is negative, a face mixes groups, or there is
-            no such volume.
+        ValueError: a face repeats a vertex, an index is negative, a face mixes groups, ``groups``
+            is no :class:`Groups`, ``threads`` no int >= 0, or there is no such method or volume.
     """
 
     def __init__(
@@ -64,16 +70,17 @@ class MeshCCD:
         method_number(method)  # raises where there is none
         if volume not in VOLUMES:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
+        if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 0:
+            raise ValueError(f"threads: {threads!r}, expected an int >= 0 (0: all processors)")
         k, moving = VOLUMES[volume]
         self.method = method
-        self.threads = threads
+        self.threads = int(threads)
         self.volume = volume
         self.groups = groups
         self.faces = _checked_faces(faces, groups)
-        #: Counts and seconds of the last broad phase.
         self.broad_stats: dict[str, Any] = {}
         self._vertices: int | None = None
-        self._mesh = _mesh.Mesh(self.faces, *_group_arrays(groups), k, moving, threads)
+        self._mesh = _mesh.Mesh(self.faces, *_group_arrays(groups), k, moving, self.threads)
         self.edges: NDArray[np.int32] = self._mesh.edges()
 
     def find(
@@ -194,6 +201,11 @@ def _group_arrays(groups: Groups | None) -> tuple[NDArray[np.int32], NDArray[np.
 
 
 def _checked_faces(faces: ArrayLike, groups: Groups | None) -> NDArray[np.int32]:
+    if groups is not None and not isinstance(groups, Groups):
+        raise ValueError(
+            f"groups: {type(groups).__name__}, expected Groups(ids, meets): a group for every "
+            "vertex and a table of the groups that meet"
+        )
     array = np.asarray(faces)
     if array.size == 0:
         array = np.zeros((0, 3), dtype=np.int32)

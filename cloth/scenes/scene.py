@@ -13,7 +13,7 @@ from tauguard.cloth.groups import Groups
 Points = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """A prescribed motion of a triangle mesh.
 

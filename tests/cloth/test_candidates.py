@@ -233,11 +233,29 @@ class TestGroups:
             ([0, 2], [[1, 1], [1, 1]], r"ids: index 2 in row 1, expected 0 to 1"),
             ([0, 1], [[1, 1], [0, 1]], r"meets: \[0, 1\] is True but \[1, 0\] is False"),
             ([0, 1], [[1, 1]], r"meets: shape \(1, 2\), expected \(G, G\)"),
+            ([0, 1], [[1, 1], [1]], r"meets: rows of different lengths"),
+            ([0, 1], [["True", ""], ["", "True"]], r"meets: dtype <U4, expected bools"),
+            ([0], [[1j]], r"meets: dtype complex128, expected bools"),
+            ([0, 1], [[1, 2], [2, 1]], r"meets: dtype int64, expected bools, or 0 and 1 alone"),
+            ([0], [[np.nan]], r"meets: dtype float64"),
         ],
     )
     def test_bad_tables_are_named(self, ids, meets, message):
         with pytest.raises(ValueError, match=message):
             Groups(ids, meets)
+
+    def test_ids_alone_are_no_groups(self):
+        with pytest.raises(ValueError, match=r"groups: list, expected Groups\(ids, meets\)"):
+            MeshCCD([[0, 1, 2]], groups=[0, 0, 0])
+        ccd = MeshCCD([[0, 1, 2]])
+        with pytest.raises(ValueError, match=r"groups: ndarray, expected Groups"):
+            ccd.update_topology([[0, 1, 2]], np.zeros(3, int))
+
+    def test_two_of_them_can_be_compared(self):
+        a, b = (Groups([0, 0, 1], np.eye(2)) for _ in range(2))
+        assert a == a
+        assert a != b
+        assert len({a, b}) == 2
 
     def test_a_face_of_two_groups_is_named(self):
         with pytest.raises(ValueError, match=r"faces: row 1 has vertices of groups \[1, 1, 0\]"):
@@ -289,6 +307,12 @@ class TestBadInput:
     def test_distance(self, distance):
         with pytest.raises(ValueError, match="min_distance"):
             MeshCCD(self.faces).candidates(self.x, self.x, distance)
+
+    @pytest.mark.parametrize("threads", [-1, 1.5, "2", None, True])
+    def test_threads(self, threads):
+        with pytest.raises(ValueError, match=r"threads: .*, expected an int >= 0 \(0: all"):
+            MeshCCD(self.faces, threads=threads)
+        assert MeshCCD(self.faces, threads=np.int64(2)).threads == 2
 
     def test_volume(self):
         with pytest.raises(ValueError, match="volume 'sphere': there are k_dop6, "):

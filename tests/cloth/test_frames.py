@@ -32,6 +32,16 @@ def assert_same(a, b):
             assert x.tobytes() == y.tobytes(), (kind, field)
 
 
+def test_two_frames_can_be_compared():
+    """By identity: arrays have no one truth value."""
+    scene = SCENES["pleats"](1_000, 0)
+    a, b = (MeshCCD(scene.faces).find(*next(scene.steps(5))) for _ in range(2))
+    assert a == a
+    assert a != b
+    assert a.vf_impacts != b.vf_impacts
+    assert_same(a, b)
+
+
 @settings(deadline=None, max_examples=80)
 @given(small_meshes())
 def test_any_small_mesh_has_the_collisions_of_all_pairs(mesh):
