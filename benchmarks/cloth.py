@@ -123,11 +123,15 @@ def recorded() -> Path | None:
     if not named:
         return None
     folder = Path(named) / "ccd"
-    needed = [f"{name}/frames" for name in LISTED] + list(cloth_queries.HARD_SETS)
-    lacks = [name for name in needed if not (folder / name).is_dir()]
+    needed = [f"{name}/{part}" for name in LISTED for part in ("frames", "boxes", "mma_bool")]
+    needed += [
+        f"{x}/{kind}" for x in cloth_queries.HARD_SETS for kind in ("vertex-face", "edge-edge")
+    ]
+    lacks = [name for name in needed if not any((folder / name).glob("*.*"))]
     if lacks:
+        more = f" and {len(lacks) - 3} more" if len(lacks) > 3 else ""
         raise ValueError(
-            f"TAUGUARD_DATA: {folder} lacks {', '.join(lacks)}; "
+            f"TAUGUARD_DATA: {folder} lacks files in {', '.join(lacks[:3])}{more}; "
             "docs/cloth.md says where they come from; unset, the bench runs without them"
         )
     return Path(named)

@@ -10,11 +10,15 @@ def test_recorded_data_are_named_by_the_variable(monkeypatch, tmp_path):
     monkeypatch.delenv("TAUGUARD_DATA", raising=False)
     assert cloth.recorded() is None
     monkeypatch.setenv("TAUGUARD_DATA", str(tmp_path))
-    with pytest.raises(ValueError, match=r"TAUGUARD_DATA: .*ccd lacks cloth-funnel/frames, .*un"):
+    with pytest.raises(
+        ValueError, match=r"TAUGUARD_DATA: .*ccd lacks files in cloth-fun.* 15 more"
+    ):
         cloth.recorded()
-    for name in ("cloth-funnel/frames", "cloth-ball/frames"):
-        (tmp_path / "ccd" / name).mkdir(parents=True)
-    with pytest.raises(ValueError, match="ccd lacks unit-tests, erleben"):
+    for name in ("cloth-funnel", "cloth-ball"):
+        for part in ("frames", "boxes", "mma_bool"):
+            (tmp_path / "ccd" / name / part).mkdir(parents=True)
+            (tmp_path / "ccd" / name / part / "1.json").touch()
+    with pytest.raises(ValueError, match="ccd lacks files in unit-tests/vertex-face, unit-tests/e"):
         cloth.recorded()
 
 
