@@ -68,4 +68,8 @@ def plausible(
             f"{said}: check the unit of the currents (milliamperes?), their signs, the order of "
             "the joints, the gains and the robot file"
         )
-    return (f"{said}: alarms mean little; a load, other gains?",) if share > DOUBTED else ()
+    return (
+        (f"{said}: alarms mean little; a load, other gains, another order of the joints?",)
+        if share > DOUBTED
+        else ()
+    )

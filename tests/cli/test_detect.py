@@ -67,7 +67,7 @@ def test_the_push_is_found_and_nothing_else(log, capsys):
     assert sorted(p.name for p in out.iterdir()) == ["detect.mcap", "detect.rrd", "events.json"]
     assert json.loads((out / "events.json").read_text()) == figures
     text = capsys.readouterr().out
-    assert "1 alarms in 10.0 s watched" in text
+    assert "1 alarm in 10.0 s watched" in text
     assert "250 Hz" in text
 
 
@@ -111,6 +111,11 @@ def test_joints_that_do_not_match(log, capsys):
     with pytest.raises(SystemExit):
         run(log, "--gains", "8", "5", "--robot", str(log / "one.xml"))
     assert "the log has 2 joints (joint_1, joint_2), the robot 1 (j1)" in capsys.readouterr().err
+
+
+def test_a_short_log_is_said_to_be_short(log, capsys):
+    run(log, "--gains", "8", "5")
+    assert "per hour (95 %), a longer log would say more" in capsys.readouterr().out
 
 
 @pytest.mark.data

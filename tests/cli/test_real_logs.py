@@ -114,6 +114,54 @@ def test_payloads_by_file_name_or_stem():
             real_logs.loaded(traces, (text,))
 
 
+def test_a_load_in_grams_is_refused():
+    with pytest.raises(ValueError, match="at most 100; loads are told in kg"):
+        real_logs.loaded({"a.csv": record(0, 12.0)}, ("a=2600",))
+
+
+def test_an_untold_load_names_its_log(folder, capsys):
+    logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
+    logs.append(written(folder, "laden.csv", record(20, load=3.0)))
+    arguments = ["calibrate", *logs, *flags(folder), "--gains", *GAINS]
+    arguments += ["--out", str(folder / "laden.xml")]
+    line = ""
+    try:
+        main(arguments)
+    except SystemExit:
+        line = capsys.readouterr().err
+    assert "did laden.csv carry something? tell it with --payload laden.csv=KG" in (
+        line or capsys.readouterr().out
+    )
+    main([*arguments, "--payload", "laden=unknown"])
+    assert "carry something" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--traces", "x", "--sensitivity"), "--sensitivity: with --free only"),
+        (("--traces", "x", "--robot", "r", "--gains", "1"), "--robot, --gains: with --free only"),
+        (("--free", "x", "--robot", "r", "--levelled"), "go with --traces, not with --free"),
+        (("--free", "x", "--robot", "r", "--model", "m.skops"), "ends in .json"),
+    ],
+)
+def test_flags_of_the_other_training(capsys, arguments, message):
+    assert message in fails(capsys, "train", *arguments)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [({"t": 0}, "q, qd, current missing; its fields are t,"), ({"x": 0}, "unknown x; its")],
+)
+def test_maps_that_are_no_maps(tmp_path, fields, message):
+    path = tmp_path / "map.json"
+    path.write_text(json.dumps(fields))
+    with pytest.raises(ValueError, match=message):
+        real_logs.column_map(str(path))
+    with pytest.raises(ValueError, match="no such file; presets are ur10e"):
+        real_logs.column_map(str(tmp_path / "nosuch.json"))
+
+
 def test_where_the_scale_comes_from_is_said(folder):
     numbers = real_logs.robot_numbers(folder / "arm.xml")
     recordings = real_logs.loaded({"a": record(0, 12.0)}, ())

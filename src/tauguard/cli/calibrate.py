@@ -48,21 +48,22 @@ def command(
         json: write the figures here as JSON.
     """
     from tauguard.benchmarks.report import write_json
-    from tauguard.cli.real_logs import loaded, read_logs, robot_numbers, start
+    from tauguard.cli.real_logs import doubts, loaded, read_logs, robot_numbers, start
     from tauguard.detectors.real_arm.arm_file import save_arm
-    from tauguard.detectors.real_arm.assessment import explained, left_out
+    from tauguard.detectors.real_arm.assessment import left_out
     from tauguard.detectors.real_arm.identification import identify
-    from tauguard.detectors.real_arm.recording import Load
 
+    if gains and scale in ("masses", "payload"):
+        raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
     numbers = robot_numbers(robot)
     traces = read_logs(logs, columns, numbers)
     recordings = loaded(traces, payload)
     arm, source = start(numbers, recordings, columns, gains, scale)
     chosen = "gains" if source == "preset" else source
     found = identify(arm, recordings, scale=chosen)
-    for note in explained(found.arm, [r.trace for r in recordings if r.load == Load()]):
-        print(f"note: {note}")
     held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
+    for note in doubts(found.arm, traces, recordings, held):
+        print(f"note: {note}")
     target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=chosen, logs=list(traces))
     result = summary(list(traces), found, held, target) | {"scale": source}

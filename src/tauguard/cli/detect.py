@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
+#: A log shorter than this hardly says how often false alarms come [s].
+SHORT = 1800.0
+
+
 @dataclasses.dataclass(frozen=True)
 class Plain:
     """Without --model: the momentum observer, and thresholds from the log's own beginning.
@@ -200,10 +204,12 @@ def report(result: dict[str, Any]) -> None:
     for event in result["events"]:
         line = f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}"
         print(line + what(event))
+    count, seconds = result["alarms"], result["watched_seconds"]
     print(
-        f"{result['alarms']} alarms in {result['watched_seconds']:.1f} s watched; in a log without "
-        "collisions each of them is a false one, at most "
+        f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched; in a log without "
+        f"collisions each is a false one: in {seconds:.0f} s, at most "
         f"{result['alarms_per_hour_high']:.0f} per hour (95 %)"
+        + (", a longer log would say more" if seconds < SHORT else "")
     )
 
 

@@ -17,7 +17,7 @@ def command(
     json: Path | None = None,
     figure: Path | None = None,
 ) -> None:
-    """Judge a trained detector on labelled recordings that it was not trained on.
+    """Judge a trained detector on labelled recordings; they must not be those of its training.
 
     Args:
         traces: folder of MCAP recordings with truth.
@@ -29,13 +29,17 @@ def command(
     from tauguard.cli.folder import labelled
     from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.detectors import figures, judge, load_model
+    from tauguard.detectors.real_arm.free_motion_file import is_free_motion
 
+    if is_free_motion(model):
+        raise ValueError(f"{model}: a real arm's detector (train --free); use `tauguard detect`")
     watched = load_model(model)
     recordings = labelled(traces)
     pairs = [(watched.detect(trace), trace) for trace in recordings]
     matchings = [judge(found, trace, watched.detector.settle) for found, trace in pairs]
     summary = figures(matchings)
     summary["diagnosis"] = explained(watched, pairs)
+    print(f"{len(recordings)} recordings in {traces}")
     print(text(summary))
     print(diagnosis_text(summary["diagnosis"]))
     if figure is not None:

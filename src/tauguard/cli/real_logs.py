@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
+#: No load of an arm's is told heavier than this [kg]: it would be grams.
+HEAVIEST = 100.0
+
+
 def robot_numbers(robot: Path) -> RobotNumbers:
     """The numbers of a robot file."""
     from tauguard.detectors import RobotNumbers
@@ -32,14 +36,22 @@ def column_map(columns: str | None) -> ColumnMap | str | None:
     import json
 
     from tauguard.datasets import ColumnMap
+    from tauguard.datasets.columns import PRESETS
 
+    if not Path(columns).is_file():
+        raise ValueError(f"{columns}: no such file; presets are {', '.join(PRESETS)}")
     try:
         fields = json.loads(Path(columns).read_text())
     except json.JSONDecodeError as error:
         raise ValueError(f"{columns}: not JSON ({error})") from error
     known = [field.name for field in dataclasses.fields(ColumnMap)]
-    if not isinstance(fields, dict) or set(fields) - set(known):
-        raise ValueError(f"{columns}: expected an object with some of {', '.join(known)}")
+    fields_are = f"its fields are {', '.join(known)}"
+    if not isinstance(fields, dict):
+        raise ValueError(f"{columns}: expected an object; {fields_are}")
+    if strange := sorted(set(fields) - set(known)):
+        raise ValueError(f"{columns}: unknown {', '.join(strange)}; {fields_are}")
+    if missing := [name for name in ("t", "q", "qd", "current") if name not in fields]:
+        raise ValueError(f"{columns}: {', '.join(missing)} missing; {fields_are}")
     fields = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
     if "repair" in fields:
         fields["repair"] = frozenset(fields["repair"])
@@ -96,8 +108,10 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
             raise ValueError(f"{path}: no .csv or .mcap files in it")
         files += inside
     names = [path.name for path in files]
-    if not files or len(set(names)) < len(names):
-        raise ValueError(f"logs: {', '.join(names) or 'none'}; expected files of different names")
+    if not files:
+        raise ValueError("no logs: give .csv or .mcap files, or a folder of them")
+    if len(set(names)) < len(names):
+        raise ValueError(f"logs: {', '.join(names)}; expected files of different names")
     return files
 
 
@@ -160,8 +174,54 @@ def _load(text: str, value: str) -> Load | None:
         parts = []
     if len(parts) not in (1, 4):
         raise ValueError(f"--payload {text}: expected LOG=KG, LOG=KG,X,Y,Z or LOG=unknown")
+    if parts[0] > HEAVIEST:
+        raise ValueError(
+            f"--payload {text}: {parts[0]:g} kg, expected at most {HEAVIEST:g}; "
+            "loads are told in kg"
+        )
     centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
     return Load(parts[0], centre)
+
+
+def doubts(
+    arm: ArmModel, traces: dict[str, Trace], recordings: list[Recording], held: Sequence[Any]
+) -> list[str]:
+    """Notes on what a calibration leaves unexplained, and on a log that may have carried something.
+
+    Args:
+        arm: identified.
+        traces: by file name.
+        recordings: the same traces with what is known of their loads.
+        held: held-out residual of each [N m], (n,) each; empty: not known.
+
+    Raises:
+        ValueError: so much is left that the logs cannot be the arm's as told.
+    """
+    from tauguard.detectors.real_arm.assessment import explained, outlier
+    from tauguard.detectors.real_arm.recording import Load
+
+    bare = [k for k, r in enumerate(recordings) if r.load == Load()]
+    found = outlier([held[k] for k in bare]) if len(held) else None
+    asked = []
+    if found is not None:
+        k, times = found
+        log = list(traces)[bare[k]]
+        asked.append(
+            f"{log} is {times:.1f} times as far from what the other logs predict as they are: "
+            f"did {log} carry something? tell it with --payload {log}=KG (or =unknown)"
+        )
+    told = [
+        f"{r.load.mass:g} kg in {n}"
+        for n, r in zip(traces, recordings, strict=True)
+        if r.load is not None and r.load.mass > 0
+    ]
+    if told:
+        asked.append(f"loads told: {', '.join(told)}; are these right, and in kg?")
+    try:
+        notes = explained(arm, [recordings[k].trace for k in bare])
+    except ValueError as error:
+        raise ValueError("; ".join([str(error), *asked])) from None
+    return [*notes, *(asked if notes else asked[: found is not None])]
 
 
 def start(

@@ -26,7 +26,7 @@ def text(summary: Mapping[str, Any]) -> str:
     lines = [
         "",
         f"judged on {confusion['tp'] + confusion['fn']} collisions and "
-        f"{alarms['hours'] * 60:.1f} collision-free minutes that were not trained on",
+        f"{alarms['hours'] * 60:.1f} collision-free minutes",
         "(values with their 95 % interval)",
         "",
         f"  sensitivity from 16 N m up  {rate(head['sensitivity'])}",

@@ -55,15 +55,29 @@ def command(
     target = model or Path("model.json" if free else "model.skops")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
+    if free and (calibration or levelled or confidence is not None or detector != "srq-svr"):
+        raise ValueError(
+            "--detector, --calibration, --confidence and --levelled go with --traces, "
+            "not with --free"
+        )
     if calibration is None and (levelled or confidence is not None):
         raise ValueError("--confidence and --levelled go with a promise: give --calibration")
     if traces is not None:
+        own: dict[str, object] = {
+            "--robot": robot,
+            "--columns": columns,
+            "--gains": gains,
+            "--payload": payload,
+        }
+        own["--sensitivity"] = sensitivity
+        if given := [name for name, value in own.items() if value]:
+            raise ValueError(f"{', '.join(given)}: with --free only, not with --traces")
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
         sure = 0.95 if confidence is None else confidence
         labelled_motion(traces, target, detector, calibration, rate, sure, levelled)
         return
-    if calibration is not None or detector != "srq-svr":
-        raise ValueError("--detector and --calibration go with --traces, not with --free")
+    if target.suffix == ".skops":
+        raise ValueError(f"--model {target}: --free writes JSON; give a name that ends in .json")
     if robot is None:
         raise ValueError("--free needs --robot")
     rate = 1.0 if false_alarms_per_hour is None else false_alarms_per_hour
@@ -130,12 +144,11 @@ def free_motion(
     sensitivity: bool,
 ) -> None:
     """Train on collision-free logs."""
-    from tauguard.cli.real_logs import loaded, read_logs, robot_numbers, start
+    from tauguard.cli.real_logs import doubts, loaded, read_logs, robot_numbers, start
     from tauguard.detectors.real_arm.arm_file import load_arm
-    from tauguard.detectors.real_arm.assessment import explained
+    from tauguard.detectors.real_arm.assessment import left_out
     from tauguard.detectors.real_arm.free_motion import FreeMotionDetector, FreeMotionSettings
     from tauguard.detectors.real_arm.free_motion_file import save_free_motion
-    from tauguard.detectors.real_arm.recording import Load
 
     numbers = robot_numbers(robot)
     traces = read_logs(free, columns, numbers)
@@ -145,7 +158,8 @@ def free_motion(
         arm, _ = start(numbers, recordings, columns, gains, "gains")
     settings = FreeMotionSettings(false_alarms_per_hour=rate)
     detector = FreeMotionDetector(settings).fit(recordings, arm)
-    for note in explained(detector.arm, [r.trace for r in recordings if r.load == Load()]):
+    held = left_out(arm, recordings)
+    for note in doubts(detector.arm, traces, recordings, held):
         print(f"note: {note}")
     save_free_motion(detector, model)
     report(detector, model, len(traces))
