@@ -75,7 +75,7 @@ def write_rrd(
     if model is None:
         attached = [text for name, text in trace.attachments.items() if name.endswith(".xml")]
         if not attached:
-            raise ValueError("the trace has no attached MJCF: give the robot's model")
+            raise ValueError("the trace has no attached MJCF: give the robot's model (--robot)")
         model = attached[0]
     scene = load_model(model)
     with TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:

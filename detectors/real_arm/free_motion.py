@@ -127,7 +127,7 @@ class FreeMotionDetector:
         recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
         if len(recordings) < 3:
             raise ValueError(
-                f"{len(recordings)} logs: give three or more, to leave each out once "
+                f"{len(recordings)} log{'s' * (len(recordings) != 1)}: give three or more, to leave each out once "
                 "(a long one can be cut)"
             )
         check_joints([r.trace for r in recordings], robot)

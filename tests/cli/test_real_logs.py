@@ -73,7 +73,7 @@ def test_held_out_residuals_have_the_joints_names(folder, capsys):
     main(["calibrate", *logs, *flags(folder), "--gains", *GAINS, *target, *told])
     out = capsys.readouterr().out
     header = next(line for line in out.splitlines() if line.startswith("held out"))
-    assert all(name in header for name in ("a N m", "b N m", "c N m"))
+    assert all(name in header for name in ("a [N m]", "b [N m]", "c [N m]"))
     assert "from the gains that were given" in out
 
 
@@ -141,6 +141,7 @@ def test_an_untold_load_names_its_log(folder, capsys):
     [
         (("--traces", "x", "--sensitivity"), "--sensitivity: with --free only"),
         (("--traces", "x", "--robot", "r", "--gains", "1"), "--robot, --gains: with --free only"),
+        (("--traces", "x", "--calibration", "x"), "--calibration x: is --traces"),
         (("--free", "x", "--robot", "r", "--levelled"), "go with --traces, not with --free"),
         (("--free", "x", "--robot", "r", "--model", "m.skops"), "ends in .json"),
     ],

@@ -125,5 +125,5 @@ def test_another_rate_is_refused(detector, unseen):
     from dataclasses import replace
 
     slow = replace(unseen[0], t=unseen[0].t * 10, truth=None)
-    with pytest.raises(ValueError, match="trained at 1 ms: resample it or train another"):
+    with pytest.raises(ValueError, match="trained at 1 ms: resample the recording"):
         detector.detect(slow)

@@ -114,8 +114,8 @@ def report(result: dict[str, Any], found: Identified) -> None:
     for name, rms in result["held_out_rms_nm"].items():
         load = result["loads_kg"][name]
         carried = f"{load:.2f} kg" if abs(load) > 0.01 else ""
-        values = {f"{j} N m": f"{v:.2f}" for j, v in zip(result["joints"], rms, strict=True)}
-        held_out.append({"held out (rms)": name, "load, not told": carried} | values)
+        values = {f"{j} [N m]": f"{v:.2f}" for j, v in zip(result["joints"], rms, strict=True)}
+        held_out.append({"held out, rms": name, "predicted without its load": carried} | values)
     if held_out:
         print(table(held_out))
     for note in found.notes:

@@ -125,16 +125,19 @@ def plainly(
 
     trace = read_matched(log, columns, robot_numbers(robot))
     arm, source = watched_arm(robot, columns, plain.gains, plain.viscous, plain.coulomb)
-    found = watch(
-        trace,
-        arm.robot,
-        drive_torque(arm, trace),
-        plain.quiet,
-        gain=plain.observer_gain,
-        confirmation=plain.confirmation,
-        factor=plain.factor,
-        joints=plain.joints or range(1, min(4, arm.robot.joints) + 1),
-    )
+    try:
+        found = watch(
+            trace,
+            arm.robot,
+            drive_torque(arm, trace),
+            plain.quiet,
+            gain=plain.observer_gain,
+            confirmation=plain.confirmation,
+            factor=plain.factor,
+            joints=plain.joints or range(1, min(4, arm.robot.joints) + 1),
+        )
+    except ValueError as error:
+        raise ValueError(f"{log} (quiet: the first {plain.quiet:g} s): {error}") from None
     return trace, found, (f"gains and friction are those of {source}",)
 
 

@@ -110,6 +110,8 @@ def labelled_motion(
             "(`tauguard simulate --collisions 0` writes some)"
         )
     # First: what cannot be used, or cannot promise, is better named before training than after.
+    if calibration is not None and calibration.resolve() == traces.resolve():
+        raise ValueError(f"--calibration {calibration}: is --traces; give recordings not in it")
     free = labelled(calibration) if calibration is not None else []
     if free:
         check_promise([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
