@@ -113,5 +113,6 @@ def check_interval(what: str, trace: Trace, dt: float) -> None:
     if len(trace.t) > 1 and not 0.8 < trace.dt / dt < 1.25:
         raise ValueError(
             f"{what} has a sample every {1e3 * trace.dt:g} ms, this detector works at "
-            f"{1e3 * dt:g} ms: resample the recording to that, or train a detector on recordings of its rate"
+            f"{1e3 * dt:g} ms: resample the recording to that, "
+            "or train a detector on recordings of its rate"
         )

@@ -293,7 +293,8 @@ class CollisionDetector:
         if len(trace.t) > 1 and not 0.8 < trace.dt / self.dt < 1.25:
             raise ValueError(
                 f"the trace has a sample every {1e3 * trace.dt:g} ms, this detector was trained "
-                f"at {1e3 * self.dt:g} ms: resample the recording to that, or train a detector on recordings of its rate"
+                f"at {1e3 * self.dt:g} ms: resample the recording to that, "
+                "or train a detector on recordings of its rate"
             )
         estimate = self._estimate(trace)
         score = self._score(estimate, trace)

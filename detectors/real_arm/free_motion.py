@@ -127,8 +127,8 @@ class FreeMotionDetector:
         recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
         if len(recordings) < 3:
             raise ValueError(
-                f"{len(recordings)} log{'s' * (len(recordings) != 1)}: give three or more, to leave each out once "
-                "(a long one can be cut)"
+                f"{len(recordings)} log{'s' * (len(recordings) != 1)}: give three or more, "
+                "to leave each out once (a long one can be cut)"
             )
         check_joints([r.trace for r in recordings], robot)
         self.dt = max(r.trace.dt for r in recordings)

@@ -197,31 +197,41 @@ def doubts(
     Raises:
         ValueError: so much is left that the logs cannot be the arm's as told.
     """
-    from tauguard.detectors.real_arm.assessment import explained, outlier
+    from tauguard.detectors.real_arm.assessment import (
+        OUTLYING,
+        OUTLYING_IN_DOUBT,
+        explained,
+        outlier,
+    )
     from tauguard.detectors.real_arm.recording import Load
 
     bare = [k for k, r in enumerate(recordings) if r.load == Load()]
-    found = outlier([held[k] for k in bare]) if len(held) else None
+    names, refused = list(traces), ""
+    notes: tuple[str, ...] = ()
+    try:
+        notes = explained(arm, [recordings[k].trace for k in bare])
+    except ValueError as error:
+        refused = str(error)
+    doubtful = bool(notes or refused)
+    least = OUTLYING_IN_DOUBT if doubtful else OUTLYING
     asked = []
+    found = outlier([held[k] for k in bare], least) if len(held) else None
     if found is not None:
-        k, times = found
-        log = list(traces)[bare[k]]
+        log = names[bare[found[0]]]
         asked.append(
-            f"{log} is {times:.1f} times as far from what the other logs predict as they are: "
+            f"{log} is {found[1]:.1f} times as far from what the other logs predict as they are: "
             f"did {log} carry something? tell it with --payload {log}=KG (or =unknown)"
         )
     told = [
         f"{r.load.mass:g} kg in {n}"
-        for n, r in zip(traces, recordings, strict=True)
+        for n, r in zip(names, recordings, strict=True)
         if r.load is not None and r.load.mass > 0
     ]
-    if told:
+    if told and doubtful:
         asked.append(f"loads told: {', '.join(told)}; are these right, and in kg?")
-    try:
-        notes = explained(arm, [recordings[k].trace for k in bare])
-    except ValueError as error:
-        raise ValueError("; ".join([str(error), *asked])) from None
-    return [*notes, *(asked if notes else asked[: found is not None])]
+    if refused:
+        raise ValueError("; ".join([refused, *asked]))
+    return [*notes, *asked]
 
 
 def start(
