@@ -129,13 +129,14 @@ def _friction_beliefs(
     friction: FrictionModel, beliefs: Beliefs, gain: Array, recordings: Sequence[Recording]
 ) -> Array:
     """Standard deviations of the friction weights, shape (n, columns)."""
-    sizes = [np.abs(r.trace.current * gain)[moving_span(r.trace)] for r in recordings]
-    usual = np.max([np.median(size, axis=0) for size in sizes], axis=0)
+    sizes = [np.abs(r.trace.current * gain) for r in recordings]
+    moving = [size[moving_span(r.trace)] for size, r in zip(sizes, recordings, strict=True)]
+    usual = np.max([np.median(size, axis=0) for size in moving], axis=0)
     out = np.repeat(np.maximum(beliefs.friction * usual, 1e-6)[:, None], friction.columns, axis=1)
     out[:, friction.load_columns] = beliefs.loaded
     if friction.saturation:
-        peaks = [np.abs(r.trace.current * gain).max(axis=0) for r in recordings]
-        out[:, -1] = beliefs.saturation / np.maximum(np.max(peaks, axis=0), 1e-9)
+        peaks = np.max([size.max(axis=0) for size in sizes], axis=0)
+        out[:, -1] = beliefs.saturation / np.maximum(peaks, 1e-9)
     return out
 
 

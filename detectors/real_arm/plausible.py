@@ -11,7 +11,7 @@ import numpy as np
 
 from tauguard.detectors.estimator import ArmModel
 from tauguard.detectors.numbers import RobotNumbers, gravity_torque, momentum_terms
-from tauguard.detectors.observer import intervals, low_pass, observe
+from tauguard.detectors.observer import intervals, low_pass
 from tauguard.traces.trace import Array, Bools, Trace
 
 #: Share of the torque left over that is refused, and from which on it is said. A UR10e with
@@ -33,7 +33,7 @@ def drive_torque(arm: ArmModel, trace: Trace) -> Array:
 
 
 def plausible(
-    robot: RobotNumbers, trace: Trace, tau: Array, rows: Bools, rate: float
+    robot: RobotNumbers, trace: Trace, tau: Array, residual: Array, rows: Bools, rate: float
 ) -> tuple[str, ...]:
     """Notes on torques that the motion hardly explains.
 
@@ -41,8 +41,9 @@ def plausible(
         robot: the arm.
         trace: a log.
         tau: torques at the joints less friction [N m], shape (T, n).
+        residual: what an observer makes of them [N m], shape (T, n).
         rows: in which nothing touches the arm, shape (T,).
-        rate: of the observer [1/s].
+        rate: of that observer [1/s].
 
     Raises:
         ValueError: more than ``REFUSED`` of the torque is left over.
@@ -51,12 +52,11 @@ def plausible(
     rates, nothing = np.full(n, rate), np.zeros_like(trace.q)
     needed = low_pass(rates, dt, *momentum_terms(robot, trace.q, trace.qd))
     given = -low_pass(rates, dt, nothing, nothing, np.ascontiguousarray(tau))
-    left = observe(robot, trace.t, trace.q, trace.qd, tau, rate)
     poses = np.random.default_rng(0).uniform(-np.pi, np.pi, (200, n))
     most = STRENGTH * float(np.linalg.norm(np.abs(gravity_torque(robot, poses)).max(axis=0)))
     if most < 1e-6:
         return ()  # gravity asks for nothing: friction may be all there is
-    sizes = [float(np.sqrt((x[rows] ** 2).sum(axis=1).mean())) for x in (left, needed, given)]
+    sizes = [float(np.sqrt((x[rows] ** 2).sum(axis=1).mean())) for x in (residual, needed, given)]
     share = sizes[0] / max(*sizes[1:], most)
     said = (
         f"where nothing should touch the arm, {100 * share:.0f} % of the torque is not explained "

@@ -71,8 +71,8 @@ def watch(
     until = trace.t[0] + quiet
     if not (np.isfinite(factor) and factor > 0):
         raise ValueError(f"factor: {factor}, expected above 0")
-    doubts = plausible(robot, trace, tau, learning, gain)
     residual = observe(robot, trace.t, trace.q, trace.qd, tau, gain)
+    doubts = plausible(robot, trace, tau, residual, learning, gain)
     thresholds = factor * np.abs(residual[learning]).max(axis=0)
     thresholds[~used(joints, robot.joints)] = np.inf
     score = (np.abs(residual) / thresholds).max(axis=1)
@@ -160,8 +160,9 @@ def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
             f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector watches from "
             f"{detector.settle:g} s on"
         )
-    tau, rows = drive_torque(detector.arm, trace), trace.t >= settled
-    notes = [note, *plausible(detector.arm.robot, trace, tau, rows, GAIN)]
+    robot, tau, rows = detector.arm.robot, drive_torque(detector.arm, trace), trace.t >= settled
+    residual = observe(robot, trace.t, trace.q, trace.qd, tau, GAIN)
+    notes = [note, *plausible(robot, trace, tau, residual, rows, GAIN)]
     if detection.alarm[rows].mean() > STRANGE:
         notes.append(
             "alarms fill much of this log: this is not the arm, the joints' order, the sign or the "
