@@ -86,18 +86,24 @@ def edge_edge(
 
 def method_number(method: str) -> int:
     """The number of a method, or a ``ValueError`` that lists the names there are."""
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise ValueError(f"method {method!r}: there are {', '.join(METHODS)}")
     return METHODS[method]
 
 
 def checked_distance(min_distance: float, method: str) -> float:
     """A finite distance of at least 0 (0 with a comparator), or a ``ValueError``."""
-    if min_distance > 0 and method != "ab2pf":
+    try:
+        if isinstance(min_distance, str | bytes | bool | np.bool_):
+            raise TypeError
+        distance = float(min_distance)
+    except (TypeError, ValueError, OverflowError):
+        distance = np.nan
+    if distance > 0 and method != "ab2pf":
         raise ValueError(f"min_distance: {min_distance} with method {method!r}: only ab2pf has one")
-    if not (np.isfinite(min_distance) and min_distance >= 0):
-        raise ValueError(f"min_distance: {min_distance}, expected a finite number >= 0")
-    return float(min_distance)
+    if not (np.isfinite(distance) and distance >= 0):
+        raise ValueError(f"min_distance: {min_distance!r:.40}, expected a finite number >= 0")
+    return distance
 
 
 def _solve(

@@ -68,10 +68,9 @@ class MeshCCD:
     ) -> None:
         """Check the faces and number the edges; the hierarchy waits for positions."""
         method_number(method)  # raises where there is none
-        if volume not in VOLUMES:
+        if not isinstance(volume, str) or volume not in VOLUMES:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
-        if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 0:
-            raise ValueError(f"threads: {threads!r}, expected an int >= 0 (0: all processors)")
+        _check_threads(threads)
         k, moving = VOLUMES[volume]
         self.method = method
         self.threads = int(threads)
@@ -103,7 +102,7 @@ class MeshCCD:
             *self._checked_step(x_t0, x_t1),
             method_number(self.method),
             checked_distance(min_distance, self.method),
-            fresh,
+            _checked_flag(fresh),
         )
         answer = Frame(
             vf["pairs"],
@@ -134,10 +133,13 @@ class MeshCCD:
 
         Raises:
             ValueError: positions that are not finite or not (V, 3), of different sizes at both
-                ends, of a size that the faces or earlier frames do not have; a negative distance.
+                ends, of a size that the faces or earlier frames do not have; a distance that is
+                negative or no number; ``fresh`` that is no bool.
         """
         vf, ee, self.broad_stats = self._mesh.candidates(
-            *self._checked_step(x_t0, x_t1), checked_distance(min_distance, self.method), fresh
+            *self._checked_step(x_t0, x_t1),
+            checked_distance(min_distance, self.method),
+            _checked_flag(fresh),
         )
         return vf, ee
 
@@ -189,6 +191,18 @@ class MeshCCD:
             )
         self._vertices = len(start)
         return start, end
+
+
+def _check_threads(threads: int) -> None:
+    number = isinstance(threads, int | np.integer) and not isinstance(threads, bool)
+    if not number or not 0 <= threads <= np.iinfo(np.int32).max:
+        raise ValueError(f"threads: {threads!r:.40}, expected an int >= 0 (0: all processors)")
+
+
+def _checked_flag(fresh: bool) -> bool:
+    if not isinstance(fresh, bool | np.bool_):
+        raise ValueError(f"fresh: {fresh!r:.40}, expected True or False")
+    return bool(fresh)
 
 
 def _impacts(found: dict[str, Any]) -> Impacts:

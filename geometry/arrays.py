@@ -15,7 +15,7 @@ def finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArra
     """
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name}: not an array of numbers ({error})") from None
     fits = array.ndim == len(shape) and all(
         want is None or have == want for have, want in zip(array.shape, shape, strict=True)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from tauguard.cloth import VOLUMES, Groups, MeshCCD, _mesh
+from tauguard.cloth import VOLUMES, Groups, MeshCCD, _mesh, edge_edge, vertex_face
 from tests.cloth import brute_force
 
 KINDS = sorted(set(VOLUMES.values()))
@@ -303,12 +303,46 @@ class TestBadInput:
         with pytest.raises(ValueError, match="8 vertices, but the frames before had 4"):
             ccd.candidates(longer, longer)
 
-    @pytest.mark.parametrize("distance", [-1.0, np.nan, np.inf])
+    @pytest.mark.parametrize(
+        "distance", [-1.0, np.nan, np.inf, "a", "0.1", None, [0.1], 1j, True, 10**400, {}]
+    )
     def test_distance(self, distance):
-        with pytest.raises(ValueError, match="min_distance"):
-            MeshCCD(self.faces).candidates(self.x, self.x, distance)
+        x = np.zeros((1, 4, 3))
+        for call in (
+            lambda: MeshCCD(self.faces).candidates(self.x, self.x, distance),
+            lambda: MeshCCD(self.faces).find(self.x, self.x, distance),
+            lambda: vertex_face(x, x, min_distance=distance),
+            lambda: edge_edge(x, x, min_distance=distance),
+        ):
+            with pytest.raises(
+                ValueError, match=r"min_distance: .*, expected a finite number >= 0"
+            ):
+                call()
 
-    @pytest.mark.parametrize("threads", [-1, 1.5, "2", None, True])
+    @pytest.mark.parametrize("distance", [0, np.float32(0.5), np.array(0.5), np.int64(1)])
+    def test_any_number_is_a_distance(self, distance):
+        mesh = MeshCCD(self.faces)
+        of_float = mesh.candidates(self.x, self.x, float(distance))
+        assert all(map(np.array_equal, mesh.candidates(self.x, self.x, distance), of_float))
+
+    @pytest.mark.parametrize("fresh", ["yes", None, 1, [True]])
+    def test_fresh(self, fresh):
+        for call in (MeshCCD(self.faces).find, MeshCCD(self.faces).candidates):
+            with pytest.raises(ValueError, match=r"fresh: .*, expected True or False"):
+                call(self.x, self.x, fresh=fresh)
+
+    @pytest.mark.parametrize("name", [["ab2pf"], {}, None, 0])
+    def test_names_that_are_no_text(self, name):
+        with pytest.raises(ValueError, match=r"method .*: there are ab2pf, "):
+            MeshCCD(self.faces, method=name)
+        with pytest.raises(ValueError, match=r"volume .*: there are k_dop6, "):
+            MeshCCD(self.faces, volume=name)
+
+    def test_numbers_beyond_the_doubles(self):
+        with pytest.raises(ValueError, match="x_t0: not an array of numbers"):
+            MeshCCD(self.faces).find([[10**400, 0, 0]], self.x)
+
+    @pytest.mark.parametrize("threads", [-1, 1.5, "2", None, True, 2**31])
     def test_threads(self, threads):
         with pytest.raises(ValueError, match=r"threads: .*, expected an int >= 0 \(0: all"):
             MeshCCD(self.faces, threads=threads)
