@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,25 @@ class Approach:
         )
         return way, core
 
+    def oriented(
+        self, contacts: Contacts, before: State, after: State
+    ) -> tuple[Contacts, NDArray[np.bool_]]:
+        """The contacts with a normal each, and in which rows their checker told none. (K,).
+
+        Surfaces that meet from the start, or in a point, have no normal of their own. There the
+        direction in which both material points approach each other stands for it: along no other
+        one do they come closer. It is zero where nothing moves.
+        """
+        unknown = ~(np.abs(np.linalg.norm(contacts.normal, axis=1) - 1) < 0.5)
+        if not unknown.any():
+            return contacts, unknown
+        rows = contacts.where(unknown)
+        way = self._way(rows, rows.time, before, after)
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        normal = contacts.normal.copy()
+        normal[unknown] = np.divide(way, length, out=np.zeros_like(way), where=length > 0)
+        return replace(contacts, normal=normal), unknown
+
     def depth(self, contacts: Contacts, before: State, after: State) -> Array:
         """Depth of each contact at the end of the step, had nothing resisted. Shape (K,), m.
 
@@ -70,6 +90,10 @@ class Approach:
 
     def _towards(self, contacts: Contacts, s: Array, before: State, after: State) -> Array:
         """How far both points of each row approach along its normal from ``s`` (K,) to the end."""
+        return np.asarray((self._way(contacts, s, before, after) * contacts.normal).sum(axis=1))
+
+    def _way(self, contacts: Contacts, s: Array, before: State, after: State) -> Array:
+        """The first partner's way from ``s`` (K,) to the end less the second one's. (K, 3)."""
         ways = []
         for side in (0, 1):
             geom, flex = contacts.geom[:, side], contacts.flex[:, side]
@@ -82,7 +106,7 @@ class Approach:
                 rows = flex == number
                 way[rows] = self._flex_way(number, contacts.point[rows], s[rows], before, after)
             ways.append(way)
-        return np.asarray(((ways[0] - ways[1]) * contacts.normal).sum(axis=1))
+        return np.asarray(ways[0] - ways[1])
 
     def _rigid_way(
         self, geom: NDArray[np.int32], point: Array, s: Array, before: State, after: State
@@ -138,7 +162,8 @@ def _weights(corners: Array, point: Array) -> Array:
     """Weights (K, M, n) of corners (K, M, n, 3) that come near points (K, 3): clamped, sum 1."""
     edges = corners[:, :, 1:] - corners[:, :, :1]
     square = edges @ edges.swapaxes(2, 3)
-    square += 1e-12 * np.trace(square, axis1=2, axis2=3)[..., None, None] * np.eye(edges.shape[2])
+    least = 1e-12 * np.trace(square, axis1=2, axis2=3) + np.finfo(float).tiny  # corners may agree
+    square += least[..., None, None] * np.eye(edges.shape[2])
     side = edges @ (point[:, None] - corners[:, :, 0])[..., None]
     inner = np.linalg.solve(square, side)[..., 0]
     weights = np.concatenate([1 - inner.sum(axis=2, keepdims=True), inner], axis=2)

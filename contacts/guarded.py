@@ -116,7 +116,12 @@ class GuardedStepper:
         return self._stiffening.pairs()
 
     def step(self) -> StepReport:
-        """Advance by one ``model.opt.timestep``."""
+        """Advance by one ``model.opt.timestep``.
+
+        Raises:
+            ValueError: a checker reports a contact whose point, time or distance is not finite. Its
+                normal may be unknown (NaN): then the direction of approach stands for it.
+        """
         whole, end = float(self.model.opt.timestep), self.data.time + self.model.opt.timestep
         rest, length = whole, self._piece(whole, whole)
         steps, contacts, exhausted, cuts, first = 0, 0, False, list[Cut](), None
@@ -200,7 +205,7 @@ class GuardedStepper:
         new = [
             one
             for checker in self.checkers
-            for one in self._new(asked(checker, before, after), held, before, after)
+            for one in self._new(_placed(checker, before, after), held, before, after)
         ]
         return min(new) if new else self._sinking(held, before, after)
 
@@ -216,11 +221,11 @@ class GuardedStepper:
         matter = fresh | ((way > DEEP * core) & (found.time > 0))
         if not matter.any():
             return []
-        matter &= np.isfinite(found.normal).all(axis=1)
         found, fresh, core = found.where(matter), fresh[matter], core[matter]
+        found, unknown = self._approach.oriented(found, before, after)
         depth = self._approach.depth(found, before, after)
         passed = depth > DEEP * core
-        parting = fresh & (depth <= 0)
+        parting = fresh & ((depth <= 0) | unknown)
         if parting.any():
             ends = self._keys(self._ends(after))
             passed |= parting & np.array([key not in ends for key in self._rows(found)])
@@ -283,6 +288,23 @@ class GuardedStepper:
         last = np.empty_like(first)
         mujoco.mj_getState(self.model, self.data, last, self._kind)
         return self._books.between(first, last)
+
+
+def _placed(one: Checker, before: State, after: State) -> Contacts:
+    """What a checker says of the step, each contact with its point, time and distance."""
+    found = asked(one, before, after)
+    if not len(found):
+        return found
+    known = np.isfinite(found.point).all(axis=1)
+    known &= np.isfinite(found.time) & np.isfinite(found.distance)
+    if not known.all():
+        row = int(np.argmin(known))
+        raise ValueError(
+            f"checker {one.name!r}: the contact of {pairs_of(found)[row]} has the point "
+            f"{found.point[row].tolist()} at {found.time[row]:g} of the step, distance "
+            f"{found.distance[row]:g} m; a guarded step needs finite ones (its normal may be NaN)"
+        )
+    return found
 
 
 def _touching(data: Any) -> Contacts:

@@ -1,12 +1,15 @@
 """Guarded steps hold what plain steps pass by, and change nothing where nothing is missed."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tauguard.contacts import Contacts, GuardedStepper, State
+from tauguard.contacts import Contacts, GuardedStepper, State, checker
+from tauguard.contacts.approach import Approach
 from tauguard.contacts.balance import Books
 from tauguard.contacts.scenes import SCENES, ball_cloth, sphere_plate
 from tauguard.contacts.scenes.impacts import IMPACT_POINTS
@@ -175,6 +178,106 @@ class Crying:
             normal=[[0, 0, -1.0], [np.nan] * 3],
             distance=[-1.0, 0.0],
         )
+
+
+class Blind:
+    """A checker that sees every contact and knows no normal."""
+
+    def __init__(self, model, name, normal=np.nan):
+        self.own, self.name, self.normal = checker(name, model), name, normal
+        self.covers = self.own.covers
+
+    def check(self, before, after):
+        found = self.own.check(before, after)
+        return replace(found, normal=np.full((len(found), 3), self.normal))
+
+
+@given(st.floats(0.5, 80), st.floats(0, 1), st.sampled_from([1e-3, 5e-3]), st.floats(-0.2, 0.2))
+@settings(max_examples=20, deadline=None)
+def test_a_contact_without_a_normal_is_held_all_the_same(speed, offset, timestep, slant):
+    scene = sphere_plate(speed, offset * speed * timestep)
+    model, data = scene.start(timestep)
+    data.qvel[0] = slant * speed
+    with GuardedStepper(model, data, [Blind(model, "rigid")]) as guard:
+        touched = 0
+        for _ in range(round(scene.seconds / timestep) + 1):
+            report = guard.step()
+            assert not report.exhausted
+            assert data.qpos[2] > 0
+            touched += report.contacts
+        assert touched
+
+
+@pytest.mark.parametrize("normal", [np.nan, 0.0])
+def test_a_straight_blow_is_cut_at_the_same_place_without_a_normal(normal):
+    """Head on, the way of approach is the normal."""
+    ends = []
+    for blind in (False, True):
+        model, data = ball_cloth(20.0, 0.01).start(5e-3)
+        guard = GuardedStepper(model, data, [Blind(model, "cloth", normal) if blind else "cloth"])
+        reports = [guard.step() for _ in range(2)]
+        assert sum(len(r.cuts) for r in reports) > 0
+        first = next(r.cuts[0] for r in reports if r.cuts)
+        ends.append((first.time, first.pair, data.qvel[-4]))
+    assert ends[1][0] == pytest.approx(ends[0][0], rel=1e-9)
+    assert ends[1][1] == ends[0][1]
+    assert ends[1][2] == pytest.approx(ends[0][2], rel=1e-3)
+
+
+def test_surfaces_that_meet_from_the_start_have_the_direction_of_approach():
+    """Two cubes by their surfaces, one corner in the other: the checker knows no normal there."""
+    cube = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco><asset><mesh name="cube" vertex="{cube}"/>
+      </asset><worldbody><geom type="mesh" mesh="cube"/><body pos="1.5 1.4 1.3"><freejoint/>
+      <geom type="mesh" mesh="cube"/></body></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    before = State.of(model, data)
+    data.qpos[:3] += [0.03, 0, -0.04]
+    after = State.of(model, data)
+    found = checker("rigid", model, mesh="surface").check(before, after)
+    assert np.isnan(found.normal).all()
+    assert found.time.tolist() == [0]
+    known, unknown = Approach(model).oriented(found, before, after)
+    assert unknown.all()
+    sign = 1 if found.geom[0, 0] == 0 else -1
+    np.testing.assert_allclose(known.normal, [[-0.6 * sign, 0, 0.8 * sign]], atol=1e-12)
+    assert Approach(model).depth(known, before, after) == pytest.approx([0.05], abs=1e-12)
+    still, _ = Approach(model).oriented(found, before, before)
+    assert still.normal.tolist() == [[0, 0, 0]]
+    assert Approach(model).depth(still, before, before).tolist() == [0]
+
+
+def test_a_triangle_that_has_collapsed_into_a_point_is_no_reason_to_fail():
+    """A ball comes down on triangles whose corners all lie in one point."""
+    model, data = ball_cloth(10.0).start(1e-3)
+    before = State.of(model, data)
+    corners = model.flex_elem.reshape(-1, 3)[:6].ravel()
+    vertices = before.flexvert_xpos.copy()
+    vertices[np.unique(corners)] = vertices[corners[0]]
+    point = vertices[corners[0]] + [0, 0, model.flex_radius[0]]
+    down = replace(before, flexvert_xpos=vertices)
+    xpos = before.xpos.copy()
+    xpos[model.body("ball").id] -= [0, 0, 0.002]
+    after = replace(down, xpos=xpos)
+    one = Contacts([0.0], [[0, -1]], [[-1, 0]], [[-1, 0]], [point], [[0, 0, -1.0]], [0.0])
+    assert Approach(model).depth(one, down, after) == pytest.approx([0.002], abs=1e-12)
+
+
+@pytest.mark.parametrize("field", ["point", "time", "distance"])
+def test_a_contact_that_is_nowhere_is_refused_by_the_name_of_its_checker(field):
+    class Nowhere(Crying):
+        name = "nowhere"
+
+        def check(self, before, after):
+            found = super().check(before, after)
+            value = getattr(found, field).copy()
+            value[1] = np.nan
+            return replace(found, **{field: value})
+
+    model, data = sphere_plate(1.0).start(1e-3)
+    with pytest.raises(ValueError, match=r"checker 'nowhere': the contact of .*'geom', 0.*nan"):
+        GuardedStepper(model, data, [Nowhere()]).step()
+    assert model.opt.timestep == 1e-3
 
 
 def test_the_work_of_a_step_is_bounded_and_the_shortfall_is_told():
