@@ -171,13 +171,14 @@ def test_a_wrong_answer_or_a_slow_cell_breaks_a_claim():
 
 def test_a_quick_run_says_no_to_errors_only(monkeypatch):
     def judged(quick):
-        errors = [rigid_claims.at_most("wrong", 0, [1.0]), rigid_claims.at_most("t", 1e-7, [1e-6])]
-        times = [rigid_claims.at_most("ns", 10, [12.0]), rigid_claims.at_least("ratio", 4, [3.0])]
+        asked = [("wrong", 0, [1.0]), ("t", 1e-7, [1e-6]), ("depth", 2.5e-6, [1e-5])]
+        errors = [rigid_claims.error_at_most(*one) for one in asked]
+        times = [rigid_claims.at_most("ns", 0, [12.0]), rigid_claims.at_least("ratio", 4, [3.0])]
         monkeypatch.setattr(rigid_claims, "wrong_answers", lambda rows: errors)
         monkeypatch.setattr(rigid_claims, "convex_ratios", lambda rows: times)
         monkeypatch.setattr(rigid_claims, "mesh_ratios", lambda rows, volume: [])
         monkeypatch.setattr(rigid_claims, "impacts", lambda rows: [])
         return [row["met"] for row in rigid_claims.claims([], quick)]
 
-    assert judged(quick=True) == [False, False, "full run", "full run"]
-    assert judged(quick=False) == [False] * 4
+    assert judged(quick=True) == [False, False, False, "full run", "full run"]
+    assert judged(quick=False) == [False] * 5
