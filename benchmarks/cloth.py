@@ -110,7 +110,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     rows += cloth_scaling.size(sizes, seed, repeats)
     rows += cloth_scaling.threads(triangles, seed, repeats)
     rows += cloth_scaling.topology(triangles, seed, repeats)
-    return rows + summary(rows, quick)
+    return rows + summary(rows, quick, recorded=data is not None)
 
 
 def recorded() -> Path | None:

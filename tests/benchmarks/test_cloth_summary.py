@@ -1,5 +1,7 @@
 """The cloth study's closing summary: what the referees found, and what a quick run cannot deny."""
 
+import pytest
+
 from tauguard.benchmarks.cloth_summary import summary
 
 
@@ -63,3 +65,17 @@ def test_frames_are_compared_on_each_ones_own_volume_and_on_the_same():
         name + "each on its own volume": False,
         name + "both on moving_k_dop14": None,
     }
+
+
+@pytest.mark.parametrize("quick", [True, False])
+@pytest.mark.parametrize("mean", [1.0, 9.0])
+def test_a_mean_over_all_scenes_is_not_judged_where_some_are_absent(mean, quick):
+    row = {
+        "study": "frame mean", "method": "iccd", "volume": "k_dop18", "scenes": 4,
+        "times_ab2pf_mean": mean, "times_ab2pf_least": 1.0, "times_ab2pf_most": 9.0,
+    }  # fmt: skip
+    (open_,) = summary([row], quick, recorded=False)
+    (judged,) = summary([row], quick, recorded=True)
+    assert open_["met"] == "not judged: data absent"
+    assert judged["met"] == (mean > 2.3 or ("full run" if quick else False))
+    assert {**open_, "met": None} == {**judged, "met": None}
