@@ -43,6 +43,33 @@ from tauguard.traces import STRATA
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_JUDGED = (
+    "sensitivity: of the collisions from 16 N m up (achieved peak of the external torque, joints 1 "
+    "to 4), "
+)
+#: What the columns of each table mean.
+NOTES = {
+    "speed": _JUDGED + "and specificity, of collision-free cases of 2 s; by percent of the largest "
+    "speed. threshold_a: the operating point [A]; threshold: of each arm's own, median [least, "
+    "most]. All arms and collisions are simulated.",
+    "hourly": _JUDGED + "all speeds, at thresholds that aim at 0.25 false alarms an hour; "
+    "alarms_per_hour: what came of it in so many hours. Delays from the touch [ms]. tau98: the "
+    "least torque above which 98 % are found [N m], by speed.",
+    "floor": "the same collisions by an oracle that is given the true external torque: no detector "
+    "that needs as much torque is sooner.",
+    "strata": "found of all, by torque [N m]; what is below 4 N m counts in no other rate.",
+    "dissertation": "TP, FN, FP, TN printed for a real arm beside ours for simulated ones: the "
+    "same experiment, not the same collisions. Sensitivities are of all from 4 N m up.",
+    "mcnemar": "exact test on the same collisions: found by the first detector only, by the other.",
+    "output": "Spearman's between a collision's torque and the highest output.",
+    "training_size": "at the third point, one speed and arm; few collisions, wide intervals.",
+    "conditions": "what training did not have, at the third point, one speed and arm; nothing is "
+    "learnt anew.",
+    "sigma": "the length of the SRQ kernel, at the third point, one speed and arm.",
+    "sample_rate": "a kilohertz beside the rate of the arm in the dissertation.",
+    "headline": "the best detector (one for all cells) and SVR-SRQ beside the dissertation's SVR. "
+    "met: both rates of the best reach 0.98, and both of SVR-SRQ's the dissertation's.",
+}
 
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 Trained = Mapping[int, dict[str, Detector]]

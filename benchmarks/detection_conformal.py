@@ -27,6 +27,15 @@ Row = dict[str, Any]
 #: Detectors of the study when it runs by itself.
 NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds", "current-network")
 
+#: What the columns of each table mean.
+NOTES = {
+    "conformal": "a threshold from calibration motion promises asked_per_hour; "
+    "false_alarms_per_hour counts what came in fresh_hours of fresh motion, drawn alike. kept: the "
+    "rate asked lies in or above its exact 95 % interval; draws_kept: in how many other splits of "
+    "the same motion. Motion that is not drawn alike is promised nothing, and missed collisions "
+    "are not in it.",
+}
+
 
 @dataclass(frozen=True)
 class Plan:

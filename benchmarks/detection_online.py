@@ -33,6 +33,17 @@ SHARES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75)
 #: A controller's period at 1 kHz, and what a sample may take of it at the median [us].
 PERIOD, GOAL = 1000.0, 100.0
 
+#: What the columns of each table mean.
+NOTES = {
+    "step": "wall time of one sample of the whole detector (observer, features, SVR), one thread "
+    "[us]; over_a_period: of its samples, those that took over 1 ms; difference_to_batch: of the "
+    "scores, largest.",
+    "kernel": "one window of the SVR alone: all support vectors, then ever fewer. The peer is "
+    "scikit-learn's predict with its kernel row by NumPy, less than its own callable kernels do. "
+    "error: of the output, beside all vectors. What fewer vectors cost in missed collisions is not "
+    "shown.",
+}
+
 
 @dataclass(frozen=True)
 class Extent:

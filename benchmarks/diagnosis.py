@@ -50,6 +50,23 @@ METHODS = ("surface", "exposed", "usual", "told")
 #: Links that collisions of these plans are on, which ``exposed`` knows.
 EXPOSED = (2, 3, 4, 5, 6)
 
+_ALARMS = (
+    "of the collisions that raised an alarm. surface: this project's; exposed: told that link 1 is "
+    "out of reach; usual, the peer: last joint with a residual, damped least squares at the "
+    "middle of its link; told: surface with the true torque, what no observer can better. "
+)
+#: What the columns of each table mean.
+NOTES = {
+    "link": "rates " + _ALARMS + "Missed collisions are not in it.",
+    "link_confusion": "counts: a row a true link, a column what was said of it.",
+    "contact": "medians and 95th percentiles " + _ALARMS + "force_error_n: norm of the difference.",
+    "kind": "counts: a row a true kind, a column what was said of it. All are simulated, pushes "
+    "too: no person made one.",
+    "payload": "loads that nobody told of, taken up and put down. mass_error_g: median, of those "
+    "not called a collision.",
+    "cost": "wall time of one alarm; aftermath_us is what the residual around it takes first.",
+}
+
 
 @dataclass(frozen=True)
 class Size:

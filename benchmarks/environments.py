@@ -42,6 +42,21 @@ OUTCOMES = (
 #: The tool counts as stopped this near to the farthest place that it comes to [m].
 NEAR = 5e-4
 
+#: What the columns of each table mean.
+NOTES = {
+    "step": "processor time of an action (10 ms) of one Reach environment, one thread. The peers: "
+    "MuJoCo's rollout of the same scene and forces; the same physics and drives in a bare loop. "
+    "added_us: over the environment. q_difference_rad: largest, of rollout's joints. "
+    "Rows below the environment change one thing of it; a checker's price grows with the scene.",
+    "vector": "wall time of 16 copies; ratio_to_sync: over Gymnasium's SyncVectorEnv; mujoco.batch "
+    "alone: physics without drives, observations or rewards. Means little on a loaded machine.",
+    "reaction": "swings into the chest, median [least, most] over them; false_alarms: swings with "
+    "an alarm before the touch, left out of the rest. delay_s: from the touch to the reaction; "
+    "farthest_m, end_m: of the tool from where it touched; force_over_limit: of the standard's for "
+    "a transient contact. Known from the contact: no detector is as fast.",
+    "asked": "what was asked of the environments, beside what this run measured.",
+}
+
 
 def run(quick: bool, seed: int) -> list[Row]:
     """Rows of three studies, ``step``, ``vector`` and ``reaction``, and what was asked of them.

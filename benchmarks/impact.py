@@ -46,6 +46,18 @@ SIDES = 12
 CONTACTS = ("direct", "direct, hard solimp", "MuJoCo's default")
 _HARD, _DEFAULT = (0.9, 0.95, 0.001, 0.5, 2.0), (0.02, 1.0)
 
+#: What the columns of each table mean.
+NOTES = {
+    "rail": "a mass on a rail against each region; the errors are shares of the two-mass model's "
+    "closed form, worst of the regions, energy_error of the energy taken by the spring. direct: "
+    "the stiffness told to MuJoCo as such.",
+    "arm": "a link strikes a region at 0.25 m/s. inertial_peak_n: the limp arm; predicted_n: by "
+    "its reflected mass, error: between both; standard_n: by half the moving mass and the load; "
+    "driven_peak_n: with the drives holding their course, which neither predicts. The regions are "
+    "the standard's springs, not tissue.",
+    "asked": "what the model must keep, beside what it kept; errors are shares.",
+}
+
 
 def run(quick: bool, seed: int) -> list[Row]:
     """Rows of the studies ``rail`` and ``arm``; nothing is drawn at random, ``seed`` is unused."""

@@ -1,6 +1,7 @@
 """Tables that fit a terminal and lose no column, and of a value its interval at most."""
 
 import importlib
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -44,6 +45,21 @@ def test_notes_are_of_tables_that_there_are(name):
     parts = "".join(path.read_text() for path in FOLDER.glob(f"{name.split('_')[0]}*.py"))
     for title in getattr(study, "NOTES", {}):
         assert parts.count(f'"{title}"') >= 2, title
+
+
+#: Its notes are still to come.
+WITHOUT = {"real_arm"}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_every_study_says_how_its_tables_are_read(name):
+    study = importlib.import_module(f"tauguard.benchmarks.{name}")
+    notes = getattr(study, "NOTES", {})
+    assert notes or name in WITHOUT
+    for note in notes.values():
+        assert note.endswith(".")
+        assert "  " not in note
+        assert len(textwrap.wrap(note, WIDTH)) <= 5
 
 
 def test_headings_break_before_intervals_go_and_these_before_columns_do():
