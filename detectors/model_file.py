@@ -19,6 +19,14 @@ from tauguard.detectors.pipeline import CollisionDetector, DetectorSettings
 from tauguard.detectors.svr import SrqSVR
 
 FORMAT = "tauguard detector 1"
+#: Of :mod:`tauguard.detectors.zoo.file`: any other detector, with its threshold.
+RANKING = "tauguard ranking detector 2"
+#: What another kind of detector is told where samples come one at a time.
+_WHOLE = (
+    "which watches whole recordings only (`tauguard detect`); expected one that takes one sample "
+    "at a time, as environments do: srq-svr, which `tauguard train --traces` writes without "
+    "--levelled"
+)
 #: What reading a damaged archive may raise, by where it is damaged.
 _DAMAGE = (
     zipfile.BadZipFile,
@@ -107,10 +115,17 @@ def load_detector(path: str | os.PathLike[str]) -> CollisionDetector:
     """Read what :func:`save_detector` wrote.
 
     Raises:
-        ValueError: missing, truncated or of another kind, or holding types that a detector does
-            not need (nothing of them is built).
+        ValueError: missing, truncated or of another kind (the message says which would do), or
+            holding types that a detector does not need (nothing of them is built).
     """
+    from tauguard.detectors.real_arm.free_motion_file import is_free_motion
+
+    if is_free_motion(path):
+        raise ValueError(f"{path}: a real arm's detector (train --free), {_WHOLE}")
     content = read_archive(path)
+    if content.get("format") == RANKING:
+        levelled = "levelled " if content.get("levels") else ""
+        raise ValueError(f"{path}: a {levelled}{content.get('detector')}, {_WHOLE}")
     if content.get("format") != FORMAT:
         raise ValueError(f"{path}: not a detector file of this version ({FORMAT!r})")
     try:

@@ -123,11 +123,15 @@ def make_detector(world: World, wanted: object) -> Detector | None:
         parts = [ObserverDetector(*part, world.settings.timestep) for part in _arms(world)]
         return parts[0] if len(parts) == 1 else _PerArm(parts)
     if isinstance(wanted, str):
-        wanted = CollisionDetector.load(wanted)
+        try:
+            wanted = CollisionDetector.load(wanted)
+        except ValueError as error:
+            raise ValueError(f"detector {error}") from None
     if not (hasattr(wanted, "step") and hasattr(wanted, "reset")):
         raise ValueError(
-            f"detector {wanted!r}: expected {', '.join(DETECTORS)}, the path of a trained srq-svr "
-            "detector, or an object with step(q, qd, current) and reset()"
+            f"detector: {type(wanted).__name__} has no step and reset; expected "
+            f"{', '.join(DETECTORS)}, the path of a trained srq-svr detector, or an object with "
+            "step(q, qd, current) and reset()"
         )
     if isinstance(wanted, CollisionDetector):
         joints = wanted.arm.robot.joints if wanted.arm else 0

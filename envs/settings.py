@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
@@ -68,13 +69,15 @@ class Settings:
         for item in self.obstacles:
             if not isinstance(item, BodyProxy):
                 body_region(item)
+        if isinstance(self.detector, os.PathLike):
+            object.__setattr__(self, "detector", os.fspath(self.detector))
         if isinstance(self.detector, str) and self.detector not in DETECTORS:
             from pathlib import Path
 
             if not Path(self.detector).is_file():
                 raise ValueError(
                     f"detector {self.detector!r}: no such model file; expected "
-                    f"{', '.join(DETECTORS)}, the path of a trained detector, or None"
+                    f"{', '.join(DETECTORS)}, the path of a trained srq-svr, or None"
                 )
 
     @property

@@ -8,12 +8,11 @@ from typing import Any, Protocol
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.levelling import Levelled, SpeedLevels
 from tauguard.detectors.model_file import FORMAT as CHAIN_FORMAT
+from tauguard.detectors.model_file import RANKING as FORMAT
 from tauguard.detectors.model_file import read_archive, rebuilt, write_archive
 from tauguard.detectors.thresholded import Thresholded
 from tauguard.detectors.zoo.srq_svr import SvrDetector
 from tauguard.detectors.zoo.table import make_detector
-
-FORMAT = "tauguard ranking detector 2"
 
 
 class Storable(Detector, Protocol):

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import gymnasium as gym
 import mujoco
@@ -13,6 +14,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import tauguard
+from tauguard.detectors.model_file import RANKING, write_archive
 from tauguard.environments import ENVIRONMENTS
 from tauguard.envs.cell import FIGURES
 from tauguard.envs.reach import ReachEnv
@@ -351,6 +353,7 @@ def test_pictures_show_the_arm_and_the_target():
     code = """
 import gymnasium, numpy, tauguard, warnings
 from gymnasium.utils.env_checker import check_env
+from tauguard.detectors.model_file import RANKING, write_archive
 from tauguard.environments import ENVIRONMENTS
 warnings.simplefilter("error")
 for name in ENVIRONMENTS:
@@ -380,3 +383,24 @@ assert len(numpy.unique(a.reshape(-1, 3), axis=0)) > 100
 
 def test_figures_are_named_once():
     assert len(set(FIGURES)) == len(FIGURES)
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_a_detector_that_cannot_listen_says_what_can(kind, tmp_path):
+    path = tmp_path / "model.skops"
+    content = {"format": RANKING, "detector": "cusum", "levels": {"speed": np.zeros(1)}}
+    write_archive(path, content)
+    with pytest.raises(ValueError, match=r"detector .*model\.skops: a levelled cusum, .*srq-svr"):
+        gym.make(REACH, detector=kind(path))
+    path.write_text('{"format": "tauguard free-motion detector 1"}')
+    with pytest.raises(ValueError, match=r"a real arm's detector \(train --free\).*expected.*srq-"):
+        gym.make(REACH, detector=kind(path))
+    with pytest.raises(ValueError, match=r"none\.skops.*no such model file; expected observer, "):
+        gym.make(REACH, detector=kind(tmp_path / "none.skops"))
+
+
+def test_an_object_that_cannot_detect_is_named_by_its_type():
+    with pytest.raises(
+        ValueError, match=r"detector: dict has no step and reset; expected observer"
+    ):
+        gym.make(REACH, detector={"threshold": np.zeros(1000)})

@@ -160,6 +160,21 @@ def test_a_levelled_detector_comes_back_from_its_file(fitted, unseen, tmp_path):
     assert scores.tobytes() == own.scores(trace).tobytes() != fitted.scores(trace).tobytes()
 
 
+def test_a_file_that_takes_no_single_samples_says_which_would(fitted, tmp_path):
+    path = tmp_path / "model.skops"
+    own = Levelled(fitted, SpeedLevels(np.array([0.0, 2.0]), np.array([1.0, 3.0]), np.ones(2)))
+    remedy = "expected one that takes one sample at a time.*srq-svr.*without --levelled"
+    save_model(Thresholded(own, 7.0), path)
+    with pytest.raises(ValueError, match=rf"model\.skops: a levelled {fitted.name}, .*{remedy}"):
+        CollisionDetector.load(path)
+    save_model(Thresholded(fitted, 7.0), path)
+    if fitted.name == "srq-svr":
+        assert CollisionDetector.load(path).threshold == 7.0
+        return
+    with pytest.raises(ValueError, match=rf"model\.skops: a {fitted.name}, .*{remedy}"):
+        CollisionDetector.load(path)
+
+
 def test_damaged_and_foreign_files_are_named(tmp_path):
     bad = tmp_path / "bad.skops"
     for content, message in (
