@@ -21,9 +21,10 @@ that holds ``ur10e/``. Chosen by looking at these same logs, so that the figures
 than a fresh arm's would be: the columns of the friction model (the slope of 1 rad/s among 0.6, 1
 and 1.5), the terms of the allowances, the gain of the detector's observer, its confirmation, how
 far and how fast (1, 3, 5 and 10 s were compared) its tracked offset may go, its prior of the
-payload, the spread of friction weights (0.3, 1, 3 and 10 of a joint's torque), the 0.1 s at the
-end, and from what share of unexplained torque a log is refused. The numbers in them, thresholds
-included, come from the training logs alone.
+payload (1, 1.5, 2 and 3 kg), how fast payload and friction may change (60 and 300 s), how long a
+motion counts for a joint at rest (rates of 0.5, 1, 2 and 4/s), the spread of friction weights (0.3,
+1, 3 and 10 of a joint's torque), the 0.1 s at the end, and from what share of unexplained torque a
+log is refused. The numbers in them, thresholds included, come from the training logs alone.
 """
 
 from __future__ import annotations

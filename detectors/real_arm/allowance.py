@@ -1,11 +1,12 @@
 """How much residual collision-free motion may leave: a bound a joint, linear in what is measured.
 
 Terms: 1; the sum of all speeds; the largest sum of all accelerations of late; how much the
-rigid-body torque at the joint has changed within the last second or so; and whether the joint has
-been slow of late. The fourth is for joints at rest: static friction may take all of such a change
-or none of it, and no current tells which. The last is for joints that start, stop or turn round,
-where friction is known least. "Of late" is the last ``HELD`` seconds, which a blow's residual and
-its confirmation take.
+rigid-body torque at the joint has changed within the last second or so; whether the joint has been
+slow of late; and how lately any joint has moved. The fourth is for joints at rest: static friction
+may take all of such a change or none of it, and no current tells which. The fifth is for joints
+that start, stop or turn round, where friction is known least. The last is for joints at rest, too:
+after a stop the arm swings out and friction gives way, later next to nothing happens. "Of late" is
+the last ``HELD`` seconds, which a blow's residual and its confirmation take.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from tauguard.detectors.observer import intervals, low_pass
 
 Array = NDArray[np.float64]
 
-TERMS = 5
+TERMS = 6
 #: Terms that count for a joint at rest, and for one in motion, whose friction is known.
-AT_REST, IN_MOTION = (0, 1, 2, 3), (0, 2, 4)
+AT_REST, IN_MOTION = (0, 1, 2, 3, 5), (0, 2, 4)
 #: Rate at which a change of torque is forgotten, while static friction gives way [1/s].
 FORGET = 1.0
 #: How long accelerations and slowness count [s].
@@ -35,6 +36,8 @@ HELD = 0.2
 JOLT = 100.0
 #: Speed at which a joint is half slow [rad/s].
 SLOW = 0.05
+#: Rate at which a motion is forgotten once all joints are at rest [1/s].
+SETTLES = 1.0
 #: Share of the residual's peaks that the unscaled bound covers.
 COVERED = 0.8
 #: Share of its Coulomb friction that a joint's bound never goes below: friction changes by as much
@@ -78,12 +81,36 @@ def held(x: Array, samples: int) -> Array:
     return out
 
 
-def terms(qd: Array, acceleration: Array, change: Array, dt: float) -> Array:
-    """The terms of every joint, shape (T, n, TERMS); causal."""
+def stirred(rest: NDArray[np.bool_], dt: float) -> Array:
+    """1 while any joint moves and at the start, then falling at the rate ``SETTLES``, shape (T,).
+
+    Args:
+        rest: which joints are at rest, shape (T, n).
+        dt: sample interval [s].
+    """
+    index = np.arange(len(rest))
+    moved = np.maximum.accumulate(np.where(rest.all(axis=1), 0, index))
+    out: Array = np.exp(-SETTLES * dt * (index - moved))
+    return out
+
+
+def terms(
+    qd: Array, acceleration: Array, change: Array, rest: NDArray[np.bool_], dt: float
+) -> Array:
+    """The terms of every joint, shape (T, n, TERMS); causal.
+
+    Args:
+        qd: [rad/s], shape (T, n).
+        acceleration: [rad/s^2], shape (T, n).
+        change: of the rigid-body torque of late [N m], shape (T, n).
+        rest: which joints are at rest, shape (T, n).
+        dt: sample interval [s].
+    """
     speed, samples = np.abs(qd), max(1, round(HELD / dt))
     shaken = held(np.abs(acceleration).sum(axis=-1, keepdims=True), samples)
     slow = held(1 / (1 + (qd / SLOW) ** 2), samples)
-    columns = np.ones_like(qd), speed.sum(axis=-1, keepdims=True), shaken, np.abs(change), slow
+    speeds, lately = speed.sum(axis=-1, keepdims=True), stirred(rest, dt)[:, None]
+    columns = np.ones_like(qd), speeds, shaken, np.abs(change), slow, lately
     return np.stack([np.broadcast_to(c, qd.shape) for c in columns], axis=-1)
 
 

@@ -63,10 +63,11 @@ class FreeMotionSettings:
     """Take the median of three successive currents, or of five where it jumps: a controller's kick,
     as at a commanded stop, says nothing about contact. It costs one sample of delay or two."""
     unknowns: Unknowns = field(
-        default_factory=lambda: Unknowns(payload=3.0, moment=0.3, offset=0.6, fast=5.0)
+        default_factory=lambda: Unknowns(payload=1.5, moment=0.15, offset=0.3, fast=5.0, slow=300.0)
     )
-    """What is tracked; a load that nobody told is more than the training logs show. The offset's
-    time constant is longer than a hand's push: what is followed faster than that vanishes."""
+    """What is tracked; a load that nobody told is more than the training logs show. Loads and the
+    friction of gears that warm up change over minutes: what is followed as fast as a hand pushes
+    explains the push away."""
     beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
 
 
@@ -75,7 +76,7 @@ class Judged:
     """What the detector sees of a trace; rows are samples."""
 
     left: Array  #: residual that the tracked unknowns do not explain [N m], shape (T, n)
-    terms: Array  #: of the allowances, shape (T, n, 5)
+    terms: Array  #: of the allowances, shape (T, n, TERMS)
     rest: Bools  #: which joints stand still, shape (T, n)
 
 
@@ -216,7 +217,8 @@ class FreeMotionDetector:
         gain = self.settings.observer_gain
         found = Estimator(model, gain, self.dt, self.settings.unknowns).run(t, q, qd, current)
         change = torque_change(model.robot, t, q, qd, gain)
-        return Judged(found.left, terms(qd, shaken, change, self.dt), resting(q, qd, self.dt))
+        rest = resting(q, qd, self.dt)
+        return Judged(found.left, terms(qd, shaken, change, rest, self.dt), rest)
 
     @staticmethod
     def _jump(model: ArmModel) -> Array:

@@ -17,7 +17,7 @@ from tauguard.detectors.real_arm.allowance import TERMS, Allowance
 from tauguard.detectors.real_arm.free_motion import FreeMotionDetector, FreeMotionSettings
 from tauguard.detectors.real_arm.identification import Beliefs
 
-FORMAT = "tauguard free-motion detector 1"
+FORMAT = "tauguard free-motion detector 2"
 
 
 def _plain(value: Any) -> Any:

@@ -7,11 +7,13 @@ from hypothesis import strategies as st
 
 from tauguard.detectors.operating_point import followed
 from tauguard.detectors.real_arm.allowance import (
+    SETTLES,
     TERMS,
     Allowance,
     held,
     peaks,
     quantile_bound,
+    stirred,
     terms,
 )
 
@@ -47,18 +49,28 @@ def test_terms_of_a_stop_last_a_while_and_then_fade():
     qd = np.concatenate([np.full(100, 1.0), np.zeros(100)])[:, None]
     acceleration = np.zeros((200, 1))
     acceleration[100] = -30.0
-    x = terms(qd, acceleration, np.zeros((200, 1)), 0.01)
+    x = terms(qd, acceleration, np.zeros((200, 1)), np.abs(qd) < 0.5, 0.01)
     assert x.shape == (200, 1, TERMS)
     assert (x[100:120, 0, 2] == 30).all()
     assert (x[120:, 0, 2] == 0).all()
     assert x[99, 0, 4] < 0.01 < 0.99 < x[100, 0, 4]
 
 
+def test_a_motion_of_any_joint_is_forgotten_within_seconds():
+    rest = np.ones((600, 2), dtype=bool)
+    rest[100:200, 1] = False
+    x = stirred(rest, 0.01)
+    assert (x[100:200] == 1).all()
+    np.testing.assert_allclose(x[199:], np.exp(-SETTLES * 0.01 * np.arange(401)), rtol=1e-12)
+    np.testing.assert_array_equal(stirred(rest[:300], 0.01), x[:300])
+
+
 def test_a_joint_without_peaks_of_its_own_takes_those_of_the_other_regime():
     left = np.abs(np.random.default_rng(0).normal(size=(3000, 2)))
     use = np.ones((3000, 2), dtype=bool)
     use[:, 1] = False
-    x = terms(np.ones((3000, 2)), np.zeros((3000, 2)), np.zeros((3000, 2)), 0.01)
+    nothing = np.zeros((3000, 2))
+    x = terms(nothing + 1, nothing, nothing, nothing == 1, 0.01)
     found = Allowance.fit(left, x, use, 50, (0,))
     assert found.weights[:, 0] == pytest.approx(found.weights[0, 0], rel=0.2)
     assert len(peaks(np.zeros(100), 50)) == 0
