@@ -1,4 +1,4 @@
-"""Learn to reach with Stable-Baselines3's PPO: `pip install tauguard[learn]`.
+"""Learn to reach with Stable-Baselines3's PPO: `uv run --extra learn python examples/learn_sb3.py`.
 
 Prints the return over training, and that of the mean action afterwards.
 """

@@ -51,6 +51,15 @@ def test_commands_exist(page):
             assert re.search(rf"\b{flag.replace('-', '_')}:", source), f"{command} --{flag}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_environments_are_named_so_that_gymnasium_finds_them(page):
+    from tauguard.environments import ENVIRONMENTS
+
+    for name in re.findall(r"""make(?:_vec)?\(\s*["'](\S*?-v\d)["']""", page.read_text()):
+        assert name.removeprefix("tauguard:") in ENVIRONMENTS, name
+        assert name.startswith("tauguard:"), f"{name}: found only where tauguard was imported"
+
+
 def test_no_page_is_lost():
     """Every page can be reached from the README."""
     told = (ROOT / "README.md").read_text()
