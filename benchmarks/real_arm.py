@@ -22,9 +22,11 @@ than a fresh arm's would be: the columns of the friction model (the slope of 1 r
 and 1.5), the terms of the allowances, the gain of the detector's observer, its confirmation, how
 far and how fast (1, 3, 5 and 10 s were compared) its tracked offset may go, its prior of the
 payload (1, 1.5, 2 and 3 kg), how fast payload and friction may change (60 and 300 s), how long a
-motion counts for a joint at rest (rates of 0.5, 1, 2 and 4/s), the spread of friction weights (0.3,
-1, 3 and 10 of a joint's torque), the 0.1 s at the end, and from what share of unexplained torque a
-log is refused. The numbers in them, thresholds included, come from the training logs alone.
+motion counts for a joint at rest (rates of 0.5, 1, 2 and 4/s), how the joints' ratios become one
+score (the largest, the root of the sum of the squares, the sum), the spread of friction weights
+(0.3, 1, 3 and 10 of a joint's torque), the 0.1 s at the end, and from what share of unexplained
+torque a log is refused. The numbers in them, thresholds included, come from the training logs
+alone.
 """
 
 from __future__ import annotations
@@ -246,7 +248,7 @@ def _alarm_row(
 
 
 def _held(detector: FreeMotionDetector, trace: Trace) -> float:
-    """The highest score of a joint that lasts as long as an alarm needs; 1 is the threshold."""
+    """The highest score that lasts as long as an alarm needs; 1 is the threshold."""
     from tauguard.detectors.filter import confirmation_samples
     from tauguard.detectors.operating_point import sustained
 

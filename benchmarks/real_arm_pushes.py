@@ -4,7 +4,9 @@ A push is half a sine of 0.3 to 1 s and 20 to 80 N at its peak, in any direction
 the last link; its torques follow from the Jacobian along the recorded motion and are added to the
 currents of logs that the detector has not seen. It is found by an alarm between its start and 0.2 s
 after its end that the log alone does not raise. The delay counts from the start, where the force is
-still 0: a push of 50 N passes 20 N after an eighth of its time.
+still 0: a push of 50 N passes 20 N after an eighth of its time. Pushes of all deals are counted
+together: they differ, the minutes of the logs that they are added to do not, so that the intervals
+say how well the share of such pushes in these logs is known, not in others.
 """
 
 from __future__ import annotations

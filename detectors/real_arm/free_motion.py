@@ -7,9 +7,11 @@ of a joint at rest wanders with the others' motion, which the tracked offset fol
 
 Allowances come from residuals of logs that the calibration in use did not see: every training log
 is judged by a calibration from the others, as new logs will be. The allowances at rest and in
-motion are scaled to half of the false alarms to accept each, so that 1 is the threshold. The tail
-of the ratios of residual to allowance is taken to be that of all joints together: one joint's share
-of some minutes says too little of what it does once in hours.
+motion are scaled to half of the false alarms to accept each. The tail of the ratios of residual to
+allowance is taken to be that of all joints together: one joint's share of some minutes says too
+little of what it does once in hours. The score is the root of the sum of the squares of the joints'
+ratios, and a last factor makes 1 its threshold: friction errs in one joint at a time, a push at a
+link loads several.
 """
 
 from __future__ import annotations
@@ -48,6 +50,8 @@ Array = NDArray[np.float64]
 RELEASE = 5e-3
 #: A joint's threshold over its largest training peak is at least this.
 HEADROOM = 1.2
+#: Share of the peaks that the tail is taken from.
+TAIL = 0.02
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class FreeMotionSettings:
     """Take the median of three successive currents, or of five where it jumps: a controller's kick,
     as at a commanded stop, says nothing about contact. It costs one sample of delay or two."""
     unknowns: Unknowns = field(
-        default_factory=lambda: Unknowns(payload=1.5, moment=0.15, offset=0.3, fast=5.0, slow=300.0)
+        default_factory=lambda: Unknowns(payload=2.0, moment=0.2, offset=0.3, fast=5.0, slow=300.0)
     )
     """What is tracked; a load that nobody told is more than the training logs show. Loads and the
     friction of gears that warm up change over minutes: what is followed as fast as a hand pushes
@@ -177,13 +181,23 @@ class FreeMotionDetector:
         self.resting, self.moving = (bound.times(np.full(len(coulomb), room)) for bound in bounds)
 
     def _room(self, judged: Sequence[Judged], at_rest: Allowance, moving: Allowance) -> float:
-        """At least 1: for alarms that several joints, or rest and motion, make in turn."""
-        if self._allowed() >= 1:
+        """At least 1: for alarms that several joints, or rest and motion, make together."""
+        first, rows = (
+            int(np.ceil(self.settings.settle / self.dt)),
+            max(1, round(MERGE_GAP / self.dt)),
+        )
+        levels = [
+            sustained(combined(self._ratio(part, at_rest, moving)[first:]), self._samples())
+            for part in judged
+        ]
+        found = np.sort(np.concatenate([level[peaks(level, rows)] for level in levels]))[::-1]
+        if not len(found):
             return 1.0
-        first = int(np.ceil(self.settings.settle / self.dt))
-        scores = [self._ratio(part, at_rest, moving)[first:].max(axis=1) for part in judged]
-        worst = max(float(sustained(score, self._samples()).max()) for score in scores)
-        return max(1.0, HEADROOM * worst)
+        allowed = 2 * self._allowed()
+        if allowed >= 1:
+            return max(1.0, float(found[min(int(allowed), len(found) - 1)]))
+        tail = followed(found, allowed, max(10, round(TAIL * len(found))))
+        return max(1.0, tail, HEADROOM * float(found[0]))
 
     def _allowed(self) -> float:
         """False alarms at rest, or in motion, to accept in the training logs."""
@@ -201,7 +215,7 @@ class FreeMotionDetector:
         allowed = self._allowed()
         if allowed >= 1:
             return np.full(len(own), pooled[min(int(allowed), len(pooled) - 1)])
-        common = followed(pooled, allowed, max(10, round(0.02 * len(pooled))))
+        common = followed(pooled, allowed, max(10, round(TAIL * len(pooled))))
         return np.array([max(common, HEADROOM * float(z[0])) if len(z) else common for z in own])
 
     # -- detection --------------------------------------------------------------------------------
@@ -263,19 +277,19 @@ class FreeMotionDetector:
 
     def _alarms(self, judged: Judged) -> int:
         _, at_rest, moving = self._fitted()
-        above = self._ratio(judged, at_rest, moving).max(axis=1) > self.threshold
+        above = combined(self._ratio(judged, at_rest, moving)) > self.threshold
         t = np.arange(len(above)) * self.dt
         alarm = confirmed(above & (t >= self.settings.settle), self._samples())
         return len(find_alarms(t, alarm))
 
     def scores(self, trace: Trace) -> Array:
-        """The largest ratio of a joint's residual to its allowance, shape (T,)."""
-        return np.asarray(self.ratios(trace).max(axis=1))
+        """All joints' ratios of residual to allowance together, shape (T,)."""
+        return combined(self.ratios(trace))
 
     def detect(self, trace: Trace) -> Detection:
         """Judge a trace; no alarm within the first ``settle`` seconds."""
         judged = self._checked(trace)
-        score = self._ratio(judged, *self._fitted()[1:]).max(axis=1)
+        score = combined(self._ratio(judged, *self._fitted()[1:]))
         settled = trace.t - trace.t[0] >= self.settings.settle
         samples = confirmation_samples(self.settings.confirmation, min(self.dt, trace.dt))
         alarm = confirmed((score > self.threshold) & settled, samples)
@@ -302,6 +316,11 @@ def resting(q: Array, qd: Array, dt: float) -> Bools:
                 at_rest, anchor = True, angle
             out[k, j] = at_rest
     return out
+
+
+def combined(ratio: Array) -> Array:
+    """The root of the sum of the squares over the joints, shape (T,), of ``ratio``, (T, n)."""
+    return np.asarray(np.sqrt((ratio**2).sum(axis=1)))
 
 
 def delayed(x: Array) -> Array:

@@ -28,7 +28,8 @@ class Plain:
     """
 
     quiet: float = 10.0
-    """seconds from the beginning that you vouch for"""
+    """seconds from the beginning that you vouch for; a collision in them raises the thresholds so
+    that others like it are missed later"""
     joints: tuple[int, ...] = ()
     """whose residuals are looked at, counted from 1 (default: the first four)"""
     gains: tuple[float, ...] = ()
@@ -65,7 +66,8 @@ def command(
 
     With --model a trained detector watches the log. Without one, every joint's threshold is learned
     from the first --quiet seconds, in which nothing may touch the arm, and the rest is watched.
-    Torques that the motion does not explain are refused: a wrong unit, sign or order of currents.
+    Torques that the motion does not explain are refused: currents in a wrong unit or of the other
+    sign. Currents of exchanged joints are noticed only as far as gravity loads those joints.
 
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).

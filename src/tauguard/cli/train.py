@@ -37,13 +37,15 @@ def command(
         model: the model file (default: model.skops, or model.json with --free).
         detector: with --traces, one of tauguard.detectors.DETECTORS; all but the momentum-observer
             SVR need --calibration.
-        calibration: folder of collision-free recordings that are not in --traces.
+        calibration: folder of collision-free recordings that are not in --traces. Those with
+            labelled collisions are refused; collisions without a label raise the threshold.
         false_alarms_per_hour: what the threshold aims at on collision-free training motion
             (default: 10, or 1 with --free), or promises with --calibration.
         confidence: with --calibration, how sure the promise is to be (default: 0.95).
         levelled: with --calibration, count the score from what free motion reaches at the speed of
             the moment: slow motion is then watched more closely. For evaluate and detect.
-        free: collision-free logs of a real arm, files or a folder.
+        free: collision-free logs of a real arm, files or a folder; a contact in them raises the
+            bounds, so that others like it are missed later.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains.
         columns: of CSV files, see `tauguard detect`.
         gains: N m per ampere, one a joint (known for calibrated robot files and for ur10e).

@@ -62,6 +62,21 @@ def test_smallest_found_is_a_threshold(detector, fresh):
             assert bool(alarm[rows].any()) is expected
 
 
+def test_joints_that_are_loaded_together_count_together(detector, fresh):
+    """Two thirds of what is found on each joint alone are found on all of them at once."""
+    start = float(fresh.t[0] + 13.0)
+    alone = [
+        smallest_found(lambda t: detector.detect(t).alarm, fresh, GAIN, joint, [start])[0]
+        for joint in range(3)
+    ]
+    for share, expected in ((2 / 3, True), (0.2, False)):
+        torque = tuple(share * np.array(alone))
+        struck = add_contact(fresh, GAIN, Added(start, 0.1, torque))
+        assert bool(detector.detect(struck).alarms) is expected
+    score = np.linalg.norm(detector.ratios(fresh), axis=1)
+    np.testing.assert_allclose(detector.scores(fresh), score, rtol=1e-12)
+
+
 def test_one_sample_kick_of_the_controller_is_no_contact(detector, fresh):
     row = 1400
     current = fresh.current.copy()
