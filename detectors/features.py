@@ -1,12 +1,12 @@
 """Windows of the scaled residual: what a detector looks at.
 
 The dissertation's window is rows 1-4 of the observer output, t_W = 80 ms long, sampled every
-t_I = 8 ms: 11 samples each, 44 numbers. Scaling decides whether the SVR works: the kernel's length
-is sigma = 3, and raw N m residuals have a median distance near 100, which makes the kernel matrix
-almost diagonal. So each joint's residual is divided by its envelope (what free motion leaves of it
-at this speed and acceleration), compressed by asinh (a hard blow must not leave the region that
-training has seen) and multiplied by one factor that brings the median distance between windows of
-collisions and of free motion to ``distance``.
+t_I = 8 ms: 11 samples each, 44 numbers. Scaling decides whether the SVR works: raw N m residuals
+have a median distance near 100, which makes the matrix of a kernel as long as the dissertation's
+sigma = 3 almost diagonal. So each joint's residual is divided by its envelope (what free motion
+leaves of it at this speed and acceleration), compressed by asinh (a hard blow must not leave the
+region that training has seen) and multiplied by one factor that brings the median distance between
+windows of collisions and of free motion to ``distance``.
 """
 
 from __future__ import annotations
