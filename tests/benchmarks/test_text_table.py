@@ -47,15 +47,11 @@ def test_notes_are_of_tables_that_there_are(name):
         assert parts.count(f'"{title}"') >= 2, title
 
 
-#: Its notes are still to come.
-WITHOUT = {"real_arm"}
-
-
 @pytest.mark.parametrize("name", STUDIES)
 def test_every_study_says_how_its_tables_are_read(name):
     study = importlib.import_module(f"tauguard.benchmarks.{name}")
     notes = getattr(study, "NOTES", {})
-    assert notes or name in WITHOUT
+    assert notes
     for note in notes.values():
         assert note.endswith(".")
         assert "  " not in note
