@@ -33,7 +33,7 @@ from tauguard.benchmarks.detection_pool import (
     free_pool,
     struck_pool,
 )
-from tauguard.benchmarks.detection_thresholds import AIM, Fleet, Pieces, watched
+from tauguard.benchmarks.detection_thresholds import Fleet, Pieces, watched
 from tauguard.benchmarks.report import Row
 from tauguard.benchmarks.workers import Workers
 from tauguard.detectors.detector import Detector
@@ -87,7 +87,7 @@ class Size:
     short: float  #: of them, those that all detectors judge; the rest only the thorough ones
     per_stratum: int  #: judged collisions of a stratum at one speed
     faint: int  #: the same below the judged strata
-    target: float = AIM  #: false alarms per hour that the third threshold aims at
+    target: float = 0.25  #: false alarms per hour that the third threshold aims at
     variations: bool = False  #: also training size, sigma, conditions, sample rate
 
 

@@ -24,9 +24,8 @@ Array = NDArray[np.float64]
 
 #: The dissertation's thresholds on the network's residual current [A].
 AMPERES = (1.6, 2.0)
-#: The third operating point, for at most one false alarm per hour, and the rate it aims at: moves
-#: that are too rare for the calibration motion add to it.
-HOURLY, AIM = "hourly", 0.25
+#: The third operating point: false alarms per hour.
+HOURLY = "hourly"
 #: Names of the operating points, in the order of the tables.
 POINTS = ("1.6", "2.0", HOURLY)
 #: Motion is kept as the peaks of pieces this long [s].

@@ -40,7 +40,7 @@ class DetectorSettings:
     window: float = 80e-3  #: t_W [s]
     interval: float = 8e-3  #: t_I [s]
     confirmation: float = CONFIRMATION  #: t_c [s]
-    sigma: float = 1.0  #: of the SRQ kernel
+    sigma: float = 3.0  #: of the SRQ kernel
     C: float = 1.0
     epsilon: float = 0.02
     units: float = 5.0  #: envelopes of free motion that count one before the asinh
@@ -67,9 +67,7 @@ class DetectorSettings:
         learnt; one factor for all joints brings the median distance to sigma. ``distance=0``
         gives the literal form without it.
         """
-        plain = cls(
-            plain=True, calibrate=False, adapt=False, mined=0, settle=0.5, sigma=3.0, distance=3.0
-        )
+        plain = cls(plain=True, calibrate=False, adapt=False, mined=0, settle=0.5, distance=3.0)
         return replace(plain, **changes)  # type: ignore[arg-type]
 
     def references(self, joints: int) -> Array:
