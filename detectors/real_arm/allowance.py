@@ -22,6 +22,7 @@ from scipy.sparse import csr_array, eye_array, hstack
 
 from tauguard.detectors.numbers import RobotNumbers, momentum_terms
 from tauguard.detectors.observer import intervals, low_pass
+from tauguard.detectors.operating_point import block_maxima
 
 Array = NDArray[np.float64]
 
@@ -144,29 +145,29 @@ class Allowance:
     weights: Array  #: not negative [N m per unit of each term], shape (n, TERMS)
 
     @classmethod
-    def fit(
-        cls, left: Array, terms: Array, use: NDArray[np.bool_], rows: int, columns: Sequence[int]
-    ) -> Allowance:
+    def fit(cls, left: Array, terms: Array, rows: int, columns: Sequence[int]) -> Allowance:
         """A bound that ``COVERED`` of the peaks of ``left`` stay below.
 
         Args:
-            left: level of the residual without collisions [N m], shape (T, n).
+            left: level of the residual without collisions [N m], 0 where it does not count,
+                shape (T, n). A joint that has no peak gets no more than 1e-9 N m.
             terms: shape (T, n, TERMS).
-            use: rows of each joint that count, shape (T, n); where they have fewer than 30 peaks,
-                all rows do.
             rows: samples that have one peak.
             columns: terms to use.
         """
         weights = np.zeros((left.shape[1], TERMS))
-        for j in range(left.shape[1]):
-            at = peaks(np.where(use[:, j], left[:, j], 0.0), rows)
-            if len(at) < 30:
-                at = peaks(left[:, j], rows)
-            size = left[at, j]
-            weights[j, columns] = quantile_bound(terms[at, j][:, columns], size, COVERED)
-            mean = float(size.mean()) if len(size) else 0.0
-            weights[j, 0] = max(weights[j, 0], 0.2 * mean, 1e-9)
+        weights[:, 0] = 1e-9
+        for j, level in enumerate(left.T):
+            at = peaks(level, rows)
+            if len(at):
+                own = quantile_bound(terms[at, j][:, columns], level[at], COVERED)
+                weights[j, columns] = own
+                weights[j, 0] = max(weights[j, 0], 0.2 * float(level[at].mean()), 1e-9)
         return cls(weights)
+
+    def where(self, own: NDArray[np.bool_], other: Allowance) -> Allowance:
+        """This bound for the joints in ``own``, shape (n,), and ``other`` for the rest."""
+        return Allowance(np.where(own[:, None], self.weights, other.weights))
 
     def scale(self, terms: Array) -> Array:
         """The bound [N m] at every sample, shape (T, n)."""
@@ -196,5 +197,5 @@ class Allowance:
 
 def peaks(level: Array, rows: int) -> NDArray[np.intp]:
     """Index of the largest value above 0 of every ``rows`` samples of ``level``, shape (T,)."""
-    found = [k + int(np.argmax(level[k : k + rows])) for k in range(0, len(level), rows)]
-    return np.array([k for k in found if level[k] > 0], dtype=np.intp)
+    high, where = block_maxima(level, rows)
+    return where[high > 0]

@@ -11,7 +11,8 @@ motion are scaled to half of the false alarms to accept each. The tail of the ra
 allowance is taken to be that of all joints together: one joint's share of some minutes says too
 little of what it does once in hours. The score is the root of the sum of the squares of the joints'
 ratios, and a last factor makes 1 its threshold: friction errs in one joint at a time, a push at a
-link loads several.
+link loads several. A joint that no log shows at rest, or in motion, has the allowance of the other
+regime there.
 """
 
 from __future__ import annotations
@@ -166,30 +167,26 @@ class FreeMotionDetector:
 
     def _learn(self, judged: Sequence[Judged], coulomb: Array) -> None:
         """Allowances of left-out residuals, scaled to the false alarms to accept."""
-        first = int(np.ceil(self.settings.settle / self.dt))
+        first, rows = self._first(), self._gap()
         self.seconds = sum(len(part.left) - first for part in judged) * self.dt
         columns = np.concatenate([part.terms[first:] for part in judged])
-        rest = np.concatenate([part.rest[first:] for part in judged])
-        bounds = []
-        for use, which in ((rest, AT_REST), (~rest, IN_MOTION)):
-            level = np.concatenate([self._level(part, use is rest)[first:] for part in judged])
-            rows = max(1, round(MERGE_GAP / self.dt))
-            allowance = Allowance.fit(level, columns, use, rows, which)
+        bounds, shown = [], []
+        for resting, which in ((True, AT_REST), (False, IN_MOTION)):
+            level = np.concatenate([self._level(part, resting)[first:] for part in judged])
+            allowance = Allowance.fit(level, columns, rows, which)
             factors = self._factors(level / allowance.scale(columns), rows)
-            bounds.append(allowance.times(factors).at_least(coulomb))
-        room = self._room(judged, bounds[0], bounds[1])
-        self.resting, self.moving = (bound.times(np.full(len(coulomb), room)) for bound in bounds)
+            bounds.append(allowance.times(factors))
+            shown.append(level.max(axis=0) > 0)
+        at_rest = bounds[0].where(shown[0], bounds[1]).at_least(coulomb)
+        moving = bounds[1].where(shown[1], bounds[0]).at_least(coulomb)
+        room = np.full(len(coulomb), self._room(judged, at_rest, moving))
+        self.resting, self.moving = at_rest.times(room), moving.times(room)
 
     def _room(self, judged: Sequence[Judged], at_rest: Allowance, moving: Allowance) -> float:
         """At least 1: for alarms that several joints, or rest and motion, make together."""
-        first, rows = (
-            int(np.ceil(self.settings.settle / self.dt)),
-            max(1, round(MERGE_GAP / self.dt)),
-        )
-        levels = [
-            sustained(combined(self._ratio(part, at_rest, moving)[first:]), self._samples())
-            for part in judged
-        ]
+        first, samples, rows = self._first(), self._samples(), self._gap()
+        scores = [combined(self._ratio(part, at_rest, moving))[first:] for part in judged]
+        levels = [sustained(score, samples) for score in scores]
         found = np.sort(np.concatenate([level[peaks(level, rows)] for level in levels]))[::-1]
         if not len(found):
             return 1.0
@@ -198,6 +195,14 @@ class FreeMotionDetector:
             return max(1.0, float(found[min(int(allowed), len(found) - 1)]))
         tail = followed(found, allowed, max(10, round(TAIL * len(found))))
         return max(1.0, tail, HEADROOM * float(found[0]))
+
+    def _first(self) -> int:
+        """The first sample that may be an alarm."""
+        return int(np.ceil(self.settings.settle / self.dt))
+
+    def _gap(self) -> int:
+        """Samples that have one peak: alarms so near to each other are one."""
+        return max(1, round(MERGE_GAP / self.dt))
 
     def _allowed(self) -> float:
         """False alarms at rest, or in motion, to accept in the training logs."""
@@ -212,6 +217,8 @@ class FreeMotionDetector:
         """What each joint's allowance is to be multiplied by, shape (n,)."""
         own = [np.sort(column[peaks(column, rows)])[::-1] for column in ratio.T]
         pooled = np.sort(np.concatenate(own))[::-1]
+        if not len(pooled):
+            return np.ones(len(own))
         allowed = self._allowed()
         if allowed >= 1:
             return np.full(len(own), pooled[min(int(allowed), len(pooled) - 1)])

@@ -65,15 +65,19 @@ def test_a_motion_of_any_joint_is_forgotten_within_seconds():
     np.testing.assert_array_equal(stirred(rest[:300], 0.01), x[:300])
 
 
-def test_a_joint_without_peaks_of_its_own_takes_those_of_the_other_regime():
+def test_a_joint_without_peaks_gets_next_to_nothing_and_can_have_the_bound_of_another():
     left = np.abs(np.random.default_rng(0).normal(size=(3000, 2)))
-    use = np.ones((3000, 2), dtype=bool)
-    use[:, 1] = False
+    left[:, 1] = 0
     nothing = np.zeros((3000, 2))
     x = terms(nothing + 1, nothing, nothing, nothing == 1, 0.01)
-    found = Allowance.fit(left, x, use, 50, (0,))
-    assert found.weights[:, 0] == pytest.approx(found.weights[0, 0], rel=0.2)
-    assert len(peaks(np.zeros(100), 50)) == 0
+    found = Allowance.fit(left, x, 50, (0,))
+    assert found.weights[0, 0] > 1
+    assert found.weights[1].tolist() == [1e-9, 0, 0, 0, 0, 0]
+    other = Allowance(np.full((2, TERMS), 7.0))
+    both = found.where(np.array([True, False]), other)
+    assert both.weights.tolist() == [found.weights[0].tolist(), [7] * TERMS]
+    assert len(peaks(np.zeros(100), 50)) == len(peaks(np.zeros(0), 50)) == 0
+    assert peaks(np.array([0, 3, 3, 0, 0, 0, 1.0]), 3).tolist() == [1, 6]
 
 
 def test_friction_is_a_floor_that_joints_share():

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from tauguard.detectors import ArmModel
@@ -17,7 +18,7 @@ from tauguard.detectors.real_arm.free_motion import (
 )
 from tauguard.detectors.real_arm.free_motion_file import load_free_motion, save_free_motion
 from tauguard.detectors.real_arm.semi_real import Added, add_contact, moments, smallest_found
-from tests.detectors.synthetic_arm import GAIN, nominal, record
+from tests.detectors.synthetic_arm import COULOMB, GAIN, VISCOUS, nominal, record, true_model
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +76,39 @@ def test_joints_that_are_loaded_together_count_together(detector, fresh):
         assert bool(detector.detect(struck).alarms) is expected
     score = np.linalg.norm(detector.ratios(fresh), axis=1)
     np.testing.assert_allclose(detector.scores(fresh), score, rtol=1e-12)
+
+
+def held_joint(seed):
+    """A log in which the last joint stands still: its torque is what gravity and the others ask."""
+    trace = record(seed)
+    q, qd = trace.q.copy(), trace.qd.copy()
+    q[:, 2], qd[:, 2] = 0.3, 0.0
+    qdd = np.gradient(qd, trace.t, axis=0)
+    model = true_model()
+    data = model.createData()
+    tau = np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd, strict=True)])
+    tau += COULOMB * np.tanh(qd / 0.02) + VISCOUS * qd
+    noise = np.random.default_rng(seed).normal(scale=0.01, size=tau.shape)
+    return dataclasses.replace(trace, q=q, qd=qd, current=tau / GAIN + noise)
+
+
+def test_a_regime_that_no_log_shows_has_the_bounds_of_the_other():
+    """A joint that never stops, or never starts, leaves no gap in which nothing is an alarm."""
+    arm = ArmModel(nominal(), GAIN)
+    restless = FreeMotionDetector().fit([record(s, dwell=(-2, -1)) for s in range(4)], arm)
+    dwelling = record(11, seconds=20.0)
+    assert not restless.detect(dwelling).alarms
+    hit = add_contact(dwelling, GAIN, Added(9.0, 0.1, (0.0, 40.0, 0.0)))
+    assert restless.rests(dwelling)[890:900].all()
+    assert [a for a in restless.detect(hit).alarms if 9 <= a.start <= 9.3]
+
+    one_holds = FreeMotionDetector().fit([held_joint(s) for s in range(4)], arm)
+    np.testing.assert_array_equal(one_holds.moving.weights[2], one_holds.resting.weights[2])
+    trace = held_joint(11)
+    assert not one_holds.detect(trace).alarms
+    hit = add_contact(trace, GAIN, Added(13.0, 0.1, (0.0, 40.0, 0.0)))
+    assert [a for a in one_holds.detect(hit).alarms if 13 <= a.start <= 13.3]
+    assert np.isfinite(one_holds.scores(dwelling)).all()
 
 
 def test_one_sample_kick_of_the_controller_is_no_contact(detector, fresh):
