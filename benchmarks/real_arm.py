@@ -63,6 +63,7 @@ Array = NDArray[np.float64]
 
 #: What a log's name says of its load.
 LOADS: dict[str, Load | None] = {"ur-20_01_13-load_2600": Load(2.6), "ur-20_01_31-load": None}
+#: What the columns of each table mean.
 NOTES = {
     "residual": "root mean squares of the plain observer's residual, of logs that the parameters "
     "were not identified on. The published ones are those of the data's authors, without offsets.",

@@ -32,14 +32,16 @@ def of(rows: Iterable[Row], study: str, **fields: object) -> list[Row]:
     ]
 
 
-def claim(what: str, of: str, bound: float, values: list[float | None], least: bool = False) -> Row:
+def claim(
+    what: str, kind: str, bound: float, values: list[float | None], least: bool = False
+) -> Row:
     """Judges the worst of several figures; a figure that could not be measured leaves it open.
 
-    ``of`` is "error", or "time" for what a quick run may miss by chance; ``least``: the figures are
-    to reach the bound, otherwise to keep within it.
+    ``kind`` is "error", or "time" for what a quick run may miss by chance; ``least``: the figures
+    are to reach the bound, otherwise to keep within it.
     """
     asked = f"{'at least' if least else 'at most'} {bound:g}"
-    row: Row = {"study": "claims", "claim": what, "of": of, "asked": asked}
+    row: Row = {"study": "claims", "claim": what, "of": kind, "asked": asked}
     known = [value for value in values if value is not None]
     if not known or len(known) < len(values):
         return row | {"measured": None, "met": None}

@@ -27,6 +27,8 @@ _WHOLE = (
     "at a time, as environments do: srq-svr, which `tauguard train --traces` writes without "
     "--levelled"
 )
+#: What a file of another format or version is told.
+ANEW = "train the detector anew by `tauguard train --traces`"
 #: What reading a damaged archive may raise, by where it is damaged.
 _DAMAGE = (
     zipfile.BadZipFile,
@@ -107,7 +109,7 @@ def read_archive(path: str | os.PathLike[str]) -> dict[str, Any]:
     if strangers:
         raise ValueError(f"{target}: holds types not to be trusted: {', '.join(strangers)}")
     if not isinstance(content, dict):
-        raise ValueError(f"{target}: not a detector file of this version ({FORMAT!r})")
+        raise ValueError(f"{target}: not a detector file of this version ({FORMAT!r}); {ANEW}")
     return content
 
 
@@ -127,7 +129,7 @@ def load_detector(path: str | os.PathLike[str]) -> CollisionDetector:
         levelled = "levelled " if content.get("levels") else ""
         raise ValueError(f"{path}: a {levelled}{content.get('detector')}, {_WHOLE}")
     if content.get("format") != FORMAT:
-        raise ValueError(f"{path}: not a detector file of this version ({FORMAT!r})")
+        raise ValueError(f"{path}: not a detector file of this version ({FORMAT!r}); {ANEW}")
     try:
         return rebuilt(content)
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:

@@ -71,14 +71,12 @@ class Settings:
                 body_region(item)
         if isinstance(self.detector, os.PathLike):
             object.__setattr__(self, "detector", os.fspath(self.detector))
-        if isinstance(self.detector, str) and self.detector not in DETECTORS:
-            from pathlib import Path
-
-            if not Path(self.detector).is_file():
-                raise ValueError(
-                    f"detector {self.detector!r}: no such model file; expected "
-                    f"{', '.join(DETECTORS)}, the path of a trained srq-svr, or None"
-                )
+        named = isinstance(self.detector, str) and self.detector not in DETECTORS
+        if named and not os.path.isfile(self.detector):
+            raise ValueError(
+                f"detector {self.detector!r}: no such model file; expected "
+                f"{', '.join(DETECTORS)}, the path of a trained srq-svr, or None"
+            )
 
     @property
     def substeps(self) -> int:

@@ -81,7 +81,10 @@ def load_free_motion(path: str | os.PathLike[str]) -> FreeMotionDetector:
     except ValueError as error:
         raise ValueError(f"{target}: not a detector file, or a damaged one ({error})") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise ValueError(f"{target}: not a detector file of this version ({FORMAT!r})")
+        raise ValueError(
+            f"{target}: not a detector file of this version ({FORMAT!r}); train the detector anew "
+            "by `tauguard train --free`"
+        )
     try:
         return _rebuilt(content)
     except (KeyError, TypeError, AttributeError, ValueError) as error:

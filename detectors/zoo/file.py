@@ -7,9 +7,9 @@ from typing import Any, Protocol
 
 from tauguard.detectors.detector import Detector
 from tauguard.detectors.levelling import Levelled, SpeedLevels
+from tauguard.detectors.model_file import ANEW, read_archive, rebuilt, write_archive
 from tauguard.detectors.model_file import FORMAT as CHAIN_FORMAT
 from tauguard.detectors.model_file import RANKING as FORMAT
-from tauguard.detectors.model_file import read_archive, rebuilt, write_archive
 from tauguard.detectors.thresholded import Thresholded
 from tauguard.detectors.zoo.srq_svr import SvrDetector
 from tauguard.detectors.zoo.table import make_detector
@@ -63,7 +63,7 @@ def load_model(path: str | os.PathLike[str]) -> Thresholded:
     """
     content = read_archive(path)
     if content.get("format") not in (FORMAT, CHAIN_FORMAT):
-        raise ValueError(f"{path}: not a detector file of this version ({FORMAT!r})")
+        raise ValueError(f"{path}: not a detector file of this version ({FORMAT!r}); {ANEW}")
     try:
         if content["format"] == CHAIN_FORMAT:
             chain = rebuilt(content)

@@ -353,7 +353,6 @@ def test_pictures_show_the_arm_and_the_target():
     code = """
 import gymnasium, numpy, tauguard, warnings
 from gymnasium.utils.env_checker import check_env
-from tauguard.detectors.model_file import RANKING, write_archive
 from tauguard.environments import ENVIRONMENTS
 warnings.simplefilter("error")
 for name in ENVIRONMENTS:

@@ -178,7 +178,10 @@ def test_a_file_that_takes_no_single_samples_says_which_would(fitted, tmp_path):
 def test_damaged_and_foreign_files_are_named(tmp_path):
     bad = tmp_path / "bad.skops"
     for content, message in (
-        ({"format": "other"}, "not a detector file of this version"),
+        (
+            {"format": "other"},
+            "not a detector file of this version .*anew by .tauguard train --traces",
+        ),
         ({"format": FORMAT, "detector": "none"}, "with a part missing"),
         ({"format": FORMAT, "detector": "cusum", "parts": {}}, "with a part missing"),
         ([1], "not a detector file"),
