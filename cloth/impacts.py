@@ -93,12 +93,14 @@ def method_number(method: str) -> int:
 
 def checked_distance(min_distance: float, method: str) -> float:
     """A finite distance of at least 0 (0 with a comparator), or a ``ValueError``."""
+    distance = np.nan
     try:
-        if isinstance(min_distance, str | bytes | bool | np.bool_):
-            raise TypeError
-        distance = float(min_distance)
-    except (TypeError, ValueError, OverflowError):
-        distance = np.nan
+        array = np.asarray(min_distance)
+        value = array.item() if array.ndim == 0 else None
+        if isinstance(value, int | float | np.floating) and not isinstance(value, bool):
+            distance = float(value)
+    except (ValueError, OverflowError):  # lists of different lengths, a number beyond the doubles
+        pass
     if distance > 0 and method != "ab2pf":
         raise ValueError(f"min_distance: {min_distance} with method {method!r}: only ab2pf has one")
     if not (np.isfinite(distance) and distance >= 0):

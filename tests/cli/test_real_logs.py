@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tauguard.cli import main, real_logs
+from tauguard.cli.train import never_moved
 from tauguard.detectors.real_arm.arm_file import load_arm
 from tauguard.detectors.real_arm.recording import Load
-from tests.detectors.synthetic_arm import GAIN, XML, record
+from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 
 COLUMNS = {"t": 0, "q": [1, 2, 3], "qd": [4, 5, 6], "current": [7, 8, 9]}
 GAINS = [str(g) for g in GAIN]
@@ -99,6 +100,17 @@ def test_a_model_refuses_strange_currents_too(folder, calibrated, capsys):
     log = written(folder, "right.csv", record(8))
     main(["detect", log, *robot, "--model", model])
     assert "0 alarms" in capsys.readouterr().out
+
+
+def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
+    logs = [written(folder, f"held{seed}.csv", held_joint(seed)) for seed in range(3)]
+    model = str(folder / "held.json")
+    robot = flags(folder, calibrated.name)
+    main(["train", "--free", *logs, *robot, "--model", model])
+    assert "note: c moves in none of the logs" in capsys.readouterr().out
+    main(["detect", written(folder, "held.csv", held_joint(8)), *robot, "--model", model])
+    assert "0 alarms" in capsys.readouterr().out
+    assert never_moved([held_joint(0), record(0)]) == []
 
 
 def test_payloads_by_file_name_or_stem():

@@ -304,7 +304,11 @@ class TestBadInput:
             ccd.candidates(longer, longer)
 
     @pytest.mark.parametrize(
-        "distance", [-1.0, np.nan, np.inf, "a", "0.1", None, [0.1], 1j, True, 10**400, {}]
+        "distance",
+        [
+            *(-1.0, np.nan, np.inf, "a", "0.1", None, [0.1], 1j, True, 10**400, {}, b"1"),
+            *(np.array("0.1"), np.array(True), np.complex128(1 + 2j), [[0.1], []]),
+        ],
     )
     def test_distance(self, distance):
         x = np.zeros((1, 4, 3))
@@ -319,7 +323,7 @@ class TestBadInput:
             ):
                 call()
 
-    @pytest.mark.parametrize("distance", [0, np.float32(0.5), np.array(0.5), np.int64(1)])
+    @pytest.mark.parametrize("distance", [0, np.float32(0.5), np.array(0.5), np.int64(1), 10**20])
     def test_any_number_is_a_distance(self, distance):
         mesh = MeshCCD(self.faces)
         of_float = mesh.candidates(self.x, self.x, float(distance))

@@ -1,5 +1,7 @@
 """A small arm: currents from Pinocchio's inverse dynamics, with friction and rotor inertia."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 
@@ -60,3 +62,17 @@ def record(seed, seconds=25.0, load=0.0, dt=0.01, noise=0.01, dwell=(8.0, 10.0))
     tau += COULOMB * np.tanh(qd / 0.02) + VISCOUS * qd
     current = tau / GAIN + rng.normal(scale=noise, size=tau.shape)
     return Trace(("a", "b", "c"), t, q, qd, current)
+
+
+def held_joint(seed):
+    """A log in which the last joint stands still: its torque is what gravity and the others ask."""
+    trace = record(seed)
+    q, qd = trace.q.copy(), trace.qd.copy()
+    q[:, 2], qd[:, 2] = 0.3, 0.0
+    qdd = np.gradient(qd, trace.t, axis=0)
+    model = true_model()
+    data = model.createData()
+    tau = np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd, strict=True)])
+    tau += COULOMB * np.tanh(qd / 0.02) + VISCOUS * qd
+    noise = np.random.default_rng(seed).normal(scale=0.01, size=tau.shape)
+    return replace(trace, q=q, qd=qd, current=tau / GAIN + noise)

@@ -163,12 +163,26 @@ def free_motion(
     settings = FreeMotionSettings(false_alarms_per_hour=rate)
     detector = FreeMotionDetector(settings).fit(recordings, arm)
     held = left_out(arm, recordings)
-    for note in doubts(detector.arm, traces, recordings, held):
+    unseen = never_moved(list(traces.values()))
+    for note in (*doubts(detector.arm, traces, recordings, held), *unseen):
         print(f"note: {note}")
     save_free_motion(detector, model)
     report(detector, model, len(traces))
     if sensitivity:
         blows(detector, list(traces.values()))
+
+
+def never_moved(traces: list[Trace]) -> list[str]:
+    """A note on each joint that all logs show standing still only."""
+    from tauguard.detectors.real_arm.free_motion import resting
+
+    still = [resting(t.q, t.qd, t.dt).all(axis=0) for t in traces]
+    return [
+        f"{name} moves in none of the logs: its friction is not known, and moving it may raise an "
+        "alarm; add a log in which it moves"
+        for name, rests in zip(traces[0].joint_names, zip(*still, strict=True), strict=True)
+        if all(rests)
+    ]
 
 
 def report(detector: FreeMotionDetector, model: Path, logs: int) -> None:
@@ -184,7 +198,8 @@ def report(detector: FreeMotionDetector, model: Path, logs: int) -> None:
     for name, moving, rest in pairs:
         print(f"  {name}: its residual may be {moving[0]:.1f} N m in motion, {rest[0]:.1f} at rest")
     print(
-        "  more with speed and acceleration; a contact has to add more than is free: --sensitivity"
+        "  more with speed and acceleration, less where several joints have some at once; a "
+        "contact has to add more than is free: --sensitivity"
     )
 
 

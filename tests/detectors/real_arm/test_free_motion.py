@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from tauguard.detectors import ArmModel
@@ -18,7 +17,7 @@ from tauguard.detectors.real_arm.free_motion import (
 )
 from tauguard.detectors.real_arm.free_motion_file import load_free_motion, save_free_motion
 from tauguard.detectors.real_arm.semi_real import Added, add_contact, moments, smallest_found
-from tests.detectors.synthetic_arm import COULOMB, GAIN, VISCOUS, nominal, record, true_model
+from tests.detectors.synthetic_arm import GAIN, held_joint, nominal, record
 
 
 @pytest.fixture(scope="module")
@@ -76,20 +75,6 @@ def test_joints_that_are_loaded_together_count_together(detector, fresh):
         assert bool(detector.detect(struck).alarms) is expected
     score = np.linalg.norm(detector.ratios(fresh), axis=1)
     np.testing.assert_allclose(detector.scores(fresh), score, rtol=1e-12)
-
-
-def held_joint(seed):
-    """A log in which the last joint stands still: its torque is what gravity and the others ask."""
-    trace = record(seed)
-    q, qd = trace.q.copy(), trace.qd.copy()
-    q[:, 2], qd[:, 2] = 0.3, 0.0
-    qdd = np.gradient(qd, trace.t, axis=0)
-    model = true_model()
-    data = model.createData()
-    tau = np.array([pin.rnea(model, data, *row) for row in zip(q, qd, qdd, strict=True)])
-    tau += COULOMB * np.tanh(qd / 0.02) + VISCOUS * qd
-    noise = np.random.default_rng(seed).normal(scale=0.01, size=tau.shape)
-    return dataclasses.replace(trace, q=q, qd=qd, current=tau / GAIN + noise)
 
 
 def test_a_regime_that_no_log_shows_has_the_bounds_of_the_other():
