@@ -174,18 +174,17 @@ class Allowance:
         bound: Array = np.einsum("tjc,jc->tj", terms, self.weights)
         return bound
 
-    def at_least(self, level: Array, pooled: float = 0.5) -> Allowance:
+    def at_least(self, level: Array) -> Allowance:
         """The constant term of each joint raised to a common multiple of ``level``.
 
         What friction leaves is alike in all joints when measured in their Coulomb friction, and
-        no log shows all of it for every joint. The multiple is ``LEAST`` or more.
+        no log shows all of it for every joint. The multiple is the joints' median, at least ``LEAST``.
 
         Args:
             level: Coulomb friction [N m], shape (n,).
-            pooled: quantile of the joints' ratios that becomes the common multiple; 1: the largest.
         """
         safe = np.maximum(level, 1e-9)
-        common = max(float(np.quantile(self.weights[:, 0] / safe, pooled)), LEAST)
+        common = max(float(np.quantile(self.weights[:, 0] / safe, 0.5)), LEAST)
         weights = self.weights.copy()
         weights[:, 0] = np.maximum(weights[:, 0], common * level)
         return Allowance(weights)

@@ -32,7 +32,9 @@ class Watch:
     """What was found in a log, and by which thresholds."""
 
     detection: Detection
-    thresholds: Array  #: residual that counts 1 [N m], one a joint, inf where not used, shape (n,)
+    thresholds: Array
+    """Residual that counts 1 [N m], inf where not used, shape (n,); of a trained detector, whose
+    bounds change with the motion, only what each joint is measured by to name the loudest."""
     quiet_until: float  #: [s]; alarms are counted from here on
     notes: tuple[str, ...]
 

@@ -84,7 +84,8 @@ def test_friction_is_a_floor_that_joints_share():
     bound = Allowance(np.array([[2.0, 1], [0.1, 1], [3.0, 1]]))
     level = np.array([10.0, 10.0, 10.0])
     assert bound.at_least(level).weights[:, 0] == pytest.approx([2, 2, 3])
-    assert bound.at_least(level, 0.0).weights[:, 0] == pytest.approx([2, 1, 3])  # a tenth
+    tight = Allowance(np.array([[0.5, 1], [0.1, 1], [3.0, 1]]))
+    assert tight.at_least(level).weights[:, 0] == pytest.approx([1, 1, 3])  # a tenth
     np.testing.assert_array_equal(bound.at_least(level).weights[:, 1], 1)
 
 
