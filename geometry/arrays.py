@@ -10,11 +10,14 @@ def finite(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArra
     """``value`` as a C-contiguous float64 array of ``shape`` (``None``: any length).
 
     Raises:
-        ValueError: the shape differs, or an entry is NaN or infinite; the message names the
-            argument and the first bad row.
+        ValueError: the shape differs, an entry is NaN or infinite, or entries are text, complex
+            or dates; the message names the argument and the first bad row.
     """
     try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
+        given = np.asarray(value)
+        if given.dtype.kind in "cSUVMm":
+            raise TypeError(f"its entries are {given.dtype}")
+        array = np.ascontiguousarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name}: not an array of numbers ({error})") from None
     fits = array.ndim == len(shape) and all(

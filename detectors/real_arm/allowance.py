@@ -178,7 +178,8 @@ class Allowance:
         """The constant term of each joint raised to a common multiple of ``level``.
 
         What friction leaves is alike in all joints when measured in their Coulomb friction, and
-        no log shows all of it for every joint. The multiple is the joints' median, at least ``LEAST``.
+        no log shows all of it for every joint. The multiple is the joints' median, and at least
+        ``LEAST``.
 
         Args:
             level: Coulomb friction [N m], shape (n,).
