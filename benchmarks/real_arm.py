@@ -22,7 +22,8 @@ than a fresh arm's would be: the columns of the friction model (the slope of 1 r
 and 1.5), the terms of the allowances, the gain of the detector's observer, its confirmation, how
 far (0.3, 0.4 and 0.6 of the joints' noise) and how fast (1, 3, 5 and 10 s) its tracked offset may
 go, its prior of the payload (1, 1.5, 2 and 3 kg), how fast payload and friction may change (60, 300
-and 1000 s), how long a motion counts for a joint at rest (rates of 0.5, 1, 2 and 4/s), how the
+and 1000 s), from how large an innovation it counts less (3, 5, 6, 8, 10, 15 and 30 deviations),
+how long a motion counts for a joint at rest (rates of 0.5, 1, 2 and 4/s), how the
 joints' ratios become one score (the largest, the root of the sum of the squares, the sum), the
 spread of friction weights (0.3, 1, 3 and 10 of a joint's torque), the 0.1 s at the end, and from
 what share of unexplained torque a log is refused. Looked at and dropped: corrections 0.05 to 0.5 s

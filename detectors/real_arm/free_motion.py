@@ -68,11 +68,14 @@ class FreeMotionSettings:
     """Take the median of three successive currents, or of five where it jumps: a controller's kick,
     as at a commanded stop, says nothing about contact. It costs one sample of delay or two."""
     unknowns: Unknowns = field(
-        default_factory=lambda: Unknowns(payload=3.0, moment=0.3, offset=0.3, fast=5.0, slow=300.0)
+        default_factory=lambda: Unknowns(
+            payload=3.0, moment=0.3, offset=0.3, fast=5.0, slow=300.0, clip=10.0
+        )
     )
     """What is tracked; a load that nobody told is more than the training logs show. Loads and the
     friction of gears that warm up change over minutes: what is followed as fast as a hand pushes
-    explains the push away."""
+    explains the push away. What is followed so slowly has to heed large innovations: a load that a
+    standing arm got wrong would otherwise stay, since what contradicts it counts less."""
     beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
 
 
