@@ -43,7 +43,7 @@ def _draw_strata(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None
     axis.set(
         xlabel="achieved peak |tau_ext| over joints 1-4 [N m]",
         ylabel="sensitivity, all speeds",
-        title="At one false alarm per hour",
+        title="At the hourly threshold",
     )
     axis.legend(fontsize=6, framealpha=0.5)
     axis.grid(alpha=0.3)
@@ -97,7 +97,7 @@ def _draw_cells(rows: list[Row], axis: Any) -> None:
     )
     axis.set(
         xlabel="1 - specificity (motion cases)",
-        ylabel="sensitivity (all 65)",
+        ylabel="sensitivity, all collisions",
         title="The twelve cells of 1.6 and 2.0 A",
     )
     axis.legend(fontsize=7)

@@ -105,13 +105,13 @@ def _column(key: str, values: list[Any], narrow: bool, brief: bool) -> Column:
 
 
 def _broken(key: str, room: int) -> list[str]:
-    """A heading in lines that end at an underscore."""
+    """A heading in lines that end at a space or an underscore."""
     lines = [""]
-    for word in key.replace("_", "_ ").split():
-        if lines[-1] and len(lines[-1]) + len(word.rstrip("_")) > room:
+    for word in key.replace("_", "_\0").replace(" ", " \0").split("\0"):
+        if lines[-1] and len(lines[-1]) + len(word.rstrip("_ ")) > room:
             lines.append("")
         lines[-1] += word
-    return lines
+    return [line.rstrip() for line in lines]
 
 
 def _wide(column: Column) -> int:

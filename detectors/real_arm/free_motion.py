@@ -62,7 +62,7 @@ class FreeMotionSettings:
     observer_gain: float = 40.0  #: [1/s]
     calibration_rate: float = 20.0  #: of the filter that the calibration looks through [1/s]
     confirmation: float = 0.05  #: t_c [s]
-    settle: float = 2.0  #: seconds at the beginning that are never an alarm
+    settle: float = 4.0  #: at the beginning, never an alarm: until motion has shown the load [s]
     false_alarms_per_hour: float = 1.0  #: to accept when the allowances are scaled
     spike: bool = True
     """Take the median of three successive currents, or of five where it jumps: a controller's kick,

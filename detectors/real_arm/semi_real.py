@@ -152,9 +152,9 @@ def smallest_found(
 def moments(moving: NDArray[np.bool_], t: Array, count: int, seed: int) -> list[float]:
     """``count`` times [s] at which ``moving``, shape (T,), holds; fewer if there are not so many.
 
-    None lies within 3 s of the beginning or 1 s of the end.
+    None lies within 5 s of the beginning, where detectors settle, or 1 s of the end.
     """
-    rows = np.flatnonzero(moving & (t > t[0] + 3) & (t < t[-1] - 1))
+    rows = np.flatnonzero(moving & (t > t[0] + 5) & (t < t[-1] - 1))
     if not len(rows):
         return []
     picked = np.random.default_rng(seed).choice(rows, min(count, len(rows)), replace=False)

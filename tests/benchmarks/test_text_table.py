@@ -95,3 +95,12 @@ def test_a_small_rate_is_not_shown_as_none():
 def test_a_time_of_one_repeat_has_no_interval():
     assert cell({"median": 2.0, "low": 2.0, "high": 2.0}) == "2"
     assert cell({"median": 2.0, "low": 1.5, "high": 2.0}) == "2 [1.5, 2]"
+
+
+def test_a_broken_heading_keeps_its_spaces():
+    rows = [{"held out, rms of each log": "a" * 30, "another long_heading here": "b" * 30}]
+    lines = table(rows, width=60).splitlines()
+    text = " ".join(" ".join(lines).split())
+    assert "held out" in text
+    assert "another long_" in text
+    assert "heldout" not in text

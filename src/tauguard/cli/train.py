@@ -34,7 +34,8 @@ def command(
 
     Args:
         traces: folder of MCAP recordings with truth (`tauguard simulate` writes such).
-        model: the model file (default: model.skops, or model.json with --free).
+        model: the model file; one that is there is replaced if it is named (default: model.skops,
+            or model.json with --free).
         detector: with --traces, one of tauguard.detectors.DETECTORS; all but the momentum-observer
             SVR need --calibration.
         calibration: folder of collision-free recordings that are not in --traces. Those with
@@ -57,6 +58,8 @@ def command(
     target = model or Path("model.json" if free else "model.skops")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
+    if model is None and target.exists():
+        raise FileExistsError(f"{target} is there already: name the file to write with --model")
     if free and (calibration or levelled or confidence is not None or detector != "srq-svr"):
         raise ValueError(
             "--detector, --calibration, --confidence and --levelled go with --traces, "

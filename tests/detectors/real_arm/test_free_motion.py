@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from tauguard.benchmarks import real_arm
 from tauguard.detectors import ArmModel
 from tauguard.detectors.real_arm.free_motion import (
     RELEASE,
@@ -34,7 +35,7 @@ def fresh():
 def test_quiet_on_motion_it_has_not_seen(detector, fresh):
     assert not detector.detect(fresh).alarms
     assert not detector.detect(record(12, load=2.0)).alarms
-    assert detector.seconds == pytest.approx(4 * 23.0, abs=0.5)
+    assert detector.seconds == pytest.approx(4 * 21.0, abs=0.5)
 
 
 def test_finds_added_contacts_and_small_ones_not(detector, fresh):
@@ -211,3 +212,15 @@ def test_what_it_refuses(detector, fresh):
         detector.scores(slow)
     with pytest.raises(ValueError, match="expected blow or push"):
         add_contact(fresh, GAIN, Added(1.0, 0.1, (1.0, 0.0, 0.0), "kick"))
+
+
+@pytest.mark.data
+def test_a_log_that_begins_at_rest_does_not_blind_the_detector(data_dir, monkeypatch):
+    # Its first seconds tell mass and moment of a load badly; the tracker has to forget that later.
+    monkeypatch.setenv("TAUGUARD_DATA", str(data_dir))
+    if real_arm.available() is None:
+        pytest.skip("no ur10e folder in the real data")
+    data = real_arm.load(real_arm.available())
+    names = ["ur-20_01_31-unload", "ur-20_02_10-30sec_12harm", "ur-20_02_12-40sec_12harm"]
+    detector = FreeMotionDetector().fit([data.moving[name] for name in names], data.arm)
+    assert (detector.moving.weights[:, 0] < [8, 10, 7, 2, 2, 2]).all()
