@@ -167,8 +167,9 @@ def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
     notes = [note, *plausible(robot, trace, tau, residual, rows, GAIN)]
     if detection.alarm[rows].mean() > STRANGE:
         notes.append(
-            "alarms fill much of this log: this is not the arm, the joints' order, the sign or the "
-            "unit of the currents that the detector was trained on, or it is held all the time"
+            "alarms fill much of this log: it carries a load that no training log carried, it is "
+            "held all the time, or this is not the arm, the joints' order, the sign or the unit of "
+            "the currents that the detector was trained on"
         )
     return Watch(detection, detector.moving.weights[:, 0], settled, tuple(notes))
 
