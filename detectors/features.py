@@ -97,6 +97,12 @@ class Envelope:
         level = np.asarray(scale, dtype=np.float64)
         return cls(np.column_stack([level, np.zeros((len(level), 3))]))
 
+    def at_least(self, scale: ArrayLike) -> Envelope:
+        """At rest no less than ``scale``, shape (n,) [N m]; what motion adds is as before."""
+        weights = self.weights.copy()
+        weights[:, 0] = np.maximum(weights[:, 0], scale)
+        return Envelope(weights)
+
     @staticmethod
     def _columns(qd: Array, acceleration: Array) -> Array:
         speed, total = np.abs(qd), np.abs(acceleration).sum(axis=-1, keepdims=True)

@@ -104,8 +104,11 @@ def believed(detector: Any) -> tuple[ArmModel, Envelope | None]:
     if arm is None:
         raise ValueError("this detector is not fitted: call fit or load first")
     for holder in (getattr(inner, "front", None), getattr(inner, "features", None)):
-        if getattr(holder, "envelope", None) is not None:
-            return arm, getattr(holder, "envelope", None)
+        envelope: Envelope | None = getattr(holder, "envelope", None)
+        if envelope is not None:
+            # A detector that doubts a payload counts the joints that carry it less, so that their
+            # envelope is less than what the residual itself does.
+            return arm, envelope.at_least(arm.noise)
     return arm, None
 
 
