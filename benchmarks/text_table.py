@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -105,9 +106,9 @@ def _column(key: str, values: list[Any], narrow: bool, brief: bool) -> Column:
 
 
 def _broken(key: str, room: int) -> list[str]:
-    """A heading in lines that end at a space or an underscore."""
+    """A heading in lines that end at a space or an underscore, but not within a unit's brackets."""
     lines = [""]
-    for word in key.replace("_", "_\0").replace(" ", " \0").split("\0"):
+    for word in re.split(r"(?<=[_ ])(?![^\[]*\])", key):
         if lines[-1] and len(lines[-1]) + len(word.rstrip("_ ")) > room:
             lines.append("")
         lines[-1] += word
