@@ -88,6 +88,13 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     assert "link or its neighbour" in out
 
 
+def test_a_model_file_that_was_not_named_is_not_replaced(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.skops").write_text("older")
+    assert "--model" in fails(capsys, "train", "--traces", str(tmp_path))
+    assert (tmp_path / "model.skops").read_text() == "older"
+
+
 def test_train_any_detector_with_a_promise(tmp_path, capsys):
     """Few recordings promise little; the message says how many more would do."""
     struck, free = tmp_path / "struck", tmp_path / "free"
