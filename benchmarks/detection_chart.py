@@ -13,6 +13,9 @@ from tauguard.benchmarks.report import Row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Style of most legends.
+SMALL = {"fontsize": 7}
+
 
 def draw(rows: list[Row], figure: Figure) -> None:
     """Sensitivity over the torque, false alarms, delay, and the cells beside the dissertation's."""
@@ -40,13 +43,13 @@ def _draw_strata(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None
             share.append(sum(r["value"] * r["n"] for r in rates) / n if n else np.nan)
         axis.plot(range(len(kinds)), share, "o-", color=colour, label=name, ms=3)
     axis.set_xticks(range(len(kinds)), kinds, rotation=30)
-    axis.set(
+    _finish(
+        axis,
         xlabel="achieved peak |tau_ext| over joints 1-4 [N m]",
         ylabel="sensitivity, all speeds",
         title="At the hourly threshold",
+        legend={"fontsize": 6, "framealpha": 0.5},
     )
-    axis.legend(fontsize=6, framealpha=0.5)
-    axis.grid(alpha=0.3)
 
 
 def _draw_hourly(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None:
@@ -57,12 +60,12 @@ def _draw_hourly(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None
             speed, [r["tau98"] if r["tau98"] else np.nan for r in own], "o-", color=colour, ms=3
         )
     axis.set_yscale("log")
-    axis.set(
+    _finish(
+        axis,
         xlabel="speed [% of the maximum]",
         ylabel="tau98 [N m]",
         title="Torque above which 98 % are found",
     )
-    axis.grid(alpha=0.3)
 
 
 def _draw_delay(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None:
@@ -72,13 +75,13 @@ def _draw_delay(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None:
         speed = [r["speed"] for r in own]
         axis.plot(speed, [r["delay_ms"]["median"] for r in own], "o-", color=colour, ms=3)
         axis.plot(speed, [r["delay_ms"]["p95"] for r in own], ":", color=colour)
-    axis.set(
+    axis.set_yscale("log")
+    _finish(
+        axis,
         xlabel="speed [% of the maximum]",
         ylabel="delay [ms]",
         title="Delay: median, 95th percentile dotted",
     )
-    axis.set_yscale("log")
-    axis.grid(alpha=0.3)
 
 
 def _draw_cells(rows: list[Row], axis: Any) -> None:
@@ -95,13 +98,13 @@ def _draw_cells(rows: list[Row], axis: Any) -> None:
         "kx",
         label="dissertation, SVR",
     )
-    axis.set(
+    _finish(
+        axis,
         xlabel="1 - specificity (motion cases)",
         ylabel="sensitivity, all collisions",
         title="The twelve cells of 1.6 and 2.0 A",
+        legend=SMALL,
     )
-    axis.legend(fontsize=7)
-    axis.grid(alpha=0.3)
 
 
 def _draw_output(rows: list[Row], axis: Any) -> None:
@@ -111,13 +114,13 @@ def _draw_output(rows: list[Row], axis: Any) -> None:
             output = [float(x) for x in row["output"].split()]
             axis.plot(torque, output, ".", ms=4, label=f"{row['speed']:g} %")
     axis.set_xscale("log")
-    axis.set(
+    _finish(
+        axis,
         xlabel="achieved peak |tau_ext| [N m]",
         ylabel="highest output of the SVR",
         title="SVR output over collision torque",
+        legend=SMALL,
     )
-    axis.legend(fontsize=7)
-    axis.grid(alpha=0.3)
 
 
 def _draw_sigma(rows: list[Row], axis: Any) -> None:
@@ -132,11 +135,19 @@ def _draw_sigma(rows: list[Row], axis: Any) -> None:
         )
     if own:
         axis.set_xscale("log")
-        axis.legend(fontsize=7)
-    axis.set(
+    _finish(
+        axis,
         xlabel="sigma of the SRQ kernel",
         ylabel="sensitivity",
         title="Length of the kernel" if own else "Length of the kernel: full run only",
+        legend=SMALL if own else None,
         ylim=(0, 1.03),
     )
+
+
+def _finish(axis: Any, legend: Mapping[str, float] | None = None, **labels: Any) -> None:
+    """Labels, a legend in this style if one is given, and the grid of every panel."""
+    axis.set(**labels)
+    if legend is not None:
+        axis.legend(**legend)
     axis.grid(alpha=0.3)
