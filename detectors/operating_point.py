@@ -61,22 +61,21 @@ def threshold_for_rate(
         raise ValueError("no collision-free scores to choose a threshold by")
     peaks = np.sort(np.concatenate(parts))[::-1]
     hours = sum(len(level) for level in levels) * dt / 3600
-    allowed = per_hour * hours
-    if allowed >= 1:
-        return float(peaks[min(int(allowed), len(peaks) - 1)])
-    return followed(peaks, allowed, max(2, round(tail * len(peaks))))
+    return followed(peaks, per_hour * hours, max(2, round(tail * len(peaks))))
 
 
 def followed(peaks: Array, allowed: float, count: int) -> float:
-    """The level that ``allowed`` (fewer than 1) peaks are expected to exceed.
+    """The level that ``allowed`` peaks exceed, or are expected to where that is fewer than one.
 
-    An exponential tail through the ``count`` largest; never below the largest.
+    Then it lies on an exponential tail through the ``count`` largest; never below the largest.
 
     Args:
         peaks: in descending order, shape (N,), N >= 1.
         allowed: above 0.
         count: at most N - 1 are used.
     """
+    if allowed >= 1:
+        return float(peaks[min(int(allowed), len(peaks) - 1)])
     count = min(count, len(peaks) - 1)
     base = float(peaks[count])
     mean_excess = float(np.mean(peaks[:count] - base)) if count else 0.0

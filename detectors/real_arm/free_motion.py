@@ -194,10 +194,8 @@ class FreeMotionDetector:
         if not len(found):
             return 1.0
         allowed = 2 * self._allowed()
-        if allowed >= 1:
-            return max(1.0, float(found[min(int(allowed), len(found) - 1)]))
-        tail = followed(found, allowed, max(10, round(TAIL * len(found))))
-        return max(1.0, tail, HEADROOM * float(found[0]))
+        level = max(1.0, _exceeded(found, allowed))
+        return level if allowed >= 1 else max(level, HEADROOM * float(found[0]))
 
     def _first(self) -> int:
         """The first sample that may be an alarm."""
@@ -223,9 +221,9 @@ class FreeMotionDetector:
         if not len(pooled):
             return np.ones(len(own))
         allowed = self._allowed()
+        common = _exceeded(pooled, allowed)
         if allowed >= 1:
-            return np.full(len(own), pooled[min(int(allowed), len(pooled) - 1)])
-        common = followed(pooled, allowed, max(10, round(TAIL * len(pooled))))
+            return np.full(len(own), common)
         return np.array([max(common, HEADROOM * float(z[0])) if len(z) else common for z in own])
 
     # -- detection --------------------------------------------------------------------------------
@@ -326,6 +324,11 @@ def resting(q: Array, qd: Array, dt: float) -> Bools:
                 at_rest, anchor = True, angle
             out[k, j] = at_rest
     return out
+
+
+def _exceeded(ordered: Array, allowed: float) -> float:
+    """The level that so many of some peaks, in descending order, are expected to exceed."""
+    return followed(ordered, allowed, max(10, round(TAIL * len(ordered))))
 
 
 def combined(ratio: Array) -> Array:
