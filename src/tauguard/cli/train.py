@@ -55,11 +55,7 @@ def command(
     """
     if (traces is None) == (not free):
         raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
-    target = model or Path("model.json" if free else "model.skops")
-    if not target.parent.is_dir():
-        raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
-    if model is None and target.exists():
-        raise FileExistsError(f"{target} is there already: name the file to write with --model")
+    target = _target(model, "model.json" if free else "model.skops")
     if free and (calibration or levelled or confidence is not None or detector != "srq-svr"):
         raise ValueError(
             "--detector, --calibration, --confidence and --levelled go with --traces, "
@@ -73,8 +69,8 @@ def command(
             "--columns": columns,
             "--gains": gains,
             "--payload": payload,
+            "--sensitivity": sensitivity,
         }
-        own["--sensitivity"] = sensitivity
         if given := [name for name, value in own.items() if value]:
             raise ValueError(f"{', '.join(given)}: with --free only, not with --traces")
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
@@ -87,6 +83,16 @@ def command(
         raise ValueError("--free needs --robot")
     rate = 1.0 if false_alarms_per_hour is None else false_alarms_per_hour
     free_motion(free, robot, target, rate, columns, gains, payload, sensitivity)
+
+
+def _target(model: Path | None, default: str) -> Path:
+    """The file to write, in a folder that there is; one that was not named is not replaced."""
+    target = model or Path(default)
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
+    if model is None and target.exists():
+        raise FileExistsError(f"{target} is there already: name the file to write with --model")
+    return target
 
 
 def labelled_motion(
