@@ -1,6 +1,6 @@
-// The first filter of single queries: which are apart on an axis, on the same side at both ends of the step and so in
-// between. By comparing x, y and z, which is exact; or, where many queries share positions, by the seven axes of a
-// 14-DOP in float32, beyond rounding.
+// The first filter of single queries: which are apart on an axis, on the same side at both ends of
+// the step and so in between. By comparing x, y and z, which is exact; or, where many queries share
+// positions, by the seven axes of a 14-DOP in float32, beyond rounding.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +36,8 @@ TAUGUARD_INLINE int not_apart(const double* x0, const double* x1, const std::int
     Choice above{-1, -1, -1, -1}, below = above;
     for (int e = 0; e < 2; ++e) {
       const double* x = e ? x1 : x0;
-      const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]), d = point(x, row[3]);
+      const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]),
+                 d = point(x, row[3]);
       above &= (vf ? a : min(a, b)) > (vf ? max(max(b, c), d) : max(c, d));
       below &= (vf ? a : max(a, b)) < (vf ? min(min(b, c), d) : min(c, d));
     }
@@ -62,15 +63,17 @@ TAUGUARD_INLINE Eight eight(const float* from) {
 TAUGUARD_INLINE Eight min(Eight x, Eight y) { return x < y ? x : y; }
 TAUGUARD_INLINE Eight max(Eight x, Eight y) { return x > y ? x : y; }
 
-// Values lie within 2^-24 of the exact images (k_dop.hpp), which are at most 1. Where x > fl(y + gap), the exact ones
-// differ by more than gap - 2^-24 (1 + gap) - 2 * 2^-24 > 0 to the same side.
+// Values lie within 2^-24 of the exact images (k_dop.hpp), which are at most 1. Where x > fl(y +
+// gap), the exact ones differ by more than gap - 2^-24 (1 + gap) - 2 * 2^-24 > 0 to the same side.
 TAUGUARD_INLINE Choice8 above(Eight x, Eight y) {
   constexpr float gap = 0x1p-21f;
   return x > y + gap;
 }
 
 // On which axes the first feature lies over the second, and under it.
-struct Sides { Choice8 over, under; };
+struct Sides {
+  Choice8 over, under;
+};
 template <bool vf>
 TAUGUARD_INLINE Sides sides(Eight a, Eight b, Eight c, Eight d) {
   if (vf) return {above(a, max(max(b, c), d)), above(min(min(b, c), d), a)};
@@ -79,7 +82,8 @@ TAUGUARD_INLINE Sides sides(Eight a, Eight b, Eight c, Eight d) {
 
 // The same on `points`: of `seven_axes`.
 template <bool vf>
-TAUGUARD_INLINE int not_apart_on_seven(const float* points, const std::int32_t* rows, int n, std::int32_t* left) {
+TAUGUARD_INLINE int not_apart_on_seven(const float* points, const std::int32_t* rows, int n,
+                                       std::int32_t* left) {
   constexpr int slots = 8;
   const auto place = [points](std::int32_t v) { return points + 2 * slots * std::ptrdiff_t(v); };
   int count = 0;
@@ -88,7 +92,8 @@ TAUGUARD_INLINE int not_apart_on_seven(const float* points, const std::int32_t* 
     for (int j = 0; j < 4; ++j) __builtin_prefetch(place(next[j]));
     const float *a = place(row[0]), *b = place(row[1]), *c = place(row[2]), *d = place(row[3]);
     const Sides start = sides<vf>(eight(a), eight(b), eight(c), eight(d));
-    const Sides end = sides<vf>(eight(a + slots), eight(b + slots), eight(c + slots), eight(d + slots));
+    const Sides end =
+        sides<vf>(eight(a + slots), eight(b + slots), eight(c + slots), eight(d + slots));
     const Choice apart = (Choice)((start.over & end.over) | (start.under & end.under));
     left[count] = i;
     count += (apart[0] | apart[1] | apart[2] | apart[3]) == 0;

@@ -23,11 +23,12 @@ TAUGUARD_INLINE Wide inverse_power(Wide x) {
   return (Wide)((std::int64_t{0x7fe} << 52) - exponent);
 }
 
-// With u = 2^-53 and M the product of the largest |p|, |q|, |r|. Differences carry u. A triple product of
-// differences is 6 products: 3 u and 5 u of arithmetic on each: 48 u M. The mixed ones double the cross
-// product: 108 u M, and with 48 u M of the other and the sums, divided by three: 64 u M for each coefficient,
-// which is at most 6 M. Each of three cuts adds 54 u M, a value of the polynomial 60 u M, its argument's own
-// rounding 324 u M: 610 u M in all, below the 1024 u M = 2^-43 M in use. Underflow adds less than 2^-1000.
+// With u = 2^-53 and M the product of the largest |p|, |q|, |r|. Differences carry u. A triple
+// product of differences is 6 products: 3 u and 5 u of arithmetic on each: 48 u M. The mixed ones
+// double the cross product: 108 u M, and with 48 u M of the other and the sums, divided by three:
+// 64 u M for each coefficient, which is at most 6 M. Each of three cuts adds 54 u M, a value of the
+// polynomial 60 u M, its argument's own rounding 324 u M: 610 u M in all, below the 1024 u M =
+// 2^-43 M in use. Underflow adds less than 2^-1000.
 TAUGUARD_INLINE void finish(const Wide3* p, const Wide3* q, const Wide3* r, Group& g) {
   Wide sizes[3] = {splat(0), splat(0), splat(0)};
   for (int e = 0; e < 2; ++e) {
@@ -43,13 +44,15 @@ TAUGUARD_INLINE void finish(const Wide3* p, const Wide3* q, const Wide3* r, Grou
     set(g, Group::q + 3 * e, s * q[e]);
     set(g, Group::r + 3 * e, s * r[e]);
   }
-  const Wide3 p0 = s * p[0], p1 = s * p[1], q0 = s * q[0], q1 = s * q[1], r0 = s * r[0], r1 = s * r[1];
+  const Wide3 p0 = s * p[0], p1 = s * p[1], q0 = s * q[0], q1 = s * q[1], r0 = s * r[0],
+              r1 = s * r[1];
   const Wide3 c00 = cross(q0, r0), c11 = cross(q1, r1), mixed = cross(q0, r1) + cross(q1, r0);
   const Wide b0 = dot(p0, c00), b1 = (1.0 / 3) * (dot(p1, c00) + dot(p0, mixed)),
              b2 = (1.0 / 3) * (dot(p0, c11) + dot(p1, mixed)), b3 = dot(p1, c11);
   const Wide error = 0x1p-43 * ((s * sizes[0]) * (s * sizes[1]) * (s * sizes[2])) + 0x1p-1000;
   const Wide least = min(min(b0, b1), min(b2, b3)), most = max(max(b0, b1), max(b2, b3));
-  // One variation: the ends have different signs, and not both coefficients between them the other end's.
+  // One variation: the ends have different signs, and not both coefficients between them the other
+  // end's.
   const Choice falls = (b0 > error) & (b3 < -error) & ((b1 > error) | (b2 < -error));
   const Choice rises = (b0 < -error) & (b3 > error) & ((b1 < -error) | (b2 > error));
   g.odd = static_cast<std::uint8_t>(bits(~fair));
@@ -64,7 +67,9 @@ TAUGUARD_INLINE void finish(const Wide3* p, const Wide3* q, const Wide3* r, Grou
 }
 
 // Of one query, at one end of the step.
-struct Differences { Wide p, q, r; };
+struct Differences {
+  Wide p, q, r;
+};
 template <bool vf>
 TAUGUARD_INLINE Differences differences(const double* x, const std::int32_t* row) {
   const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]), d = point(x, row[3]);
@@ -72,14 +77,18 @@ TAUGUARD_INLINE Differences differences(const double* x, const std::int32_t* row
   return {c - a, b - a, d - c};
 }
 TAUGUARD_INLINE Wide3 transposed(Wide a, Wide b, Wide c, Wide d) {
-  const Wide ab = __builtin_shufflevector(a, b, 0, 4, 2, 6), cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
-  const Wide y_ab = __builtin_shufflevector(a, b, 1, 5, 3, 7), y_cd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
-  return {__builtin_shufflevector(ab, cd, 0, 1, 4, 5), __builtin_shufflevector(y_ab, y_cd, 0, 1, 4, 5),
+  const Wide ab = __builtin_shufflevector(a, b, 0, 4, 2, 6),
+             cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+  const Wide y_ab = __builtin_shufflevector(a, b, 1, 5, 3, 7),
+             y_cd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+  return {__builtin_shufflevector(ab, cd, 0, 1, 4, 5),
+          __builtin_shufflevector(y_ab, y_cd, 0, 1, 4, 5),
           __builtin_shufflevector(ab, cd, 2, 3, 6, 7)};
 }
 
 template <bool vf>
-TAUGUARD_INLINE void gather(const double* x0, const double* x1, const std::int32_t* rows, int n, Group* groups) {
+TAUGUARD_INLINE void gather(const double* x0, const double* x1, const std::int32_t* rows, int n,
+                            Group* groups) {
   for (int first = 0; first < n; first += width, ++groups) {
     const auto row = [&](int i) { return rows + 4 * std::min(first + i, n - 1); };
     for (int i = 0; i < width; ++i) prefetch(x0, x1, row(i + ahead));
@@ -102,7 +111,7 @@ struct Pieces {
   Wide start, length, root, cubic[4], error, big;
 };
 TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const double* roots, int n,
-                              Pieces& out) {
+                               Pieces& out) {
   alignas(64) double value[Group::fields][width], own[7][width];
   for (int i = 0; i < width; ++i) {
     const Piece& piece = pieces[std::min(i, n - 1)];
@@ -115,7 +124,9 @@ TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const d
     own[6][i] = roots[std::min(i, n - 1)];
   }
   for (int e = 0; e < 2; ++e) {
-    const auto vector = [&](int f) { return Wide3{load(value[f]), load(value[f + 1]), load(value[f + 2])}; };
+    const auto vector = [&](int f) {
+      return Wide3{load(value[f]), load(value[f + 1]), load(value[f + 2])};
+    };
     out.p[e] = vector(Group::p + 3 * e);
     out.q[e] = vector(Group::q + 3 * e);
     out.r[e] = vector(Group::r + 3 * e);
@@ -134,9 +145,10 @@ TAUGUARD_INLINE Wide at(const Wide* b, Wide x) {
   return y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
 }
 
-// Roots in (0, 1) of many cubics: Newton's steps kept within the bracket until a step is below 2^-24, after which
-// the root is off by less than 2^-40 or so (what is not is found out). A lane stops by itself, so that a root
-// does not depend on its neighbours; several groups at once hide the latency of the divisions.
+// Roots in (0, 1) of many cubics: Newton's steps kept within the bracket until a step is below
+// 2^-24, after which the root is off by less than 2^-40 or so (what is not is found out). A lane
+// stops by itself, so that a root does not depend on its neighbours; several groups at once hide
+// the latency of the divisions.
 constexpr int together = 4;
 TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
   alignas(64) double value[5][together * width];
@@ -176,21 +188,25 @@ TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
   }
 }
 
-// Contact at a root is the origin in the hull of the features' differences g_i: on the same side of all its
-// edges, (g_i x g_j) . n >= 0 with n = q x r. Let d = 2^-33 be what the time may be off, B the largest |p|, |q|,
-// |r|, and G that of the g_i near the root. Then |q|, |r| <= 2 G, |n| <= 8 G^2, and since g changes by at most
-// 6 B a unit of time, q and r by 2 B, a side changes by at most (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 a unit:
-// 2^-23.6 B G^3 in d. Rounding adds less than 2^-38 B G^3. In use: 2^-23 B G^3.
+// Contact at a root is the origin in the hull of the features' differences g_i: on the same side of
+// all its edges, (g_i x g_j) . n >= 0 with n = q x r. Let d = 2^-33 be what the time may be off, B
+// the largest |p|, |q|, |r|, and G that of the g_i near the root. Then |q|, |r| <= 2 G, |n| <= 8
+// G^2, and since g changes by at most 6 B a unit of time, q and r by 2 B, a side changes by at most
+// (4 * 6 * 24 + 6 * 16) B G^3 = 672 B G^3 a unit: 2^-23.6 B G^3 in d. Rounding adds less than 2^-38
+// B G^3. In use: 2^-23 B G^3.
 template <bool vf>
-TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, Outcome* outcome, double* toi) {
+TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, Outcome* outcome,
+                              double* toi) {
   find_roots(pieces, n, toi);
   for (int first = 0; first < n; first += width) {
     Pieces k;
     transpose(groups, pieces + first, toi + first, n - first, k);
     const Wide t = k.start + k.length * k.root;
     const Wide lo = max(t - 0x1p-33, k.start), hi = min(t + 0x1p-33, k.start + k.length);
-    const Wide f_lo = at(k.cubic, (lo - k.start) / k.length), f_hi = at(k.cubic, (hi - k.start) / k.length);
-    const Choice bracket = ((f_lo > k.error) & (f_hi < -k.error)) | ((f_lo < -k.error) & (f_hi > k.error));
+    const Wide f_lo = at(k.cubic, (lo - k.start) / k.length),
+               f_hi = at(k.cubic, (hi - k.start) / k.length);
+    const Choice bracket =
+        ((f_lo > k.error) & (f_hi < -k.error)) | ((f_lo < -k.error) & (f_hi > k.error));
 
     const Wide3 p = k.p[0] + t * (k.p[1] - k.p[0]), q = k.q[0] + t * (k.q[1] - k.q[0]),
                 r = k.r[0] + t * (k.r[1] - k.r[0]), normal = cross(q, r);
@@ -200,8 +216,8 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
     if (!vf) extent = max(extent, size(p + r - q));
     extent += 0x1p-30 * k.big;
     const Wide margin = 0x1p-23 * k.big * (extent * extent * extent);
-    const unsigned inside = bits(bracket & (least > margin)), outside = bits(bracket & (least < -margin)),
-                   rooted = bits(bracket);
+    const unsigned inside = bits(bracket & (least > margin)),
+                   outside = bits(bracket & (least < -margin)), rooted = bits(bracket);
     for (int i = 0; i < width && first + i < n; ++i) {
       outcome[first + i] = inside >> i & 1    ? Outcome::contact
                            : outside >> i & 1 ? Outcome::clear
@@ -212,24 +228,27 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
   }
 }
 
-#define TAUGUARD_VARIANT(name, attributes)                                                                     \
-  attributes void gather_##name(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n,  \
-                                Group* groups) {                                                               \
-    vf ? gather<true>(x0, x1, rows, n, groups) : gather<false>(x0, x1, rows, n, groups);                       \
-  }                                                                                                            \
-  attributes void at_roots_##name(bool vf, const Group* groups, const Piece* pieces, int n, Outcome* outcome,  \
-                                  double* toi) {                                                               \
-    vf ? at_roots<true>(groups, pieces, n, outcome, toi) : at_roots<false>(groups, pieces, n, outcome, toi);   \
-  }                                                                                                            \
-  attributes int not_apart_##name(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n,  \
-                                  std::int32_t* left) {                                                        \
-    return vf ? not_apart<true>(x0, x1, rows, n, left) : not_apart<false>(x0, x1, rows, n, left);              \
-  }                                                                                                            \
-  attributes int not_apart_on_seven_##name(bool vf, const float* points, const std::int32_t* rows, int n,        \
-                                           std::int32_t* left) {                                               \
-    return vf ? not_apart_on_seven<true>(points, rows, n, left) : not_apart_on_seven<false>(points, rows, n, left);  \
-  }                                                                                                            \
-  constexpr BatchKernels name{not_apart_##name, not_apart_on_seven_##name, gather_##name, at_roots_##name};
+#define TAUGUARD_VARIANT(name, attributes)                                                         \
+  attributes void gather_##name(bool vf, const double* x0, const double* x1,                       \
+                                const std::int32_t* rows, int n, Group* groups) {                  \
+    vf ? gather<true>(x0, x1, rows, n, groups) : gather<false>(x0, x1, rows, n, groups);           \
+  }                                                                                                \
+  attributes void at_roots_##name(bool vf, const Group* groups, const Piece* pieces, int n,        \
+                                  Outcome* outcome, double* toi) {                                 \
+    vf ? at_roots<true>(groups, pieces, n, outcome, toi)                                           \
+       : at_roots<false>(groups, pieces, n, outcome, toi);                                         \
+  }                                                                                                \
+  attributes int not_apart_##name(bool vf, const double* x0, const double* x1,                     \
+                                  const std::int32_t* rows, int n, std::int32_t* left) {           \
+    return vf ? not_apart<true>(x0, x1, rows, n, left) : not_apart<false>(x0, x1, rows, n, left);  \
+  }                                                                                                \
+  attributes int not_apart_on_seven_##name(bool vf, const float* points, const std::int32_t* rows, \
+                                           int n, std::int32_t* left) {                            \
+    return vf ? not_apart_on_seven<true>(points, rows, n, left)                                    \
+              : not_apart_on_seven<false>(points, rows, n, left);                                  \
+  }                                                                                                \
+  constexpr BatchKernels name{not_apart_##name, not_apart_on_seven_##name, gather_##name,          \
+                              at_roots_##name};
 
 TAUGUARD_VARIANT(portable, )
 #if defined(__x86_64__)

@@ -1,4 +1,5 @@
-// Several queries at a time: the coplanarity cubics of many queries, and what happens at their roots.
+// Several queries at a time: the coplanarity cubics of many queries, and what happens at their
+// roots.
 #pragma once
 
 #include <cstdint>
@@ -7,34 +8,45 @@
 
 namespace tauguard::cloth {
 
-// `width` queries in differences (query.hpp), scaled by powers of two so that the largest is in [1, 2).
+// `width` queries in differences (query.hpp), scaled by powers of two so that the largest is in [1,
+// 2).
 struct Group {
   enum Field { p = 0, q = 6, r = 12, cubic = 18, error = 22, big = 23, fields = 24 };
   alignas(64) double value[fields][width];  // p, q, r: x, y, z at the start, then at the end
-  // A bit per query, beyond rounding: the Bernstein coefficients of its cubic have one sign, so that it has no
-  // root; or one variation, so that it has one. Both 0 where the query's size keeps it out of this.
+  // A bit per query, beyond rounding: the Bernstein coefficients of its cubic have one sign, so
+  // that it has no root; or one variation, so that it has one. Both 0 where the query's size keeps
+  // it out of this.
   std::uint8_t no_root, one_root;
   std::uint8_t odd;  // that size: too small, too large or not finite
 };
 
-// A part [start, start + length] of a query's time in which its cubic has exactly one root, beyond rounding.
+// A part [start, start + length] of a query's time in which its cubic has exactly one root, beyond
+// rounding.
 struct Piece {
   double start, length, cubic[4];
   std::int32_t query;
 };
-// edge: so close to the boundary of a feature that rounding hides the side; unknown: so is the root itself.
+// edge: so close to the boundary of a feature that rounding hides the side; unknown: so is the root
+// itself.
 enum class Outcome : std::uint8_t { clear, contact, edge, unknown };
 
 struct BatchKernels {
-  // The queries of n that no axis (x, y or z) keeps apart, on the same side at both ends of the step and so in
-  // between: their numbers go to `left`. Comparisons of coordinates only, and so exact.
-  int (*not_apart)(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n, std::int32_t* left);
+  // The queries of n that no axis (x, y or z) keeps apart, on the same side at both ends of the
+  // step and so in between: their numbers go to `left`. Comparisons of coordinates only, and so
+  // exact.
+  int (*not_apart)(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n,
+                   std::int32_t* left);
   // The same by seven axes (apart.hpp), beyond rounding; points: of those positions.
-  int (*not_apart_on_seven)(bool vf, const float* points, const std::int32_t* rows, int n, std::int32_t* left);
-  // (n + width - 1) / width groups of n queries; the last is filled up with copies of the last query.
-  void (*gather)(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n, Group* groups);
-  // Per piece: is there contact at its root, and from when on can that be (at most 2^-32 before it).
-  void (*at_roots)(bool vf, const Group* groups, const Piece* pieces, int n, Outcome* outcome, double* toi);
+  int (*not_apart_on_seven)(bool vf, const float* points, const std::int32_t* rows, int n,
+                            std::int32_t* left);
+  // (n + width - 1) / width groups of n queries; the last is filled up with copies of the last
+  // query.
+  void (*gather)(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n,
+                 Group* groups);
+  // Per piece: is there contact at its root, and from when on can that be (at most 2^-32 before
+  // it).
+  void (*at_roots)(bool vf, const Group* groups, const Piece* pieces, int n, Outcome* outcome,
+                   double* toi);
 };
 
 // The fastest that this processor runs; every variant gives the same bits.

@@ -33,15 +33,15 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
 
 }  // namespace
 
-void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves, const Groups& groups,
-                     CandidateBlock& out) {
+void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
+                     const Groups& groups, CandidateBlock& out) {
   static const OverlapKernels& kernels = overlap_kernels();
   const bool edges = &a == &b, same = edges && leaves.a == leaves.b;
   LeafLanes left = a.lanes_of(leaves.a);
   const LeafLanes right = b.lanes_of(leaves.b);
   if (!same)  // x, y and z leave out nearly all rows that can be
-    left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block, 3, a.times(),
-                                          left.occupied);
+    left.occupied = kernels.lanes_of_node(b.node(b.leaves() + leaves.b), a.slots(), left.block, 3,
+                                          a.times(), left.occupied);
   Overlaps found;
   kernels.leaf_pair(left, right, a.axes(), a.times(), same, found);
   out.adjacent += found.adjacent;

@@ -9,20 +9,22 @@
 
 namespace tauguard::cloth {
 
-// Candidates in the form the narrow phase takes: `rows` holds 4 vertices a query (vertex and face, or edge
-// and edge), `pairs` the numbers of the two features.
+// Candidates in the form the narrow phase takes: `rows` holds 4 vertices a query (vertex and face,
+// or edge and edge), `pairs` the numbers of the two features.
 struct CandidateBlock {
   // Where a block is handed on, and the room that the leaf pair before that may still need.
   static constexpr std::size_t full = 2048, capacity = full + lanes * lanes;
   std::vector<std::int32_t> rows = std::vector<std::int32_t>(4 * capacity);
   std::vector<std::int32_t> pairs = std::vector<std::int32_t>(2 * capacity);
   std::size_t size = 0;
-  std::uint64_t adjacent = 0, kept_apart = 0;  // left out: sharing a vertex; of groups that do not meet
+  std::uint64_t adjacent = 0,
+                kept_apart = 0;  // left out: sharing a vertex; of groups that do not meet
 };
 
-// Appends the candidates of one leaf pair: features whose own volumes overlap, share no vertex and may meet.
-// Edges come smaller number first; vertices and faces come vertex first. `out` must not be full.
-void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves, const Groups& groups,
-                     CandidateBlock& out);
+// Appends the candidates of one leaf pair: features whose own volumes overlap, share no vertex and
+// may meet. Edges come smaller number first; vertices and faces come vertex first. `out` must not
+// be full.
+void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
+                     const Groups& groups, CandidateBlock& out);
 
 }  // namespace tauguard::cloth

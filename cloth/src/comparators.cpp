@@ -50,8 +50,10 @@ bool inside(const Query& k, double t, bool vf) {
 bool filtered_out(const Cubic& c, Method method) {
   double a[4];
   switch (method) {
-    case Method::dnf: return one_sign(c, 0) != 0;
-    case Method::vcd: return variations(c.b) == 0 && c.b[0] != 0 && c.b[3] != 0;
+    case Method::dnf:
+      return one_sign(c, 0) != 0;
+    case Method::vcd:
+      return variations(c.b) == 0 && c.b[0] != 0 && c.b[3] != 0;
     case Method::scd: {
       powers(c.b, a);
       if (variations(a) == 0 && a[0] != 0) return true;
@@ -59,7 +61,8 @@ bool filtered_out(const Cubic& c, Method method) {
       powers(reversed, a);
       return variations(a) == 0 && a[0] != 0;
     }
-    default: return false;
+    default:
+      return false;
   }
 }
 

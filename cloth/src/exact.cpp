@@ -1,8 +1,9 @@
-// Contact is the origin in the convex hull of the features' differences g_i(t): three of a vertex and a face,
-// four (a parallelogram) of two edges. Its first time is 0, or a root of the coplanarity cubic. Where the
-// cubic is zero throughout, everything stays in one (turning) plane, and the first time has the origin on the
-// boundary of the hull: between two of its corners, g_i x g_j = 0; and where that too is zero throughout, at a
-// corner, g_i = 0. Each is a finite list of roots, at which the hull is tested by signs of quadratics.
+// Contact is the origin in the convex hull of the features' differences g_i(t): three of a vertex
+// and a face, four (a parallelogram) of two edges. Its first time is 0, or a root of the
+// coplanarity cubic. Where the cubic is zero throughout, everything stays in one (turning) plane,
+// and the first time has the origin on the boundary of the hull: between two of its corners, g_i x
+// g_j = 0; and where that too is zero throughout, at a corner, g_i = 0. Each is a finite list of
+// roots, at which the hull is tested by signs of quadratics.
 #include "exact.hpp"
 
 #include <algorithm>

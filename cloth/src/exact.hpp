@@ -1,4 +1,5 @@
-// The reference: does a query hit, and when first, in exact arithmetic. Right for all finite doubles.
+// The reference: does a query hit, and when first, in exact arithmetic. Right for all finite
+// doubles.
 #pragma once
 
 #include <cstdint>

@@ -9,8 +9,8 @@ const Dyadic one(1.0);
 
 Dyadic magnitude(const Dyadic& x) { return x.sign() < 0 ? -x : x; }
 
-// a := |lead b|^n a - quotient b, of degree below b's. The multiplier is positive, so that signs stay;
-// `quotient`, if asked for, is up to that multiplier.
+// a := |lead b|^n a - quotient b, of degree below b's. The multiplier is positive, so that signs
+// stay; `quotient`, if asked for, is up to that multiplier.
 Polynomial remainder(Polynomial a, const Polynomial& b, Polynomial* quotient = nullptr) {
   const Dyadic lead = magnitude(b.back());
   if (quotient) quotient->assign(a.size() < b.size() ? 0 : a.size() - b.size() + 1, Dyadic());
@@ -132,11 +132,14 @@ void refine(Root& root) {
   narrow(root, Dyadic(root.hi.to_double()), below);  // a root that is a double is exact
 }
 
-// Intervals with one root each of p, which has no double roots and none at 0 or 1. Where a midpoint is a
-// root, it is returned through `found` and nothing else is of use.
+// Intervals with one root each of p, which has no double roots and none at 0 or 1. Where a midpoint
+// is a root, it is returned through `found` and nothing else is of use.
 std::vector<Root> isolate(const Polynomial& p, Dyadic& found) {
   const auto sturm = sequence(p, derivative(p));
-  struct Part { Dyadic lo, hi; int at_lo, at_hi; };
+  struct Part {
+    Dyadic lo, hi;
+    int at_lo, at_hi;
+  };
   std::vector<Part> open{{Dyadic(), one, variations(sturm, Dyadic()), variations(sturm, one)}};
   std::vector<Root> roots;
   while (!open.empty()) {
@@ -187,7 +190,8 @@ Polynomial operator*(const Polynomial& a, const Polynomial& b) {
 
 Polynomial derivative(const Polynomial& p) {
   Polynomial d;
-  for (std::size_t i = 1; i < p.size(); ++i) d.push_back(Dyadic::from_int(static_cast<std::int64_t>(i)) * p[i]);
+  for (std::size_t i = 1; i < p.size(); ++i)
+    d.push_back(Dyadic::from_int(static_cast<std::int64_t>(i)) * p[i]);
   return d;
 }
 
@@ -231,7 +235,8 @@ int sign_at(const Root& root, const Polynomial& g) {
   if (root.exact()) return at_lo;
   // Of degree 2 at most, g keeps its sign where both ends and the control point between them agree.
   if (g.size() <= 3) {
-    const Dyadic control = value(g, root.lo).scaled(1) + (root.hi - root.lo) * value(derivative(g), root.lo);
+    const Dyadic control =
+        value(g, root.lo).scaled(1) + (root.hi - root.lo) * value(derivative(g), root.lo);
     if (at_lo != 0 && control.sign() == at_lo && value(g, root.hi).sign() == at_lo) return at_lo;
   }
   const auto tarski = sequence(root.of, remainder(derivative(root.of) * g, root.of));

@@ -1,6 +1,7 @@
-// Polynomials with dyadic coefficients, and signs of one at a root of another: Sturm's theorem and its
-// generalisation by Tarski (Basu, Pollack & Roy, "Algorithms in Real Algebraic Geometry", chapter 2). No
-// rounding anywhere, and no bisection down to the distance of two roots where a sign is zero.
+// Polynomials with dyadic coefficients, and signs of one at a root of another: Sturm's theorem and
+// its generalisation by Tarski (Basu, Pollack & Roy, "Algorithms in Real Algebraic Geometry",
+// chapter 2). No rounding anywhere, and no bisection down to the distance of two roots where a sign
+// is zero.
 #pragma once
 
 #include <vector>
@@ -11,7 +12,8 @@ namespace tauguard::cloth {
 
 using geometry::Dyadic;
 
-// Coefficients in ascending powers; the leading one is not zero. No coefficients: the zero polynomial.
+// Coefficients in ascending powers; the leading one is not zero. No coefficients: the zero
+// polynomial.
 using Polynomial = std::vector<Dyadic>;
 
 Polynomial trimmed(Polynomial p);
@@ -21,8 +23,8 @@ Polynomial operator*(const Polynomial& a, const Polynomial& b);
 Polynomial derivative(const Polynomial& p);
 Dyadic value(const Polynomial& p, const Dyadic& x);
 
-// A root in (0, 1) or at an end: either exactly `lo` == `hi`, or the only root of `of` in (lo, hi), where
-// it is simple and `of` is not zero at either end.
+// A root in (0, 1) or at an end: either exactly `lo` == `hi`, or the only root of `of` in (lo, hi),
+// where it is simple and `of` is not zero at either end.
 struct Root {
   Dyadic lo, hi;
   Polynomial of;

@@ -14,8 +14,9 @@ namespace {
 using geometry::Aabb;
 using geometry::ThreadPool;
 
-// Features of a leaf at build, of 16 slots. Shares are rounded down to the left at every level, which lets a
-// leaf receive up to 2 more (1 + 1/2 + 1/4 + ...); the rest is room for features that come later.
+// Features of a leaf at build, of 16 slots. Shares are rounded down to the left at every level,
+// which lets a leaf receive up to 2 more (1 + 1/2 + 1/4 + ...); the rest is room for features that
+// come later.
 constexpr std::size_t fill = 13;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -39,7 +40,8 @@ void split(std::vector<std::int32_t>& order, std::size_t begin, std::size_t left
     if (at[a].x[axis] != at[b].x[axis]) return at[a].x[axis] < at[b].x[axis];
     return a < b;
   };
-  std::nth_element(order.begin() + begin, order.begin() + begin + left, order.begin() + end, before);
+  std::nth_element(order.begin() + begin, order.begin() + begin + left, order.begin() + end,
+                   before);
 }
 
 std::vector<Centroid> centroids(const Features& features, const double* x, const Groups& groups) {
@@ -56,9 +58,11 @@ std::vector<Centroid> centroids(const Features& features, const double* x, const
 
 }  // namespace
 
-void FeatureTree::build(const Features& features, const double* x, const Groups& groups, int threads) {
+void FeatureTree::build(const Features& features, const double* x, const Groups& groups,
+                        int threads) {
   arity_ = features.arity;
-  leaves_ = static_cast<std::int32_t>(std::max<std::size_t>(1, (features.size() + fill - 1) / fill));
+  leaves_ =
+      static_cast<std::int32_t>(std::max<std::size_t>(1, (features.size() + fill - 1) / fill));
   const std::size_t n = leaves_;
   ids_.assign(n * lanes, -1);
   vertices_.assign(n * lanes * arity_, -1);
@@ -79,7 +83,8 @@ void FeatureTree::build(const Features& features, const double* x, const Groups&
       for (auto i = level + from; i < level + to; ++i) {
         if (i >= n) {
           for (auto s = begin[i]; s < end[i]; ++s)
-            put(static_cast<std::int32_t>(i - n), static_cast<int>(s - begin[i]), order[s], features);
+            put(static_cast<std::int32_t>(i - n), static_cast<int>(s - begin[i]), order[s],
+                features);
           continue;
         }
         const std::size_t left = (end[i] - begin[i]) * count[2 * i] / count[i];
@@ -159,18 +164,21 @@ void write_lanes(const Row<slots>* rows, int axes, int times, float* block) {
   for (int r = 0; r < times * slots; r += 4) {
     const int t = r / slots;
     for (int lane = 0; lane < lanes; lane += 4) {
-      const auto a = rows[lane].value[r / 4], b = rows[lane + 1].value[r / 4], c = rows[lane + 2].value[r / 4],
-                 d = rows[lane + 3].value[r / 4];
+      const auto a = rows[lane].value[r / 4], b = rows[lane + 1].value[r / 4],
+                 c = rows[lane + 2].value[r / 4], d = rows[lane + 3].value[r / 4];
       const auto ab = __builtin_shufflevector(a, b, 0, 4, 1, 5);
       const auto cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
       const auto later_ab = __builtin_shufflevector(a, b, 2, 6, 3, 7);
       const auto later_cd = __builtin_shufflevector(c, d, 2, 6, 3, 7);
       const typename Row<slots>::Four columns[] = {
           __builtin_shufflevector(ab, cd, 0, 1, 4, 5), __builtin_shufflevector(ab, cd, 2, 3, 6, 7),
-          __builtin_shufflevector(later_ab, later_cd, 0, 1, 4, 5), __builtin_shufflevector(later_ab, later_cd, 2, 3, 6, 7)};
+          __builtin_shufflevector(later_ab, later_cd, 0, 1, 4, 5),
+          __builtin_shufflevector(later_ab, later_cd, 2, 3, 6, 7)};
       for (int j = 0; j < 4; ++j) {
         const int axis = r % slots + j;
-        if (axis < axes) std::memcpy(block + (axis * times + t) * 2 * lanes + lane, columns + j, sizeof columns[j]);
+        if (axis < axes)
+          std::memcpy(block + (axis * times + t) * 2 * lanes + lane, columns + j,
+                      sizeof columns[j]);
       }
     }
   }
@@ -181,7 +189,8 @@ void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
   const std::int32_t* v = vertices(leaf);
   // Vertices lie anywhere in memory: the next leaf's are asked for before they are used.
   if (leaf + 1 < leaves_)
-    for (int i = 0; i < lanes * arity_; ++i) __builtin_prefetch(points.of(std::max(v[lanes * arity_ + i], 0)));
+    for (int i = 0; i < lanes * arity_; ++i)
+      __builtin_prefetch(points.of(std::max(v[lanes * arity_ + i], 0)));
   Row<slots> pad, point, low[lanes], high[lanes], node_low, node_high;
   for (int r = 0; r < 2 * slots; ++r) pad[r] = points.pad()[r % slots];
   node_low.fill(infinity);
@@ -238,8 +247,9 @@ void FeatureTree::refit(const Projection& points, int threads) {
   const std::size_t n = leaves_;
   blocks_.resize(n * block_stride());
   nodes_.resize(2 * n * node_stride());
-  const auto fit = slots_ == 4 ? &FeatureTree::fit_leaf<4>
-                   : slots_ == 8 ? &FeatureTree::fit_leaf<8> : &FeatureTree::fit_leaf<16>;
+  const auto fit = slots_ == 4   ? &FeatureTree::fit_leaf<4>
+                   : slots_ == 8 ? &FeatureTree::fit_leaf<8>
+                                 : &FeatureTree::fit_leaf<16>;
   auto& pool = ThreadPool::shared();
   pool.parallel_for(n, threads, 128, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i) (this->*fit)(static_cast<std::int32_t>(i), points);
@@ -247,9 +257,11 @@ void FeatureTree::refit(const Projection& points, int threads) {
   std::size_t level = 1;
   while (2 * level < n) level *= 2;
   for (; level >= 1 && n > 1; level /= 2)
-    pool.parallel_for(std::min(2 * level, n) - level, threads, 1024, [&](auto begin, auto end, auto) {
-      for (auto i = level + begin; i < level + end; ++i) fit_inner(static_cast<std::int32_t>(i));
-    });
+    pool.parallel_for(std::min(2 * level, n) - level, threads, 1024,
+                      [&](auto begin, auto end, auto) {
+                        for (auto i = level + begin; i < level + end; ++i)
+                          fit_inner(static_cast<std::int32_t>(i));
+                      });
   spread_ = 0;
   for (std::size_t i = n; i < 2 * n; ++i) {
     const float* v = node(static_cast<std::int32_t>(i));
@@ -289,9 +301,11 @@ bool FeatureTree::update(const Features& features, const std::vector<std::int32_
   // A leaf that touches each vertex, for new features to settle near.
   std::vector<std::int32_t> leaf_at;
   if (!missing.empty()) {
-    leaf_at.assign(std::size_t(*std::max_element(features.vertices.begin(), features.vertices.end())) + 1, -1);
+    leaf_at.assign(
+        std::size_t(*std::max_element(features.vertices.begin(), features.vertices.end())) + 1, -1);
     for (std::size_t i = 0; i < vertices_.size(); ++i)
-      if (vertices_[i] >= 0) leaf_at[vertices_[i]] = static_cast<std::int32_t>(i / (lanes * arity_));
+      if (vertices_[i] >= 0)
+        leaf_at[vertices_[i]] = static_cast<std::int32_t>(i / (lanes * arity_));
   }
   std::int32_t near = 0;
   for (const auto id : missing) {

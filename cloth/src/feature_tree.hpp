@@ -1,8 +1,9 @@
 // A bounding-volume tree over the features of a mesh (vertices, edges or faces), 16 to a leaf.
 //
-// The tree is a left-complete binary heap: node 1 is the root, the children of i are 2 i and 2 i + 1, leaf l
-// is node leaves() + l. It is built top-down (median of the centroids along the longest axis), refitted every
-// step, and keeps free slots in its leaves so that features come and go without a rebuild.
+// The tree is a left-complete binary heap: node 1 is the root, the children of i are 2 i and 2 i +
+// 1, leaf l is node leaves() + l. It is built top-down (median of the centroids along the longest
+// axis), refitted every step, and keeps free slots in its leaves so that features come and go
+// without a rebuild.
 #pragma once
 
 #include <cstddef>
@@ -33,13 +34,15 @@ struct Groups {
 
 class FeatureTree {
  public:
-  // Places every feature by the centroid of its vertices in x (n, 3). Groups are split before space is.
+  // Places every feature by the centroid of its vertices in x (n, 3). Groups are split before space
+  // is.
   void build(const Features& features, const double* x, const Groups& groups, int threads);
   // Bounds of every leaf and node for this step.
   void refit(const Projection& points, int threads);
-  // The features are now `features`; old feature i is new_id[i], or gone (-1). New ones go near features
-  // that share their vertices. False where the free slots do not suffice: build again.
-  bool update(const Features& features, const std::vector<std::int32_t>& new_id, const Groups& groups);
+  // The features are now `features`; old feature i is new_id[i], or gone (-1). New ones go near
+  // features that share their vertices. False where the free slots do not suffice: build again.
+  bool update(const Features& features, const std::vector<std::int32_t>& new_id,
+              const Groups& groups);
 
   std::int32_t leaves() const { return leaves_; }
   int times() const { return times_; }
@@ -47,9 +50,15 @@ class FeatureTree {
   int slots() const { return slots_; }
   bool is_leaf(std::int32_t node) const { return node >= leaves_; }
   const float* node(std::int32_t i) const { return nodes_.data() + std::size_t(i) * node_stride(); }
-  const float* block(std::int32_t leaf) const { return blocks_.data() + std::size_t(leaf) * block_stride(); }
-  LeafLanes lanes_of(std::int32_t leaf) const { return {block(leaf), vertices(leaf), arity_, occupied_[leaf]}; }
-  const std::int32_t* ids(std::int32_t leaf) const { return ids_.data() + std::size_t(leaf) * lanes; }
+  const float* block(std::int32_t leaf) const {
+    return blocks_.data() + std::size_t(leaf) * block_stride();
+  }
+  LeafLanes lanes_of(std::int32_t leaf) const {
+    return {block(leaf), vertices(leaf), arity_, occupied_[leaf]};
+  }
+  const std::int32_t* ids(std::int32_t leaf) const {
+    return ids_.data() + std::size_t(leaf) * lanes;
+  }
   // [vertex of the feature][lane]
   const std::int32_t* vertices(std::int32_t leaf) const {
     return vertices_.data() + std::size_t(leaf) * lanes * arity_;
@@ -77,7 +86,8 @@ class FeatureTree {
   std::vector<float> nodes_, blocks_;
   std::vector<std::int32_t> ids_, vertices_, free_;  // free_: empty slots below every node
   std::vector<Mask> occupied_;
-  std::vector<std::uint64_t> members_, partners_;  // groups below a node, groups they meet; modulo 64
+  std::vector<std::uint64_t> members_,
+      partners_;  // groups below a node, groups they meet; modulo 64
 };
 
 }  // namespace tauguard::cloth

@@ -1,9 +1,11 @@
-// Polynomials on [0, 1] with integer coefficients of fixed width, their roots and signs at them: what
-// exact_polynomial.hpp does, for the many queries whose numbers are short and whose roots are simple.
+// Polynomials on [0, 1] with integer coefficients of fixed width, their roots and signs at them:
+// what exact_polynomial.hpp does, for the many queries whose numbers are short and whose roots are
+// simple.
 //
-// A form of degree n is the sum of c_i (1 - t)^(n - i) t^i: Bernstein's basis without its binomials. A product is
-// a convolution, the sign variations of the c_i bound the number of roots in (0, 1) (Descartes), and t -> t / 2
-// keeps integers integers (Vincent). Times are multiples of 2^-52.
+// A form of degree n is the sum of c_i (1 - t)^(n - i) t^i: Bernstein's basis without its
+// binomials. A product is a convolution, the sign variations of the c_i bound the number of roots
+// in (0, 1) (Descartes), and t -> t / 2 keeps integers integers (Vincent). Times are multiples of
+// 2^-52.
 #pragma once
 
 #include <algorithm>
@@ -21,8 +23,9 @@ using geometry::FixedInt;
 constexpr int time_bits = 52;
 constexpr std::int64_t end_of_time = std::int64_t{1} << time_bits;
 
-// 128 bits a degree. With coefficients of degree 1 below 2^117, those of a side of the hull are below 2^236, of the
-// sum of its sides below 2^238, of the cubic below 2^356, and of the remainders below 2^834.
+// 128 bits a degree. With coefficients of degree 1 below 2^117, those of a side of the hull are
+// below 2^236, of the sum of its sides below 2^238, of the cubic below 2^356, and of the remainders
+// below 2^834.
 template <int degree>
 struct Form {
   std::array<FixedInt<2 * degree>, degree + 1> c;
@@ -117,15 +120,16 @@ inline double estimate(const Form<3>& part, int before) {
 inline double estimate(const Form<2>& part, int before) {
   Form<3> raised;
   const auto& c = part.c;
-  raised.c = {FixedInt<6>(c[0]), FixedInt<6>(c[0] + c[1]), FixedInt<6>(c[1] + c[2]), FixedInt<6>(c[2])};
+  raised.c = {FixedInt<6>(c[0]), FixedInt<6>(c[0] + c[1]), FixedInt<6>(c[1] + c[2]),
+              FixedInt<6>(c[2])};
   return estimate(raised, before);
 }
 
-// Adds the roots of f inside (start, start + length), of which `part` is the restriction. Parts are halved five
-// times at most, which the width allows for.
+// Adds the roots of f inside (start, start + length), of which `part` is the restriction. Parts are
+// halved five times at most, which the width allows for.
 template <int degree>
-void add_roots_inside(const Form<degree>& f, const Form<degree>& part, std::int64_t start, std::int64_t length,
-                      FormRoots<degree>& roots) {
+void add_roots_inside(const Form<degree>& f, const Form<degree>& part, std::int64_t start,
+                      std::int64_t length, FormRoots<degree>& roots) {
   const int variations = part.variations();
   if (variations == 0) return;
   if (variations > 1) {
@@ -144,11 +148,15 @@ void add_roots_inside(const Form<degree>& f, const Form<degree>& part, std::int6
   int before = 0;
   for (const auto& c : part.c)
     if (before == 0) before = c.sign();
-  const auto guess = start + static_cast<std::int64_t>(estimate(part, before) * static_cast<double>(length));
+  const auto guess =
+      start + static_cast<std::int64_t>(estimate(part, before) * static_cast<double>(length));
   for (const std::int64_t off : {std::int64_t{2}, std::int64_t{1} << 7, std::int64_t{1} << 14}) {
-    const std::int64_t lo = std::max(guess - off, start), hi = std::min(guess + off, start + length);
-    const int at_lo = lo == start ? before : sign_at(f, lo), at_hi = hi == start + length ? -before : sign_at(f, hi);
-    if (at_lo == 0 || at_hi == 0) return roots.add(at_lo == 0 ? FormRoot<degree>{lo, lo} : FormRoot<degree>{hi, hi});
+    const std::int64_t lo = std::max(guess - off, start),
+                       hi = std::min(guess + off, start + length);
+    const int at_lo = lo == start ? before : sign_at(f, lo),
+              at_hi = hi == start + length ? -before : sign_at(f, hi);
+    if (at_lo == 0 || at_hi == 0)
+      return roots.add(at_lo == 0 ? FormRoot<degree>{lo, lo} : FormRoot<degree>{hi, hi});
     if (at_lo == before && at_hi == -before) return roots.add({lo, hi, &f});
   }
   roots.complete = false;
@@ -171,8 +179,8 @@ Form<degree> reversed(const Form<degree>& f) {
   return r;
 }
 
-// With a positive factor m, m f = q l + r (1 - t)^(n - 1) for a form l and r of degree 1: where q is zero, f has the
-// sign of r. The last coefficient of q must not be zero.
+// With a positive factor m, m f = q l + r (1 - t)^(n - 1) for a form l and r of degree 1: where q
+// is zero, f has the sign of r. The last coefficient of q must not be zero.
 inline std::array<FixedInt<14>, 2> remainder(const Form<3>& f, const Form<2>& q) {
   const auto& [q0, q1, q2] = q.c;
   const auto& [f0, f1, f2, f3] = f.c;
@@ -187,14 +195,18 @@ inline std::array<FixedInt<8>, 2> remainder(const Form<2>& f, const Form<2>& q) 
   return {r0, r1};
 }
 
-// The sign of q at the one root of f in (lo, hi), where q has one root as well, and its own signs at both ends.
+// The sign of q at the one root of f in (lo, hi), where q has one root as well, and its own signs
+// at both ends.
 template <int degree>
-int sign_where_both_change(const Form<2>& q, int at_lo, int at_hi, const Form<degree>& f, std::int64_t lo,
-                           std::int64_t hi) {
+int sign_where_both_change(const Form<2>& q, int at_lo, int at_hi, const Form<degree>& f,
+                           std::int64_t lo, std::int64_t hi) {
   if (q.c[2].sign() == 0)
-    return sign_where_both_change(reversed(q), at_hi, at_lo, reversed(f), end_of_time - hi, end_of_time - lo);
+    return sign_where_both_change(reversed(q), at_hi, at_lo, reversed(f), end_of_time - hi,
+                                  end_of_time - lo);
   const auto [r0, r1] = remainder(f, q);
-  const auto of_r = [&r0 = r0, &r1 = r1](std::int64_t t) { return (r0.times(end_of_time - t) + r1.times(t)).sign(); };
+  const auto of_r = [&r0 = r0, &r1 = r1](std::int64_t t) {
+    return (r0.times(end_of_time - t) + r1.times(t)).sign();
+  };
   const int r_lo = of_r(lo), r_hi = of_r(hi);
   int f_at_q = r_lo;  // the sign of f at the root of q
   if (r_lo == 0 && r_hi == 0) return 0;

@@ -10,7 +10,9 @@ namespace {
 
 using Instant = std::chrono::steady_clock::time_point;
 
-double seconds(Instant from, Instant to) { return std::chrono::duration<double>(to - from).count(); }
+double seconds(Instant from, Instant to) {
+  return std::chrono::duration<double>(to - from).count();
+}
 
 // One collision, and those of one chunk of candidates.
 struct Row {
@@ -29,7 +31,8 @@ struct Place {
   const Row* row;
 };
 
-// By key, a digit at a time from the last (radix sort); digits that are zero in all keys are passed over.
+// By key, a digit at a time from the last (radix sort); digits that are zero in all keys are passed
+// over.
 void sort(std::vector<Place>& places) {
   constexpr int digit = 11;
   std::vector<Place> other(places.size());
@@ -60,7 +63,8 @@ Collisions sorted(const std::vector<Part>& parts) {
   std::vector<Place> places;
   for (const auto& part : parts) {
     for (const auto& row : part.rows)
-      places.push_back({std::uint64_t(std::uint32_t(row.pair[0])) << 32 | std::uint32_t(row.pair[1]), &row});
+      places.push_back(
+          {std::uint64_t(std::uint32_t(row.pair[0])) << 32 | std::uint32_t(row.pair[1]), &row});
     all.stats += part.stats;
     all.narrow_s += part.narrow_s;
   }

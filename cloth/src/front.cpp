@@ -61,8 +61,8 @@ class Walk {
     return {gap >= 0 ? p.a / 2 : p.a, gap <= 0 ? p.b / 2 : p.b};
   }
 
-  // Entries [begin, end) of the old cut. Where all children of a pair stand in a row and the pair itself
-  // is apart, it takes their place.
+  // Entries [begin, end) of the old cut. Where all children of a pair stand in a row and the pair
+  // itself is apart, it takes their place.
   void move(const NodePair* begin, const NodePair* end) {
     while (begin < end) {
       NodePair child[4];
@@ -104,10 +104,12 @@ void append(std::vector<NodePair>& to, const std::vector<NodePair>& from) {
 
 }  // namespace
 
-const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTree& b, int threads) {
+const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTree& b,
+                                           int threads) {
   const std::size_t step = cut_.empty() ? root_grain : kept_grain;
   if (cut_.empty()) {
-    // Split every entry, without looking at the volumes, until it is `first_depth` deep or two leaves.
+    // Split every entry, without looking at the volumes, until it is `first_depth` deep or two
+    // leaves.
     const Walk walk(a, b);
     cut_.push_back({1, 1});
     for (int level = 0; level < first_depth; ++level) {
@@ -125,9 +127,9 @@ const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTr
     }
   }
   std::vector<Walk> walks((cut_.size() + step - 1) / step, Walk(a, b));
-  geometry::ThreadPool::shared().parallel_for(cut_.size(), threads, step, [&](auto begin, auto end, auto c) {
-    walks[c].move(cut_.data() + begin, cut_.data() + end);
-  });
+  geometry::ThreadPool::shared().parallel_for(
+      cut_.size(), threads, step,
+      [&](auto begin, auto end, auto c) { walks[c].move(cut_.data() + begin, cut_.data() + end); });
   cut_.clear();
   leaf_pairs_.clear();
   tests_ = 0;

@@ -24,7 +24,8 @@ struct Binary {
     std::uint64_t bits;
     std::memcpy(&bits, &x, sizeof bits);
     const int field = static_cast<int>(bits >> 52 & 0x7ff);
-    mantissa = static_cast<std::int64_t>((bits & ((std::uint64_t{1} << 52) - 1)) | std::uint64_t{field != 0} << 52);
+    mantissa = static_cast<std::int64_t>((bits & ((std::uint64_t{1} << 52) - 1)) |
+                                         std::uint64_t{field != 0} << 52);
     const int zeros = mantissa ? __builtin_ctzll(mantissa) : 0;
     mantissa >>= zeros;
     exponent = std::max(field, 1) - 1075 + zeros;
@@ -33,9 +34,10 @@ struct Binary {
   int bits() const { return 64 - __builtin_clzll(mantissa < 0 ? -mantissa : mantissa); }
 };
 
-// Coordinates k of four vertices at both ends, [vertex][end], in units of a power of two (each axis its own, which
-// changes neither contact nor its time); false where they do not fit.
-bool on_axis(const double* x0, const double* x1, const std::int32_t* row, int k, FixedInt<2> (*out)[2]) {
+// Coordinates k of four vertices at both ends, [vertex][end], in units of a power of two (each axis
+// its own, which changes neither contact nor its time); false where they do not fit.
+bool on_axis(const double* x0, const double* x1, const std::int32_t* row, int k,
+             FixedInt<2> (*out)[2]) {
   int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
   for (int v = 0; v < 4; ++v)
     for (const double* x : {x0, x1}) {
@@ -62,7 +64,8 @@ class Hull {
  public:
   // The vertices' coordinates as [axis][vertex][end].
   Hull(bool vf, const FixedInt<2> (&x)[3][4][2]) : corners_(vf ? 3 : 4) {
-    constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}}, of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
+    constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}},
+                  of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
     for (int i = 0; i < corners_; ++i) {
       const int* pair = vf ? of_vf[i] : of_ee[i];
       for (int k = 0; k < 3; ++k)
@@ -71,7 +74,8 @@ class Hull {
   }
 
   double first_contact() {
-    const Form<3> cubic = corner_[0][0] * side(1, 0) + corner_[0][1] * side(1, 1) + corner_[0][2] * side(1, 2);
+    const Form<3> cubic =
+        corner_[0][0] * side(1, 0) + corner_[0][1] * side(1, 1) + corner_[0][2] * side(1, 2);
     if (cubic.zero()) return first_contact_in_plane();
     const auto roots = roots_of(cubic);
     return first_of(roots.all.data(), roots.count, roots.complete);
@@ -125,7 +129,8 @@ class Hull {
     for (int i = 0; i < count; ++i) {
       const bool contact = contains_origin(times[i]);
       if (open_) return silent;
-      if (contact && (complete || times[i].lo == 0)) return static_cast<double>(times[i].lo) * 0x1p-52;
+      if (contact && (complete || times[i].lo == 0))
+        return static_cast<double>(times[i].lo) * 0x1p-52;
     }
     return complete ? never : silent;
   }
@@ -146,7 +151,8 @@ class Hull {
       count += roots.count;
       complete = complete && roots.complete;
     }
-    std::sort(times.begin(), times.begin() + count, [](const auto& a, const auto& b) { return a.lo < b.lo; });
+    std::sort(times.begin(), times.begin() + count,
+              [](const auto& a, const auto& b) { return a.lo < b.lo; });
     return first_of(times.data(), count, complete);
   }
 

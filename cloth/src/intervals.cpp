@@ -1,9 +1,10 @@
-// A query is answered by cutting [0, 1] into intervals of time and clearing them, earliest first. An interval
-// is clear where the coplanarity cubic has Bernstein coefficients of one sign on it, or where one direction
-// separates the features at both of its ends (and so in between: the differences are linear in time). Where
-// the cubic changes sign its root is cut out into an interval too small to matter. What cannot be cleared
-// down to a width of 2^-34 is a hit, at the interval's start, where the signs prove it beyond rounding; where
-// they do not, exact arithmetic decides. Never late, never missed, never false.
+// A query is answered by cutting [0, 1] into intervals of time and clearing them, earliest first.
+// An interval is clear where the coplanarity cubic has Bernstein coefficients of one sign on it, or
+// where one direction separates the features at both of its ends (and so in between: the
+// differences are linear in time). Where the cubic changes sign its root is cut out into an
+// interval too small to matter. What cannot be cleared down to a width of 2^-34 is a hit, at the
+// interval's start, where the signs prove it beyond rounding; where they do not, exact arithmetic
+// decides. Never late, never missed, never false.
 #include "intervals.hpp"
 
 #include <algorithm>
@@ -13,8 +14,9 @@
 namespace tauguard::cloth {
 namespace {
 
-// Does m see every gap on one side by more than the distance, at times a and b? Rounding, against |m|_1 big:
-// u of the difference, 3 u of the dot product, 6 u of the interpolation: 10 u, below the 16 u in use.
+// Does m see every gap on one side by more than the distance, at times a and b? Rounding, against
+// |m|_1 big: u of the difference, 3 u of the dot product, 6 u of the interpolation: 10 u, below the
+// 16 u in use.
 bool separated(const Query& k, Vec m, double a, double b) {
   const double m1 = std::fabs(m.x) + std::fabs(m.y) + std::fabs(m.z);
   const double margin = 16 * u * m1 * k.big + k.distance * std::sqrt(dot(m, m)) * (1 + 16 * u);
@@ -52,18 +54,22 @@ double determinant(const Query& k, double t) {
   return dot(mix(k.p[0], k.p[1], t), cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t)));
 }
 
-// Is there contact between times a and b or within 2^-32 of them, whatever rounding did? The cubic changes
-// sign, so that it has a root there, and throughout the origin is inside every edge of the hull of the gaps.
+// Is there contact between times a and b or within 2^-32 of them, whatever rounding did? The cubic
+// changes sign, so that it has a root there, and throughout the origin is inside every edge of the
+// hull of the gaps.
 //
-// With B = big, each component of a mix carries 6 u B (u B of the differences, 5 u B of its own), a determinant
-// of three at most 174 u B^3 < 2^-45 B^3. (g x h) . n with n = q x r is below 12 B^4 and changes at most
-// 96 B^4 a unit of time, half the interval from its middle; rounding adds less than 2^-43 B^4.
+// With B = big, each component of a mix carries 6 u B (u B of the differences, 5 u B of its own), a
+// determinant of three at most 174 u B^3 < 2^-45 B^3. (g x h) . n with n = q x r is below 12 B^4
+// and changes at most 96 B^4 a unit of time, half the interval from its middle; rounding adds less
+// than 2^-43 B^4.
 bool certain(const Query& k, double a, double b, bool vf) {
   a = std::max(0.0, a - 0x1p-32);
   b = std::min(1.0, b + 0x1p-32);
-  const double error = 0x1p-45 * k.big * k.big * k.big, fa = determinant(k, a), fb = determinant(k, b);
+  const double error = 0x1p-45 * k.big * k.big * k.big, fa = determinant(k, a),
+               fb = determinant(k, b);
   if (!((fa > error && fb < -error) || (fa < -error && fb > error))) return false;
-  const double t = 0.5 * (a + b), big2 = k.big * k.big, margin = (64 * (b - a) + 0x1p-43) * big2 * big2;
+  const double t = 0.5 * (a + b), big2 = k.big * k.big,
+               margin = (64 * (b - a) + 0x1p-43) * big2 * big2;
   const Vec n = cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t));
   Vec g[4];
   for (int i = 0; i < k.gaps; ++i) g[i] = mix(k.gap[0][i], k.gap[1][i], t);
@@ -80,13 +86,17 @@ bool certain(const Query& k, double a, double b, bool vf) {
 }  // namespace
 
 double first_contact(const Query& k, bool vf, Stats& stats) {
-  struct Piece { double a, b; Cubic c; };
+  struct Piece {
+    double a, b;
+    Cubic c;
+  };
   const double error = k.cubic_error();
   Piece stack[128];
   int top = 0;
   stack[top++] = {0, 1, cubic(k)};
   const double* c = stack[0].c.b;
-  const bool flat = std::max({std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2]), std::fabs(c[3])}) < error;
+  const bool flat =
+      std::max({std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2]), std::fabs(c[3])}) < error;
   const int most = k.distance > 0 ? 4000 : flat ? 0 : 40;
   for (int count = 0; top > 0; ++count) {
     const Piece piece = stack[--top];
@@ -101,7 +111,8 @@ double first_contact(const Query& k, bool vf, Stats& stats) {
       if (!(crosses && width > 0x1p-30) && edge_direction(k, middle, piece.a, piece.b)) continue;
     }
     if (width < 0x1p-34 || count > most || top > 120)
-      return k.distance > 0 || (width < 0x1p-33 && certain(k, piece.a, piece.b, vf)) ? piece.a : undecided;
+      return k.distance > 0 || (width < 0x1p-33 && certain(k, piece.a, piece.b, vf)) ? piece.a
+                                                                                     : undecided;
     Piece left, right;
     if (crosses) {
       const double x = root(b), delta = 0x1p-37 / width;
@@ -111,14 +122,21 @@ double first_contact(const Query& k, bool vf, Stats& stats) {
         Piece rest, near;
         halve(piece.c, lo, left.c, rest.c);
         halve(rest.c, (hi - lo) / (1 - lo), near.c, right.c);
-        left.a = piece.a; left.b = near.a = piece.a + lo * width;
-        near.b = right.a = piece.a + hi * width; right.b = piece.b;
-        stack[top++] = right; stack[top++] = near; stack[top++] = left;
+        left.a = piece.a;
+        left.b = near.a = piece.a + lo * width;
+        near.b = right.a = piece.a + hi * width;
+        right.b = piece.b;
+        stack[top++] = right;
+        stack[top++] = near;
+        stack[top++] = left;
         continue;
       }
     }
     const double cut = piece.a + s * width;
-    left.a = piece.a; left.b = cut; right.a = cut; right.b = piece.b;
+    left.a = piece.a;
+    left.b = cut;
+    right.a = cut;
+    right.b = piece.b;
     halve(piece.c, s, left.c, right.c);
     stack[top++] = right;
     stack[top++] = left;

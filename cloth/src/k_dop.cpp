@@ -20,7 +20,7 @@ using geometry::ThreadPool;
 constexpr std::int8_t all_axes[13][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 0},  {1, 0, 1},
                                          {0, 1, 1},  {1, -1, 0}, {1, 0, -1}, {0, 1, -1}, {1, 1, 1},
                                          {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
-constexpr std::int8_t corner_axes[7][3] = {{1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 1},
+constexpr std::int8_t corner_axes[7][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 1},
                                            {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
 constexpr std::size_t grain = 4096;
 
@@ -33,7 +33,8 @@ Aabb bounds(const double* x_t0, const double* x_t1, std::size_t n, int threads) 
       part.add(x_t0 + 3 * i);
       part.add(x_t1 + 3 * i);
     }
-    const std::lock_guard<std::mutex> lock(mutex);  // minima and maxima: any order gives the same box
+    const std::lock_guard<std::mutex> lock(
+        mutex);  // minima and maxima: any order gives the same box
     all.add(part);
   });
   return all;
@@ -49,9 +50,15 @@ double shrink(double size) {
 
 const std::int8_t (*axes_of(int k))[3] {
   switch (k) {
-    case 6: case 16: case 18: case 26: return all_axes;
-    case 14: return corner_axes;
-    default: throw std::invalid_argument("k_dop" + std::to_string(k) + ": k is 6, 14, 16, 18 or 26");
+    case 6:
+    case 16:
+    case 18:
+    case 26:
+      return all_axes;
+    case 14:
+      return corner_axes;
+    default:
+      throw std::invalid_argument("k_dop" + std::to_string(k) + ": k is 6, 14, 16, 18 or 26");
   }
 }
 
@@ -77,9 +84,10 @@ void Projection::set(const double* x_t0, const double* x_t1, std::size_t n, Volu
 
   for (int a = 0; a < axes; ++a) {
     const int terms = std::abs(axis[a][0]) + std::abs(axis[a][1]) + std::abs(axis[a][2]);
-    // |axis| / 2^(terms - 1), times half of the distance in scaled units; a product that is too large for
-    // float32 becomes infinite: nothing is apart then, which is conservative.
-    const double margin = 0.5 * min_distance * first * second * std::sqrt(double(terms)) / (1 << (terms - 1));
+    // |axis| / 2^(terms - 1), times half of the distance in scaled units; a product that is too
+    // large for float32 becomes infinite: nothing is apart then, which is conservative.
+    const double margin =
+        0.5 * min_distance * first * second * std::sqrt(double(terms)) / (1 << (terms - 1));
     const double padded = margin * (1 + 0x1p-20) + 0x1p-22;
     pad_[a] = padded < 1e30 ? static_cast<float>(padded) : std::numeric_limits<float>::infinity();
   }

@@ -1,5 +1,6 @@
-// Four doubles side by side, by the compiler's vector types: the same source is compiled for the baseline and,
-// by target attributes, for wider units. No contraction, no reassociation: the same bits from each.
+// Four doubles side by side, by the compiler's vector types: the same source is compiled for the
+// baseline and, by target attributes, for wider units. No contraction, no reassociation: the same
+// bits from each.
 #pragma once
 
 #include <cstdint>
@@ -29,14 +30,17 @@ TAUGUARD_INLINE unsigned bits(Choice c) {
   return unsigned(x[0] | x[1] | x[2] | x[3]);
 }
 
-// How many bits of a mask of 16 (the builtin is a call where the processor's own instruction may be missing).
+// How many bits of a mask of 16 (the builtin is a call where the processor's own instruction may be
+// missing).
 TAUGUARD_INLINE unsigned count_of(unsigned x) {
   x -= x >> 1 & 0x5555;
   x = (x & 0x3333) + (x >> 2 & 0x3333);
   return (((x + (x >> 4)) & 0x0f0f) * 0x0101) >> 8 & 0x1f;
 }
 
-struct Wide3 { Wide x, y, z; };
+struct Wide3 {
+  Wide x, y, z;
+};
 TAUGUARD_INLINE Wide3 operator+(Wide3 a, Wide3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 TAUGUARD_INLINE Wide3 operator-(Wide3 a, Wide3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 TAUGUARD_INLINE Wide3 operator*(Wide s, Wide3 a) { return {s * a.x, s * a.y, s * a.z}; }

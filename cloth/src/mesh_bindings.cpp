@@ -58,7 +58,8 @@ struct Mesh {
 std::vector<std::int32_t> sorted_candidates(MeshCcd& ccd, MeshCcd::Kind kind) {
   std::vector<std::vector<std::uint64_t>> parts(ccd.chunks(kind));
   ccd.for_each_block(kind, [&](const CandidateBlock& block, std::size_t chunk) {
-    for (std::size_t i = 0; i < block.size; ++i) parts[chunk].push_back(key_of(&block.pairs[2 * i]));
+    for (std::size_t i = 0; i < block.size; ++i)
+      parts[chunk].push_back(key_of(&block.pairs[2 * i]));
   });
   std::vector<std::uint64_t> keys;
   for (const auto& part : parts) keys.insert(keys.end(), part.begin(), part.end());
@@ -111,8 +112,8 @@ nb::tuple candidates(Mesh& mesh, Positions x_t0, Positions x_t1, double min_dist
     bytes = mesh.ccd.bytes();
   }
   const std::size_t n_vf = vf.size() / 2, n_ee = ee.size() / 2;
-  return nb::make_tuple(array_of<Pairs>(std::move(vf), {n_vf, 2}), array_of<Pairs>(std::move(ee), {n_ee, 2}),
-                        stats_of(broad, bytes));
+  return nb::make_tuple(array_of<Pairs>(std::move(vf), {n_vf, 2}),
+                        array_of<Pairs>(std::move(ee), {n_ee, 2}), stats_of(broad, bytes));
 }
 
 void add_counts(nb::dict& d, const Stats& s) {
@@ -142,7 +143,8 @@ nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
   return d;
 }
 
-nb::tuple find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double min_distance, bool fresh) {
+nb::tuple find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double min_distance,
+               bool fresh) {
   Collisions vf, ee;
   BroadStats broad;
   std::size_t bytes = 0;
@@ -161,7 +163,8 @@ nb::tuple find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double mi
   seconds["ee"] = ee.total_s;
   seconds["vf_narrow"] = vf.narrow_s;
   seconds["ee_narrow"] = ee.narrow_s;
-  return nb::make_tuple(arrays_of(std::move(vf), broad.vf), arrays_of(std::move(ee), broad.ee), stats);
+  return nb::make_tuple(arrays_of(std::move(vf), broad.vf), arrays_of(std::move(ee), broad.ee),
+                        stats);
 }
 
 nb::dict update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
@@ -184,8 +187,8 @@ nb::dict update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
 
 NB_MODULE(_mesh, m) {
   nb::class_<Mesh>(m, "Mesh")
-      .def(nb::init<Faces, Ids, Table, int, bool, int>(), nb::arg("faces"), nb::arg("ids"), nb::arg("meets"),
-           nb::arg("k"), nb::arg("moving"), nb::arg("threads"))
+      .def(nb::init<Faces, Ids, Table, int, bool, int>(), nb::arg("faces"), nb::arg("ids"),
+           nb::arg("meets"), nb::arg("k"), nb::arg("moving"), nb::arg("threads"))
       .def("edges",
            [](const Mesh& mesh) {
              auto list = mesh.ccd.topology().edges.vertices;
@@ -194,50 +197,60 @@ NB_MODULE(_mesh, m) {
            })
       .def("candidates", &candidates, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("min_distance"),
            nb::arg("fresh"))
-      .def("find", &find, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("method"), nb::arg("min_distance"),
-           nb::arg("fresh"))
+      .def("find", &find, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("method"),
+           nb::arg("min_distance"), nb::arg("fresh"))
       .def("update_topology", &update_topology, nb::arg("faces"), nb::arg("ids"), nb::arg("meets"));
-  m.def("solve", [](bool vf, Positions x_t0, Positions x_t1,
-                    nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu> rows, int method, double min_distance,
-                      nb::ndarray<std::uint8_t, nb::shape<-1>, nb::c_contig> hit,
-                      nb::ndarray<double, nb::shape<-1>, nb::c_contig> toi,
-                      nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> point,
-                      nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> normal,
-                      nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig> weights) {
-    Stats stats;
-    {
-      const nb::gil_scoped_release release;
-      const tauguard::geometry::RoundToNearest guard;
-      Projection points;
-      AxisFilter axes;
-      constexpr std::size_t pays = 4;  // queries a vertex: one costs 18 ns to project, a query saves 6
-      if (Method(method) == Method::ab2pf && min_distance == 0 && rows.shape(0) >= pays * x_t0.shape(0)) {
-        points.set(x_t0.data(), x_t1.data(), x_t0.shape(0), seven_axes, 0, 1);
-        axes.points = &points;
-      }
-      (vf ? solve_vf : solve_ee)(x_t0.data(), x_t1.data(), rows.data(), rows.shape(0), Method(method), min_distance,
-                                 hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
-    }
-    nb::dict counts;
-    add_counts(counts, stats);
-    return counts;
-  });
-  // For tests: the narrow phase's kernels from now on ("portable", "avx2"); another name: the fastest again.
-  m.def("force_batch_kernels", [](const std::string& name) { return force_batch_kernels(name.c_str()); },
-        nb::arg("name"));
-  // For tests: of two leaves, the lanes that each row meets, then how many share a vertex with theirs; by the named
-  // variant, empty where it cannot run here.
-  m.def("leaf_pair", [](const std::string& variant, nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,
+  m.def("solve",
+        [](bool vf, Positions x_t0, Positions x_t1,
+           nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu> rows,
+           int method, double min_distance,
+           nb::ndarray<std::uint8_t, nb::shape<-1>, nb::c_contig> hit,
+           nb::ndarray<double, nb::shape<-1>, nb::c_contig> toi,
+           nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> point,
+           nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> normal,
+           nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig> weights) {
+          Stats stats;
+          {
+            const nb::gil_scoped_release release;
+            const tauguard::geometry::RoundToNearest guard;
+            Projection points;
+            AxisFilter axes;
+            constexpr std::size_t pays =
+                4;  // queries a vertex: one costs 18 ns to project, a query saves 6
+            if (Method(method) == Method::ab2pf && min_distance == 0 &&
+                rows.shape(0) >= pays * x_t0.shape(0)) {
+              points.set(x_t0.data(), x_t1.data(), x_t0.shape(0), seven_axes, 0, 1);
+              axes.points = &points;
+            }
+            (vf ? solve_vf : solve_ee)(
+                x_t0.data(), x_t1.data(), rows.data(), rows.shape(0), Method(method), min_distance,
+                hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
+          }
+          nb::dict counts;
+          add_counts(counts, stats);
+          return counts;
+        });
+  // For tests: the narrow phase's kernels from now on ("portable", "avx2"); another name: the
+  // fastest again.
+  m.def(
+      "force_batch_kernels",
+      [](const std::string& name) { return force_batch_kernels(name.c_str()); }, nb::arg("name"));
+  // For tests: of two leaves, the lanes that each row meets, then how many share a vertex with
+  // theirs; by the named variant, empty where it cannot run here.
+  m.def("leaf_pair", [](const std::string& variant,
+                        nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,
                         nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> b,
                         nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_a,
-                        nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_b, bool same) {
+                        nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_b,
+                        bool same) {
     const OverlapKernels* kernels = overlap_kernels(variant.c_str());
     std::vector<std::int32_t> found;
     if (kernels) {
       Overlaps out;
-      kernels->leaf_pair({a.data(), vertices_a.data(), static_cast<int>(vertices_a.shape(0)), 0xffff},
-                         {b.data(), vertices_b.data(), static_cast<int>(vertices_b.shape(0)), 0xffff},
-                         static_cast<int>(a.shape(0)), static_cast<int>(a.shape(1)), same, out);
+      kernels->leaf_pair(
+          {a.data(), vertices_a.data(), static_cast<int>(vertices_a.shape(0)), 0xffff},
+          {b.data(), vertices_b.data(), static_cast<int>(vertices_b.shape(0)), 0xffff},
+          static_cast<int>(a.shape(0)), static_cast<int>(a.shape(1)), same, out);
       for (int i = 0; i < lanes; ++i) found.push_back(out.rows >> i & 1 ? out.lanes_of[i] : 0);
       found.push_back(static_cast<std::int32_t>(out.adjacent));
     }

@@ -8,7 +8,7 @@
 namespace tauguard::cloth {
 namespace {
 
-constexpr std::size_t chunk_pairs = 512;   // leaf pairs of a chunk
+constexpr std::size_t chunk_pairs = 512;  // leaf pairs of a chunk
 // Trees are built anew where the leaves have spread this much wider than when they were built.
 constexpr double worn = 2;
 
@@ -144,7 +144,8 @@ TopologyChange MeshCcd::update_topology(std::vector<std::int32_t> faces, Groups 
 }
 
 std::size_t MeshCcd::bytes() const {
-  const std::size_t lists = topology_.vertices.vertices.capacity() + topology_.edges.vertices.capacity() +
+  const std::size_t lists = topology_.vertices.vertices.capacity() +
+                            topology_.edges.vertices.capacity() +
                             topology_.faces.vertices.capacity() + groups_.of_vertex.capacity();
   return lists * sizeof(std::int32_t) + points_.bytes() + vertices_.bytes() + edges_.bytes() +
          faces_.bytes() + vf_front_.bytes() + ee_front_.bytes();

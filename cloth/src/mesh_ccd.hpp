@@ -1,5 +1,5 @@
-// Continuous collision detection of a deforming mesh with itself: the broad phase kept between steps and
-// the narrow phase on what it leaves.
+// Continuous collision detection of a deforming mesh with itself: the broad phase kept between
+// steps and the narrow phase on what it leaves.
 #pragma once
 
 #include <array>
@@ -17,7 +17,8 @@ namespace tauguard::cloth {
 
 // One kind of query (vertex-face or edge-edge) in the last step.
 struct BroadCounts {
-  std::uint64_t node_tests = 0, front = 0, leaf_pairs = 0, candidates = 0, adjacent = 0, kept_apart = 0;
+  std::uint64_t node_tests = 0, front = 0, leaf_pairs = 0, candidates = 0, adjacent = 0,
+                kept_apart = 0;
 };
 
 struct BroadStats {
@@ -41,10 +42,13 @@ class MeshCcd {
   int threads() const { return threads_; }
   VolumeKind volume() const { return volume_; }
 
-  // Trees, volumes and fronts for this step. fresh: descend from the root instead of the last front.
-  void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance, bool fresh);
-  // After prepare: hands the candidates of one kind to `take(block, chunk)`, from several threads; a chunk
-  // is always the same candidates, taken in the same order, and comes in blocks of some thousand.
+  // Trees, volumes and fronts for this step. fresh: descend from the root instead of the last
+  // front.
+  void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance,
+               bool fresh);
+  // After prepare: hands the candidates of one kind to `take(block, chunk)`, from several threads;
+  // a chunk is always the same candidates, taken in the same order, and comes in blocks of some
+  // thousand.
   using Take = std::function<void(const CandidateBlock&, std::size_t)>;
   std::size_t chunks(Kind kind) const;
   void for_each_block(Kind kind, const Take& take);

@@ -1,7 +1,8 @@
-// Queries are answered in batches. Most have a coplanarity cubic without a root. The time of the others is split
-// into pieces of one root each (Descartes' rule in Bernstein form, which is Vincent's), and at each root, earliest
-// first, the features touch or not, beyond rounding and beyond what the root's own error can change. What that
-// leaves open goes through intervals.hpp, and what those leave open through exact.hpp.
+// Queries are answered in batches. Most have a coplanarity cubic without a root. The time of the
+// others is split into pieces of one root each (Descartes' rule in Bernstein form, which is
+// Vincent's), and at each root, earliest first, the features touch or not, beyond rounding and
+// beyond what the root's own error can change. What that leaves open goes through intervals.hpp,
+// and what those leave open through exact.hpp.
 #include "narrow_phase.hpp"
 
 #include <algorithm>
@@ -18,15 +19,19 @@
 namespace tauguard::cloth {
 namespace {
 
-constexpr int batch = 128, block = 512;  // queries at a time, after and before those apart on an axis are left out
+constexpr int batch = 128,
+              block =
+                  512;  // queries at a time, after and before those apart on an axis are left out
 constexpr double never = std::numeric_limits<double>::infinity();
 
-Vec at(const double* x0, const double* x1, std::int32_t v, double t) { return mix(load(x0, v), load(x1, v), t); }
+Vec at(const double* x0, const double* x1, std::int32_t v, double t) {
+  return mix(load(x0, v), load(x1, v), t);
+}
 
 // Where, along which normal and with which weights the two features meet at time t.
 template <bool vf>
-void describe(const double* x0, const double* x1, const std::int32_t* row, double t, ImpactArrays out,
-              std::size_t i) {
+void describe(const double* x0, const double* x1, const std::int32_t* row, double t,
+              ImpactArrays out, std::size_t i) {
   const Vec a = at(x0, x1, row[0], t), b = at(x0, x1, row[1], t), c = at(x0, x1, row[2], t),
             d = at(x0, x1, row[3], t);
   const Vec q = vf ? c - b : b - a, r = vf ? d - b : d - c, p = vf ? a - b : c - a;
@@ -35,7 +40,8 @@ void describe(const double* x0, const double* x1, const std::int32_t* row, doubl
   double* w = out.weights + 4 * i;
   Vec point = a;
   if (vf) {
-    const double v1 = nn > 0 ? dot(cross(p, r), n) / nn : 0, v2 = nn > 0 ? dot(cross(q, p), n) / nn : 0;
+    const double v1 = nn > 0 ? dot(cross(p, r), n) / nn : 0,
+                 v2 = nn > 0 ? dot(cross(q, p), n) / nn : 0;
     w[0] = 1;
     w[2] = std::clamp(v1, 0.0, 1.0);
     w[3] = std::clamp(v2, 0.0, 1.0 - w[2]);
@@ -62,10 +68,12 @@ bool one_root(const double* b, double error) {
   return s * b[0] > error && s * b[3] < -error && (s * b[1] > error || s * b[2] < -error);
 }
 
-// Where to cut a cubic for pieces of one root: ends on one side, at the extremum towards the other (where the
-// derivative turns to their side); else at the inflection, on either side of which there are two at most.
+// Where to cut a cubic for pieces of one root: ends on one side, at the extremum towards the other
+// (where the derivative turns to their side); else at the inflection, on either side of which there
+// are two at most.
 double cut_of(const double* b) {
-  const double s = b[0] > 0 ? 1 : -1, d0 = s * (b[1] - b[0]), d1 = s * (b[2] - b[1]), d2 = s * (b[3] - b[2]);
+  const double s = b[0] > 0 ? 1 : -1, d0 = s * (b[1] - b[0]), d1 = s * (b[2] - b[1]),
+               d2 = s * (b[3] - b[2]);
   const double a = d0 - 2 * d1 + d2, h = d1 - d0;
   double cut = -h / a;
   if (s * b[3] > 0) {
@@ -75,10 +83,14 @@ double cut_of(const double* b) {
   return cut > 0x1p-20 && cut < 1 - 0x1p-20 ? cut : 0.5;
 }
 
-// Pieces with one root each that hold every root of the cubic, in order; -1 where rounding leaves that open.
-// At most three cuts in a row, which the error allows for.
+// Pieces with one root each that hold every root of the cubic, in order; -1 where rounding leaves
+// that open. At most three cuts in a row, which the error allows for.
 int split(const double* b, double error, std::int32_t query, Piece* pieces) {
-  struct Part { double start, length; Cubic c; int cuts; } stack[8];
+  struct Part {
+    double start, length;
+    Cubic c;
+    int cuts;
+  } stack[8];
   stack[0] = {0, 1, {{b[0], b[1], b[2], b[3]}}, 0};
   int count = 0;
   for (int top = 1; top > 0;) {
@@ -110,7 +122,8 @@ double exactly(const double* x0, const double* x1, const std::int32_t* row, Stat
 
 // The rest, one by one: by intervals, then exactly.
 template <bool vf>
-double resolve(const double* x0, const double* x1, const std::int32_t* row, double distance, Stats& stats) {
+double resolve(const double* x0, const double* x1, const std::int32_t* row, double distance,
+               Stats& stats) {
   ++stats.resolved;
   const double t = first_contact(make<vf>(x0, x1, row, distance), vf, stats);
   return std::isnan(t) ? exactly<vf>(x0, x1, row, stats) : t;
@@ -126,7 +139,8 @@ struct Batch {
   int count = 0, left = 0;  // pieces; queries that stay open
 };
 
-// Pieces of all queries that may have contact, those of one piece first; returns how many these are.
+// Pieces of all queries that may have contact, those of one piece first; returns how many these
+// are.
 int make_pieces(Batch& b, int n, Stats& stats) {
   std::uint8_t rest[batch / width];
   const int groups = (n + width - 1) / width;
@@ -152,7 +166,8 @@ int make_pieces(Batch& b, int n, Stats& stats) {
       double c[4];
       for (int j = 0; j < 4; ++j) c[j] = group.value[Group::cubic + j][lane];
       const bool odd = group.odd >> lane & 1;
-      const int found = odd ? -1 : split(c, group.value[Group::error][lane], query, b.pieces + b.count);
+      const int found =
+          odd ? -1 : split(c, group.value[Group::error][lane], query, b.pieces + b.count);
       if (found < 0) b.open[b.left++] = query;
       if (found == 0) ++stats.cubic_sign;
       b.count += std::max(found, 0);
@@ -162,7 +177,8 @@ int make_pieces(Batch& b, int n, Stats& stats) {
 
 // One batch: the time of contact of each query, or `never`.
 template <bool vf>
-void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, double* toi, Stats& stats) {
+void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, double* toi,
+           Stats& stats) {
   static thread_local Batch b;
   const BatchKernels& kernels = batch_kernels();
   b.count = b.left = 0;
@@ -173,13 +189,15 @@ void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, 
   for (int i = 0; i < single; ++i) {
     toi[b.pieces[i].query] = b.outcome[i] == Outcome::contact ? b.at[i] : never;
     stats.roots += b.outcome[i] == Outcome::clear;
-    if (b.outcome[i] == Outcome::edge) toi[b.pieces[i].query] = exactly<vf>(x0, x1, rows + 4 * b.pieces[i].query, stats);
+    if (b.outcome[i] == Outcome::edge)
+      toi[b.pieces[i].query] = exactly<vf>(x0, x1, rows + 4 * b.pieces[i].query, stats);
     if (b.outcome[i] == Outcome::unknown) b.open[b.left++] = b.pieces[i].query;
   }
   for (int i = single; i < b.count;) {
     const std::int32_t query = b.pieces[i].query;
     int first = i;  // the first piece that is not clear
-    while (first < b.count && b.pieces[first].query == query && b.outcome[first] == Outcome::clear) ++first;
+    while (first < b.count && b.pieces[first].query == query && b.outcome[first] == Outcome::clear)
+      ++first;
     if (first == b.count || b.pieces[first].query != query) {
       ++stats.roots;
     } else if (b.outcome[first] == Outcome::contact) {
@@ -191,13 +209,14 @@ void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, 
     }
     while (i < b.count && b.pieces[i].query == query) ++i;
   }
-  for (int i = 0; i < b.left; ++i) toi[b.open[i]] = resolve<vf>(x0, x1, rows + 4 * b.open[i], 0, stats);
+  for (int i = 0; i < b.left; ++i)
+    toi[b.open[i]] = resolve<vf>(x0, x1, rows + 4 * b.open[i], 0, stats);
 }
 
 // A block: what no axis keeps apart goes on in batches.
 template <bool vf>
-void in_batches(const double* x0, const double* x1, const std::int32_t* rows, int n, AxisFilter axes, double* toi,
-                Stats& stats) {
+void in_batches(const double* x0, const double* x1, const std::int32_t* rows, int n,
+                AxisFilter axes, double* toi, Stats& stats) {
   if (!axes.look) {
     for (int first = 0; first < n; first += batch)
       ab2pf<vf>(x0, x1, rows + 4 * first, std::min(batch, n - first), toi + first, stats);
@@ -205,8 +224,9 @@ void in_batches(const double* x0, const double* x1, const std::int32_t* rows, in
   }
   std::int32_t left[block], part[4 * batch];
   double found[batch];
-  const int count = axes.points ? batch_kernels().not_apart_on_seven(vf, axes.points->of(0), rows, n, left)
-                                : batch_kernels().not_apart(vf, x0, x1, rows, n, left);
+  const int count = axes.points
+                        ? batch_kernels().not_apart_on_seven(vf, axes.points->of(0), rows, n, left)
+                        : batch_kernels().not_apart(vf, x0, x1, rows, n, left);
   stats.axes += n - count;
   std::fill(toi, toi + n, never);
   for (int first = 0; first < count; first += batch) {
@@ -233,7 +253,9 @@ void one_by_one(const double* x0, const double* x1, const std::int32_t* rows, in
 }
 
 Query query_of(const Group& g, int lane) {
-  const auto vector = [&](int f) { return Vec{g.value[f][lane], g.value[f + 1][lane], g.value[f + 2][lane]}; };
+  const auto vector = [&](int f) {
+    return Vec{g.value[f][lane], g.value[f + 1][lane], g.value[f + 2][lane]};
+  };
   Query k{};
   for (int e = 0; e < 2; ++e) {
     k.p[e] = vector(Group::p + 3 * e);
@@ -245,8 +267,8 @@ Query query_of(const Group& g, int lane) {
 
 // The comparators, on the same differences and cubics.
 template <bool vf>
-void compare(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method, double* toi,
-             Stats& stats) {
+void compare(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method,
+             double* toi, Stats& stats) {
   static thread_local Group groups[block / width];
   batch_kernels().gather(vf, x0, x1, rows, n, groups);
   for (int i = 0; i < n; ++i) {
@@ -265,8 +287,9 @@ void compare(const double* x0, const double* x1, const std::int32_t* rows, int n
 }
 
 template <bool vf>
-void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n, Method method,
-           double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats, AxisFilter axes) {
+void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n,
+           Method method, double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats,
+           AxisFilter axes) {
   double toi[block];
   for (std::size_t first = 0; first < n; first += block) {
     const int count = static_cast<int>(std::min<std::size_t>(block, n - first));
@@ -288,12 +311,14 @@ void solve(const double* x0, const double* x1, const std::int32_t* rows, std::si
 }
 }  // namespace
 
-void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, AxisFilter axes) {
+void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n,
+              Method method, double min_distance, std::uint8_t* hit, ImpactArrays impacts,
+              Stats& stats, AxisFilter axes) {
   solve<true>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, axes);
 }
-void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, AxisFilter axes) {
+void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n,
+              Method method, double min_distance, std::uint8_t* hit, ImpactArrays impacts,
+              Stats& stats, AxisFilter axes) {
   solve<false>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, axes);
 }
 }  // namespace tauguard::cloth

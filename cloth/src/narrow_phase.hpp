@@ -1,4 +1,5 @@
-// Vertex-face and edge-edge queries: does a moving vertex meet a moving face, do two moving edges meet?
+// Vertex-face and edge-edge queries: does a moving vertex meet a moving face, do two moving edges
+// meet?
 #pragma once
 
 #include <cstddef>
@@ -8,21 +9,22 @@
 
 namespace tauguard::cloth {
 
-// ab2pf is right and so is exact, its reference in exact arithmetic throughout; the others are comparators
-// (comparators.hpp). Only ab2pf knows a minimum distance, where it is conservative.
+// ab2pf is right and so is exact, its reference in exact arithmetic throughout; the others are
+// comparators (comparators.hpp). Only ab2pf knows a minimum distance, where it is conservative.
 enum class Method : int { ab2pf = 0, naive, iccd, dnf, scd, vcd, exact };
 
-// Row i is written where hit[i] is not 0. Weights are those of the four vertices of the row: (1, w of the
-// face's vertices), or (1 - s, s, 1 - t, t) of the two edges.
+// Row i is written where hit[i] is not 0. Weights are those of the four vertices of the row: (1, w
+// of the face's vertices), or (1 - s, s, 1 - t, t) of the two edges.
 struct ImpactArrays {
   double *toi, *point, *normal, *weights;  // (n), (n, 3), (n, 3), (n, 4)
 };
 
-// How many queries each filter removed (apart on an axis; no root of the cubic; no contact at its roots); how many were resolved
-// one by one and cut into how many intervals of time; how many exact arithmetic decided, and of these with numbers of
-// any length.
+// How many queries each filter removed (apart on an axis; no root of the cubic; no contact at its
+// roots); how many were resolved one by one and cut into how many intervals of time; how many exact
+// arithmetic decided, and of these with numbers of any length.
 struct Stats {
-  std::uint64_t axes = 0, cubic_sign = 0, roots = 0, resolved = 0, intervals = 0, exact = 0, long_exact = 0;
+  std::uint64_t axes = 0, cubic_sign = 0, roots = 0, resolved = 0, intervals = 0, exact = 0,
+                long_exact = 0;
   Stats& operator+=(const Stats& o) {
     axes += o.axes;
     cubic_sign += o.cubic_sign;
@@ -35,19 +37,22 @@ struct Stats {
   }
 };
 
-// How ab2pf first leaves out queries that an axis keeps apart at both ends of the step: by comparing x, y and z; by
-// `points` of the same positions on `seven_axes` (apart.hpp), which pays from a few queries a vertex on; or not at
-// all, where the broad phase has. What is left is answered the same whichever it is.
+// How ab2pf first leaves out queries that an axis keeps apart at both ends of the step: by
+// comparing x, y and z; by `points` of the same positions on `seven_axes` (apart.hpp), which pays
+// from a few queries a vertex on; or not at all, where the broad phase has. What is left is
+// answered the same whichever it is.
 struct AxisFilter {
   bool look = true;
   const Projection* points = nullptr;
 };
 
-// rows: (n, 4) indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge. Callable from several threads.
-// Needs round-to-nearest.
-void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, AxisFilter axes);
-void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n, Method method,
-              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats, AxisFilter axes);
+// rows: (n, 4) indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge. Callable from
+// several threads. Needs round-to-nearest.
+void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n,
+              Method method, double min_distance, std::uint8_t* hit, ImpactArrays impacts,
+              Stats& stats, AxisFilter axes);
+void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n,
+              Method method, double min_distance, std::uint8_t* hit, ImpactArrays impacts,
+              Stats& stats, AxisFilter axes);
 
 }  // namespace tauguard::cloth

@@ -34,18 +34,20 @@ struct Remaining {
   }
 };
 
-TAUGUARD_INLINE Mask apart_portable(const float* row, RowStride s, const float* b, int axes, int times,
-                                    Mask wanted) {
+TAUGUARD_INLINE Mask apart_portable(const float* row, RowStride s, const float* b, int axes,
+                                    int times, Mask wanted) {
   std::int32_t apart[lanes] = {};
   for (int k = 0; k < axes; ++k, row += s.axis, b += 2 * lanes * times) {
     if (times == 1) {
       const float low = row[0], high = row[s.side];
       for (int i = 0; i < lanes; ++i) apart[i] |= -((high < b[i]) | (b[lanes + i] < low));
     } else {
-      const float low0 = row[0], high0 = row[s.side], low1 = row[s.end], high1 = row[s.end + s.side];
+      const float low0 = row[0], high0 = row[s.side], low1 = row[s.end],
+                  high1 = row[s.end + s.side];
       const float* c = b + 2 * lanes;
       for (int i = 0; i < lanes; ++i)
-        apart[i] |= -(((high0 < b[i]) & (high1 < c[i])) | ((b[lanes + i] < low0) & (c[lanes + i] < low1)));
+        apart[i] |=
+            -(((high0 < b[i]) & (high1 < c[i])) | ((b[lanes + i] < low0) & (c[lanes + i] < low1)));
     }
   }
   Mask mask = 0;
@@ -54,7 +56,7 @@ TAUGUARD_INLINE Mask apart_portable(const float* row, RowStride s, const float* 
 }
 
 Mask node_portable(const float* node, int slots, const float* block, int axes, int times,
-                         Mask wanted) {
+                   Mask wanted) {
   return apart_portable(node, in_node(slots), block, axes, times, wanted);
 }
 // The lanes of b that share a vertex with one lane of a.
@@ -62,16 +64,19 @@ Mask sharing_portable(const LeafLanes& a, int row, const LeafLanes& b) {
   std::int32_t equal[lanes] = {};
   for (int j = 0; j < a.arity; ++j)
     for (int k = 0; k < b.arity; ++k)
-      for (int i = 0; i < lanes; ++i) equal[i] |= a.vertices[j * lanes + row] == b.vertices[k * lanes + i];
+      for (int i = 0; i < lanes; ++i)
+        equal[i] |= a.vertices[j * lanes + row] == b.vertices[k * lanes + i];
   Mask mask = 0;
   for (int i = 0; i < lanes; ++i) mask |= Mask(equal[i]) << i;
   return mask;
 }
 
-void pair_portable(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same, Overlaps& out) {
+void pair_portable(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
+                   Overlaps& out) {
   for (Mask rows = a.occupied; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
-    const Mask all = apart_portable(a.block + row, in_block(times), b.block, axes, times, lanes_after(same, row, b));
+    const Mask all = apart_portable(a.block + row, in_block(times), b.block, axes, times,
+                                    lanes_after(same, row, b));
     const Mask shared = all ? all & sharing_portable(a, row, b) : 0;
     out.adjacent += count_of(shared);
     out.set(row, all & ~shared);
@@ -81,19 +86,22 @@ void pair_portable(const LeafLanes& a, const LeafLanes& b, int axes, int times, 
 #if defined(__x86_64__)
 #define TAUGUARD_AVX2 __attribute__((target("avx2")))
 
-TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const float* b, int times) {
+TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const float* b,
+                                            int times) {
   const __m256 below = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
-  const __m256 above = _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
+  const __m256 above =
+      _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
   if (times == 1) return _mm256_or_ps(below, above);
   row += s.end;
   b += 2 * lanes;
   const __m256 below1 = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
-  const __m256 above1 = _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
+  const __m256 above1 =
+      _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
   return _mm256_or_ps(_mm256_and_ps(below, below1), _mm256_and_ps(above, above1));
 }
 
-TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, const float* b, int axes,
-                                                int times, Mask wanted) {
+TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, const float* b,
+                                                int axes, int times, Mask wanted) {
   for (int k = 0; k < axes && wanted; ++k, row += s.axis, b += 2 * lanes * times) {
     const Mask left = _mm256_movemask_ps(apart8(row, s, b, times));
     const Mask right = _mm256_movemask_ps(apart8(row, s, b + 8, times));
@@ -103,7 +111,7 @@ TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, c
 }
 
 TAUGUARD_AVX2 Mask node_avx2(const float* node, int slots, const float* block, int axes, int times,
-                         Mask wanted) {
+                             Mask wanted) {
   return overlap_avx2(node, in_node(slots), block, axes, times, wanted);
 }
 TAUGUARD_AVX2 Mask sharing_avx2(const LeafLanes& a, int row, const LeafLanes& b) {
@@ -118,9 +126,10 @@ TAUGUARD_AVX2 Mask sharing_avx2(const LeafLanes& a, int row, const LeafLanes& b)
   return Mask(_mm256_movemask_ps(_mm256_castsi256_ps(left))) |
          Mask(_mm256_movemask_ps(_mm256_castsi256_ps(right))) << 8;
 }
-// On x, y and z for all rows; for those with lanes left that share no vertex, on the other axes: few branches to
-// mispredict.
-TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same, Overlaps& out) {
+// On x, y and z for all rows; for those with lanes left that share no vertex, on the other axes:
+// few branches to mispredict.
+TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
+                             Overlaps& out) {
   const RowStride s = in_block(times);
   Remaining rest;
   for (Mask rows = a.occupied; rows; rows &= rows - 1) {
@@ -130,7 +139,8 @@ TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, i
   }
   for (int i = 0; i < rest.count; ++i) {
     const int row = rest.rows[i];
-    out.set(row, overlap_avx2(a.block + row + 3 * s.axis, s, b.block + 3 * s.axis, axes - 3, times, out.lanes_of[row]));
+    out.set(row, overlap_avx2(a.block + row + 3 * s.axis, s, b.block + 3 * s.axis, axes - 3, times,
+                              out.lanes_of[row]));
   }
 }
 
@@ -159,22 +169,22 @@ struct Axis16 {
 };
 
 template <int times>
-TAUGUARD_AVX512 TAUGUARD_INLINE Mask overlap_avx512(const float* row, RowStride s, const float* b, int axes,
-                                                    Mask wanted) {
+TAUGUARD_AVX512 TAUGUARD_INLINE Mask overlap_avx512(const float* row, RowStride s, const float* b,
+                                                    int axes, Mask wanted) {
   for (int k = 0; k < axes; ++k, row += s.axis, b += 2 * lanes * times)
     wanted &= ~Axis16<times>::load(b).apart(row, s);
   return wanted;
 }
 
-TAUGUARD_AVX512 Mask node_avx512(const float* node, int slots, const float* block, int axes, int times,
-                         Mask wanted) {
+TAUGUARD_AVX512 Mask node_avx512(const float* node, int slots, const float* block, int axes,
+                                 int times, Mask wanted) {
   return times == 1 ? overlap_avx512<1>(node, in_node(slots), block, axes, wanted)
                     : overlap_avx512<2>(node, in_node(slots), block, axes, wanted);
 }
 
 template <int times, int arity_a, int arity_b>
-TAUGUARD_AVX512 TAUGUARD_INLINE void pair_avx512(const LeafLanes& a, const LeafLanes& b, int axes, bool same,
-                                                 Overlaps& out) {
+TAUGUARD_AVX512 TAUGUARD_INLINE void pair_avx512(const LeafLanes& a, const LeafLanes& b, int axes,
+                                                 bool same, Overlaps& out) {
   constexpr int step = 2 * lanes * times;
   const auto x = Axis16<times>::load(b.block), y = Axis16<times>::load(b.block + step),
              z = Axis16<times>::load(b.block + 2 * step);
@@ -190,20 +200,24 @@ TAUGUARD_AVX512 TAUGUARD_INLINE void pair_avx512(const LeafLanes& a, const LeafL
     Mask shared = 0;
     for (int j = 0; j < arity_a; ++j)
       for (int k = 0; k < arity_b; ++k)
-        shared |= _mm512_cmpeq_epi32_mask(vertices[k], _mm512_set1_epi32(a.vertices[j * lanes + row]));
+        shared |=
+            _mm512_cmpeq_epi32_mask(vertices[k], _mm512_set1_epi32(a.vertices[j * lanes + row]));
     rest.add(row, near, shared, out);
   }
   for (int i = 0; i < rest.count; ++i) {
     const int row = rest.rows[i];
-    out.set(row, overlap_avx512<times>(a.block + row + 3 * s.axis, s, b.block + 3 * step, axes - 3, out.lanes_of[row]));
+    out.set(row, overlap_avx512<times>(a.block + row + 3 * s.axis, s, b.block + 3 * step, axes - 3,
+                                       out.lanes_of[row]));
   }
 }
-TAUGUARD_AVX512 void pair_avx512(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
-                                 Overlaps& out) {
+TAUGUARD_AVX512 void pair_avx512(const LeafLanes& a, const LeafLanes& b, int axes, int times,
+                                 bool same, Overlaps& out) {
   if (a.arity == 1) {
-    times == 1 ? pair_avx512<1, 1, 3>(a, b, axes, same, out) : pair_avx512<2, 1, 3>(a, b, axes, same, out);
+    times == 1 ? pair_avx512<1, 1, 3>(a, b, axes, same, out)
+               : pair_avx512<2, 1, 3>(a, b, axes, same, out);
   } else {
-    times == 1 ? pair_avx512<1, 2, 2>(a, b, axes, same, out) : pair_avx512<2, 2, 2>(a, b, axes, same, out);
+    times == 1 ? pair_avx512<1, 2, 2>(a, b, axes, same, out)
+               : pair_avx512<2, 2, 2>(a, b, axes, same, out);
   }
 }
 constexpr OverlapKernels avx2{node_avx2, pair_avx2}, avx512{node_avx512, pair_avx512};

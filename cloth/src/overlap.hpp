@@ -10,10 +10,12 @@ namespace tauguard::cloth {
 inline constexpr int lanes = 16;
 using Mask = std::uint32_t;  // a bit per lane
 
-// A block holds 16 volumes lane by lane: [axis][end of the step][low, high][lane]. A node holds one, axis
-// by axis: [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf) everywhere.
+// A block holds 16 volumes lane by lane: [axis][end of the step][low, high][lane]. A node holds
+// one, axis by axis: [end of the step][low, high][axis slot]. An empty lane or node is (inf, -inf)
+// everywhere.
 
-// The 16 features of a leaf: their volumes, their vertices as [vertex of the feature][lane], the lanes in use.
+// The 16 features of a leaf: their volumes, their vertices as [vertex of the feature][lane], the
+// lanes in use.
 struct LeafLanes {
   const float* block;
   const std::int32_t* vertices;
@@ -36,9 +38,11 @@ struct OverlapKernels {
   // Of `candidates`, the lanes of `block` that `node` does not stand apart from.
   Mask (*lanes_of_node)(const float* node, int slots, const float* block, int axes, int times,
                         Mask candidates);
-  // Volumes that are not apart, of features that share no vertex. same: b is a; each unordered pair once. A shared
-  // vertex lies in both volumes, so that it does not matter which is looked at first.
-  void (*leaf_pair)(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same, Overlaps& out);
+  // Volumes that are not apart, of features that share no vertex. same: b is a; each unordered pair
+  // once. A shared vertex lies in both volumes, so that it does not matter which is looked at
+  // first.
+  void (*leaf_pair)(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
+                    Overlaps& out);
 };
 
 // The fastest that this processor runs. Comparisons only: every variant gives the same bits.
@@ -63,7 +67,10 @@ bool nodes_overlap(const float* a, const float* b) {
 
 using NodeTest = bool (*)(const float*, const float*);
 inline NodeTest node_test(int slots, int times) {
-  if (times == 1) return slots == 4 ? nodes_overlap<4, 1> : slots == 8 ? nodes_overlap<8, 1> : nodes_overlap<16, 1>;
+  if (times == 1)
+    return slots == 4   ? nodes_overlap<4, 1>
+           : slots == 8 ? nodes_overlap<8, 1>
+                        : nodes_overlap<16, 1>;
   return slots == 4 ? nodes_overlap<4, 2> : slots == 8 ? nodes_overlap<8, 2> : nodes_overlap<16, 2>;
 }
 

@@ -9,27 +9,31 @@ namespace tauguard::cloth {
 
 inline constexpr double u = 0x1p-53;
 
-struct Vec { double x, y, z; };
+struct Vec {
+  double x, y, z;
+};
 inline Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec operator*(double s, Vec a) { return {s * a.x, s * a.y, s * a.z}; }
 inline double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+inline Vec cross(Vec a, Vec b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 inline double size(Vec a) { return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}); }
 inline Vec load(const double* x, std::int32_t i) { return {x[3 * i], x[3 * i + 1], x[3 * i + 2]}; }
 inline Vec mix(Vec a, Vec b, double t) { return a + t * (b - a); }
 
-// Differences of positions at both ends: the cubic is p . (q x r); `gap` holds those that a separating
-// direction must see on one side. `big` is the largest magnitude among them.
+// Differences of positions at both ends: the cubic is p . (q x r); `gap` holds those that a
+// separating direction must see on one side. `big` is the largest magnitude among them.
 struct Query {
   Vec p[2], q[2], r[2];
   Vec gap[2][4];
   int gaps;
   double big, distance;
-  // Of a Bernstein coefficient, with M = big^3: each of up to three triple products of 6 terms carries 3
-  // differences, 2 products and 3 sums, 8 u of 6 M each, 144 u M and 40 for their own sum; every cut adds
-  // 3 interpolations of 3 roundings on values up to 6 M, 54 u M, and there are at most 70 in a row:
-  // (184 + 70 * 54) u M < 2^12 u M. The scale keeps underflow far below that.
+  // Of a Bernstein coefficient, with M = big^3: each of up to three triple products of 6 terms
+  // carries 3 differences, 2 products and 3 sums, 8 u of 6 M each, 144 u M and 40 for their own
+  // sum; every cut adds 3 interpolations of 3 roundings on values up to 6 M, 54 u M, and there are
+  // at most 70 in a row: (184 + 70 * 54) u M < 2^12 u M. The scale keeps underflow far below that.
   double cubic_error() const { return 0x1p-41 * big * big * big; }
 };
 
@@ -43,11 +47,20 @@ Query make(const double* x0, const double* x1, const std::int32_t* row, double d
     const double* x = e ? x1 : x0;
     const Vec a = load(x, row[0]), b = load(x, row[1]), c = load(x, row[2]), d = load(x, row[3]);
     if (vf) {
-      k.p[e] = a - b; k.q[e] = c - b; k.r[e] = d - b;
-      k.gap[e][0] = a - b; k.gap[e][1] = a - c; k.gap[e][2] = a - d;
+      k.p[e] = a - b;
+      k.q[e] = c - b;
+      k.r[e] = d - b;
+      k.gap[e][0] = a - b;
+      k.gap[e][1] = a - c;
+      k.gap[e][2] = a - d;
     } else {
-      k.p[e] = c - a; k.q[e] = b - a; k.r[e] = d - c;
-      k.gap[e][0] = c - a; k.gap[e][1] = d - a; k.gap[e][2] = c - b; k.gap[e][3] = d - b;
+      k.p[e] = c - a;
+      k.q[e] = b - a;
+      k.r[e] = d - c;
+      k.gap[e][0] = c - a;
+      k.gap[e][1] = d - a;
+      k.gap[e][2] = c - b;
+      k.gap[e][3] = d - b;
     }
     for (int i = 0; i < k.gaps; ++i) k.big = std::max(k.big, size(k.gap[e][i]));
     k.big = std::max({k.big, size(k.q[e]), size(k.r[e])});
@@ -56,7 +69,9 @@ Query make(const double* x0, const double* x1, const std::int32_t* row, double d
   if (k.big > 0x1p-20 && k.big < 0x1p20) return k;
   const double s = k.big > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(k.big), -1000, 1000)) : 1;
   for (int e = 0; e < 2; ++e) {
-    k.p[e] = s * k.p[e]; k.q[e] = s * k.q[e]; k.r[e] = s * k.r[e];
+    k.p[e] = s * k.p[e];
+    k.q[e] = s * k.q[e];
+    k.r[e] = s * k.r[e];
     for (int i = 0; i < k.gaps; ++i) k.gap[e][i] = s * k.gap[e][i];
   }
   k.big *= s;
@@ -64,7 +79,9 @@ Query make(const double* x0, const double* x1, const std::int32_t* row, double d
   return k;
 }
 
-struct Cubic { double b[4]; };
+struct Cubic {
+  double b[4];
+};
 inline Cubic cubic(const Query& k) {
   const Vec c00 = cross(k.q[0], k.r[0]), c11 = cross(k.q[1], k.r[1]);
   const Vec mixed = cross(k.q[0], k.r[1]) + cross(k.q[1], k.r[0]);
@@ -85,14 +102,16 @@ inline void halve(const Cubic& c, double s, Cubic& left, Cubic& right) {
   right = {{f, e1, d2, c.b[3]}};
 }
 
-// The root of a cubic with ends of different sign, in (0, 1): Newton's steps kept within the bracket.
+// The root of a cubic with ends of different sign, in (0, 1): Newton's steps kept within the
+// bracket.
 inline double root(const double* b) {
   double lo = 0, hi = 1, x = b[0] / (b[0] - b[3]);
   for (int i = 0; i < 40; ++i) {
     const double y = 1 - x;
     const double f = y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
     ((f > 0) == (b[0] > 0) ? lo : hi) = x;
-    const double df = 3 * ((b[1] - b[0]) * y * y + 2 * (b[2] - b[1]) * y * x + (b[3] - b[2]) * x * x);
+    const double df =
+        3 * ((b[1] - b[0]) * y * y + 2 * (b[2] - b[1]) * y * x + (b[3] - b[2]) * x * x);
     double next = x - f / df;
     if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
     if (std::fabs(next - x) < 1e-14) return next;

@@ -15,8 +15,9 @@ int compare(const Features& a, std::int32_t i, const Features& b, std::int32_t j
 }
 
 // Walks two sorted orders together.
-void merge(const Features& before, const std::vector<std::int32_t>& old_order, const Features& after,
-           const std::vector<std::int32_t>& new_order, std::vector<std::int32_t>& match) {
+void merge(const Features& before, const std::vector<std::int32_t>& old_order,
+           const Features& after, const std::vector<std::int32_t>& new_order,
+           std::vector<std::int32_t>& match) {
   std::size_t i = 0, j = 0;
   while (i < old_order.size() && j < new_order.size()) {
     const int order = compare(before, old_order[i], after, new_order[j]);
@@ -62,7 +63,8 @@ void Topology::set(std::vector<std::int32_t> face_vertices) {
 }
 
 std::vector<std::int32_t> match_sorted(const Features& before, const Features& after) {
-  std::vector<std::int32_t> match(before.size(), -1), old_order(before.size()), new_order(after.size());
+  std::vector<std::int32_t> match(before.size(), -1), old_order(before.size()),
+      new_order(after.size());
   std::iota(old_order.begin(), old_order.end(), 0);
   std::iota(new_order.begin(), new_order.end(), 0);
   merge(before, old_order, after, new_order, match);

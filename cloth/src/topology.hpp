@@ -1,4 +1,5 @@
-// What a list of faces implies: the vertices in use, the unique edges, and what changed since another list.
+// What a list of faces implies: the vertices in use, the unique edges, and what changed since
+// another list.
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,11 @@
-// Conservative advancement (Mirtich 1996; Zhang, Lee and Kim 2006) on support functions, with directions that
-// turn, as rigid/src/first_contact.cpp has it for vertices. For any unit n, any rate r and n(h) = n + h r, the
-// separation of the cores along n(h) at time t + h is at least
+// Conservative advancement (Mirtich 1996; Zhang, Lee and Kim 2006) on support functions, with
+// directions that turn, as rigid/src/first_contact.cpp has it for vertices. For any unit n, any
+// rate r and n(h) = n + h r, the separation of the cores along n(h) at time t + h is at least
 //   G(h) = -(tangent of b along -n(h)) - (tangent of a along n(h)) - K h^2 / 2,
-// where a tangent is the largest of the vertices' own tangents (one support call) and K bounds their second
-// derivatives. The surfaces are apart by more than the threshold while G(h) exceeds (radii + threshold) |n(h)|.
-// Three rates are tried, standing still and turning with either partner; the longest certified step is taken.
+// where a tangent is the largest of the vertices' own tangents (one support call) and K bounds
+// their second derivatives. The surfaces are apart by more than the threshold while G(h) exceeds
+// (radii + threshold) |n(h)|. Three rates are tried, standing still and turning with either
+// partner; the longest certified step is taken.
 #include "advance.hpp"
 
 #include <algorithm>
@@ -16,7 +17,8 @@ namespace {
 
 // A guard against creeping along a resting gap: the time reached is still never late.
 constexpr int most_steps = 500;
-// Shapes closer than this share of their size touch. Smaller costs steps, larger is early by as much.
+// Shapes closer than this share of their size touch. Smaller costs steps, larger is early by as
+// much.
 constexpr double touching = 1e-10;
 
 class Lower {
@@ -30,7 +32,8 @@ class Lower {
   }
   double operator()(double h) const {
     const Vec minus_n = -1.0 * n_, minus_r = -1.0 * r_;
-    return -b_.tangent(minus_n, minus_r, h, c_, drift_) - a_.tangent(n_, r_, h, c_, drift_) - half_k_ * h * h - offset_;
+    return -b_.tangent(minus_n, minus_r, h, c_, drift_) - a_.tangent(n_, r_, h, c_, drift_) -
+           half_k_ * h * h - offset_;
   }
 
  private:
@@ -40,14 +43,15 @@ class Lower {
   double offset_, half_k_;
 };
 
-// A step on which G >= 0, G being concave with G(0) > 0: secants through (0, G(0)) end left of the root.
+// A step on which G >= 0, G being concave with G(0) > 0: secants through (0, G(0)) end left of the
+// root.
 double safe_step(const Lower& g, double at_zero, double limit) {
   double right = limit, value = g(limit);
   if (value >= 0) return limit;
   double left = 0, left_value = at_zero, short_of = 8 * unit_roundoff;
   for (int i = 0; i < 8; ++i) {
-    // The chord of a concave function lies below it: its root is certified. Where G is all but a line, rounding
-    // hides the sign at the root: ever more is left out, or no step would remain.
+    // The chord of a concave function lies below it: its root is certified. Where G is all but a
+    // line, rounding hides the sign at the root: ever more is left out, or no step would remain.
     const double h = left + (right - left) * (left_value / (left_value - value)) * (1 - short_of);
     short_of *= 16;
     if (!(h > left) || !(h < right)) break;
@@ -63,7 +67,8 @@ double safe_step(const Lower& g, double at_zero, double limit) {
   return left;
 }
 
-double longest_step(const Mover& a, const Mover& b, const Distance& d, double offset, double limit) {
+double longest_step(const Mover& a, const Mover& b, const Distance& d, double offset,
+                    double limit) {
   const Vec rates[3] = {cross(a.angular(), d.n), cross(b.angular(), d.n), Vec{}};
   double best = 0;
   for (int i = 0; i < (a.half_space() ? 1 : 3); ++i) {
@@ -85,10 +90,14 @@ Touch describe(const Mover& a, const Mover& b, const Distance& d, const Vec& n, 
   Touch touch;
   touch.hit = true, touch.t = t;
   Distance at = d;
-  if (d.overlap && dot(n, n) > 0 && t > 0) at.n = n, at.lower = std::min(0.0, d.lower);
-  else if (d.overlap && !a.half_space()) penetration(a, b, &at);
-  else if (!a.half_space() && d.upper > 1e-7 * size) at.n = (1 / d.upper) * (d.on_b - d.on_a), at.lower = d.upper;
-  else if (dot(n, n) > 0 && !a.half_space()) at.n = n;
+  if (d.overlap && dot(n, n) > 0 && t > 0)
+    at.n = n, at.lower = std::min(0.0, d.lower);
+  else if (d.overlap && !a.half_space())
+    penetration(a, b, &at);
+  else if (!a.half_space() && d.upper > 1e-7 * size)
+    at.n = (1 / d.upper) * (d.on_b - d.on_a), at.lower = d.upper;
+  else if (dot(n, n) > 0 && !a.half_space())
+    at.n = n;
   touch.normal = at.n;
   touch.distance = at.lower - radii;
   touch.point = 0.5 * (at.on_a + a.radius() * at.n + at.on_b - b.radius() * at.n);
@@ -105,8 +114,9 @@ Touch first_touch(Mover& a, Mover& b, double threshold, double start) {
     a.move_to(t), b.move_to(t);
     const Distance d = distance_of(a, b, n, close);
     if (d.overlap || d.lower <= close) {
-      // With curved cores the bound may lag behind the distance: what the segment says is then not a contact
-      // yet, but no step is certified either. It is reported, early by at most what the bound lags.
+      // With curved cores the bound may lag behind the distance: what the segment says is then not
+      // a contact yet, but no step is certified either. It is reported, early by at most what the
+      // bound lags.
       return describe(a, b, d, n, t);
     }
     n = d.n;

@@ -35,7 +35,8 @@ std::vector<Vec> vectors(const Rows3& rows) {
   return out;
 }
 
-Poses poses_of(const Rows3& xpos_t0, const Rows9& xmat_t0, const Rows3& xpos_t1, const Rows9& xmat_t1) {
+Poses poses_of(const Rows3& xpos_t0, const Rows9& xmat_t0, const Rows3& xpos_t1,
+               const Rows9& xmat_t1) {
   return {xpos_t0.data(), xmat_t0.data(), xpos_t1.data(), xmat_t1.data()};
 }
 
@@ -46,7 +47,8 @@ nb::tuple answer(const std::vector<Row>& rows, const Counts& counts) {
   ids.reserve(3 * rows.size()), values.reserve(8 * rows.size());
   for (const Row& r : rows) {
     ids.insert(ids.end(), {r.first, r.second, r.feature});
-    values.insert(values.end(), {r.t, r.distance, r.point[0], r.point[1], r.point[2], r.normal[0], r.normal[1], r.normal[2]});
+    values.insert(values.end(), {r.t, r.distance, r.point[0], r.point[1], r.point[2], r.normal[0],
+                                 r.normal[1], r.normal[2]});
   }
   return nb::make_tuple(owned(std::move(ids), std::array<std::size_t, 2>{rows.size(), 3}),
                         owned(std::move(values), std::array<std::size_t, 2>{rows.size(), 8}),
@@ -56,10 +58,18 @@ nb::tuple answer(const std::vector<Row>& rows, const Counts& counts) {
 // The geoms of a scene and which of them meet.
 class Scene {
  public:
-  void add(int core, Doubles size, double radius, int body, Doubles pos, Doubles mat, Rows3 vertices, Rows3 normals,
-           Rows3 edges) {
-    Shape shape{static_cast<Core>(core), {size.data()[0], size.data()[1], size.data()[2]}, radius, {}, {}, {}, {}, {}};
-    for (const Vec& v : vectors(vertices)) shape.x.push_back(v[0]), shape.y.push_back(v[1]), shape.z.push_back(v[2]);
+  void add(int core, Doubles size, double radius, int body, Doubles pos, Doubles mat,
+           Rows3 vertices, Rows3 normals, Rows3 edges) {
+    Shape shape{static_cast<Core>(core),
+                {size.data()[0], size.data()[1], size.data()[2]},
+                radius,
+                {},
+                {},
+                {},
+                {},
+                {}};
+    for (const Vec& v : vectors(vertices))
+      shape.x.push_back(v[0]), shape.y.push_back(v[1]), shape.z.push_back(v[2]);
     shape.normals = vectors(normals), shape.edges = vectors(edges);
     Frame frame;
     for (int i = 0; i < 3; ++i) {
@@ -82,7 +92,8 @@ class Scene {
         middle = middle + (1.0 / 3) * p;
       }
       double radius = 0;
-      for (int k = 0; k < 3; ++k) radius = std::max(radius, norm(points[faces.data()[3 * i + k]] - middle));
+      for (int k = 0; k < 3; ++k)
+        radius = std::max(radius, norm(points[faces.data()[3 * i + k]] - middle));
       surface.triangles.push_back(std::move(triangle));
       surface.centre.push_back(middle), surface.radius.push_back(radius);
     }
@@ -108,8 +119,9 @@ class Scene {
     return answer(rows, counts);
   }
 
-  nb::tuple find_flex(Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1, Rows9 xmat_t1, Rows3 x_t0, Rows3 x_t1,
-                      IntRows elements, double radius, Ints with, Doubles reach, Mask skip) {
+  nb::tuple find_flex(Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1, Rows9 xmat_t1, Rows3 x_t0,
+                      Rows3 x_t1, IntRows elements, double radius, Ints with, Doubles reach,
+                      Mask skip) {
     std::vector<Row> rows;
     Counts counts;
     {
@@ -119,9 +131,10 @@ class Scene {
       std::vector<FlexPair> pairs(with.shape(0));
       for (std::size_t i = 0; i < pairs.size(); ++i)
         pairs[i] = {with.data()[i], reach.data()[i], skip.data() + i * skip.shape(1)};
-      counts = tauguard::contacts::find_flex(geoms_, poses_of(xpos_t0, xmat_t0, xpos_t1, xmat_t1), x_t0.data(),
-                                             x_t1.data(), elements.data(), elements.shape(0),
-                                             static_cast<int>(elements.shape(1)), radius, pairs, &rows);
+      counts = tauguard::contacts::find_flex(geoms_, poses_of(xpos_t0, xmat_t0, xpos_t1, xmat_t1),
+                                             x_t0.data(), x_t1.data(), elements.data(),
+                                             elements.shape(0), static_cast<int>(elements.shape(1)),
+                                             radius, pairs, &rows);
     }
     return answer(rows, counts);
   }
@@ -137,18 +150,21 @@ std::vector<T> list(const Array& values) {
   return std::vector<T>(values.data(), values.data() + values.size());
 }
 
-Travel travel(Ints body_of_geom, Doubles inner, Ints vertex_begin, Ints vertex_end, Doubles flex_radius) {
-  return Travel(list<std::int32_t>(body_of_geom), list<double>(inner), list<std::int32_t>(vertex_begin),
-                list<std::int32_t>(vertex_end), list<double>(flex_radius));
+Travel travel(Ints body_of_geom, Doubles inner, Ints vertex_begin, Ints vertex_end,
+              Doubles flex_radius) {
+  return Travel(list<std::int32_t>(body_of_geom), list<double>(inner),
+                list<std::int32_t>(vertex_begin), list<std::int32_t>(vertex_end),
+                list<double>(flex_radius));
 }
 
 // Rows (way, core) of contacts, see Travel::bound.
-auto bound(const Travel& travel, IntRows geom, IntRows flex, Rows3 point, Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1,
-           Rows9 xmat_t1, Rows3 x_t0, Rows3 x_t1) {
+auto bound(const Travel& travel, IntRows geom, IntRows flex, Rows3 point, Rows3 xpos_t0,
+           Rows9 xmat_t0, Rows3 xpos_t1, Rows9 xmat_t1, Rows3 x_t0, Rows3 x_t1) {
   const std::size_t count = geom.shape(0);
   std::vector<double> out(2 * count);
-  travel.bound(geom.data(), flex.data(), point.data(), count, poses_of(xpos_t0, xmat_t0, xpos_t1, xmat_t1), x_t0.data(),
-               x_t1.data(), out.data(), out.data() + count);
+  travel.bound(geom.data(), flex.data(), point.data(), count,
+               poses_of(xpos_t0, xmat_t0, xpos_t1, xmat_t1), x_t0.data(), x_t1.data(), out.data(),
+               out.data() + count);
   return owned(std::move(out), std::array<std::size_t, 2>{2, count});
 }
 
@@ -160,7 +176,8 @@ auto carried(Rows3 xpos, Rows9 xmat, Ints body, Rows3 local) {
     const double* v = local.data() + 3 * i;
     const bool origin = v[0] == 0 && v[1] == 0 && v[2] == 0;
     for (int k = 0; k < 3; ++k)
-      out[3 * i + k] = origin ? at[k] : r[3 * k] * v[0] + r[3 * k + 1] * v[1] + r[3 * k + 2] * v[2] + at[k];
+      out[3 * i + k] =
+          origin ? at[k] : r[3 * k] * v[0] + r[3 * k + 1] * v[1] + r[3 * k + 2] * v[2] + at[k];
   }
   const std::size_t count = body.size();
   return owned(std::move(out), std::array<std::size_t, 2>{count, 3});
@@ -188,8 +205,8 @@ nb::tuple simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs,
     for (std::size_t i = 0; i < pairs.shape(0); ++i) {
       const std::int32_t first = pairs.data()[2 * i], second = pairs.data()[2 * i + 1];
       Touch touch;
-      if (simplices_touch(x_t0.data(), x_t1.data(), a.data() + corners * first, b.data() + corners * second, corners,
-                          distance, &touch))
+      if (simplices_touch(x_t0.data(), x_t1.data(), a.data() + corners * first,
+                          b.data() + corners * second, corners, distance, &touch))
         rows.push_back({first, second, -1, touch.t, touch.distance, touch.point, touch.normal});
     }
   }

@@ -9,7 +9,8 @@ struct Corner {
   Vec w, a, b;  // w = b - a
 };
 
-// Weights of the point of the affine hull of c[0..m) nearest to the origin; false where it is not inside.
+// Weights of the point of the affine hull of c[0..m) nearest to the origin; false where it is not
+// inside.
 bool nearest_inside(const Corner* c, int m, double* weight) {
   if (m == 1) return weight[0] = 1, true;
   Vec e[3];
@@ -136,7 +137,8 @@ Distance distance_of(const Mover& a, const Mover& b, const Vec& guess, double ne
       break;
     }
   }
-  // Close to contact the nearest point is all cancellation: the face of the last simplex has a better normal.
+  // Close to contact the nearest point is all cancellation: the face of the last simplex has a
+  // better normal.
   if (!out.overlap && m == 3) {
     Vec n = cross(c[1].w - c[0].w, c[2].w - c[0].w);
     if (dot(n, c[0].w) < 0) n = -1.0 * n;

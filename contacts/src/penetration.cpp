@@ -1,6 +1,7 @@
-// The expanding polytope algorithm (van den Bergen 2001) on a - b: a point q of its boundary nearest to the
-// origin is the shortest translation of b that separates the cores. The polytope need not hold the origin yet:
-// its faces expand in the order of their signed distance, those with the origin outside first.
+// The expanding polytope algorithm (van den Bergen 2001) on a - b: a point q of its boundary
+// nearest to the origin is the shortest translation of b that separates the cores. The polytope
+// need not hold the origin yet: its faces expand in the order of their signed distance, those with
+// the origin outside first.
 #include "penetration.hpp"
 
 #include <algorithm>
@@ -36,7 +37,8 @@ class Polytope {
     return p;
   }
 
-  // A tetrahedron of support points; false where a - b is flat to rounding, with its normal in `flat`.
+  // A tetrahedron of support points; false where a - b is flat to rounding, with its normal in
+  // `flat`.
   bool start(Vec* flat) {
     const double small = 1e-9 * size_;
     const Vec x = {1, 0, 0};
@@ -57,9 +59,11 @@ class Polytope {
       return false;
     const Vec n = cross(e, edge(2));
     *flat = n;
-    if (!add_off(n, [&](const Vec& y) { return std::fabs(dot(n, y)) > small * norm(n); })) return false;
+    if (!add_off(n, [&](const Vec& y) { return std::fabs(dot(n, y)) > small * norm(n); }))
+      return false;
     inside_ = 0.25 * (vertices_[0].q + vertices_[1].q + vertices_[2].q + vertices_[3].q);
-    for (const auto& v : {std::array{0, 1, 2}, std::array{0, 1, 3}, std::array{0, 2, 3}, std::array{1, 2, 3}})
+    for (const auto& v :
+         {std::array{0, 1, 2}, std::array{0, 1, 3}, std::array{0, 2, 3}, std::array{1, 2, 3}})
       add_face(v[0], v[1], v[2]);
     return true;
   }
@@ -72,7 +76,8 @@ class Polytope {
   // True where the face was not final: the polytope grew.
   bool expand(const Face& face) {
     const Vertex p = along(face.n);
-    if (dot(face.n, p.q) - face.offset <= resolution * size_ || static_cast<int>(vertices_.size()) >= most_vertices)
+    if (dot(face.n, p.q) - face.offset <= resolution * size_ ||
+        static_cast<int>(vertices_.size()) >= most_vertices)
       return false;
     const int fresh = static_cast<int>(vertices_.size());
     std::vector<std::pair<int, int>> horizon;

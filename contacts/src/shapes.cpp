@@ -12,7 +12,8 @@ Vec Shape::support(const Vec& d) const {
     case Core::segment:
       return {0, 0, d[2] >= 0 ? size[1] : -size[1]};
     case Core::box:
-      return {d[0] >= 0 ? size[0] : -size[0], d[1] >= 0 ? size[1] : -size[1], d[2] >= 0 ? size[2] : -size[2]};
+      return {d[0] >= 0 ? size[0] : -size[0], d[1] >= 0 ? size[1] : -size[1],
+              d[2] >= 0 ? size[2] : -size[2]};
     case Core::ellipsoid: {
       const Vec e = {size[0] * d[0], size[1] * d[1], size[2] * d[2]};
       const double length = norm(e);
@@ -20,7 +21,8 @@ Vec Shape::support(const Vec& d) const {
       return {size[0] * e[0] / length, size[1] * e[1] / length, size[2] * e[2] / length};
     }
     case Core::disc_prism: {
-      const double across = std::sqrt(d[0] * d[0] + d[1] * d[1]), z = d[2] >= 0 ? size[1] : -size[1];
+      const double across = std::sqrt(d[0] * d[0] + d[1] * d[1]),
+                   z = d[2] >= 0 ? size[1] : -size[1];
       if (!(across > 0)) return {0, 0, z};
       return {size[0] * d[0] / across, size[0] * d[1] / across, z};
     }
@@ -83,7 +85,8 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
     if (k < 0) {
       const double s = 2 * std::sqrt(std::max(0.0, 1 + trace));
       q[0] = s / 4;
-      q[1] = (r[2][1] - r[1][2]) / s, q[2] = (r[0][2] - r[2][0]) / s, q[3] = (r[1][0] - r[0][1]) / s;
+      q[1] = (r[2][1] - r[1][2]) / s, q[2] = (r[0][2] - r[2][0]) / s,
+      q[3] = (r[1][0] - r[0][1]) / s;
     } else {
       const int j = (k + 1) % 3, l = (k + 2) % 3;
       const double s = 2 * std::sqrt(std::max(0.0, 1 + r[k][k] - r[j][j] - r[l][l]));
@@ -101,13 +104,18 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
 }
 
 Mover::Mover(const Shape& shape, const Frame& in_body, const RigidMotion& motion, const Vec& origin)
-    : shape_(&shape), in_body_(in_body), motion_(&motion), turning_(true), shift_(motion.x0 - origin),
+    : shape_(&shape),
+      in_body_(in_body),
+      motion_(&motion),
+      turning_(true),
+      shift_(motion.x0 - origin),
       radius_(shape.radius) {
   reach_ = norm(in_body.at) + shape.extent();
   magnitude_ = norm(shift_) + norm(motion.linear) + (4 + motion.speed) * reach_ + radius_;
 }
 
-Mover::Mover(const double* const* x_t0, const double* const* x_t1, int count, double radius, const Vec& origin)
+Mover::Mover(const double* const* x_t0, const double* const* x_t1, int count, double radius,
+             const Vec& origin)
     : count_(count), radius_(radius) {
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -127,7 +135,8 @@ void Mover::move_to(double t) {
   centre_ = shift_ + t * motion_->linear;
   Frame body{{motion_->r0[0], motion_->r0[1], motion_->r0[2]}, centre_};
   if (motion_->speed != 0) {
-    const double angle = motion_->speed * t, c = std::cos(angle), s = std::sin(angle), half = std::sin(0.5 * angle);
+    const double angle = motion_->speed * t, c = std::cos(angle), s = std::sin(angle),
+                 half = std::sin(0.5 * angle);
     const Vec& u = motion_->axis;
     for (int j = 0; j < 3; ++j) {  // column by column: the rotated axes
       const Vec w = {motion_->r0[0][j], motion_->r0[1][j], motion_->r0[2][j]};

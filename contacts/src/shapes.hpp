@@ -21,13 +21,13 @@ constexpr double unit_roundoff = 0x1p-53;
 
 enum class Core : std::uint8_t { half_space, point, segment, ellipsoid, disc_prism, box, hull };
 
-// A convex core and a radius around it, in the geom's own frame (MuJoCo's: axes along z, sizes are half
-// lengths). A plane is the half space z <= 0.
+// A convex core and a radius around it, in the geom's own frame (MuJoCo's: axes along z, sizes are
+// half lengths). A plane is the half space z <= 0.
 struct Shape {
   Core core;
   double size[3];
   double radius;
-  std::vector<double> x, y, z;  // the vertices of a hull, by coordinate
+  std::vector<double> x, y, z;      // the vertices of a hull, by coordinate
   std::vector<Vec> normals, edges;  // of a polytope, where they are few
 
   Vec support(const Vec& d) const;  // a point of the core that is furthest along d
@@ -43,23 +43,27 @@ struct Frame {
   Vec back(const Vec& d) const { return d[0] * row[0] + d[1] * row[1] + d[2] * row[2]; }
 };
 
-// The motion of a body between two poses: its origin moves linearly, its frame turns at a constant rate
-// about the shortest rotation vector.
-RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1, const double* xmat_t1);
+// The motion of a body between two poses: its origin moves linearly, its frame turns at a constant
+// rate about the shortest rotation vector.
+RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1,
+                           const double* xmat_t1);
 
-// A shape on a moving body, or a simplex whose vertices move linearly. Positions are relative to an origin
-// near both partners.
+// A shape on a moving body, or a simplex whose vertices move linearly. Positions are relative to an
+// origin near both partners.
 class Mover {
  public:
   Mover(const Shape& shape, const Frame& in_body, const RigidMotion& motion, const Vec& origin);
-  Mover(const double* const* x_t0, const double* const* x_t1, int count, double radius, const Vec& origin);
+  Mover(const double* const* x_t0, const double* const* x_t1, int count, double radius,
+        const Vec& origin);
 
   void move_to(double t);
   Vec support(const Vec& d) const;
-  // Max over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)): the tangent of the projection on n + h r.
+  // Max over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)): the tangent of the projection
+  // on n + h r.
   double tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift) const;
-  double speed_about(const Vec& drift) const;             // no point moves faster than this against drift
-  double acceleration(const Vec& n, double drift) const;  // bound on |n.x''| for n within drift of the given one
+  double speed_about(const Vec& drift) const;  // no point moves faster than this against drift
+  double acceleration(const Vec& n,
+                      double drift) const;  // bound on |n.x''| for n within drift of the given one
   Vec angular() const { return turning_ ? motion_->speed * motion_->axis : Vec{}; }
   Vec linear() const { return turning_ ? motion_->linear : velocity_[0]; }
   Vec centre() const { return turning_ ? centre_ : now_[0]; }

@@ -43,14 +43,17 @@ Box widened(Box box, double by) {
   return box;
 }
 
-rigid::MovingBody vertices_of(const Shape& s, const Frame& in_body, const RigidMotion& motion, const Vec& origin) {
+rigid::MovingBody vertices_of(const Shape& s, const Frame& in_body, const RigidMotion& motion,
+                              const Vec& origin) {
   rigid::MovingBody body(motion, origin);
   if (s.core == Core::hull)
-    for (std::size_t i = 0; i < s.x.size(); ++i) body.add_vertex(in_body.out({s.x[i], s.y[i], s.z[i]}));
+    for (std::size_t i = 0; i < s.x.size(); ++i)
+      body.add_vertex(in_body.out({s.x[i], s.y[i], s.z[i]}));
   else
     for (int corner = 0; corner < 8; ++corner)
-      body.add_vertex(in_body.out({corner & 1 ? s.size[0] : -s.size[0], corner & 2 ? s.size[1] : -s.size[1],
-                                   corner & 4 ? s.size[2] : -s.size[2]}));
+      body.add_vertex(
+          in_body.out({corner & 1 ? s.size[0] : -s.size[0], corner & 2 ? s.size[1] : -s.size[1],
+                       corner & 4 ? s.size[2] : -s.size[2]}));
   for (const Vec& n : s.normals) body.add_normal(in_body.turn(n));
   for (const Vec& e : s.edges) body.add_edge(in_body.turn(e));
   body.complete = !s.normals.empty();
@@ -100,20 +103,24 @@ void Geoms::update(const Poses& p) {
 namespace {
 
 // Polytopes that only have to touch go through the kernel of rigid/, which follows their features.
-Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec& origin, Mover& a, Mover& b) {
+Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec& origin, Mover& a,
+                      Mover& b) {
   auto x = vertices_of(geoms.shape(pair.a), geoms.in_body(pair.a), geoms.motion(pair.a), origin);
   auto y = vertices_of(geoms.shape(pair.b), geoms.in_body(pair.b), geoms.motion(pair.b), origin);
   const rigid::Impact impact = rigid::first_contact(x, y, 0, 1);
   if (!impact.hit) return {};
   a.move_to(impact.t), b.move_to(impact.t);
-  return describe(a, b, distance_of(a, b, impact.normal, 0), impact.t > 0 ? impact.normal : Vec{}, impact.t);
+  return describe(a, b, distance_of(a, b, impact.normal, 0), impact.t > 0 ? impact.normal : Vec{},
+                  impact.t);
 }
 
 // The first triangle of b's surface that a touches; of several at one time the deepest.
-Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, const Vec& origin, std::int32_t* face) {
+Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, const Vec& origin,
+                    std::int32_t* face) {
   const Surface& surface = geoms.surface(pair.b);
   const RigidMotion& motion = geoms.motion(pair.b);
-  const Frame &in_body = geoms.in_body(pair.b), body{{motion.r0[0], motion.r0[1], motion.r0[2]}, motion.x0};
+  const Frame &in_body = geoms.in_body(pair.b),
+              body{{motion.r0[0], motion.r0[1], motion.r0[2]}, motion.x0};
   const Box near = widened(geoms.box(pair.a), threshold);
   const double drift = norm(motion.linear);
   Mover a = geoms.mover(pair.a, origin);
@@ -121,7 +128,8 @@ Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, 
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
     const Vec y = in_body.out(surface.centre[i]), c = body.out(y);
     // No point of the triangle leaves this ball; the factor covers rounding.
-    const double way = (surface.radius[i] * (1 + motion.speed) + drift + motion.speed * norm(y)) * (1 + 0x1p-40);
+    const double way =
+        (surface.radius[i] * (1 + motion.speed) + drift + motion.speed * norm(y)) * (1 + 0x1p-40);
     bool far = false;
     for (int k = 0; k < 3; ++k) far = far || c[k] + way < near.lo[k] || c[k] - way > near.hi[k];
     if (far) continue;
@@ -151,7 +159,8 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
     cached = {true, false, {}};
     if (!widened(geoms.box(pair.a), pair.reach).meets(geoms.box(pair.b))) continue;
     ++counts.candidates;
-    const Vec origin = geoms.shape(pair.a).core == Core::half_space ? geoms.motion(pair.b).x0 : geoms.motion(pair.a).x0;
+    const Vec origin = geoms.shape(pair.a).core == Core::half_space ? geoms.motion(pair.b).x0
+                                                                    : geoms.motion(pair.a).x0;
     std::int32_t face = -1;
     const auto touch_within = [&](double threshold) {
       if (!geoms.surface(pair.b).triangles.empty() && geoms.shape(pair.a).core != Core::half_space)
@@ -165,15 +174,16 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
     if (!touch.hit && pair.reach > 0) touch = touch_within(pair.reach);
     if (!touch.hit) continue;
     cached.hit = true;
-    cached.row = {pair.a, pair.b, face, touch.t, touch.distance, touch.point + origin, touch.normal};
+    cached.row = {pair.a,      pair.b, face, touch.t, touch.distance, touch.point + origin,
+                  touch.normal};
     rows->push_back(cached.row);
   }
   return counts;
 }
 
-Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1, const std::int32_t* elements,
-                 std::size_t count, int corners, double radius, const std::vector<FlexPair>& pairs,
-                 std::vector<Row>* rows) {
+Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1,
+                 const std::int32_t* elements, std::size_t count, int corners, double radius,
+                 const std::vector<FlexPair>& pairs, std::vector<Row>* rows) {
   constexpr std::size_t block = 32;  // simplices that share a box
   geoms.update(poses);
   Counts counts;
@@ -182,7 +192,8 @@ Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const dou
   for (std::size_t e = 0; e < count; ++e) {
     Box box{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     for (int i = 0; i < corners; ++i) {
-      const double *p = x_t0 + 3 * elements[corners * e + i], *q = x_t1 + 3 * elements[corners * e + i];
+      const double *p = x_t0 + 3 * elements[corners * e + i],
+                   *q = x_t1 + 3 * elements[corners * e + i];
       for (int k = 0; k < 3; ++k) {
         box.lo[k] = std::min(box.lo[k], std::min(p[k], q[k]));
         box.hi[k] = std::max(box.hi[k], std::max(p[k], q[k]));
@@ -203,30 +214,32 @@ Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const dou
         ++counts.candidates;
         const double *start[4], *end[4];
         for (int i = 0; i < corners; ++i)
-          start[i] = x_t0 + 3 * elements[corners * e + i], end[i] = x_t1 + 3 * elements[corners * e + i];
+          start[i] = x_t0 + 3 * elements[corners * e + i],
+          end[i] = x_t1 + 3 * elements[corners * e + i];
         const Vec origin = {start[0][0], start[0][1], start[0][2]};
         Mover a = geoms.mover(pair.geom, origin);
         Mover b(start, end, corners, radius, origin);
         Touch touch = first_touch(a, b, 0, 0);
         if (!touch.hit && pair.reach > 0) touch = first_touch(a, b, pair.reach, 0);
         if (touch.hit)
-          rows->push_back({pair.geom, 0, static_cast<std::int32_t>(e), touch.t, touch.distance, touch.point + origin,
-                           touch.normal});
+          rows->push_back({pair.geom, 0, static_cast<std::int32_t>(e), touch.t, touch.distance,
+                           touch.point + origin, touch.normal});
       }
     }
   }
   return counts;
 }
 
-bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t* a, const std::int32_t* b, int corners,
-                     double distance, Touch* touch) {
+bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t* a,
+                     const std::int32_t* b, int corners, double distance, Touch* touch) {
   const double *start[2][4], *end[2][4];
   for (int i = 0; i < corners; ++i) {
     start[0][i] = x_t0 + 3 * a[i], end[0][i] = x_t1 + 3 * a[i];
     start[1][i] = x_t0 + 3 * b[i], end[1][i] = x_t1 + 3 * b[i];
   }
   const Vec origin = {start[0][0][0], start[0][0][1], start[0][0][2]};
-  Mover x(start[0], end[0], corners, 0.5 * distance, origin), y(start[1], end[1], corners, 0.5 * distance, origin);
+  Mover x(start[0], end[0], corners, 0.5 * distance, origin),
+      y(start[1], end[1], corners, 0.5 * distance, origin);
   *touch = first_touch(x, y, 0, 0);
   touch->point = touch->point + origin;
   return touch->hit;

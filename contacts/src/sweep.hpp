@@ -8,7 +8,8 @@
 
 namespace tauguard::contacts {
 
-// How far apart counts, beside touching: contacts up to `reach` are listed where the surfaces do not touch.
+// How far apart counts, beside touching: contacts up to `reach` are listed where the surfaces do
+// not touch.
 struct GeomPair {
   std::int32_t a, b;
   double reach;
@@ -23,8 +24,8 @@ struct Row {
 struct Box {
   Vec lo, hi;
   bool meets(const Box& o) const {
-    return lo[0] <= o.hi[0] && o.lo[0] <= hi[0] && lo[1] <= o.hi[1] && o.lo[1] <= hi[1] && lo[2] <= o.hi[2] &&
-           o.lo[2] <= hi[2];
+    return lo[0] <= o.hi[0] && o.lo[0] <= hi[0] && lo[1] <= o.hi[1] && o.lo[1] <= hi[1] &&
+           lo[2] <= o.hi[2] && o.lo[2] <= hi[2];
   }
 };
 
@@ -40,7 +41,7 @@ struct Counts {
 // The triangles of a mesh, for pairs in which its surface counts and not its hull.
 struct Surface {
   std::vector<Shape> triangles;
-  std::vector<Vec> centre;     // of a ball around each, in the geom's frame
+  std::vector<Vec> centre;  // of a ball around each, in the geom's frame
   std::vector<double> radius;
 };
 
@@ -51,10 +52,13 @@ class Geoms {
   void add_surface(Surface surface) { surfaces_.back() = std::move(surface); }
   std::size_t size() const { return shapes_.size(); }
 
-  // Brings motions and swept boxes up to date, of bodies that moved in this step or since the last one.
+  // Brings motions and swept boxes up to date, of bodies that moved in this step or since the last
+  // one.
   void update(const Poses& poses);
-  bool still(int geom) const { return still_[body_[geom]]; }      // unmoved in this step
-  bool as_before(int geom) const { return same_[body_[geom]]; }   // and where it was throughout the last one
+  bool still(int geom) const { return still_[body_[geom]]; }  // unmoved in this step
+  bool as_before(int geom) const {
+    return same_[body_[geom]];
+  }  // and where it was throughout the last one
   const Box& box(int geom) const { return boxes_[geom]; }
   const Shape& shape(int geom) const { return shapes_[geom]; }
   const Surface& surface(int geom) const { return surfaces_[geom]; }
@@ -68,17 +72,18 @@ class Geoms {
   std::vector<Surface> surfaces_;
   std::vector<Frame> in_body_;
   std::vector<int> body_;
-  std::vector<int> bodies_;             // those that have geoms
-  std::vector<RigidMotion> motions_;    // by body, as the rest
+  std::vector<int> bodies_;           // those that have geoms
+  std::vector<RigidMotion> motions_;  // by body, as the rest
   std::vector<char> still_, same_, seen_;
   std::vector<Box> boxes_;
-  std::vector<double> last_;            // 24 a body: both poses of the last step
+  std::vector<double> last_;  // 24 a body: both poses of the last step
   std::int64_t moved_ = 0;
 };
 
 class RigidPairs {
  public:
-  explicit RigidPairs(std::vector<GeomPair> pairs) : pairs_(std::move(pairs)), cache_(pairs_.size()) {}
+  explicit RigidPairs(std::vector<GeomPair> pairs)
+      : pairs_(std::move(pairs)), cache_(pairs_.size()) {}
   Counts find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows);
 
  private:
@@ -90,19 +95,20 @@ class RigidPairs {
   std::vector<Cached> cache_;
 };
 
-// The simplices of a flex against geoms; `skip` leaves out a simplex that hangs on the geom's own body.
+// The simplices of a flex against geoms; `skip` leaves out a simplex that hangs on the geom's own
+// body.
 struct FlexPair {
   std::int32_t geom;
   double reach;
   const std::uint8_t* skip;  // one a simplex
 };
 
-Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1, const std::int32_t* elements,
-                 std::size_t count, int corners, double radius, const std::vector<FlexPair>& pairs,
-                 std::vector<Row>* rows);
+Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1,
+                 const std::int32_t* elements, std::size_t count, int corners, double radius,
+                 const std::vector<FlexPair>& pairs, std::vector<Row>* rows);
 
 // Two simplices of linearly moving vertices; true where they come within `distance` of one another.
-bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t* a, const std::int32_t* b, int corners,
-                     double distance, Touch* touch);
+bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t* a,
+                     const std::int32_t* b, int corners, double distance, Touch* touch);
 
 }  // namespace tauguard::contacts

@@ -30,8 +30,9 @@ double Travel::rigid(int geom, const double* point, const Poses& p) const {
   return shift + turn * (apart(x0, point, 3) + shift);
 }
 
-void Travel::bound(const std::int32_t* geom, const std::int32_t* flex_of, const double* point, std::size_t count,
-                   const Poses& p, const double* x_t0, const double* x_t1, double* way, double* core) const {
+void Travel::bound(const std::int32_t* geom, const std::int32_t* flex_of, const double* point,
+                   std::size_t count, const Poses& p, const double* x_t0, const double* x_t1,
+                   double* way, double* core) const {
   std::vector<double> sheets(vertex_begin_.size(), -1);
   for (std::size_t i = 0; i < count; ++i) {
     way[i] = core[i] = 0;

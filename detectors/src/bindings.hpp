@@ -32,11 +32,14 @@ inline bool finite(const double* v, std::size_t n) {
 }
 
 // One sample of n joints, the third signal named for the message.
-inline void check_sample(std::size_t n, const In1& q, const In1& qd, const In1& drive, const char* name) {
+inline void check_sample(std::size_t n, const In1& q, const In1& qd, const In1& drive,
+                         const char* name) {
   const std::pair<const char*, const In1*> signals[] = {{"q", &q}, {"qd", &qd}, {name, &drive}};
   for (const auto& [what, signal] : signals) {
-    if (signal->shape(0) != n) throw std::invalid_argument(std::string(what) + ": expected one entry a joint");
-    if (!finite(signal->data(), n)) throw std::invalid_argument(std::string(what) + ": every entry must be finite");
+    if (signal->shape(0) != n)
+      throw std::invalid_argument(std::string(what) + ": expected one entry a joint");
+    if (!finite(signal->data(), n))
+      throw std::invalid_argument(std::string(what) + ": every entry must be finite");
   }
 }
 

@@ -80,7 +80,8 @@ Inertial unit(int parameter) {
 
 }  // namespace
 
-void Chain::momentum(const double* q, const double* qd, double* p, double* beta, Workspace& work) const {
+void Chain::momentum(const double* q, const double* qd, double* p, double* beta,
+                     Workspace& work) const {
   velocities(q, qd, work);
   for (int i = 0; i < size(); ++i) {
     const Inertial& body = joints[i].inertial;
@@ -103,7 +104,8 @@ void Chain::momentum(const double* q, const double* qd, double* p, double* beta,
   }
 }
 
-// One column of the regressor: what a unit of one parameter of `body` does at the joints that carry it.
+// One column of the regressor: what a unit of one parameter of `body` does at the joints that carry
+// it.
 void Chain::column(int body, int parameter, double* p, double* beta, std::size_t stride,
                    Workspace& work) const {
   for (int i = 0; i < size(); ++i) p[i * stride] = beta[i * stride] = 0.0;
@@ -133,11 +135,13 @@ void Chain::link_regressor(int body, int count, const double* q, const double* q
   link_regressor_again(body, count, p, beta, work);
 }
 
-void Chain::link_regressor_again(int body, int count, double* p, double* beta, Workspace& work) const {
+void Chain::link_regressor_again(int body, int count, double* p, double* beta,
+                                 Workspace& work) const {
   for (int c = 0; c < count; ++c) column(body, c, p + c, beta + c, count, work);
 }
 
-void Chain::regressor(const double* q, const double* qd, double* p, double* beta, Workspace& work) const {
+void Chain::regressor(const double* q, const double* qd, double* p, double* beta,
+                      Workspace& work) const {
   velocities(q, qd, work);
   const std::size_t stride = static_cast<std::size_t>(kInertial) * joints.size();
   for (int body = 0; body < size(); ++body)
@@ -145,7 +149,8 @@ void Chain::regressor(const double* q, const double* qd, double* p, double* beta
       column(body, c, p + kInertial * body + c, beta + kInertial * body + c, stride, work);
 }
 
-void Chain::rnea(const double* q, const double* qd, const double* qdd, double* tau, Workspace& work) const {
+void Chain::rnea(const double* q, const double* qd, const double* qdd, double* tau,
+                 Workspace& work) const {
   velocities(q, qd, work);
   for (int i = 0; i < size(); ++i) {
     const Joint& joint = joints[i];

@@ -1,8 +1,9 @@
 // The rigid-body terms that an observer needs, by O(n) recursions over a tree of one-degree joints.
 //
-// Notation: link i moves with joint i and carries its frame; all quantities of a link are in its own
-// frame, about its origin. w, v: angular and linear velocity; h, k: angular and linear momentum.
-// With S_i the joint's motion axis and H_i = (h, k) the momentum of the whole subtree of joint i,
+// Notation: link i moves with joint i and carries its frame; all quantities of a link are in its
+// own frame, about its origin. w, v: angular and linear velocity; h, k: angular and linear
+// momentum. With S_i the joint's motion axis and H_i = (h, k) the momentum of the whole subtree of
+// joint i,
 //
 //   p_i      = S_i . H_i + armature_i qd_i                    (generalised momentum M(q) qd)
 //   dT/dq_i  = H_i . (V_i x S_i)                              (= (C(q, qd)^T qd)_i)
@@ -26,7 +27,7 @@ constexpr int kInertial = 10;  // m, m c (3), Ixx Ixy Iyy Ixz Iyz Izz about the 
 
 struct Inertial {
   double mass = 0;
-  Vec3 moment;                           // mass times centre of mass
+  Vec3 moment;  // mass times centre of mass
   double xx = 0, xy = 0, yy = 0, xz = 0, yz = 0, zz = 0;
 
   Vec3 angular_momentum(Vec3 w, Vec3 v) const {
@@ -38,11 +39,11 @@ struct Inertial {
 };
 
 struct Joint {
-  int parent = -1;         // -1: the base
-  bool prismatic = false;  // else revolute
-  Vec3 axis;               // unit, in the link's frame
-  Vec3 offset;             // origin of the joint in the parent's frame
-  Vec3 slide;              // prismatic: the axis in the parent's frame
+  int parent = -1;           // -1: the base
+  bool prismatic = false;    // else revolute
+  Vec3 axis;                 // unit, in the link's frame
+  Vec3 offset;               // origin of the joint in the parent's frame
+  Vec3 slide;                // prismatic: the axis in the parent's frame
   Mat3 fixed, cosine, sine;  // rotation to the parent = fixed + cos(q) cosine + sin(q) sine
   Inertial inertial;
   double armature = 0;
@@ -70,20 +71,24 @@ class Chain {
 
   int size() const { return static_cast<int>(joints.size()); }
 
-  // p = M(q) qd and beta = C(q, qd)^T qd - g(q), so that dp/dt = tau + beta + tau_ext; n doubles each.
+  // p = M(q) qd and beta = C(q, qd)^T qd - g(q), so that dp/dt = tau + beta + tau_ext; n doubles
+  // each.
   void momentum(const double* q, const double* qd, double* p, double* beta, Workspace& work) const;
 
-  // The same, per unit of every inertial parameter of every link: p and beta are n x (10 n), row-major.
+  // The same, per unit of every inertial parameter of every link: p and beta are n x (10 n),
+  // row-major.
   void regressor(const double* q, const double* qd, double* p, double* beta, Workspace& work) const;
 
-  // The same for the inertial parameters of link `link` alone, the first `count` of them: n x count.
-  void link_regressor(int link, int count, const double* q, const double* qd, double* p, double* beta,
-                      Workspace& work) const;
+  // The same for the inertial parameters of link `link` alone, the first `count` of them: n x
+  // count.
+  void link_regressor(int link, int count, const double* q, const double* qd, double* p,
+                      double* beta, Workspace& work) const;
   // The same for the state that `work` holds from the call before.
   void link_regressor_again(int link, int count, double* p, double* beta, Workspace& work) const;
 
   // Inverse dynamics: tau = M qdd + C qd + g.
-  void rnea(const double* q, const double* qd, const double* qdd, double* tau, Workspace& work) const;
+  void rnea(const double* q, const double* qd, const double* qdd, double* tau,
+            Workspace& work) const;
 
   // M(q), n x n, armature on its diagonal.
   void mass_matrix(const double* q, double* m, Workspace& work) const;
@@ -91,7 +96,8 @@ class Chain {
  private:
   void place(int i, double q, Workspace& work) const;
   void velocities(const double* q, const double* qd, Workspace& work) const;
-  void column(int link, int parameter, double* p, double* beta, std::size_t stride, Workspace& work) const;
+  void column(int link, int parameter, double* p, double* beta, std::size_t stride,
+              Workspace& work) const;
 };
 
 }  // namespace tauguard::detectors

@@ -1,18 +1,21 @@
-// The estimator: friction compensation, momentum observer, and a Kalman filter for what the model does
-// not know (payload, friction that has changed), so that the residual that is left is a collision.
+// The estimator: friction compensation, momentum observer, and a Kalman filter for what the model
+// does not know (payload, friction that has changed), so that the residual that is left is a
+// collision.
 //
-// The residual of a wrong model is linear in what is wrong: r = Phi theta + tau_ext with Phi the columns
-// of the unknowns, passed through the observer's own filter. theta holds the payload at the last link
-// (mass and first moment in that link's frame) and, per joint, a torque offset and the relative errors of
-// viscous and Coulomb friction. Each is an Ornstein-Uhlenbeck process with its own standard deviation and
-// time constant: what no motion excites falls back to zero. A standard deviation of 0 removes an unknown.
+// The residual of a wrong model is linear in what is wrong: r = Phi theta + tau_ext with Phi the
+// columns of the unknowns, passed through the observer's own filter. theta holds the payload at the
+// last link (mass and first moment in that link's frame) and, per joint, a torque offset and the
+// relative errors of viscous and Coulomb friction. Each is an Ornstein-Uhlenbeck process with its
+// own standard deviation and time constant: what no motion excites falls back to zero. A standard
+// deviation of 0 removes an unknown.
 //
-// An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is, the less
-// it says about the model, and the sooner it is a collision.
+// An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is,
+// the less it says about the model, and the sooner it is a collision.
 //
-// What is left counts less where the payload is still a guess: with s the deviation that its covariance
-// gives the residual, `doubt` times the variance s^2 is added to the noise's. More than 1, because errors of
-// the model last longer than the time between two corrections, each of which takes them for news.
+// What is left counts less where the payload is still a guess: with s the deviation that its
+// covariance gives the residual, `doubt` times the variance s^2 is added to the noise's. More than
+// 1, because errors of the model last longer than the time between two corrections, each of which
+// takes them for news.
 #pragma once
 
 #include <cmath>
@@ -25,21 +28,21 @@
 
 namespace tauguard::detectors {
 
-constexpr int kPayload = 4;    // mass and first moment
-constexpr int kPerJoint = 3;   // offset, viscous, Coulomb
+constexpr int kPayload = 4;                 // mass and first moment
+constexpr int kPerJoint = 3;                // offset, viscous, Coulomb
 constexpr double kAccelerationRate = 30.0;  // [1/s]
 
 struct EstimatorSettings {
-  std::vector<double> drive_gain;    // N m/A, n
-  std::vector<double> gain;          // of the observer [1/s], n
-  std::vector<double> weights;       // friction, n x columns
-  std::vector<double> deviation;     // of the unknowns, 4 + 3 n
-  std::vector<double> persistence;   // time constants of the unknowns [s], 4 + 3 n
-  std::vector<double> noise;         // standard deviation of the residual [N m], n
+  std::vector<double> drive_gain;   // N m/A, n
+  std::vector<double> gain;         // of the observer [1/s], n
+  std::vector<double> weights;      // friction, n x columns
+  std::vector<double> deviation;    // of the unknowns, 4 + 3 n
+  std::vector<double> persistence;  // time constants of the unknowns [s], 4 + 3 n
+  std::vector<double> noise;        // standard deviation of the residual [N m], n
   double clip = 3.0;
-  int every = 10;                    // samples between two corrections
-  double doubt = 0.0;                // see above; 0: all of what is left counts
-  std::vector<double> fusion;        // of position and velocity, 6 n; empty: velocity as measured
+  int every = 10;              // samples between two corrections
+  double doubt = 0.0;          // see above; 0: all of what is left counts
+  std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
 };
 
 class Estimator {
@@ -58,8 +61,11 @@ class Estimator {
         covariance_(m_ * m_),
         gathered_(m_),
         row_(m_) {
-    for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_, &decay_}) v->resize(n_);
-    for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_}) v->resize(kPayload * n_);
+    for (auto* v :
+         {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_, &decay_})
+      v->resize(n_);
+    for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
+      v->resize(kPayload * n_);
     for (auto* v : {&own_now_, &own_before_, &own_}) v->resize(kPerJoint * n_);
     adapts_ = false;
     for (const double d : set_.deviation) adapts_ = adapts_ || d > 0;
@@ -75,15 +81,16 @@ class Estimator {
     decay_dt_ = -1.0;
   }
 
-  // One sample: residual r of the observer, what is left of it after the unknowns' share, in `left`, and
-  // an acceleration (velocity differentiated at the rate kAccelerationRate).
+  // One sample: residual r of the observer, what is left of it after the unknowns' share, in
+  // `left`, and an acceleration (velocity differentiated at the rate kAccelerationRate).
   void step(const double* q, const double* qd, const double* current, double dt, double* residual,
             double* left, double* acceleration) {
     if (!started_) begin(q, qd);
     if (fusion_.active()) qd = started_ ? fusion_.step(q, qd, dt) : fusion_.last();
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
     if (adapts_)
-      chain_.link_regressor_again(static_cast<int>(n_) - 1, kPayload, load_p_.data(), load_beta_.data(), work_);
+      chain_.link_regressor_again(static_cast<int>(n_) - 1, kPayload, load_p_.data(),
+                                  load_beta_.data(), work_);
     drive(q, qd, current);
     if (started_) filter(dt);
     remember();
@@ -104,8 +111,10 @@ class Estimator {
     smooth_.assign(qd, qd + n_);
     fusion_.reset(q, qd);
     for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
-    for (auto* v : {&residual_, &load_, &own_, &theta_, &covariance_}) std::fill(v->begin(), v->end(), 0.0);
-    for (std::size_t a = 0; a < m_; ++a) covariance_[a * m_ + a] = set_.deviation[a] * set_.deviation[a];
+    for (auto* v : {&residual_, &load_, &own_, &theta_, &covariance_})
+      std::fill(v->begin(), v->end(), 0.0);
+    for (std::size_t a = 0; a < m_; ++a)
+      covariance_[a * m_ + a] = set_.deviation[a] * set_.deviation[a];
     since_ = 0;
   }
 
@@ -128,8 +137,8 @@ class Estimator {
     }
   }
 
-  // Torque that arm and tracked payload need at joint j, accelerations aside. The residual of a payload
-  // that the model lacks has the sign of what is missing: theta is less than 0 for it.
+  // Torque that arm and tracked payload need at joint j, accelerations aside. The residual of a
+  // payload that the model lacks has the sign of what is missing: theta is less than 0 for it.
   double carried(std::size_t j) const {
     double sum = beta_[j];
     if (adapts_)
@@ -144,12 +153,12 @@ class Estimator {
       decay_dt_ = dt;
     }
     for (std::size_t j = 0; j < n_; ++j) {
-      residual_[j] = observer_step(residual_[j], decay_[j], dt, p_[j], p_before_[j], beta_[j], beta_before_[j],
-                                   tau_before_[j]);
+      residual_[j] = observer_step(residual_[j], decay_[j], dt, p_[j], p_before_[j], beta_[j],
+                                   beta_before_[j], tau_before_[j]);
       if (!adapts_) continue;
       for (std::size_t a = j * kPayload; a < (j + 1) * kPayload; ++a)
-        load_[a] = observer_step(load_[a], decay_[j], dt, load_p_[a], load_p_before_[a], load_beta_[a],
-                                 load_beta_before_[a], 0.0);
+        load_[a] = observer_step(load_[a], decay_[j], dt, load_p_[a], load_p_before_[a],
+                                 load_beta_[a], load_beta_before_[a], 0.0);
       for (std::size_t a = j * kPerJoint; a < (j + 1) * kPerJoint; ++a)
         own_[a] += decay_[j] * (-own_before_[a] - own_[a]);
     }

@@ -17,8 +17,9 @@ using Numbers = std::vector<double>;
 FrictionBasis make_basis(const Numbers& bristles, const Numbers& stops, const Numbers& stribeck,
                          const Numbers& slopes, const Numbers& loaded, bool saturation,
                          bool modelled, const Numbers& cycles, double play, std::size_t joints) {
-  require(bristles.size() + stops.size() > 0 && joints > 0 && cycles.size() % joints == 0 && play >= 0,
-          "friction: no bristle and no stop, cycles not per joint, or play below 0");
+  require(
+      bristles.size() + stops.size() > 0 && joints > 0 && cycles.size() % joints == 0 && play >= 0,
+      "friction: no bristle and no stop, cycles not per joint, or play below 0");
   FrictionBasis basis;
   basis.bristles = bristles;
   basis.play = play;
@@ -37,9 +38,8 @@ FrictionBasis make_basis(const Numbers& bristles, const Numbers& stops, const Nu
 void friction_columns(const FrictionBasis& basis, In2 q, In2 qd, In2 tau, In2 load, Out3 out) {
   const std::size_t rows = q.shape(0), n = q.shape(1), c = basis.columns();
   require(qd.shape(0) == rows && qd.shape(1) == n && tau.shape(0) == rows && tau.shape(1) == n &&
-              load.shape(0) == rows && load.shape(1) == n &&
-              out.shape(0) == rows && out.shape(1) == n && out.shape(2) == c &&
-              basis.cycles.size() == n * basis.ripples,
+              load.shape(0) == rows && load.shape(1) == n && out.shape(0) == rows &&
+              out.shape(1) == n && out.shape(2) == c && basis.cycles.size() == n * basis.ripples,
           "friction_columns: arrays differ in shape");
   nb::gil_scoped_release release;
   Numbers memory(basis.memory());
@@ -66,8 +66,8 @@ void run(Estimator& estimator, In1 dt, In2 q, In2 qd, In2 current, Out2 residual
   estimator.reset();
   for (std::size_t t = 0; t < rows; ++t) {
     const double step = t ? dt.data()[t - 1] : 0.0;
-    estimator.step(q.data() + n * t, qd.data() + n * t, current.data() + n * t, step, residual.data() + n * t,
-                   left.data() + n * t, acceleration.data() + n * t);
+    estimator.step(q.data() + n * t, qd.data() + n * t, current.data() + n * t, step,
+                   residual.data() + n * t, left.data() + n * t, acceleration.data() + n * t);
     if (wanted) std::copy(estimator.theta().begin(), estimator.theta().end(), theta.data() + m * t);
   }
 }
@@ -76,49 +76,58 @@ void run(Estimator& estimator, In1 dt, In2 q, In2 qd, In2 current, Out2 residual
 
 void bind_estimator(nb::module_& m) {
   nb::class_<FrictionBasis>(m, "FrictionBasis")
-      .def("__init__",
-           [](FrictionBasis* self, const Numbers& bristles, const Numbers& stops, const Numbers& stribeck,
-              const Numbers& slopes, const Numbers& loaded, bool saturation, bool modelled,
-              const Numbers& cycles, double play, std::size_t joints) {
-             new (self) FrictionBasis(
-                 make_basis(bristles, stops, stribeck, slopes, loaded, saturation, modelled, cycles, play, joints));
-           })
+      .def(
+          "__init__",
+          [](FrictionBasis* self, const Numbers& bristles, const Numbers& stops,
+             const Numbers& stribeck, const Numbers& slopes, const Numbers& loaded, bool saturation,
+             bool modelled, const Numbers& cycles, double play, std::size_t joints) {
+            new (self) FrictionBasis(make_basis(bristles, stops, stribeck, slopes, loaded,
+                                                saturation, modelled, cycles, play, joints));
+          })
       .def_prop_ro("columns", &FrictionBasis::columns)
-      .def("evaluate", &friction_columns, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+      .def("evaluate", &friction_columns, nb::arg(), nb::arg(), nb::arg(), nb::arg(),
+           nb::arg().noconvert());
   nb::class_<Estimator>(m, "Estimator")
       .def("__init__",
-           [](Estimator* self, const Chain& chain, const FrictionBasis& basis, const Numbers& drive_gain,
-              const Numbers& gain, const Numbers& weights, const Numbers& deviation,
-              const Numbers& persistence, const Numbers& noise, double clip, int every, double doubt,
-              const Numbers& fusion) {
+           [](Estimator* self, const Chain& chain, const FrictionBasis& basis,
+              const Numbers& drive_gain, const Numbers& gain, const Numbers& weights,
+              const Numbers& deviation, const Numbers& persistence, const Numbers& noise,
+              double clip, int every, double doubt, const Numbers& fusion) {
              const std::size_t n = chain.joints.size(), unknown = kPayload + kPerJoint * n;
              require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
                          weights.size() == n * basis.columns() && deviation.size() == unknown &&
-                         persistence.size() == unknown && basis.cycles.size() == n * basis.ripples &&
+                         persistence.size() == unknown &&
+                         basis.cycles.size() == n * basis.ripples &&
                          (fusion.empty() || fusion.size() == n * VelocityFusion::kGains),
                      "Estimator: array lengths differ");
              new (self) Estimator(chain, basis,
-                                  {drive_gain, gain, weights, deviation, persistence, noise, clip, every, doubt, fusion});
+                                  {drive_gain, gain, weights, deviation, persistence, noise, clip,
+                                   every, doubt, fusion});
            })
       .def_prop_ro("started", &Estimator::started)
-      .def("theta",
-           [](const Estimator& estimator, Out1 out) {
-             require(out.shape(0) == estimator.unknowns(), "theta: wrong length");
-             std::copy(estimator.theta().begin(), estimator.theta().end(), out.data());
-           }, nb::arg().noconvert())
+      .def(
+          "theta",
+          [](const Estimator& estimator, Out1 out) {
+            require(out.shape(0) == estimator.unknowns(), "theta: wrong length");
+            std::copy(estimator.theta().begin(), estimator.theta().end(), out.data());
+          },
+          nb::arg().noconvert())
       .def("reset", &Estimator::reset)
-      .def("run", &run, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(),
-           nb::arg().noconvert(), nb::arg().noconvert())
-      .def("step", [](Estimator& estimator, In1 q, In1 qd, In1 current, double dt, Out1 residual, Out1 left,
-                      Out1 acceleration) {
-        check_sample(estimator.joints(), q, qd, current, "current");
-        for (const auto& a : {residual, left, acceleration})
-          require(a.shape(0) == estimator.joints(), "outputs: one entry a joint");
-        require(!estimator.started() || (dt > 0 && std::isfinite(dt)), "dt: must be above 0");
-        estimator.step(q.data(), qd.data(), current.data(), dt, residual.data(), left.data(),
-                       acceleration.data());
-      }, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(),
-           nb::arg().noconvert());
+      .def("run", &run, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(),
+           nb::arg().noconvert(), nb::arg().noconvert(), nb::arg().noconvert())
+      .def(
+          "step",
+          [](Estimator& estimator, In1 q, In1 qd, In1 current, double dt, Out1 residual, Out1 left,
+             Out1 acceleration) {
+            check_sample(estimator.joints(), q, qd, current, "current");
+            for (const auto& a : {residual, left, acceleration})
+              require(a.shape(0) == estimator.joints(), "outputs: one entry a joint");
+            require(!estimator.started() || (dt > 0 && std::isfinite(dt)), "dt: must be above 0");
+            estimator.step(q.data(), qd.data(), current.data(), dt, residual.data(), left.data(),
+                           acceleration.data());
+          },
+          nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(),
+          nb::arg().noconvert());
 }
 
 }  // namespace tauguard::detectors

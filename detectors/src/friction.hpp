@@ -1,16 +1,18 @@
 // A friction model that is linear in its weights: columns of position, velocity and drive torque.
 //
 // Presliding and Coulomb friction come in two forms, both in [-1, 1] and rate-independent:
-//   a Dahl bristle of settling length d:   ds = (dq - s |dq|) / d   (exact over a step: exponential)
-//   a stop operator of width d:            s = (q - rest) / d, rest dragged along beyond d
-// The bristle forgets under jitter, so it follows a position that moves only when the measured one has
-// left a dead zone of `play` around it. With b the first bristle (the first stop where there is none), the
-// columns of one joint are, in this order,
-//   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each width w,
-//   |load| b, |load| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each ripple frequency c,
-//   tau |tau| where the drive's torque per ampere changes with the current
-// The load is the drive's torque, or with `modelled` what the arm's own model says of it: a joint without
-// gravity needs hardly any torque but friction, and friction must not be predicted from itself.
+//   a Dahl bristle of settling length d:   ds = (dq - s |dq|) / d   (exact over a step:
+//   exponential) a stop operator of width d:            s = (q - rest) / d, rest dragged along
+//   beyond d
+// The bristle forgets under jitter, so it follows a position that moves only when the measured one
+// has left a dead zone of `play` around it. With b the first bristle (the first stop where there is
+// none), the columns of one joint are, in this order,
+//   1, qd, bristles, stops, b exp(-(qd/w)^2) for each Stribeck velocity w, tanh(qd/w) for each
+//   width w, |load| b, |load| tanh(qd/w) for each loaded width w, cos(c q), sin(c q) for each
+//   ripple frequency c, tau |tau| where the drive's torque per ampere changes with the current
+// The load is the drive's torque, or with `modelled` what the arm's own model says of it: a joint
+// without gravity needs hardly any torque but friction, and friction must not be predicted from
+// itself.
 #pragma once
 
 #include <algorithm>
@@ -31,16 +33,15 @@ class FrictionBasis {
   bool modelled = false;         // whose torque the load is
   std::vector<double> cycles;    // per joint, `ripples` each [1/rad]
   std::size_t ripples = 0;
-  double play = 0.0;             // [rad]
+  double play = 0.0;  // [rad]
 
   static constexpr std::size_t kOffset = 0, kViscous = 1, kFirst = 2;
 
-  std::size_t columns() const {
-    return smooth() + 2 * ripples + (saturation ? 1 : 0);
-  }
+  std::size_t columns() const { return smooth() + 2 * ripples + (saturation ? 1 : 0); }
   // Columns [kFirst, smooth()) are Coulomb friction in its forms.
   std::size_t smooth() const {
-    return kFirst + bristles.size() + stops.size() + stribeck.size() + slopes.size() + 1 + loaded.size();
+    return kFirst + bristles.size() + stops.size() + stribeck.size() + slopes.size() + 1 +
+           loaded.size();
   }
 
   // Numbers of memory a joint: the followed position, the bristles, the stops' rests.

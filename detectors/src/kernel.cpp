@@ -1,8 +1,8 @@
 // tauguard.detectors._kernel: the SRQ kernel 1 / (1 + |x - z|^2 / sigma^2)^2 and sums of it.
 //
-// Lanes run over support vectors: every lane does the same arithmetic in the same order whatever the
-// vector width, so that all code paths give the same bits. A result depends on its row alone, so that any
-// number of threads and online evaluation give the same bits too.
+// Lanes run over support vectors: every lane does the same arithmetic in the same order whatever
+// the vector width, so that all code paths give the same bits. A result depends on its row alone,
+// so that any number of threads and online evaluation give the same bits too.
 #include <nanobind/nanobind.h>
 
 #include <algorithm>
@@ -34,9 +34,10 @@ inline Four load(const double* p) {
   return v;
 }
 
-// sum_i coef_i / (1 + |x - z_i|^2 inv)^2 over `blocks` blocks of kLanes vectors of d numbers, lane last.
-TAUGUARD_WIDE double weighted_sum(const double* x, const double* vectors, const double* coef, std::size_t blocks,
-                                  std::size_t d, double inv) {
+// sum_i coef_i / (1 + |x - z_i|^2 inv)^2 over `blocks` blocks of kLanes vectors of d numbers, lane
+// last.
+TAUGUARD_WIDE double weighted_sum(const double* x, const double* vectors, const double* coef,
+                                  std::size_t blocks, std::size_t d, double inv) {
   Four sum[kFours] = {};
   for (std::size_t b = 0; b < blocks; ++b) {
     Four square[kFours] = {};
@@ -59,11 +60,14 @@ TAUGUARD_WIDE double weighted_sum(const double* x, const double* vectors, const 
   return total;
 }
 
-// A weighted sum of kernels: support vectors packed for weighted_sum, padded with zero coefficients.
+// A weighted sum of kernels: support vectors packed for weighted_sum, padded with zero
+// coefficients.
 class KernelSum {
  public:
   KernelSum(In2 vectors, In1 coef, double intercept, double sigma)
-      : d_(vectors.shape(1)), blocks_((vectors.shape(0) + kLanes - 1) / kLanes), intercept_(intercept) {
+      : d_(vectors.shape(1)),
+        blocks_((vectors.shape(0) + kLanes - 1) / kLanes),
+        intercept_(intercept) {
     require(coef.shape(0) == vectors.shape(0), "KernelSum: one coefficient a vector");
     require(sigma > 0, "KernelSum: sigma must be above 0");
     inv_ = 1.0 / (sigma * sigma);
@@ -90,16 +94,18 @@ class KernelSum {
 namespace {
 
 void rows(const KernelSum& kernel, In2 x, Out1 out, int threads) {
-  require(x.shape(1) == kernel.dimension() && out.shape(0) == x.shape(0), "rows: arrays differ in shape");
+  require(x.shape(1) == kernel.dimension() && out.shape(0) == x.shape(0),
+          "rows: arrays differ in shape");
   nb::gil_scoped_release release;
   ThreadPool::shared().parallel_for(x.shape(0), threads, 256, [&](auto begin, auto end, auto) {
     for (auto t = begin; t < end; ++t) out.data()[t] = kernel.at(x.data() + t * kernel.dimension());
   });
 }
 
-// The window that ends with row t of a signal of m columns: `count` rows `lag` apart, oldest first, one
-// column after the other; rows before the first are the first.
-void window(const double* signal, std::size_t m, std::size_t t, std::size_t lag, std::size_t count, double* out) {
+// The window that ends with row t of a signal of m columns: `count` rows `lag` apart, oldest first,
+// one column after the other; rows before the first are the first.
+void window(const double* signal, std::size_t m, std::size_t t, std::size_t lag, std::size_t count,
+            double* out) {
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t back = (count - 1 - i) * lag;
     const double* row = signal + m * (back > t ? 0 : t - back);
@@ -109,7 +115,8 @@ void window(const double* signal, std::size_t m, std::size_t t, std::size_t lag,
 
 void windows(In2 signal, Ids ends, std::size_t lag, std::size_t count, Out2 out) {
   const std::size_t m = signal.shape(1);
-  require(out.shape(0) == ends.shape(0) && out.shape(1) == m * count, "windows: arrays differ in shape");
+  require(out.shape(0) == ends.shape(0) && out.shape(1) == m * count,
+          "windows: arrays differ in shape");
   for (std::size_t i = 0; i < ends.shape(0); ++i) {
     require(ends.data()[i] >= 0 && static_cast<std::size_t>(ends.data()[i]) < signal.shape(0),
             "windows: an end lies outside the signal");
@@ -117,7 +124,8 @@ void windows(In2 signal, Ids ends, std::size_t lag, std::size_t count, Out2 out)
   }
 }
 
-void series(const KernelSum& kernel, In2 signal, std::size_t lag, std::size_t count, Out1 out, int threads) {
+void series(const KernelSum& kernel, In2 signal, std::size_t lag, std::size_t count, Out1 out,
+            int threads) {
   const std::size_t m = signal.shape(1);
   require(m * count == kernel.dimension() && out.shape(0) == signal.shape(0) && lag > 0,
           "series: arrays differ in shape");
@@ -131,15 +139,21 @@ void series(const KernelSum& kernel, In2 signal, std::size_t lag, std::size_t co
   });
 }
 
-// Online: scales a residual, keeps the last window of it, and evaluates the kernel sum. All memory is taken in
-// the constructor; a step allocates nothing.
+// Online: scales a residual, keeps the last window of it, and evaluates the kernel sum. All memory
+// is taken in the constructor; a step allocates nothing.
 class Sliding {
  public:
   // weights: of the envelope, a row of four a joint; no rows: the residual in N m times `factor`.
-  Sliding(const KernelSum& kernel, Ids joints, In2 weights, double units, double factor, bool compress,
-          std::size_t lag, std::size_t count)
-      : kernel_(kernel), units_(units), factor_(factor), compress_(compress), lag_(lag), count_(count) {
-    require(joints.shape(0) * count == kernel.dimension() && lag > 0 && count > 0, "Sliding: sizes differ");
+  Sliding(const KernelSum& kernel, Ids joints, In2 weights, double units, double factor,
+          bool compress, std::size_t lag, std::size_t count)
+      : kernel_(kernel),
+        units_(units),
+        factor_(factor),
+        compress_(compress),
+        lag_(lag),
+        count_(count) {
+    require(joints.shape(0) * count == kernel.dimension() && lag > 0 && count > 0,
+            "Sliding: sizes differ");
     require(weights.shape(0) == 0 || weights.shape(1) == 4, "Sliding: four weights a joint");
     joints_.assign(joints.data(), joints.data() + joints.shape(0));
     weights_.assign(weights.data(), weights.data() + weights.shape(0) * weights.shape(1));
@@ -151,7 +165,8 @@ class Sliding {
 
   double step(In1 left, In1 qd, In1 acceleration) {
     const std::size_t n = left.shape(0), m = joints_.size(), length = rows_.size() / m;
-    require(qd.shape(0) == n && acceleration.shape(0) == n && (weights_.empty() || weights_.size() == 4 * n),
+    require(qd.shape(0) == n && acceleration.shape(0) == n &&
+                (weights_.empty() || weights_.size() == 4 * n),
             "step: expected one number a joint");
     double speed = 0.0, shaken = 0.0;
     for (std::size_t j = 0; j < n; ++j) {

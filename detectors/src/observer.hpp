@@ -1,4 +1,5 @@
-// The momentum observer: a first-order estimate of tau_ext from positions, velocities and drive torques.
+// The momentum observer: a first-order estimate of tau_ext from positions, velocities and drive
+// torques.
 #pragma once
 
 #include <cmath>
@@ -9,10 +10,10 @@
 namespace tauguard::detectors {
 
 // One step of the filter that pulls r towards dp/dt - tau - beta with the rate `gain`: exact for an
-// input that is constant over the step, with the trapezoidal mean of beta. Stable for any gain x dt.
-// decay = 1 - exp(-gain dt).
-inline double observer_step(double r, double decay, double dt, double p, double p_before, double beta,
-                            double beta_before, double tau_before) {
+// input that is constant over the step, with the trapezoidal mean of beta. Stable for any gain x
+// dt. decay = 1 - exp(-gain dt).
+inline double observer_step(double r, double decay, double dt, double p, double p_before,
+                            double beta, double beta_before, double tau_before) {
   return r + decay * ((p - p_before) / dt - (tau_before + (beta + beta_before) / 2) - r);
 }
 
@@ -23,7 +24,8 @@ class Observer {
   Observer(Chain chain, std::vector<double> gain)
       : chain_(std::move(chain)), gain_(std::move(gain)), work_(chain_.joints.size()) {
     const std::size_t n = chain_.joints.size();
-    for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_before_, &residual_, &decay_}) v->resize(n);
+    for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_before_, &residual_, &decay_})
+      v->resize(n);
   }
 
   const Chain& chain() const { return chain_; }

@@ -1,5 +1,6 @@
 // tauguard.detectors._observer: chains of one-degree joints and the momentum observer on arrays.
-// Rows are samples and independent of each other in all batch functions; shapes are checked in Python.
+// Rows are samples and independent of each other in all batch functions; shapes are checked in
+// Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -46,9 +47,10 @@ Chain make_chain(Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 a
                  In1 armature, In1 gravity) {
   const std::size_t n = parent.shape(0);
   const bool fits = prismatic.shape(0) == n && rotation.shape(0) == n && rotation.shape(1) == 3 &&
-                    rotation.shape(2) == 3 && translation.shape(0) == n && translation.shape(1) == 3 &&
-                    axis.shape(0) == n && axis.shape(1) == 3 && inertial.shape(0) == n &&
-                    inertial.shape(1) == kInertial && armature.shape(0) == n && gravity.shape(0) == 3;
+                    rotation.shape(2) == 3 && translation.shape(0) == n &&
+                    translation.shape(1) == 3 && axis.shape(0) == n && axis.shape(1) == 3 &&
+                    inertial.shape(0) == n && inertial.shape(1) == kInertial &&
+                    armature.shape(0) == n && gravity.shape(0) == 3;
   if (!fits) throw std::invalid_argument("Chain: array lengths differ");
   Chain chain;
   chain.gravity = load(gravity.data());
@@ -114,60 +116,74 @@ void filter(In1 gain, In1 dt, In2 p, In2 beta, In2 tau, Out2 out) {
 void bind_chain(nb::module_& m) {
   nb::class_<Chain>(m, "Chain")
       .def("__init__",
-           [](Chain* self, Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 axis, In2 inertial,
-              In1 armature, In1 gravity) {
-             new (self) Chain(make_chain(parent, prismatic, rotation, translation, axis, inertial, armature,
-                                         gravity));
+           [](Chain* self, Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 axis,
+              In2 inertial, In1 armature, In1 gravity) {
+             new (self) Chain(make_chain(parent, prismatic, rotation, translation, axis, inertial,
+                                         armature, gravity));
            })
-      .def("momentum",
-           [](const Chain& chain, In2 q, In2 qd, Out2 p, Out2 beta, int threads) {
-             same_rows(chain, q, qd, p, beta);
-             const std::size_t n = chain.joints.size();
-             each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
-               chain.momentum(q.data() + n * t, qd.data() + n * t, p.data() + n * t, beta.data() + n * t, work);
-             });
-           }, nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg())
-      .def("rnea",
-           [](const Chain& chain, In2 q, In2 qd, In2 qdd, Out2 tau, int threads) {
-             same_rows(chain, q, qd, qdd, tau);
-             const std::size_t n = chain.joints.size();
-             each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
-               chain.rnea(q.data() + n * t, qd.data() + n * t, qdd.data() + n * t, tau.data() + n * t, work);
-             });
-           }, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg())
-      .def("mass_matrix",
-           [](const Chain& chain, In2 q, Out3 m, int threads) {
-             const std::size_t n = chain.joints.size();
-             require(q.shape(1) == n && m.shape(0) == q.shape(0) && m.shape(1) == n && m.shape(2) == n,
-                     "mass_matrix: arrays differ in shape");
-             each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
-               chain.mass_matrix(q.data() + n * t, m.data() + n * n * t, work);
-             });
-           }, nb::arg(), nb::arg().noconvert(), nb::arg())
-      .def("regressor",
-           [](const Chain& chain, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
-             const std::size_t n = chain.joints.size(), c = kInertial * n;
-             same_rows(chain, q, qd);
-             require(p.shape(0) == q.shape(0) && p.shape(1) == n && p.shape(2) == c &&
-                         beta.shape(0) == q.shape(0) && beta.shape(1) == n && beta.shape(2) == c,
-                     "regressor: arrays differ in shape");
-             each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
-               chain.regressor(q.data() + n * t, qd.data() + n * t, p.data() + n * c * t,
-                               beta.data() + n * c * t, work);
-             });
-           }, nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg())
-      .def("link_regressor", [](const Chain& chain, int link, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
-        const std::size_t n = chain.joints.size(), c = p.shape(2);
-        same_rows(chain, q, qd);
-        require(link >= 0 && link < chain.size() && c <= kInertial && p.shape(0) == q.shape(0) &&
-                    p.shape(1) == n && beta.shape(0) == q.shape(0) && beta.shape(1) == n &&
-                    beta.shape(2) == c,
-                "link_regressor: arrays differ in shape");
-        each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
-          chain.link_regressor(link, static_cast<int>(c), q.data() + n * t, qd.data() + n * t,
-                               p.data() + n * c * t, beta.data() + n * c * t, work);
-        });
-      }, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg());
+      .def(
+          "momentum",
+          [](const Chain& chain, In2 q, In2 qd, Out2 p, Out2 beta, int threads) {
+            same_rows(chain, q, qd, p, beta);
+            const std::size_t n = chain.joints.size();
+            each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+              chain.momentum(q.data() + n * t, qd.data() + n * t, p.data() + n * t,
+                             beta.data() + n * t, work);
+            });
+          },
+          nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg())
+      .def(
+          "rnea",
+          [](const Chain& chain, In2 q, In2 qd, In2 qdd, Out2 tau, int threads) {
+            same_rows(chain, q, qd, qdd, tau);
+            const std::size_t n = chain.joints.size();
+            each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+              chain.rnea(q.data() + n * t, qd.data() + n * t, qdd.data() + n * t,
+                         tau.data() + n * t, work);
+            });
+          },
+          nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg())
+      .def(
+          "mass_matrix",
+          [](const Chain& chain, In2 q, Out3 m, int threads) {
+            const std::size_t n = chain.joints.size();
+            require(
+                q.shape(1) == n && m.shape(0) == q.shape(0) && m.shape(1) == n && m.shape(2) == n,
+                "mass_matrix: arrays differ in shape");
+            each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+              chain.mass_matrix(q.data() + n * t, m.data() + n * n * t, work);
+            });
+          },
+          nb::arg(), nb::arg().noconvert(), nb::arg())
+      .def(
+          "regressor",
+          [](const Chain& chain, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
+            const std::size_t n = chain.joints.size(), c = kInertial * n;
+            same_rows(chain, q, qd);
+            require(p.shape(0) == q.shape(0) && p.shape(1) == n && p.shape(2) == c &&
+                        beta.shape(0) == q.shape(0) && beta.shape(1) == n && beta.shape(2) == c,
+                    "regressor: arrays differ in shape");
+            each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+              chain.regressor(q.data() + n * t, qd.data() + n * t, p.data() + n * c * t,
+                              beta.data() + n * c * t, work);
+            });
+          },
+          nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg())
+      .def(
+          "link_regressor",
+          [](const Chain& chain, int link, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
+            const std::size_t n = chain.joints.size(), c = p.shape(2);
+            same_rows(chain, q, qd);
+            require(link >= 0 && link < chain.size() && c <= kInertial &&
+                        p.shape(0) == q.shape(0) && p.shape(1) == n &&
+                        beta.shape(0) == q.shape(0) && beta.shape(1) == n && beta.shape(2) == c,
+                    "link_regressor: arrays differ in shape");
+            each_row(q.shape(0), n, threads, [&](std::size_t t, Workspace& work) {
+              chain.link_regressor(link, static_cast<int>(c), q.data() + n * t, qd.data() + n * t,
+                                   p.data() + n * c * t, beta.data() + n * c * t, work);
+            });
+          },
+          nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg());
 }
 
 void bind_observer(nb::module_& m) {
@@ -175,7 +191,8 @@ void bind_observer(nb::module_& m) {
       .def("__init__",
            [](Observer* self, const Chain& chain, In1 gain) {
              require(gain.shape(0) == chain.joints.size(), "gain: one entry a joint");
-             new (self) Observer(chain, std::vector<double>(gain.data(), gain.data() + gain.shape(0)));
+             new (self)
+                 Observer(chain, std::vector<double>(gain.data(), gain.data() + gain.shape(0)));
            })
       .def_prop_ro("started", &Observer::started)
       .def("reset",
@@ -183,14 +200,17 @@ void bind_observer(nb::module_& m) {
              check_sample(observer.chain().joints.size(), q, qd, tau, "tau");
              observer.reset(q.data(), qd.data(), tau.data());
            })
-      .def("step", [](Observer& observer, In1 q, In1 qd, In1 tau, double dt, Out1 out) {
-        check_sample(observer.chain().joints.size(), q, qd, tau, "tau");
-        require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
-        require(observer.started(), "step before reset");
-        require(out.shape(0) == q.shape(0), "out: one entry a joint");
-        const double* r = observer.step(q.data(), qd.data(), tau.data(), dt);
-        std::copy(r, r + q.shape(0), out.data());
-      }, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+      .def(
+          "step",
+          [](Observer& observer, In1 q, In1 qd, In1 tau, double dt, Out1 out) {
+            check_sample(observer.chain().joints.size(), q, qd, tau, "tau");
+            require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
+            require(observer.started(), "step before reset");
+            require(out.shape(0) == q.shape(0), "out: one entry a joint");
+            const double* r = observer.step(q.data(), qd.data(), tau.data(), dt);
+            std::copy(r, r + q.shape(0), out.data());
+          },
+          nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
 }
 
 }  // namespace
@@ -198,6 +218,7 @@ void bind_observer(nb::module_& m) {
 NB_MODULE(_observer, m) {
   bind_chain(m);
   bind_observer(m);
-  m.def("filter", &filter, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+  m.def("filter", &filter, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
+        nb::arg().noconvert());
   bind_estimator(m);
 }

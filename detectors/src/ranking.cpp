@@ -28,16 +28,20 @@ void bounded_cusum(In2 x, In1 cap, Out1 state, Out2 out) {
     }
 }
 
-// base + the sum of one leaf of every tree, tree by tree. Node k goes left where the feature, rounded to single
-// precision as in training, is at or below its threshold; a leaf is its own child.
-void forest(In2 x, Ids roots, Ids feature, In1 threshold, Ids left, Ids right, In1 value, double base, Out1 out,
-            int threads) {
+// base + the sum of one leaf of every tree, tree by tree. Node k goes left where the feature,
+// rounded to single precision as in training, is at or below its threshold; a leaf is its own
+// child.
+void forest(In2 x, Ids roots, Ids feature, In1 threshold, Ids left, Ids right, In1 value,
+            double base, Out1 out, int threads) {
   const std::size_t nodes = feature.shape(0), d = x.shape(1);
   require(threshold.shape(0) == nodes && left.shape(0) == nodes && right.shape(0) == nodes &&
               value.shape(0) == nodes && out.shape(0) == x.shape(0),
           "forest: arrays differ in shape");
-  const auto within = [&](std::int64_t k, std::size_t size) { return k >= 0 && static_cast<std::size_t>(k) < size; };
-  for (std::size_t k = 0; k < roots.shape(0); ++k) require(within(roots.data()[k], nodes), "forest: a root is no node");
+  const auto within = [&](std::int64_t k, std::size_t size) {
+    return k >= 0 && static_cast<std::size_t>(k) < size;
+  };
+  for (std::size_t k = 0; k < roots.shape(0); ++k)
+    require(within(roots.data()[k], nodes), "forest: a root is no node");
   for (std::size_t k = 0; k < nodes; ++k) {
     require(within(feature.data()[k], d), "forest: a feature that the rows do not have");
     const std::int64_t l = left.data()[k], r = right.data()[k], own = static_cast<std::int64_t>(k);
@@ -52,7 +56,8 @@ void forest(In2 x, Ids roots, Ids feature, In1 threshold, Ids left, Ids right, I
       for (std::size_t tree = 0; tree < roots.shape(0); ++tree) {
         std::int64_t k = roots.data()[tree];
         while (left.data()[k] != k)
-          k = static_cast<float>(row[feature.data()[k]]) <= threshold.data()[k] ? left.data()[k] : right.data()[k];
+          k = static_cast<float>(row[feature.data()[k]]) <= threshold.data()[k] ? left.data()[k]
+                                                                                : right.data()[k];
         sum += value.data()[k];
       }
       out.data()[i] = sum;
@@ -65,7 +70,8 @@ void forest(In2 x, Ids roots, Ids feature, In1 threshold, Ids left, Ids right, I
 
 NB_MODULE(_ranking, m) {
   using namespace tauguard::detectors;
-  m.def("bounded_cusum", &bounded_cusum, nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert());
-  m.def("forest", &forest, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
-        nb::arg().noconvert(), nb::arg());
+  m.def("bounded_cusum", &bounded_cusum, nb::arg(), nb::arg(), nb::arg().noconvert(),
+        nb::arg().noconvert());
+  m.def("forest", &forest, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
+        nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
 }

@@ -1,6 +1,6 @@
-// Joint velocity from measured position and velocity together: a Kalman filter in its steady state on
-// position, velocity and acceleration, the acceleration being a random walk. Below some hundred rad/s a
-// position says more of the velocity than the measured velocity does.
+// Joint velocity from measured position and velocity together: a Kalman filter in its steady state
+// on position, velocity and acceleration, the acceleration being a random walk. Below some hundred
+// rad/s a position says more of the velocity than the measured velocity does.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,8 @@ namespace tauguard::detectors {
 
 class VelocityFusion {
  public:
-  static constexpr std::size_t kGains = 6;  // a joint: of position, velocity, acceleration by each innovation
+  static constexpr std::size_t kGains =
+      6;  // a joint: of position, velocity, acceleration by each innovation
 
   VelocityFusion() = default;
   VelocityFusion(std::vector<double> gains, std::size_t joints)

@@ -29,7 +29,9 @@ struct Chain {
   Vec3 axis(std::size_t i) const { return load(xaxis + 3 * joint[i]); }
   Vec3 anchor(std::size_t i) const { return load(xanchor + 3 * joint[i]); }
   // How far the point p of a link beyond joint i moves per unit of joint i.
-  Vec3 lever(std::size_t i, Vec3 p) const { return slide[i] ? axis(i) : cross(axis(i), p - anchor(i)); }
+  Vec3 lever(std::size_t i, Vec3 p) const {
+    return slide[i] ? axis(i) : cross(axis(i), p - anchor(i));
+  }
 
   Vec3 centre(std::size_t i) const {
     const double* m = xmat + 9 * body[i];
@@ -55,9 +57,10 @@ struct Chain {
       tau[i] += dot(lever(i, p), force) + (slide[i] ? 0.0 : dot(axis(i), torque));
   }
 
-  // Joint step dq of joints [begin, end) that moves the tool point by dx (3 m, 3 rad about world axes):
-  // damped least squares J^T (J J^T + damping^2 I)^-1 dx.
-  void resolve(std::size_t begin, std::size_t end, Vec3 tool, const double* dx, double damping, double* dq) const {
+  // Joint step dq of joints [begin, end) that moves the tool point by dx (3 m, 3 rad about world
+  // axes): damped least squares J^T (J J^T + damping^2 I)^-1 dx.
+  void resolve(std::size_t begin, std::size_t end, Vec3 tool, const double* dx, double damping,
+               double* dq) const {
     std::array<double, 36> a{};
     std::vector<std::array<double, 6>> columns;
     for (std::size_t i = begin; i < end; ++i) {

@@ -15,7 +15,8 @@ enum class Mode { current = 0, torque = 1, velocity = 2, position = 3, cartesian
 // What a reaction puts in the action's place: follow velocities, no power, no power and brakes on.
 enum class Override { none = 0, velocity = 1, limp = 2, brake = 3 };
 
-// A brake holds like a stiff spring that slips beyond its torque: this many times the servo's stiffness.
+// A brake holds like a stiff spring that slips beyond its torque: this many times the servo's
+// stiffness.
 constexpr double brake_stiffness = 10.0;
 constexpr double brake_damping = 3.0;
 // Damping of the Cartesian mode's least squares; it bounds the step near a singular pose.
@@ -28,13 +29,13 @@ struct Command {
 
 struct Controls {
   Mode mode = Mode::velocity;
-  double period = 0.01;                      // of control [s]
-  std::vector<double> scale;                 // of the action, one an entry
-  std::vector<double> centre;                // of the position mode [rad]
-  std::vector<double> max_speed;             // [rad/s]
-  std::vector<double> torque_limit;          // [N m]
+  double period = 0.01;              // of control [s]
+  std::vector<double> scale;         // of the action, one an entry
+  std::vector<double> centre;        // of the position mode [rad]
+  std::vector<double> max_speed;     // [rad/s]
+  std::vector<double> torque_limit;  // [N m]
   Override override = Override::none;
-  std::vector<double> override_speed;        // [rad/s]
+  std::vector<double> override_speed;  // [rad/s]
   Command command;
 
   // Maps the action at the state (q, the chain's kinematics, the tools) to the command.
@@ -48,7 +49,8 @@ struct Controls {
     command.brake = false;
     if (override == Override::none && mode == Mode::current) {
       command.servo = false;
-      for (std::size_t i = 0; i < n; ++i) command.feed[i] = bounded(action[i]) * scale[i] * joints[i].nominal_gain;
+      for (std::size_t i = 0; i < n; ++i)
+        command.feed[i] = bounded(action[i]) * scale[i] * joints[i].nominal_gain;
       follow(joints, q);
       return;
     }
@@ -69,7 +71,8 @@ struct Controls {
     } else {
       cartesian(chain, tools, tool_first, action);
     }
-    for (std::size_t i = 0; i < n; ++i) v[i] = std::min(std::max(v[i], -max_speed[i]), max_speed[i]);
+    for (std::size_t i = 0; i < n; ++i)
+      v[i] = std::min(std::max(v[i], -max_speed[i]), max_speed[i]);
     follow(joints, q);
   }
 
@@ -85,36 +88,40 @@ struct Controls {
     if (!command.powered) return 0.0;
     double torque = command.feed[i];
     if (command.servo)
-      torque += j.kp * (command.origin[i] + command.speed[i] * elapsed - q) + j.kd * (command.speed[i] - qd);
+      torque += j.kp * (command.origin[i] + command.speed[i] * elapsed - q) +
+                j.kd * (command.speed[i] - qd);
     const double amperes = torque / j.nominal_gain;
     return std::min(std::max(amperes, -j.current_limit), j.current_limit);
   }
 
   void advance() {
     if (!command.servo) return;
-    for (std::size_t i = 0; i < command.origin.size(); ++i) command.origin[i] += command.speed[i] * period;
+    for (std::size_t i = 0; i < command.origin.size(); ++i)
+      command.origin[i] += command.speed[i] * period;
   }
 
  private:
   static double bounded(double a) { return std::min(std::max(a, -1.0), 1.0); }
 
-  void cartesian(const Chain& chain, const std::vector<Vec3>& tools, const std::vector<int>& tool_first,
-                 const double* action) {
+  void cartesian(const Chain& chain, const std::vector<Vec3>& tools,
+                 const std::vector<int>& tool_first, const double* action) {
     for (std::size_t a = 0; a < tools.size(); ++a) {
       const std::size_t begin = static_cast<std::size_t>(tool_first[a]);
-      const std::size_t end = a + 1 < tools.size() ? static_cast<std::size_t>(tool_first[a + 1]) : chain.size();
+      const std::size_t end =
+          a + 1 < tools.size() ? static_cast<std::size_t>(tool_first[a + 1]) : chain.size();
       double dx[6];
       for (int r = 0; r < 6; ++r) dx[r] = bounded(action[6 * a + r]) * scale[6 * a + r];
       chain.resolve(begin, end, tools[a], dx, cartesian_damping, command.speed.data());
       double factor = 1.0;  // one factor for all joints keeps the direction of the motion
       for (std::size_t i = begin; i < end; ++i)
-        factor = std::min(factor, max_speed[i] * period / std::max(std::fabs(command.speed[i]), 1e-300));
+        factor =
+            std::min(factor, max_speed[i] * period / std::max(std::fabs(command.speed[i]), 1e-300));
       for (std::size_t i = begin; i < end; ++i) command.speed[i] *= factor / period;
     }
   }
 
-  // The reference stays where the servo would ask for no more than full torque: no wind-up in a blocked
-  // arm. Without a servo it follows the arm, so that the next command starts from there.
+  // The reference stays where the servo would ask for no more than full torque: no wind-up in a
+  // blocked arm. Without a servo it follows the arm, so that the next command starts from there.
   void follow(const std::vector<Joint>& joints, const double* q) {
     for (std::size_t i = 0; i < command.origin.size(); ++i) {
       const double window = command.servo || command.brake ? torque_limit[i] / joints[i].kp : 0.0;

@@ -1,4 +1,5 @@
-// One joint's drive over one step: current, ripple and friction, as documented in tauguard.models.Drive.
+// One joint's drive over one step: current, ripple and friction, as documented in
+// tauguard.models.Drive.
 #pragma once
 
 #include <algorithm>
@@ -7,18 +8,19 @@
 
 namespace tauguard::envs {
 
-// What one joint's drive is made of. A stiffness of 0 leaves friction out, an empty ripple the ripple.
+// What one joint's drive is made of. A stiffness of 0 leaves friction out, an empty ripple the
+// ripple.
 struct Joint {
-  double gain = 1.0;            // N m/A, as simulated
-  double nominal_gain = 1.0;    // N m/A, as the controller believes
-  double current_limit = 0.0;   // A
+  double gain = 1.0;           // N m/A, as simulated
+  double nominal_gain = 1.0;   // N m/A, as the controller believes
+  double current_limit = 0.0;  // A
   double gear = 1.0;
-  double coulomb = 0.0, breakaway = 0.0;  // N m, at the episode's temperature
-  double stribeck_velocity = 1.0;         // rad/s
-  double viscous = 0.0;                   // N m s/rad, at the episode's temperature
-  double bristle_stiffness = 0.0;         // N m/rad
-  double load = 0.0;                      // 1/(N m)
-  double kp = 0.0, kd = 0.0;              // N m/rad, N m s/rad
+  double coulomb = 0.0, breakaway = 0.0;         // N m, at the episode's temperature
+  double stribeck_velocity = 1.0;                // rad/s
+  double viscous = 0.0;                          // N m s/rad, at the episode's temperature
+  double bristle_stiffness = 0.0;                // N m/rad
+  double load = 0.0;                             // 1/(N m)
+  double kp = 0.0, kd = 0.0;                     // N m/rad, N m s/rad
   std::vector<double> cycles, amplitude, phase;  // per motor revolution; A; rad
 };
 
@@ -27,8 +29,9 @@ struct JointState {
   double bristle = 0.0;  // rad
 };
 
-// Bristle friction (Dahl/LuGre presliding with a Stribeck level), the bristle integrated exactly for a
-// constant velocity over the step: dz/dt = v - k |v| / g(v) z. Returns the friction torque [N m].
+// Bristle friction (Dahl/LuGre presliding with a Stribeck level), the bristle integrated exactly
+// for a constant velocity over the step: dz/dt = v - k |v| / g(v) z. Returns the friction torque [N
+// m].
 inline double friction(const Joint& j, JointState& s, double v, double tau, double dt) {
   if (j.bristle_stiffness <= 0.0) return j.viscous * v;
   const double ratio = v / j.stribeck_velocity;

@@ -1,5 +1,6 @@
-// The environments' kernel: control steps of one arm scene or of many, on a thread pool. A plant's result
-// depends on nothing but its own state and action, so it is the same for any number of threads.
+// The environments' kernel: control steps of one arm scene or of many, on a thread pool. A plant's
+// result depends on nothing but its own state and action, so it is the same for any number of
+// threads.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/map.h>
@@ -96,7 +97,8 @@ void bind_numbers(Plant& p, const Numbers& x) {
   p.controls.override_speed.assign(p.qpos.size(), 0.0);
   p.low = x.at("low");
   p.high = x.at("high");
-  const std::vector<double>& r = x.at("regions");  // quasi-static, transient [N]; span [m]; speed [m/s]
+  const std::vector<double>& r =
+      x.at("regions");  // quasi-static, transient [N]; span [m]; speed [m/s]
   for (std::size_t k = 0; k < p.regions.size(); ++k) {
     p.regions[k].quasi_static = r.at(4 * k), p.regions[k].transient = r.at(4 * k + 1);
     p.regions[k].span = r.at(4 * k + 2), p.regions[k].speed = r.at(4 * k + 3);
@@ -106,8 +108,9 @@ void bind_numbers(Plant& p, const Numbers& x) {
 void check(const double* action, std::size_t n, std::size_t env) {
   for (std::size_t i = 0; i < n; ++i)
     if (!std::isfinite(action[i]))
-      throw nb::value_error(("action: not finite at entry " + std::to_string(i) + " of environment " +
-                             std::to_string(env) + "; expected numbers from -1 to 1")
+      throw nb::value_error(("action: not finite at entry " + std::to_string(i) +
+                             " of environment " + std::to_string(env) +
+                             "; expected numbers from -1 to 1")
                                 .c_str());
 }
 
@@ -121,9 +124,11 @@ void step_one(Plant& p, Vector action) {
 
 // Steps every plant whose mask is not 0 with its row of the actions.
 void step_all(const std::vector<Plant*>& plants, Table actions,
-              nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu> mask, int threads) {
+              nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu> mask,
+              int threads) {
   const std::size_t n = plants.size(), width = actions.shape(1);
-  if (actions.shape(0) != n || mask.shape(0) != n) throw nb::value_error("actions, mask: a row a plant");
+  if (actions.shape(0) != n || mask.shape(0) != n)
+    throw nb::value_error("actions, mask: a row a plant");
   for (std::size_t i = 0; i < n; ++i) {
     if (plants[i]->controls.scale.size() != width) throw nb::value_error("actions: wrong width");
     if (mask.data()[i]) check(actions.data() + i * width, width, i);
@@ -141,43 +146,49 @@ void step_all(const std::vector<Plant*>& plants, Table actions,
 
 NB_MODULE(_env, m) {
   nb::class_<Plant>(m, "Plant")
-      .def("__init__",
-           [](Plant* self, const Words& addresses, const Integers& layout, const Numbers& numbers,
-              const std::vector<Numbers>& drive) {
-             new (self) Plant();
-             bind_layout(*self, layout);
-             bind_addresses(*self, addresses);
-             bind_numbers(*self, numbers);
-             for (const Numbers& d : drive) {
-               const auto one = [&](const char* name) { return d.at(name).at(0); };
-               self->joints.push_back(Joint{one("gain"), one("nominal_gain"), one("limit"), one("gear"),
-                                            one("coulomb"), one("breakaway"), one("stribeck_velocity"),
-                                            one("viscous"), one("bristle_stiffness"), one("load"), one("kp"),
-                                            one("kd"), d.at("cycles"), d.at("amplitude"), d.at("phase")});
-             }
-             self->states.resize(self->joints.size());
-           },
-           nb::arg("addresses"), nb::arg("layout"), nb::arg("numbers"), nb::arg("drive"))
+      .def(
+          "__init__",
+          [](Plant* self, const Words& addresses, const Integers& layout, const Numbers& numbers,
+             const std::vector<Numbers>& drive) {
+            new (self) Plant();
+            bind_layout(*self, layout);
+            bind_addresses(*self, addresses);
+            bind_numbers(*self, numbers);
+            for (const Numbers& d : drive) {
+              const auto one = [&](const char* name) { return d.at(name).at(0); };
+              self->joints.push_back(
+                  Joint{one("gain"), one("nominal_gain"), one("limit"), one("gear"), one("coulomb"),
+                        one("breakaway"), one("stribeck_velocity"), one("viscous"),
+                        one("bristle_stiffness"), one("load"), one("kp"), one("kd"), d.at("cycles"),
+                        d.at("amplitude"), d.at("phase")});
+            }
+            self->states.resize(self->joints.size());
+          },
+          nb::arg("addresses"), nb::arg("layout"), nb::arg("numbers"), nb::arg("drive"))
       .def("reset", &Plant::reset)
       .def("step", &step_one, nb::arg("action"))
-      .def("begin",
-           [](Plant& p, Vector action) {
-             if (action.shape(0) != p.controls.scale.size()) throw nb::value_error("action: wrong length");
-             check(action.data(), action.shape(0), 0);
-             p.begin(action.data());
-           },
-           nb::arg("action"))
+      .def(
+          "begin",
+          [](Plant& p, Vector action) {
+            if (action.shape(0) != p.controls.scale.size())
+              throw nb::value_error("action: wrong length");
+            check(action.data(), action.shape(0), 0);
+            p.begin(action.data());
+          },
+          nb::arg("action"))
       .def("run", &Plant::run, nb::arg("steps"), nb::call_guard<nb::gil_scoped_release>())
       .def("finish", &Plant::finish)
       .def("refresh", &Plant::refresh)
-      .def("override",
-           [](Plant& p, int kind, Vector speed) {
-             if (speed.shape(0) != p.qpos.size()) throw nb::value_error("speed: one number a joint");
-             p.controls.override = static_cast<Override>(kind);
-             p.controls.override_speed.assign(speed.data(), speed.data() + speed.shape(0));
-           },
-           nb::arg("kind"), nb::arg("speed"));
-  m.def("step_all", &step_all, nb::arg("plants"), nb::arg("actions"), nb::arg("mask"), nb::arg("threads"));
+      .def(
+          "override",
+          [](Plant& p, int kind, Vector speed) {
+            if (speed.shape(0) != p.qpos.size()) throw nb::value_error("speed: one number a joint");
+            p.controls.override = static_cast<Override>(kind);
+            p.controls.override_speed.assign(speed.data(), speed.data() + speed.shape(0));
+          },
+          nb::arg("kind"), nb::arg("speed"));
+  m.def("step_all", &step_all, nb::arg("plants"), nb::arg("actions"), nb::arg("mask"),
+        nb::arg("threads"));
   m.attr("CONTACT_WIDTH") = contact_width;
   m.attr("FIGURES") = static_cast<int>(figures);
 }

@@ -1,9 +1,10 @@
-// The simulation loop, compiled: position control, drive and mj_step at every time step, rows recorded.
+// The simulation loop, compiled: position control, drive and mj_step at every time step, rows
+// recorded.
 //
-// MuJoCo is reached through the address of mj_step and the addresses of the arrays that its Python binding
-// shows, so nothing here depends on MuJoCo's headers or on the layout of its structs. Row k of every
-// output belongs to the state before step k: q and qd are read before mj_step, sensors and body poses
-// after it, because mj_step evaluates them at the state it starts from.
+// MuJoCo is reached through the address of mj_step and the addresses of the arrays that its Python
+// binding shows, so nothing here depends on MuJoCo's headers or on the layout of its structs. Row k
+// of every output belongs to the state before step k: q and qd are read before mj_step, sensors and
+// body poses after it, because mj_step evaluates them at the state it starts from.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -35,9 +36,10 @@ using MutableVector = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device:
 class Loop {
  public:
   Loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_t data, double dt, double decay,
-       std::uintptr_t qpos, std::uintptr_t qvel, std::uintptr_t qfrc_applied, std::uintptr_t xfrc_applied,
-       std::uintptr_t xpos, std::uintptr_t xquat, std::uintptr_t sensordata, std::vector<int> qpos_adr,
-       std::vector<int> dof_adr, std::vector<int> obstacle_bodies, int sensor_begin, int sensor_count)
+       std::uintptr_t qpos, std::uintptr_t qvel, std::uintptr_t qfrc_applied,
+       std::uintptr_t xfrc_applied, std::uintptr_t xpos, std::uintptr_t xquat,
+       std::uintptr_t sensordata, std::vector<int> qpos_adr, std::vector<int> dof_adr,
+       std::vector<int> obstacle_bodies, int sensor_begin, int sensor_count)
       : step_(reinterpret_cast<Step>(step)),
         model_(pointer<void>(model)),
         data_(pointer<void>(data)),
@@ -60,12 +62,25 @@ class Loop {
 
   std::size_t joints() const { return joints_.size(); }
 
-  void set_joint(std::size_t i, double gain, double nominal_gain, double limit, double gear, double coulomb,
-                 double breakaway, double stribeck_velocity, double viscous, double bristle_stiffness,
-                 double load, double kp, double kd, std::vector<double> cycles,
-                 std::vector<double> amplitude, std::vector<double> phase) {
-    joints_.at(i) = Joint{gain,    nominal_gain,      limit, gear, coulomb, breakaway,         stribeck_velocity,
-                          viscous, bristle_stiffness, load,  kp,   kd,      std::move(cycles), std::move(amplitude),
+  void set_joint(std::size_t i, double gain, double nominal_gain, double limit, double gear,
+                 double coulomb, double breakaway, double stribeck_velocity, double viscous,
+                 double bristle_stiffness, double load, double kp, double kd,
+                 std::vector<double> cycles, std::vector<double> amplitude,
+                 std::vector<double> phase) {
+    joints_.at(i) = Joint{gain,
+                          nominal_gain,
+                          limit,
+                          gear,
+                          coulomb,
+                          breakaway,
+                          stribeck_velocity,
+                          viscous,
+                          bristle_stiffness,
+                          load,
+                          kp,
+                          kd,
+                          std::move(cycles),
+                          std::move(amplitude),
                           std::move(phase)};
   }
 
@@ -81,11 +96,11 @@ class Loop {
       states_[i] = JointState{in.data()[2 * i], in.data()[2 * i + 1]};
   }
 
-  // Runs rows(q_des) steps and fills q, qd, current, sensor and poses; returns how many steps were sound
-  // (all of them unless the simulation diverged). The wrench table (rows x 6: force, torque about the
-  // body's centre of mass, world frame) acts on wrench_body; pass 0 rows for none.
-  std::size_t run(Table q_des, Table qd_des, Table tau_ff, Table wrench, int wrench_body, Rows q, Rows qd,
-                  Rows current, Rows sensor, Rows poses) {
+  // Runs rows(q_des) steps and fills q, qd, current, sensor and poses; returns how many steps were
+  // sound (all of them unless the simulation diverged). The wrench table (rows x 6: force, torque
+  // about the body's centre of mass, world frame) acts on wrench_body; pass 0 rows for none.
+  std::size_t run(Table q_des, Table qd_des, Table tau_ff, Table wrench, int wrench_body, Rows q,
+                  Rows qd, Rows current, Rows sensor, Rows poses) {
     nb::gil_scoped_release release;
     const tauguard::geometry::RoundToNearest guard;
     const std::size_t rows = q_des.shape(0), n = joints_.size();
@@ -100,7 +115,8 @@ class Loop {
         q.data()[k * n + i] = position;
         qd.data()[k * n + i] = velocity;
         const std::size_t at = k * n + i;
-        current.data()[at] = drive(i, position, velocity, q_des.data()[at], qd_des.data()[at], tau_ff.data()[at]);
+        current.data()[at] =
+            drive(i, position, velocity, q_des.data()[at], qd_des.data()[at], tau_ff.data()[at]);
       }
       if (!finite) {
         sound = k;
@@ -158,7 +174,8 @@ NB_MODULE(_loop, m) {
   nb::class_<Loop>(m, "Loop")
       .def(nb::init<std::uintptr_t, std::uintptr_t, std::uintptr_t, double, double, std::uintptr_t,
                     std::uintptr_t, std::uintptr_t, std::uintptr_t, std::uintptr_t, std::uintptr_t,
-                    std::uintptr_t, std::vector<int>, std::vector<int>, std::vector<int>, int, int>(),
+                    std::uintptr_t, std::vector<int>, std::vector<int>, std::vector<int>, int,
+                    int>(),
            nb::arg("step"), nb::arg("model"), nb::arg("data"), nb::arg("dt"), nb::arg("decay"),
            nb::arg("qpos"), nb::arg("qvel"), nb::arg("qfrc_applied"), nb::arg("xfrc_applied"),
            nb::arg("xpos"), nb::arg("xquat"), nb::arg("sensordata"), nb::arg("qpos_adr"),
@@ -171,8 +188,8 @@ NB_MODULE(_loop, m) {
            nb::arg("phase"))
       .def("get_state", &Loop::get_state, nb::arg("out"))
       .def("set_state", &Loop::set_state, nb::arg("state"))
-      .def("run", &Loop::run, nb::arg("q_des"), nb::arg("qd_des"), nb::arg("tau_ff"), nb::arg("wrench"),
-           nb::arg("wrench_body"), nb::arg("q"), nb::arg("qd"), nb::arg("current"), nb::arg("sensor"),
-           nb::arg("poses"))
+      .def("run", &Loop::run, nb::arg("q_des"), nb::arg("qd_des"), nb::arg("tau_ff"),
+           nb::arg("wrench"), nb::arg("wrench_body"), nb::arg("q"), nb::arg("qd"),
+           nb::arg("current"), nb::arg("sensor"), nb::arg("poses"))
       .def_prop_ro("joints", &Loop::joints);
 }

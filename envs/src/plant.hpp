@@ -1,5 +1,5 @@
-// One environment's physics: an action in, control steps of several mj_step each, an observation row and a
-// row of figures out. MuJoCo is reached by addresses alone, as in loop.cpp.
+// One environment's physics: an action in, control steps of several mj_step each, an observation
+// row and a row of figures out. MuJoCo is reached by addresses alone, as in loop.cpp.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,18 @@ namespace tauguard::envs {
 
 // Columns of the row of figures.
 enum Figure {
-  time_now, distance, force, cost, ratio, region_force, onset, onset_time, link, region, diverged, speed_ratio,
+  time_now,
+  distance,
+  force,
+  cost,
+  ratio,
+  region_force,
+  onset,
+  onset_time,
+  link,
+  region,
+  diverged,
+  speed_ratio,
   figures
 };
 
@@ -46,16 +57,17 @@ class Plant {
   Controls controls;
   std::vector<Joint> joints;
   std::vector<JointState> states;
-  std::vector<int> qpos, dof;           // addresses of the arm's joints
+  std::vector<int> qpos, dof;                         // addresses of the arm's joints
   std::vector<int> tool_site, tool_body, tool_first;  // a tool an arm; site -1: the body's origin
   std::vector<Region> regions;
-  std::vector<double> low, high;        // of the observation
-  int sensor_begin = -1;                // of the links' contact sensors; -1: none
+  std::vector<double> low, high;  // of the observation
+  int sensor_begin = -1;          // of the links' contact sensors; -1: none
   int nq = 0, nv = 0;
   double dt = 1e-3, decay = 0.0;
   int substeps = 10;
 
-  // After the data was reset and forwarded: nothing has touched yet, the reference is where the arm is.
+  // After the data was reset and forwarded: nothing has touched yet, the reference is where the arm
+  // is.
   void reset() {
     std::fill(states.begin(), states.end(), JointState{});
     contact_ = Contact{};
@@ -95,7 +107,8 @@ class Plant {
       sound_ = finite();
       if (sound_) label();
       double* place = rows.region + 3 * row_ * regions.size();
-      for (const Region& r : regions) place = std::copy(at.xpos + 3 * r.body, at.xpos + 3 * r.body + 3, place);
+      for (const Region& r : regions)
+        place = std::copy(at.xpos + 3 * r.body, at.xpos + 3 * r.body + 3, place);
       ++count_;
     }
   }
@@ -152,8 +165,8 @@ class Plant {
   void label() {
     if (sensor_begin < 0) return;
     const std::size_t n = joints.size(), k = static_cast<std::size_t>(row_);
-    read_links(chain, at.sensors + sensor_begin, static_cast<double>(count_) * dt, contact_, rows.tau + k * n,
-               rows.contact + k * contact_width);
+    read_links(chain, at.sensors + sensor_begin, static_cast<double>(count_) * dt, contact_,
+               rows.tau + k * n, rows.contact + k * contact_width);
     std::copy(rows.tau + k * n, rows.tau + (k + 1) * n, rows.tau_ext);
     read_regions(regions, at.sensors, dt, contact_);
   }
@@ -168,7 +181,8 @@ class Plant {
   std::vector<Vec3> tools() const {
     std::vector<Vec3> out;
     for (std::size_t a = 0; a < tool_body.size(); ++a)
-      out.push_back(tool_site[a] >= 0 ? load(at.site_xpos + 3 * tool_site[a]) : load(at.xpos + 3 * tool_body[a]));
+      out.push_back(tool_site[a] >= 0 ? load(at.site_xpos + 3 * tool_site[a])
+                                      : load(at.xpos + 3 * tool_body[a]));
     return out;
   }
 
@@ -182,7 +196,8 @@ class Plant {
     };
     for (int i : qpos) *out++ = at.qpos[i];
     for (int i : dof) *out++ = at.qvel[i];
-    for (std::size_t i = 0; i < joints.size(); ++i) *out++ = joints[i].nominal_gain * states[i].current;
+    for (std::size_t i = 0; i < joints.size(); ++i)
+      *out++ = joints[i].nominal_gain * states[i].current;
     const std::vector<Vec3> at_tools = tools();
     double away = 0.0;
     for (Vec3 tool : at_tools) put(tool);

@@ -1,5 +1,5 @@
-// What touches the arm and how hard, kept up to date at every physics step: the net force, the external
-// joint torque, the onset of a collision, and each body region's force against its limits.
+// What touches the arm and how hard, kept up to date at every physics step: the net force, the
+// external joint torque, the onset of a collision, and each body region's force against its limits.
 #pragma once
 
 #include <algorithm>
@@ -15,20 +15,20 @@ namespace tauguard::envs {
 // A body region in the scene; -1 where it has no joint (held in place).
 struct Region {
   int body = -1, joint = -1, qpos = -1, dof = -1;
-  int sensor = -1;                       // address of its ten contact numbers
+  int sensor = -1;                         // address of its ten contact numbers
   double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no blow is allowed
-  double span = 0, speed = 0;            // it turns back this far from its origin [m], at this speed [m/s]
-  double touching = 0;                   // unbroken contact so far [s]
+  double span = 0, speed = 0;  // it turns back this far from its origin [m], at this speed [m/s]
+  double touching = 0;         // unbroken contact so far [s]
 };
 
 // The largest values over one control step, and what lasts longer.
 struct Contact {
-  double force = 0;   // peak net force on a link [N]
-  double cost = 0;    // peak force beyond the regions' limits [N]
-  double ratio = 0;   // peak force over the limit
+  double force = 0;         // peak net force on a link [N]
+  double cost = 0;          // peak force beyond the regions' limits [N]
+  double ratio = 0;         // peak force over the limit
   double region_force = 0;  // peak force on a region [N]
-  int link = 0;       // 1-based, of the peak force; 0: none
-  int region = 0;     // 1-based, of the peak ratio; 0: none
+  int link = 0;             // 1-based, of the peak force; 0: none
+  int region = 0;           // 1-based, of the peak ratio; 0: none
   bool onset = false;
   double onset_time = -1, last = -1e9;  // [s]
   void begin_step() {
@@ -42,12 +42,13 @@ constexpr double merge_gap = 0.5;       // contacts closer than this are one col
 constexpr double transient_time = 0.5;  // longer contacts are quasi-static [s]
 constexpr int sensor_width = 10;        // found, force (3), torque (3), position (3)
 
-// What a physics step leaves in its row: net force on the arm [N]; link, point [m] and force [N] of the
-// largest force on a link, 0 and NaN where there is none.
+// What a physics step leaves in its row: net force on the arm [N]; link, point [m] and force [N] of
+// the largest force on a link, 0 and NaN where there is none.
 constexpr int contact_width = 8;
 
 // Reads the links' contact sensors at time t; tau receives tau_ext, row what touched.
-inline void read_links(const Chain& chain, const double* sensor, double t, Contact& c, double* tau, double* row) {
+inline void read_links(const Chain& chain, const double* sensor, double t, Contact& c, double* tau,
+                       double* row) {
   std::fill(tau, tau + chain.size(), 0.0);
   std::fill(row, row + contact_width, 0.0);
   std::fill(row + 2, row + 5, std::numeric_limits<double>::quiet_NaN());
@@ -83,9 +84,10 @@ inline void read_links(const Chain& chain, const double* sensor, double t, Conta
 }
 
 // Reads the regions' contact sensors. A blow counts against the transient limit, unbroken contact
-// beyond half a second and a region that cannot move away against the quasi-static one. Where no blow is
-// allowed the whole force is cost, and the ratio is against the quasi-static limit.
-inline void read_regions(std::vector<Region>& regions, const double* sensors, double dt, Contact& c) {
+// beyond half a second and a region that cannot move away against the quasi-static one. Where no
+// blow is allowed the whole force is cost, and the ratio is against the quasi-static limit.
+inline void read_regions(std::vector<Region>& regions, const double* sensors, double dt,
+                         Contact& c) {
   double cost = 0;
   for (std::size_t i = 0; i < regions.size(); ++i) {
     Region& r = regions[i];

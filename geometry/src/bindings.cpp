@@ -22,19 +22,22 @@ NB_MODULE(_geometry, m) {
     nb::gil_scoped_release release;
     const double* p = points.data();
     std::int8_t* s = out.data();
-    ThreadPool::shared().parallel_for(points.shape(0), threads, 4096, [&](auto begin, auto end, auto) {
-      for (auto i = begin; i < end; ++i)
-        s[i] = static_cast<std::int8_t>(orient3d(p + 12 * i, p + 12 * i + 3, p + 12 * i + 6, p + 12 * i + 9));
-    });
+    ThreadPool::shared().parallel_for(
+        points.shape(0), threads, 4096, [&](auto begin, auto end, auto) {
+          for (auto i = begin; i < end; ++i)
+            s[i] = static_cast<std::int8_t>(
+                orient3d(p + 12 * i, p + 12 * i + 3, p + 12 * i + 6, p + 12 * i + 9));
+        });
   });
   m.def("orient2d", [](Points2 points, Signs out, int threads) {
     nb::gil_scoped_release release;
     const double* p = points.data();
     std::int8_t* s = out.data();
-    ThreadPool::shared().parallel_for(points.shape(0), threads, 4096, [&](auto begin, auto end, auto) {
-      for (auto i = begin; i < end; ++i)
-        s[i] = static_cast<std::int8_t>(orient2d(p + 6 * i, p + 6 * i + 2, p + 6 * i + 4));
-    });
+    ThreadPool::shared().parallel_for(
+        points.shape(0), threads, 4096, [&](auto begin, auto end, auto) {
+          for (auto i = begin; i < end; ++i)
+            s[i] = static_cast<std::int8_t>(orient2d(p + 6 * i, p + 6 * i + 2, p + 6 * i + 4));
+        });
   });
   // For tests of the rounding guard: what a careless library leaves behind.
   m.def("set_rounding", [](int mode) {
@@ -43,10 +46,14 @@ NB_MODULE(_geometry, m) {
   });
   m.def("get_rounding", [] {
     switch (std::fegetround()) {
-      case FE_DOWNWARD: return 1;
-      case FE_UPWARD: return 2;
-      case FE_TOWARDZERO: return 3;
-      default: return 0;
+      case FE_DOWNWARD:
+        return 1;
+      case FE_UPWARD:
+        return 2;
+      case FE_TOWARDZERO:
+        return 3;
+      default:
+        return 0;
     }
   });
   m.def("hardware_threads", [] { return ThreadPool::hardware(); });

@@ -1,30 +1,33 @@
 // Overlap of two convex bodies by eliminating the separating plane.
 //
-// A plane f separates A (f >= 0) from B (f < 0). Its unknowns are the weights of A's facet functions,
-// f = sum_i p_i F_i with p_i >= 0, one row for each vertex b_j: sum_i p_i F_i(b_j) < 0 (a generator of B
-// enters by its absolute value). Facet functions are scaled by determinants, never divided.
+// A plane f separates A (f >= 0) from B (f < 0). Its unknowns are the weights of A's facet
+// functions, f = sum_i p_i F_i with p_i >= 0, one row for each vertex b_j: sum_i p_i F_i(b_j) < 0
+// (a generator of B enters by its absolute value). Facet functions are scaled by determinants,
+// never divided.
 //   * a column all negative: p_i alone separates (a facet of A);
 //   * a row all positive: the vertex b_j is in A, no plane can exist;
-//   * eliminating p_k from a pair of columns combines the rows of opposite sign and leaves an interval
-//     for the ratio p_i / p_k: not empty, and a plane through that edge of A separates. Pairs of facets
-//     that share no edge are redundant (their zero sets meet in less than two bits) and are left out,
-//     and so are rows that the same rule drops;
-//   * the last elimination, of three unknowns, leaves planes through a facet of B, which are the columns
+//   * eliminating p_k from a pair of columns combines the rows of opposite sign and leaves an
+//   interval
+//     for the ratio p_i / p_k: not empty, and a plane through that edge of A separates. Pairs of
+//     facets that share no edge are redundant (their zero sets meet in less than two bits) and are
+//     left out, and so are rows that the same rule drops;
+//   * the last elimination, of three unknowns, leaves planes through a facet of B, which are the
+//   columns
 //     of the transposed table.
 // Nothing else can separate bodies of full dimension, so where every step is certified to fail they
 // share an interior point.
 //
 // Every entry has an error bound E (derived at its place, u = 2^-53; the sum of the stated terms is
-// rounded up to a power of two, which also covers the rounding of E itself). Entries lowered by E that
-// still do not separate, or raised by E that still do, are certain: raising an entry can only hurt a
-// separation. What is certain in neither way is `undecided`. Sizes outside [1e-30, 1e30] are left
-// undecided, so products up to degree nine neither overflow nor lose their relative accuracy.
+// rounded up to a power of two, which also covers the rounding of E itself). Entries lowered by E
+// that still do not separate, or raised by E that still do, are certain: raising an entry can only
+// hurt a separation. What is certain in neither way is `undecided`. Sizes outside [1e-30, 1e30] are
+// left undecided, so products up to degree nine neither overflow nor lose their relative accuracy.
 #pragma once
 
 #include <algorithm>
 
-#include "tauguard/rigid/bodies.hpp"
 #include "convex_lanes.hpp"
+#include "tauguard/rigid/bodies.hpp"
 
 namespace tauguard::rigid {
 
@@ -33,13 +36,17 @@ enum Verdict : std::int8_t { separated = -1, undecided = 0, common = 1 };
 inline constexpr double unit = 0x1p-53;
 
 TAUGUARD_INLINE bool in_range(double size) { return size >= 1e-30 && size <= 1e30; }
-TAUGUARD_INLINE double norm1(const double* x) { return std::fabs(x[0]) + std::fabs(x[1]) + std::fabs(x[2]); }
+TAUGUARD_INLINE double norm1(const double* x) {
+  return std::fabs(x[0]) + std::fabs(x[1]) + std::fabs(x[2]);
+}
 TAUGUARD_INLINE void cross(const double* x, const double* y, double* out) {
   out[0] = x[1] * y[2] - x[2] * y[1];
   out[1] = x[2] * y[0] - x[0] * y[2];
   out[2] = x[0] * y[1] - x[1] * y[0];
 }
-TAUGUARD_INLINE double dot(const double* x, const double* y) { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; }
+TAUGUARD_INLINE double dot(const double* x, const double* y) {
+  return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+}
 
 // Components of four points from `origin`, one point a lane.
 TAUGUARD_INLINE void load_points(const double* v, const double* origin, Double4* x) {
@@ -70,9 +77,9 @@ TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
   return low < high;
 }
 
-// The facet functions of a tetrahedron, lane i the one that vanishes on the facet opposite vertex i and is
-// positive at it: F = n . p - c, negated where the determinant is negative, with points p taken from vertex 0.
-// (The sign comes last, so that no entry waits for the determinant.)
+// The facet functions of a tetrahedron, lane i the one that vanishes on the facet opposite vertex i
+// and is positive at it: F = n . p - c, negated where the determinant is negative, with points p
+// taken from vertex 0. (The sign comes last, so that no entry waits for the determinant.)
 struct TetrahedronFacets {
   Double4 n[3], c, determinant;
   Mask4 turned;  // the sign bit, in lanes whose normal points outwards
@@ -101,12 +108,15 @@ struct TetrahedronFacets {
   }
 };
 
-// E of a tetrahedron's table at points p - a0 of 1-norm at most `reach`, a = the largest 1-norm of a
-// vertex from a0. An edge (at most 2 a) is off by 4 u a, a component of a normal (at most 4 a^2) by
-// 24 u a^2, n . p by (24 + 4 + 12) u a^2 reach and c by as much with a for reach, their difference by
-// 4 u a^2 (a + reach) more; the determinant, whose sign may be wrong, by 88 u a^3. With the slack of 8 u
-// of an entry for the ratio of an interval that is at most 164 u a^2 (a + reach).
-TAUGUARD_INLINE double tetrahedron_error(double a, double reach) { return 256 * unit * a * a * (a + reach); }
+// E of a tetrahedron's table at points p - a0 of 1-norm at most `reach`, a = the largest 1-norm of
+// a vertex from a0. An edge (at most 2 a) is off by 4 u a, a component of a normal (at most 4 a^2)
+// by 24 u a^2, n . p by (24 + 4 + 12) u a^2 reach and c by as much with a for reach, their
+// difference by 4 u a^2 (a + reach) more; the determinant, whose sign may be wrong, by 88 u a^3.
+// With the slack of 8 u of an entry for the ratio of an interval that is at most 164 u a^2 (a +
+// reach).
+TAUGUARD_INLINE double tetrahedron_error(double a, double reach) {
+  return 256 * unit * a * a * (a + reach);
+}
 
 TAUGUARD_INLINE Verdict abfme_tetrahedra(const double* a, const double* b) {
   const TetrahedronFacets fa(a);
@@ -127,8 +137,7 @@ TAUGUARD_INLINE Verdict abfme_tetrahedra(const double* a, const double* b) {
   const double eb = tetrahedron_error(fb.size, far);
   if (any(top_b < -eb)) return separated;
 
-  bool certain =
-      all((fa.determinant > ea) & (fb.determinant > eb) & (top_a > ea) & (top_b > eb));
+  bool certain = all((fa.determinant > ea) & (fb.determinant > eb) & (top_a > ea) & (top_b > eb));
   Double4 x[4], y[4];
   for (int pass = 0; pass < 2; ++pass) {
     const auto open = [&](double shift) __attribute__((always_inline)) {
@@ -145,8 +154,8 @@ TAUGUARD_INLINE Verdict abfme_tetrahedra(const double* a, const double* b) {
   return certain ? common : undecided;
 }
 
-// Slabs of a zonotope with three generators: |n_i . (p - centre)| <= determinant, lane i < 3 (lane 3 is
-// zero); n_i is the cross product of the other two generators.
+// Slabs of a zonotope with three generators: |n_i . (p - centre)| <= determinant, lane i < 3 (lane
+// 3 is zero); n_i is the cross product of the other two generators.
 struct Slabs {
   Double4 n[3];
   double determinant, size;
@@ -157,14 +166,17 @@ struct Slabs {
     determinant = std::fabs(dot(z.g[0], m[0]));
     size = std::max({norm1(z.g[0]), norm1(z.g[1]), norm1(z.g[2])});
   }
-  TAUGUARD_INLINE Double4 at(const double* p) const { return n[0] * p[0] + n[1] * p[1] + n[2] * p[2]; }
+  TAUGUARD_INLINE Double4 at(const double* p) const {
+    return n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
+  }
 };
 
-// Zonotope A against tetrahedron B. E of A's table at points p_j = (b_j - origin) - shift, `reach` the
-// 1-norm of b_j - origin plus 3 a: a point is off by 3 u reach, a normal by 4 u a^2, an entry by
-// (4 + 3 + 1 + 2) u a^2 reach, the determinant by 8 u a^3 (a <= reach / 3), their sum by one rounding
-// more: 14 u and the slack of 8 u, 32 u a^2 reach. B's planes at A's centre: as tetrahedron_error, with
-// 20 u b^2 for each of the three generators, covered by counting 6 a into the reach.
+// Zonotope A against tetrahedron B. E of A's table at points p_j = (b_j - origin) - shift, `reach`
+// the 1-norm of b_j - origin plus 3 a: a point is off by 3 u reach, a normal by 4 u a^2, an entry
+// by (4 + 3 + 1 + 2) u a^2 reach, the determinant by 8 u a^3 (a <= reach / 3), their sum by one
+// rounding more: 14 u and the slack of 8 u, 32 u a^2 reach. B's planes at A's centre: as
+// tetrahedron_error, with 20 u b^2 for each of the three generators, covered by counting 6 a into
+// the reach.
 TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const double* b) {
   const Slabs sa(a);
   Double4 p[3];  // one vertex of B a lane
@@ -215,12 +227,12 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
   return certain ? common : undecided;
 }
 
-// Two zonotopes: A's slabs with B's generators C_k = n_i . g_k (lane i) and the offset m of the centres.
-// w = |origin_b - origin_a|_1 + 3 (a + b) bounds every length; the offset is off by 4 u w.
-// Facets: m by 11 u a^2 w, the determinant by 8 u a^3, three entries by 8 u a^2 b each, four sums by
-// 8 u a^2 w: 32 u a^2 w. Edges: products of two such entries, |C| <= a^2 b: 42 u for the offset's minor,
-// 12 u for the determinant's terms, 24 u for the generators' minors, 20 u for the sums, of a^4 b w.
-// Twice the facets' bound and 128 u a^4 b w are used.
+// Two zonotopes: A's slabs with B's generators C_k = n_i . g_k (lane i) and the offset m of the
+// centres. w = |origin_b - origin_a|_1 + 3 (a + b) bounds every length; the offset is off by 4 u w.
+// Facets: m by 11 u a^2 w, the determinant by 8 u a^3, three entries by 8 u a^2 b each, four sums
+// by 8 u a^2 w: 32 u a^2 w. Edges: products of two such entries, |C| <= a^2 b: 42 u for the
+// offset's minor, 12 u for the determinant's terms, 24 u for the generators' minors, 20 u for the
+// sums, of a^4 b w. Twice the facets' bound and 128 u a^4 b w are used.
 TAUGUARD_INLINE Verdict abfme_zonotopes(const Zonotope& a, const Zonotope& b) {
   const Slabs sa(a), sb(b);
   double d[3], w = 0.0;
@@ -242,10 +254,10 @@ TAUGUARD_INLINE Verdict abfme_zonotopes(const Zonotope& a, const Zonotope& b) {
   bool certain = all(gap_a < -ea) && all(gap_b < -eb);
   const double ee = 128 * unit * sa.size * sa.size * sa.size * sa.size * sb.size * w;
   const Double4 m1 = next3(m), c1[3] = {next3(c[0]), next3(c[1]), next3(c[2])};
-  const auto minor = [&](int l, Double4 x, Double4 x1) __attribute__((always_inline)) {
-    return abs(c[l] * x1 - c1[l] * x);
-  };
-  const Double4 m01 = minor(0, c[1], c1[1]), m12 = minor(1, c[2], c1[2]), m20 = minor(2, c[0], c1[0]);
+  const auto minor = [&](int l, Double4 x, Double4 x1)
+                         __attribute__((always_inline)) { return abs(c[l] * x1 - c1[l] * x); };
+  const Double4 m01 = minor(0, c[1], c1[1]), m12 = minor(1, c[2], c1[2]),
+                m20 = minor(2, c[0], c1[0]);
   const Double4 others[3] = {m01 + m20, m01 + m12, m12 + m20};
   Double4 worst;
   for (int l = 0; l < 3; ++l) {

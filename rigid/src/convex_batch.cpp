@@ -1,5 +1,5 @@
-// The batch path of boxes: eight pairs at a time in single precision with certified bounds; what they
-// leave open (a few rows in a million, or boxes in contact) is decided one by one.
+// The batch path of boxes: eight pairs at a time in single precision with certified bounds; what
+// they leave open (a few rows in a million, or boxes in contact) is decided one by one.
 #include <atomic>
 #include <cstring>
 
@@ -33,8 +33,9 @@ TAUGUARD_INLINE std::size_t run_blocks(const Batch& batch, std::size_t begin, st
   std::size_t left = 0;
   for (std::size_t k = begin; k < end; ++k) {
     Mask8 apart, together;
-    box_blocks(batch.blocks_a[batch.a.count == 1 ? 0 : k], batch.blocks_b[batch.b.count == 1 ? 0 : k],
-               static_cast<float>(batch.skew), apart, together);
+    box_blocks(batch.blocks_a[batch.a.count == 1 ? 0 : k],
+               batch.blocks_b[batch.b.count == 1 ? 0 : k], static_cast<float>(batch.skew), apart,
+               together);
     const std::size_t first = 8 * k, lanes = std::min<std::size_t>(8, batch.n - first);
     using Byte8 = std::int8_t __attribute__((vector_size(8)));
     const Byte8 hits = __builtin_convertvector(together & 1, Byte8);
@@ -66,7 +67,8 @@ Skew box_skew(const double* rotation, std::size_t n, double tolerance) {
     double worst = 0.0;
     for (int j = 0; j < 3; ++j)
       for (int k = j; k < 3; ++k) {
-        const double entry = r[j] * r[k] + r[3 + j] * r[3 + k] + r[6 + j] * r[6 + k] - (j == k ? 1.0 : 0.0);
+        const double entry =
+            r[j] * r[k] + r[3 + j] * r[3 + k] + r[6 + j] * r[6 + k] - (j == k ? 1.0 : 0.0);
         if (!(std::fabs(entry) <= worst)) worst = std::fabs(entry);
       }
     if (!(worst <= tolerance) && out.first_beyond == n) out.first_beyond = i;
@@ -90,18 +92,20 @@ void pack_boxes(const double* packed, std::size_t n, double* blocks) {
     }
 }
 
-std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b, const void* blocks_b,
-                          double skew, std::size_t n, int threads, std::uint8_t* hit) {
-  const Batch batch{a, b, static_cast<const BoxBlock*>(blocks_a), static_cast<const BoxBlock*>(blocks_b),
-                    skew, n, hit};
+std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b,
+                          const void* blocks_b, double skew, std::size_t n, int threads,
+                          std::uint8_t* hit) {
+  const Batch batch{
+      a, b,  static_cast<const BoxBlock*>(blocks_a), static_cast<const BoxBlock*>(blocks_b), skew,
+      n, hit};
   auto run = run_portable;
 #if defined(TAUGUARD_AVX2)
   if (use_avx2()) run = run_avx2;
 #endif
   std::atomic<std::size_t> left{0};
-  geometry::ThreadPool::shared().parallel_for((n + 7) / 8, threads, 512, [&](auto begin, auto end, auto) {
-    left += run(batch, begin, end);
-  });
+  geometry::ThreadPool::shared().parallel_for(
+      (n + 7) / 8, threads, 512,
+      [&](auto begin, auto end, auto) { left += run(batch, begin, end); });
   return left;
 }
 

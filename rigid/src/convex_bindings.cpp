@@ -18,7 +18,8 @@ using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 Bodies view(int kind, const Data& data, const Offsets& offsets) {
   const bool hulls = is_cloud(static_cast<Kind>(kind));
-  return {static_cast<Kind>(kind), data.data(), offsets.data(), hulls ? offsets.shape(0) - 1 : data.shape(0)};
+  return {static_cast<Kind>(kind), data.data(), offsets.data(),
+          hulls ? offsets.shape(0) - 1 : data.shape(0)};
 }
 
 }  // namespace
@@ -26,20 +27,20 @@ Bodies view(int kind, const Data& data, const Offsets& offsets) {
 void bind_convex(nb::module_& m) {
   m.def("has_avx2", [] { return use_avx2(); });
   m.def("allow_vectors", [](bool allowed) { vectors_allowed = allowed; });
-  m.def("overlap", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b, int method,
-                      int threads, Hits hit) {
+  m.def("overlap", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
+                      int method, int threads, Hits hit) {
     nb::gil_scoped_release release;
     return overlap(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
                    static_cast<Method>(method), threads, hit.data());
   });
-  m.def("overlap_boxes", [](Data a, Data blocks_a, Data b, Data blocks_b, double skew, int threads,
-                            Hits hit) {
-    nb::gil_scoped_release release;
-    const Bodies rows_a{Kind::boxes, a.data(), nullptr, a.shape(0)};
-    const Bodies rows_b{Kind::boxes, b.data(), nullptr, b.shape(0)};
-    return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0), threads,
-                         hit.data());
-  });
+  m.def("overlap_boxes",
+        [](Data a, Data blocks_a, Data b, Data blocks_b, double skew, int threads, Hits hit) {
+          nb::gil_scoped_release release;
+          const Bodies rows_a{Kind::boxes, a.data(), nullptr, a.shape(0)};
+          const Bodies rows_b{Kind::boxes, b.data(), nullptr, b.shape(0)};
+          return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0),
+                               threads, hit.data());
+        });
   m.def("box_skew", [](Data rotation, double tolerance) {
     nb::gil_scoped_release release;
     const Skew skew = box_skew(rotation.data(), rotation.shape(0), tolerance);
@@ -49,21 +50,23 @@ void bind_convex(nb::module_& m) {
     nb::gil_scoped_release release;
     pack_boxes(packed.data(), packed.shape(0), blocks.data());
   });
-  m.def("sweep", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b, Data displacement,
-                    int method, int threads, bool points, Hits hit, Rows out) {
+  m.def("sweep", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
+                    Data displacement, int method, int threads, bool points, Hits hit, Rows out) {
     nb::gil_scoped_release release;
-    return sweep(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), displacement.data(), hit.shape(0),
-                 static_cast<Method>(method), threads, points, hit.data(), out.data());
+    return sweep(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), displacement.data(),
+                 hit.shape(0), static_cast<Method>(method), threads, points, hit.data(),
+                 out.data());
   });
-  m.def("overlap_cached", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
-                             int threads, Rows normals, Hits hit) {
+  m.def("overlap_cached", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b,
+                             Offsets offsets_b, int threads, Rows normals, Hits hit) {
     nb::gil_scoped_release release;
-    return overlap_cached(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0), threads,
-                          normals.data(), hit.data());
+    return overlap_cached(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
+                          threads, normals.data(), hit.data());
   });
-  m.def("witnesses", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b, Offsets offsets_b,
-                        int threads, Hits hit, Rows out) {
+  m.def("witnesses", [](int kind_a, Data a, Offsets offsets_a, int kind_b, Data b,
+                        Offsets offsets_b, int threads, Hits hit, Rows out) {
     nb::gil_scoped_release release;
-    witnesses(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), out.shape(0), threads, hit.data(), out.data());
+    witnesses(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), out.shape(0), threads,
+              hit.data(), out.data());
   });
 }

@@ -1,18 +1,19 @@
-// Box against box with unit axes (Gottschalk, Lin, Manocha 1996), for scalars and for lanes: the batch
-// path of eight floats, and the double-precision look at boxes with parallel edges.
+// Box against box with unit axes (Gottschalk, Lin, Manocha 1996), for scalars and for lanes: the
+// batch path of eight floats, and the double-precision look at boxes with parallel edges.
 //
 // C_ik = r_Ai . r_Bk, t_i = r_Ai . (c_B - c_A); 15 gaps, negative where the axis does not separate.
-// Error, u the unit roundoff of the lanes, w = |d|_1 + sum h_A + sum h_B: rounding inputs costs u each,
-// C is off by 5 u, t by 5 u |d|; an edge's gap by 24 u |d| and 2 * 12 u of the half extents, that of a
-// facet of B by 36 u |d| + 12 u: 64 u w covers all. The boxes are the sets of the given rotations R;
-// using R^T R = I where entries are off by `skew` moves a gap by at most 16 skew w.
+// Error, u the unit roundoff of the lanes, w = |d|_1 + sum h_A + sum h_B: rounding inputs costs u
+// each, C is off by 5 u, t by 5 u |d|; an edge's gap by 24 u |d| and 2 * 12 u of the half extents,
+// that of a facet of B by 36 u |d| + 12 u: 64 u w covers all. The boxes are the sets of the given
+// rotations R; using R^T R = I where entries are off by `skew` moves a gap by at most 16 skew w.
 //
-// Overlap needs every facet of the zonotope A - B on the right side. The axis of nearly parallel edges
-// has no certain sign, but may be left out: tilting the shorter edge by the angle makes the facet vanish
-// and moves the body by at most tau h, so a margin of that size at all other axes is enough (a ball of
-// that radius about the offset is inside the tilted body). Edges count as parallel where
-// 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 - C^2 and at most three pairs can be parallel,
-// each edge in one of them, so 2 tau min(sum h_A, sum h_B) is more than they all move.
+// Overlap needs every facet of the zonotope A - B on the right side. The axis of nearly parallel
+// edges has no certain sign, but may be left out: tilting the shorter edge by the angle makes the
+// facet vanish and moves the body by at most tau h, so a margin of that size at all other axes is
+// enough (a ball of that radius about the offset is inside the tilted body). Edges count as
+// parallel where 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 - C^2 and at most three
+// pairs can be parallel, each edge in one of them, so 2 tau min(sum h_A, sum h_B) is more than they
+// all move.
 #pragma once
 
 #include "convex_abfme.hpp"
@@ -33,17 +34,19 @@ struct BoxBounds {
 };
 template <>
 struct BoxBounds<Float8> {
-  static constexpr float unit = 0x1p-24f, tau_squared = 0x1p-16f, tau = 0x1p-8f, low = 1e-30f, high = 1e30f;
+  static constexpr float unit = 0x1p-24f, tau_squared = 0x1p-16f, tau = 0x1p-8f, low = 1e-30f,
+                         high = 1e30f;
 };
 template <>
 struct BoxBounds<double> {
-  static constexpr double unit = 0x1p-53, tau_squared = 0x1p-44, tau = 0x1p-22, low = 1e-250, high = 1e250;
+  static constexpr double unit = 0x1p-53, tau_squared = 0x1p-44, tau = 0x1p-22, low = 1e-250,
+                          high = 1e250;
 };
 
 // out: masks (bool for scalars) of lanes that are certainly separated and certainly common.
 template <class V, class Mask, class Scalar>
-TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const V* d, Scalar skew, Mask& apart,
-                              Mask& together) {
+TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const V* d, Scalar skew,
+                              Mask& apart, Mask& together) {
   using Bounds = BoxBounds<V>;
   V t[3], c[3][3], ac[3][3];
   for (int i = 0; i < 3; ++i) {
@@ -59,7 +62,8 @@ TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const 
 
   V worst = abs(t[0]) - a.h[0] - (b.h[0] * ac[0][0] + b.h[1] * ac[0][1] + b.h[2] * ac[0][2]);
   for (int i = 1; i < 3; ++i)
-    worst = max(worst, abs(t[i]) - a.h[i] - (b.h[0] * ac[i][0] + b.h[1] * ac[i][1] + b.h[2] * ac[i][2]));
+    worst = max(worst,
+                abs(t[i]) - a.h[i] - (b.h[0] * ac[i][0] + b.h[1] * ac[i][1] + b.h[2] * ac[i][2]));
   for (int k = 0; k < 3; ++k)
     worst = max(worst, abs(t[0] * c[0][k] + t[1] * c[1][k] + t[2] * c[2][k]) - b.h[k] -
                            (a.h[0] * ac[0][k] + a.h[1] * ac[1][k] + a.h[2] * ac[2][k]));
@@ -70,7 +74,8 @@ TAUGUARD_INLINE void box_axes(const BoxLanes<V>& a, const BoxLanes<V>& b, const 
     const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
     for (int k = 0; k < 3; ++k) {
       const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-      const V gap = abs(t[i2] * c[i1][k] - t[i1] * c[i2][k]) - (a.h[i1] * ac[i2][k] + a.h[i2] * ac[i1][k]) -
+      const V gap = abs(t[i2] * c[i1][k] - t[i1] * c[i2][k]) -
+                    (a.h[i1] * ac[i2][k] + a.h[i2] * ac[i1][k]) -
                     (b.h[k1] * ac[i][k2] + b.h[k2] * ac[i][k1]);
       const Mask parallel = Scalar(1) - c[i][k] * c[i][k] < Bounds::tau_squared;
       worst = max(worst, gap);

@@ -1,5 +1,6 @@
-// Overlap of frames that resemble each other: the plane that separated a pair in the last frame is tried
-// first. It answers nearly every pair that is still apart; a wrong or stale plane costs time only.
+// Overlap of frames that resemble each other: the plane that separated a pair in the last frame is
+// tried first. It answers nearly every pair that is still apart; a wrong or stale plane costs time
+// only.
 #include <atomic>
 
 #include "convex_overlap.hpp"
@@ -16,7 +17,8 @@ struct Extent {
 };
 
 // Projections of a body on n, from `base`, and the 1-norm that bounds its points.
-TAUGUARD_INLINE Extent extent_along(const Bodies& bodies, std::size_t row, const double* base, const double* n) {
+TAUGUARD_INLINE Extent extent_along(const Bodies& bodies, std::size_t row, const double* base,
+                                    const double* n) {
   const double* p = bodies.row(row);
   if (bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds) {
     const Zonotope z = zonotope_of(bodies.kind, p);
@@ -26,8 +28,10 @@ TAUGUARD_INLINE Extent extent_along(const Bodies& bodies, std::size_t row, const
       center[k] = away[k] + z.shift[k];
     }
     const double middle = dot(n, center);
-    const double radius = std::fabs(dot(n, z.g[0])) + std::fabs(dot(n, z.g[1])) + std::fabs(dot(n, z.g[2]));
-    return {middle - radius, middle + radius, norm1(away) + 2 * (norm1(z.g[0]) + norm1(z.g[1]) + norm1(z.g[2]))};
+    const double radius =
+        std::fabs(dot(n, z.g[0])) + std::fabs(dot(n, z.g[1])) + std::fabs(dot(n, z.g[2]));
+    return {middle - radius, middle + radius,
+            norm1(away) + 2 * (norm1(z.g[0]) + norm1(z.g[1]) + norm1(z.g[2]))};
   }
   const std::size_t width = bodies.kind == Kind::polygons ? 2 : 3, count = bodies.vertex_count(row);
   Extent out{HUGE_VAL, -HUGE_VAL, 0.0};
@@ -42,8 +46,10 @@ TAUGUARD_INLINE Extent extent_along(const Bodies& bodies, std::size_t row, const
   return out;
 }
 
-// Is a certainly below and b above a plane with normal n? A point is off by 8 u reach, a product sum by 4 u.
-TAUGUARD_INLINE bool plane_holds(const Bodies& a, const Bodies& b, std::size_t row, const double* n) {
+// Is a certainly below and b above a plane with normal n? A point is off by 8 u reach, a product
+// sum by 4 u.
+TAUGUARD_INLINE bool plane_holds(const Bodies& a, const Bodies& b, std::size_t row,
+                                 const double* n) {
   const double* base = a.row(row);
   const Extent ea = extent_along(a, row, base, n), eb = extent_along(b, row, base, n);
   const double reach = ea.reach + eb.reach;
@@ -62,8 +68,10 @@ bool find_axis(const Bodies& a, const Bodies& b, std::size_t row, double* n) {
     double axis[3];
     cross(e, f, axis);
     double low_a = HUGE_VAL, high_a = -HUGE_VAL, low_b = HUGE_VAL, high_b = -HUGE_VAL;
-    for (const auto& v : body_a.v) low_a = std::min(low_a, dot(axis, v)), high_a = std::max(high_a, dot(axis, v));
-    for (const auto& v : body_b.v) low_b = std::min(low_b, dot(axis, v)), high_b = std::max(high_b, dot(axis, v));
+    for (const auto& v : body_a.v)
+      low_a = std::min(low_a, dot(axis, v)), high_a = std::max(high_a, dot(axis, v));
+    for (const auto& v : body_b.v)
+      low_b = std::min(low_b, dot(axis, v)), high_b = std::max(high_b, dot(axis, v));
     const bool above = low_b > high_a;
     if (!above && !(low_a > high_b)) return false;
     const double length = (above ? 1.0 : -1.0) * std::sqrt(dot(axis, axis));
@@ -100,8 +108,8 @@ void renew(const Bodies& a, const Bodies& b, std::size_t row, double* n) {
 
 }  // namespace
 
-std::size_t overlap_cached(const Bodies& a, const Bodies& b, std::size_t n, int threads, double* normals,
-                           std::uint8_t* hit) {
+std::size_t overlap_cached(const Bodies& a, const Bodies& b, std::size_t n, int threads,
+                           double* normals, std::uint8_t* hit) {
   const RowMethod rest = row_method(a.kind, b.kind);
   std::atomic<std::size_t> answered{0};
   geometry::ThreadPool::shared().parallel_for(n, threads, 1024, [&](auto begin, auto end, auto) {

@@ -1,5 +1,5 @@
-// A common point of two bodies that touch along a known normal: the features of both that lie in the
-// contact plane (vertices within `tolerance` of it), cut with each other in that plane.
+// A common point of two bodies that touch along a known normal: the features of both that lie in
+// the contact plane (vertices within `tolerance` of it), cut with each other in that plane.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,8 @@ class ContactFeature {
  public:
   using Point2 = std::array<double, 2>;
 
-  // The vertices of `body` extreme along sign * normal, as a convex polygon in the plane basis u, v.
+  // The vertices of `body` extreme along sign * normal, as a convex polygon in the plane basis u,
+  // v.
   ContactFeature(const Points<double>& body, const double* normal, double sign, double tolerance,
                  const double* u, const double* v) {
     const auto along = [](const double* n, const std::array<double, 3>& p) {
@@ -61,7 +62,8 @@ class ContactFeature {
     for (int side = 0; side < 2; ++side) {
       const std::size_t start = out.size();
       for (const auto& x : p) {
-        while (out.size() >= start + 2 && turn(out[out.size() - 2], out.back(), x) <= 0) out.pop_back();
+        while (out.size() >= start + 2 && turn(out[out.size() - 2], out.back(), x) <= 0)
+          out.pop_back();
         out.push_back(x);
       }
       out.pop_back();
@@ -71,7 +73,8 @@ class ContactFeature {
   }
 
   // What lies left of the line o -> e, or within `tolerance` of it.
-  static std::vector<Point2> cut(const std::vector<Point2>& p, const Point2& o, const Point2& e, double tolerance) {
+  static std::vector<Point2> cut(const std::vector<Point2>& p, const Point2& o, const Point2& e,
+                                 double tolerance) {
     const double length = std::hypot(e[0] - o[0], e[1] - o[1]);
     const auto inside = [&](const Point2& x) { return turn(o, e, x) + tolerance * length; };
     std::vector<Point2> out;
@@ -96,8 +99,8 @@ class ContactFeature {
 };
 
 // `a` and `b` touch along the unit `normal` (from a to b). Writes a common point to `point`.
-inline void contact_point(const Points<double>& a, const Points<double>& b, const double* normal, double tolerance,
-                          double* point) {
+inline void contact_point(const Points<double>& a, const Points<double>& b, const double* normal,
+                          double tolerance, double* point) {
   const int least = std::fabs(normal[0]) < std::fabs(normal[1])
                         ? (std::fabs(normal[0]) < std::fabs(normal[2]) ? 0 : 2)
                         : (std::fabs(normal[1]) < std::fabs(normal[2]) ? 1 : 2);
@@ -108,7 +111,8 @@ inline void contact_point(const Points<double>& a, const Points<double>& b, cons
     length += u[k] * u[k];
   }
   for (double& x : u) x /= std::sqrt(length);
-  for (int k = 0; k < 3; ++k) v[k] = normal[(k + 1) % 3] * u[(k + 2) % 3] - normal[(k + 2) % 3] * u[(k + 1) % 3];
+  for (int k = 0; k < 3; ++k)
+    v[k] = normal[(k + 1) % 3] * u[(k + 2) % 3] - normal[(k + 2) % 3] * u[(k + 1) % 3];
   const ContactFeature fa(a, normal, 1.0, tolerance, u, v), fb(b, normal, -1.0, tolerance, u, v);
   const auto at = ContactFeature::meet(fa, fb, tolerance);
   const double level = 0.5 * (fa.level + fb.level);

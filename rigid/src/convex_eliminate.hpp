@@ -1,15 +1,16 @@
-// Elimination for vertex hulls without facets, in D = 2 or 3 dimensions. The unknowns are the values p_i
-// of the separating function at D + 1 affinely independent vertices of A, p_i >= 0; F_i are the barycentric
-// coordinates of that simplex, scaled by its determinant. A vertex of B asks sum p_i F_i(b) < 0, any other
-// vertex of A asks -sum p_i F_i(a) <= 0. Eliminating p_k keeps the rows with a positive entry (with p_k >= 0
-// that entry drops out) and combines them with the rows of the opposite sign; every row is a point of B
-// less a point of A. After s eliminations a row made of more than s + 1 inequalities is redundant
-// (Chernikov 1960), and so is one whose inequalities include those of another (Kohler 1967).
+// Elimination for vertex hulls without facets, in D = 2 or 3 dimensions. The unknowns are the
+// values p_i of the separating function at D + 1 affinely independent vertices of A, p_i >= 0; F_i
+// are the barycentric coordinates of that simplex, scaled by its determinant. A vertex of B asks
+// sum p_i F_i(b) < 0, any other vertex of A asks -sum p_i F_i(a) <= 0. Eliminating p_k keeps the
+// rows with a positive entry (with p_k >= 0 that entry drops out) and combines them with the rows
+// of the opposite sign; every row is a point of B less a point of A. After s eliminations a row
+// made of more than s + 1 inequalities is redundant (Chernikov 1960), and so is one whose
+// inequalities include those of another (Kohler 1967).
 //   * A row of positive entries: no plane exists, the bodies share a point.
 //   * No such row: back-substitution gives a plane, which is then checked against all vertices.
-// Combinations leave an entry of 2 E instead of 0 (E bounds every entry's error), so that the entries of a
-// positive row are positive beyond rounding in the eliminated columns too; rows too small for that, and
-// planes that the check rejects, leave the pair undecided.
+// Combinations leave an entry of 2 E instead of 0 (E bounds every entry's error), so that the
+// entries of a positive row are positive beyond rounding in the eliminated columns too; rows too
+// small for that, and planes that the check rejects, leave the pair undecided.
 #pragma once
 
 #include <algorithm>
@@ -56,13 +57,17 @@ class HullElimination {
   static int count(const std::array<std::uint64_t, 2>& s) {
     return __builtin_popcountll(s[0]) + __builtin_popcountll(s[1]);
   }
-  static void add(std::array<std::uint64_t, 2>& s, std::size_t i) { s[i / 64] |= std::uint64_t{1} << (i % 64); }
+  static void add(std::array<std::uint64_t, 2>& s, std::size_t i) {
+    s[i / 64] |= std::uint64_t{1} << (i % 64);
+  }
 
   bool positive(const Row& r) const {
     return std::all_of(r.entry.begin(), r.entry.end(), [&](double x) { return x > error_; });
   }
 
-  static Point minus(const Point& x, const Point& y) { return {x[0] - y[0], x[1] - y[1], x[2] - y[2]}; }
+  static Point minus(const Point& x, const Point& y) {
+    return {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
+  }
 
   // Normal of F through the points o, p (and q): F(x) = n . (x - o).
   static Point normal_of(const Point& o, const Point& p, const Point& q) {
@@ -83,12 +88,14 @@ class HullElimination {
       for (std::size_t k = 0; k < a_.size(); ++k) {
         const Point x = minus(a_[k], a_[0]);
         double size;
-        if (i == 1) size = dot(x.data(), x.data());
+        if (i == 1)
+          size = dot(x.data(), x.data());
         else if (i == 2) {
           Point c;
           cross(along.data(), x.data(), c.data());
           size = dot(c.data(), c.data());
-        } else size = std::fabs(dot(across.data(), x.data()));
+        } else
+          size = std::fabs(dot(across.data(), x.data()));
         if (size > best) best = size, chosen_[static_cast<std::size_t>(i)] = k;
       }
       const Point x = minus(a_[chosen_[static_cast<std::size_t>(i)]], a_[0]);
@@ -146,7 +153,8 @@ class HullElimination {
         for (int w = 0; w < 2; ++w) r.support[w] = p.support[w] | q.support[w];
         if (count(r.support) > column + 2) continue;
         const double share = (p.entry[k] - 2 * error_) / (p.entry[k] - q.entry[k]);
-        for (std::size_t i = 0; i <= D; ++i) r.entry[i] = (1 - share) * p.entry[i] + share * q.entry[i];
+        for (std::size_t i = 0; i <= D; ++i)
+          r.entry[i] = (1 - share) * p.entry[i] + share * q.entry[i];
         out.push_back(r);
       }
     }
@@ -156,8 +164,9 @@ class HullElimination {
   }
 
   static std::vector<Row> without_supersets(std::vector<Row> rows) {
-    std::stable_sort(rows.begin(), rows.end(),
-                     [](const Row& x, const Row& y) { return count(x.support) < count(y.support); });
+    std::stable_sort(rows.begin(), rows.end(), [](const Row& x, const Row& y) {
+      return count(x.support) < count(y.support);
+    });
     std::vector<Row> out;
     for (const Row& r : rows) {
       const bool redundant = std::any_of(out.begin(), out.end(), [&](const Row& s) {

@@ -1,5 +1,6 @@
-// Four doubles or eight floats side by side, by the compiler's vector types: the same source is compiled
-// for the baseline and (by target attributes) for AVX2. No contraction, no reassociation: the same bits.
+// Four doubles or eight floats side by side, by the compiler's vector types: the same source is
+// compiled for the baseline and (by target attributes) for AVX2. No contraction, no reassociation:
+// the same bits.
 #pragma once
 
 #include <algorithm>
@@ -53,7 +54,9 @@ TAUGUARD_INLINE bool any(Mask4 m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 TAUGUARD_INLINE bool all(Mask4 m) { return (m[0] & m[1] & m[2] & m[3]) == -1; }
 #endif
 TAUGUARD_INLINE bool all(Mask8 m) { return all((Mask4)m & ((Mask4)m << 32)); }
-TAUGUARD_INLINE double largest(Double4 x) { return std::max(std::max(x[0], x[1]), std::max(x[2], x[3])); }
+TAUGUARD_INLINE double largest(Double4 x) {
+  return std::max(std::max(x[0], x[1]), std::max(x[2], x[3]));
+}
 // Lane k of the result is lane k + 1, k + 2 (of four), or the next of the first three.
 TAUGUARD_INLINE Double4 turn1(Double4 x) { return __builtin_shufflevector(x, x, 1, 2, 3, 0); }
 TAUGUARD_INLINE Double4 turn2(Double4 x) { return __builtin_shufflevector(x, x, 2, 3, 0, 1); }

@@ -23,14 +23,14 @@ struct Chunk {
 };
 
 // A kernel gives the verdict of one row; what it leaves undecided goes to `resolve_exactly`.
-#define TAUGUARD_KERNEL(Name, expression)                              \
-  struct Name {                                                        \
+#define TAUGUARD_KERNEL(Name, expression)                                  \
+  struct Name {                                                            \
     TAUGUARD_INLINE static Verdict decide(const Chunk& c, std::size_t i) { \
-      const double *pa = c.a.row(i), *pb = c.b.row(i);                 \
-      const Kind ka = c.a.kind, kb = c.b.kind;                         \
-      (void)ka, (void)kb;                                              \
-      return expression;                                               \
-    }                                                                  \
+      const double *pa = c.a.row(i), *pb = c.b.row(i);                     \
+      const Kind ka = c.a.kind, kb = c.b.kind;                             \
+      (void)ka, (void)kb;                                                  \
+      return expression;                                                   \
+    }                                                                      \
   }
 TAUGUARD_KERNEL(AbfmeTT, abfme_tetrahedra(pa, pb));
 TAUGUARD_KERNEL(AbfmeZZ, abfme_zonotopes(zonotope_of(ka, pa), zonotope_of(kb, pb)));
@@ -64,8 +64,10 @@ TAUGUARD_INLINE std::size_t run_rows(const Chunk& c) {
   for (std::size_t i = c.begin; i < c.end; ++i) {
     Verdict v = Kernel::decide(c, i);
     if (v == undecided) {
-      // Boxes with parallel edges in deep contact have a quicker way; any accepted rotation fits its skew.
-      if (c.a.kind == Kind::boxes && c.b.kind == Kind::boxes) v = box_pair(c.a.row(i), c.b.row(i), 1.001e-6);
+      // Boxes with parallel edges in deep contact have a quicker way; any accepted rotation fits
+      // its skew.
+      if (c.a.kind == Kind::boxes && c.b.kind == Kind::boxes)
+        v = box_pair(c.a.row(i), c.b.row(i), 1.001e-6);
       if (v == undecided) {
         ++left;
         v = resolve_exactly(c.a, c.b, i);
@@ -138,10 +140,11 @@ RowMethod row_method(Kind a, Kind b) {
   };
 }
 
-void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads, const std::uint8_t* hit,
-               double* out) {
+void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads,
+               const std::uint8_t* hit, double* out) {
   geometry::ThreadPool::shared().parallel_for(n, threads, 64, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) find_witness(a, b, i, hit[i] ? common : separated, out + 7 * i);
+    for (auto i = begin; i < end; ++i)
+      find_witness(a, b, i, hit[i] ? common : separated, out + 7 * i);
   });
 }
 

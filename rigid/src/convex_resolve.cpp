@@ -24,7 +24,8 @@ Dyadic projection(const double* n, const std::array<Dyadic, 3>& p) {
 }
 
 // The largest projection of a and the smallest of b.
-std::array<Dyadic, 2> extent(const Points<Dyadic>& a, const Points<Dyadic>& b, const double* normal) {
+std::array<Dyadic, 2> extent(const Points<Dyadic>& a, const Points<Dyadic>& b,
+                             const double* normal) {
   Dyadic high = projection(normal, a[0]), low = projection(normal, b[0]);
   for (const auto& p : a) {
     const Dyadic x = projection(normal, p);
@@ -80,8 +81,8 @@ double localize(Points<double>& a, Points<double>& b, std::array<double, 3>& bas
   return reach;
 }
 
-// Gap between the projections on the plane's normal, less its error: each product sum is off by 4 u |n|
-// reach, coordinates by u reach.
+// Gap between the projections on the plane's normal, less its error: each product sum is off by 4 u
+// |n| reach, coordinates by u reach.
 double certain_gap(const Points<double>& a, const Points<double>& b, const double* n, double reach,
                    double& high, double& low) {
   high = -HUGE_VAL, low = HUGE_VAL;
@@ -91,8 +92,8 @@ double certain_gap(const Points<double>& a, const Points<double>& b, const doubl
 }
 
 // Witness in double precision; false where it is not good to a few roundings.
-bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, Verdict known,
-                          double* out) {
+bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
+                          Verdict known, double* out) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
   std::array<double, 3> base;
   const double reach = localize(a, b, base);
@@ -130,10 +131,11 @@ bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::s
 
 }  // namespace
 
-// A basis of four real columns with positive weights encloses the origin. Vertices are off by u reach, and
-// those computed from generators by 8 u of `size`, which counts the distance of the origin too. A weight is
-// a determinant of three columns (1-norm at most 2 size, off by 16 u size): 3 * 16 * 4 u size^3 from the
-// columns and 48 u size^3 from its own rounding, less than 512 u size^3.
+// A basis of four real columns with positive weights encloses the origin. Vertices are off by u
+// reach, and those computed from generators by 8 u of `size`, which counts the distance of the
+// origin too. A weight is a determinant of three columns (1-norm at most 2 size, off by 16 u size):
+// 3 * 16 * 4 u size^3 from the columns and 48 u size^3 from its own rounding, less than 512 u
+// size^3.
 Verdict resolve_hulls(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);
   std::array<double, 3> base;
@@ -178,7 +180,8 @@ Verdict resolve_sweep_exactly(const Bodies& a, const Bodies& b, const double* d,
   return lp.solve() == HullSimplex<Dyadic>::Answer::separated ? separated : common;
 }
 
-double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row, double* normal) {
+double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row,
+                       double* normal) {
   std::fill(normal, normal + 3, std::numeric_limits<double>::quiet_NaN());
   const auto pa = vertices_of<Dyadic>(a, row), start = vertices_of<Dyadic>(b, row);
   double time = 0.0;

@@ -8,7 +8,8 @@
 
 namespace tauguard::rigid {
 
-// Any bodies by the simplex method in double precision, with error bounds; `undecided` near contact.
+// Any bodies by the simplex method in double precision, with error bounds; `undecided` near
+// contact.
 Verdict resolve_hulls(const Bodies& a, const Bodies& b, std::size_t row);
 
 // Vertex hulls or polygons by elimination in double precision; `undecided` near contact.
@@ -21,12 +22,14 @@ Verdict resolve_exactly(const Bodies& a, const Bodies& b, std::size_t row);
 Verdict resolve_sweep_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row);
 
 // The time of impact of a pair that does meet, by advancing to where the separating plane of exact
-// arithmetic is reached, until exact arithmetic finds contact or no advance is left: never late, and the
-// unit normal of the last plane (NaN where the pair overlaps from the start).
-double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row, double* normal);
+// arithmetic is reached, until exact arithmetic finds contact or no advance is left: never late,
+// and the unit normal of the last plane (NaN where the pair overlaps from the start).
+double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row,
+                       double* normal);
 
 // A common point, or the unit normal (from a to b) and offset of a separating plane, of row `row`,
-// to rounding; the rest is NaN. `known` is the verdict, as far as the caller knows. out: point 3, normal 3, offset 1.
+// to rounding; the rest is NaN. `known` is the verdict, as far as the caller knows. out: point 3,
+// normal 3, offset 1.
 void find_witness(const Bodies& a, const Bodies& b, std::size_t row, Verdict known, double* out);
 
 }  // namespace tauguard::rigid

@@ -1,7 +1,7 @@
-// Separating axes, tuned: normals and edge products are shared by all projections, only vertices that can
-// be extreme are projected, four axes are tested at once, and every test has an error bound, as in
-// convex_abfme.hpp. For an edge e of A and an edge f of B, the axis e x f gives a point x the value
-// f . (x cross e), so the products with e serve all edges of B.
+// Separating axes, tuned: normals and edge products are shared by all projections, only vertices
+// that can be extreme are projected, four axes are tested at once, and every test has an error
+// bound, as in convex_abfme.hpp. For an edge e of A and an edge f of B, the axis e x f gives a
+// point x the value f . (x cross e), so the products with e serve all edges of B.
 #pragma once
 
 #include "convex_abfme.hpp"
@@ -15,7 +15,8 @@ struct TetrahedronEdges {
     for (int k = 0; k < 3; ++k) {
       const Double4 x{v[k], v[3 + k], v[6 + k], v[9 + k]};
       f[0][k] = __builtin_shufflevector(x, x, 1, 2, 3, 3) - x[0];
-      f[1][k] = __builtin_shufflevector(x, x, 3, 1, 2, 2) - __builtin_shufflevector(x, x, 2, 3, 1, 1);
+      f[1][k] =
+          __builtin_shufflevector(x, x, 3, 1, 2, 2) - __builtin_shufflevector(x, x, 2, 3, 1, 1);
     }
   }
   TAUGUARD_INLINE Double4 dot(int group, Double4 x, Double4 y, Double4 z) const {
@@ -24,7 +25,8 @@ struct TetrahedronEdges {
   TAUGUARD_INLINE Double4 dot(int group, const double* x) const {
     return f[group][0] * x[0] + f[group][1] * x[1] + f[group][2] * x[2];
   }
-  // The range of the four vertices on the group's axes; c[k] holds component k of x cross e, by vertex.
+  // The range of the four vertices on the group's axes; c[k] holds component k of x cross e, by
+  // vertex.
   TAUGUARD_INLINE void range(int group, const Double4* c, Double4& low, Double4& high) const {
     Double4 p, q, r;
     if (group == 0) {
@@ -57,7 +59,9 @@ TAUGUARD_INLINE void cross_with(const double (*p)[3], const double* e, Double4* 
 
 // E of an edge axis: a product with e is off by 6 u reach a, its dot with f by 10 u reach a b, the
 // difference of two of them by 22 u: 32 u a b reach, and twice that is used.
-TAUGUARD_INLINE double edge_error(double a, double b, double reach) { return 64 * unit * a * b * reach; }
+TAUGUARD_INLINE double edge_error(double a, double b, double reach) {
+  return 64 * unit * a * b * reach;
+}
 
 TAUGUARD_INLINE Verdict sat_tetrahedra(const double* a, const double* b) {
   const TetrahedronFacets fa(a), fb(b);
@@ -75,13 +79,14 @@ TAUGUARD_INLINE Verdict sat_tetrahedra(const double* a, const double* b) {
     top_a = j == 0 ? fa.at(p[0]) : max(top_a, fa.at(p[j]));
     top_b = j == 0 ? fb.at(q) : max(top_b, fb.at(q));
   }
-  if (!in_range(fa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(far)) return undecided;
+  if (!in_range(fa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(far))
+    return undecided;
   const double ea = tetrahedron_error(fa.size, reach), eb = tetrahedron_error(fb.size, far);
   if (any((top_a < -ea) | (top_b < -eb))) return separated;
-  bool certain =
-      all((fa.determinant > ea) & (fb.determinant > eb) & (top_a > ea) & (top_b > eb));
+  bool certain = all((fa.determinant > ea) & (fb.determinant > eb) & (top_a > ea) & (top_b > eb));
 
-  constexpr int edges[6][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 0, 2}, {2, 3, 0, 1}};
+  constexpr int edges[6][4] = {{0, 1, 2, 3}, {0, 2, 1, 3}, {0, 3, 1, 2},
+                               {1, 2, 0, 3}, {1, 3, 0, 2}, {2, 3, 0, 1}};
   const TetrahedronEdges f(b);
   const double ee = edge_error(2 * fa.size, 2 * fb.size, reach + fa.size);
   for (const auto& edge : edges) {
@@ -141,8 +146,8 @@ TAUGUARD_INLINE Verdict sat_zonotope_tetrahedron(const Zonotope& a, const double
   for (const auto& g : a.g) column += abs(fb.n[0] * g[0] + fb.n[1] * g[1] + fb.n[2] * g[2]);
   const double eb = tetrahedron_error(fb.size, far + 6 * sa.size);
   if (any(column < -eb)) return separated;
-  bool certain = wall > ea && all(fb.determinant > eb) && all(column > eb) && all(bottom < wall - ea) &&
-                 all(top > ea - wall);
+  bool certain = wall > ea && all(fb.determinant > eb) && all(column > eb) &&
+                 all(bottom < wall - ea) && all(top > ea - wall);
 
   const TetrahedronEdges f(b);
   const double ee = edge_error(sa.size, 2 * fb.size, reach);

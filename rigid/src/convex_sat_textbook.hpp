@@ -1,10 +1,11 @@
-// Separating axes as the textbooks have them (Ericson 2005, 5.2.1): all face normals of both bodies, then
-// the products of all edge pairs; every vertex is projected; exit at the first axis that separates. Plain
-// arithmetic without error bounds: the comparator of the study, wrong where rounding makes it so.
+// Separating axes as the textbooks have them (Ericson 2005, 5.2.1): all face normals of both
+// bodies, then the products of all edge pairs; every vertex is projected; exit at the first axis
+// that separates. Plain arithmetic without error bounds: the comparator of the study, wrong where
+// rounding makes it so.
 #pragma once
 
-#include "tauguard/rigid/bodies.hpp"
 #include "convex_lanes.hpp"
+#include "tauguard/rigid/bodies.hpp"
 
 namespace tauguard::rigid {
 
@@ -72,7 +73,8 @@ TAUGUARD_INLINE bool axis_separates(const A& a, const B& b, const double* axis) 
 }
 
 template <class A, class B>
-TAUGUARD_INLINE bool textbook_overlap(Kind kind_a, const double* pa, Kind kind_b, const double* pb) {
+TAUGUARD_INLINE bool textbook_overlap(Kind kind_a, const double* pa, Kind kind_b,
+                                      const double* pb) {
   A a;
   B b;
   load(kind_a, pa, a);

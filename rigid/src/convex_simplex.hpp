@@ -1,8 +1,9 @@
-// Do two vertex hulls share a point? The origin is in conv{a_i - b_j} or a plane separates it: phase one
-// of the simplex method on 4 rows (three coordinates and the sum of weights) with a basis of 4 columns.
-// All quantities are cofactors of the basis, so there is no division and the arithmetic can be exact:
-// with Dyadic the answer is right for any finite coordinates, degenerate bodies included.
-// Pricing follows Dantzig first and Bland's rule (1977) from then on, which cannot cycle.
+// Do two vertex hulls share a point? The origin is in conv{a_i - b_j} or a plane separates it:
+// phase one of the simplex method on 4 rows (three coordinates and the sum of weights) with a basis
+// of 4 columns. All quantities are cofactors of the basis, so there is no division and the
+// arithmetic can be exact: with Dyadic the answer is right for any finite coordinates, degenerate
+// bodies included. Pricing follows Dantzig first and Bland's rule (1977) from then on, which cannot
+// cycle.
 #pragma once
 
 #include <array>
@@ -16,8 +17,8 @@ namespace tauguard::rigid {
 inline int sign_of(const Dyadic& x) { return x.sign(); }
 inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
-// Is x - y positive, for a sum of terms of size `scale`? In doubles a basic column's price is rounding
-// noise about zero, which must not bring it in again.
+// Is x - y positive, for a sum of terms of size `scale`? In doubles a basic column's price is
+// rounding noise about zero, which must not bring it in again.
 inline bool exceeds(const Dyadic& x, const Dyadic& y, const Dyadic&) { return y < x; }
 inline bool exceeds(double x, double y, double scale) { return x - y > 0x1p-46 * scale; }
 inline void grow(Dyadic&, const Dyadic&) {}
@@ -34,7 +35,8 @@ class HullSimplex {
     start();
     for (int step = 0; step < limit; ++step) {
       factor();
-      if (sign_of(determinant_) == 0) return Answer::gave_up;  // rounding only: exact bases are regular
+      if (sign_of(determinant_) == 0)
+        return Answer::gave_up;  // rounding only: exact bases are regular
       multipliers();
       if (sign_of(y_[3]) <= 0) return Answer::common;  // no artificial weight is left
       std::size_t i = 0, j = 0;
@@ -70,7 +72,8 @@ class HullSimplex {
     m_[3][k] = Number(1.0);
   }
 
-  // One vertex pair and three artificial unit columns, signed so that their weights are not negative.
+  // One vertex pair and three artificial unit columns, signed so that their weights are not
+  // negative.
   void start() {
     const auto q = column(0, 0);
     for (int r = 0; r < 3; ++r) side_[r] = sign_of(q[r]) > 0 ? -1.0 : 1.0;
@@ -81,15 +84,17 @@ class HullSimplex {
   // Adjugate and determinant of the basis by 2 x 2 minors of its upper and lower halves.
   void factor() {
     const auto& m = m_;
-    const auto minor = [&](int r, int c, int d) { return m[r][c] * m[r + 1][d] - m[r][d] * m[r + 1][c]; };
+    const auto minor = [&](int r, int c, int d) {
+      return m[r][c] * m[r + 1][d] - m[r][d] * m[r + 1][c];
+    };
     const Number s0 = minor(0, 0, 1), s1 = minor(0, 0, 2), s2 = minor(0, 0, 3), s3 = minor(0, 1, 2),
                  s4 = minor(0, 1, 3), s5 = minor(0, 2, 3);
     const Number c0 = minor(2, 0, 1), c1 = minor(2, 0, 2), c2 = minor(2, 0, 3), c3 = minor(2, 1, 2),
                  c4 = minor(2, 1, 3), c5 = minor(2, 2, 3);
     determinant_ = s0 * c5 - s1 * c4 + s2 * c3 + s3 * c2 - s4 * c1 + s5 * c0;
     auto& v = adjugate_;
-    const auto row = [&](int k, int r, const Number& x, int p, const Number& y, int q, const Number& z, int w,
-                         bool negative) {
+    const auto row = [&](int k, int r, const Number& x, int p, const Number& y, int q,
+                         const Number& z, int w, bool negative) {
       const Number t = m[r][p] * x - m[r][q] * y + m[r][w] * z;
       v[k][other(r)] = negative ? -t : t;
     };
@@ -118,7 +123,9 @@ class HullSimplex {
     }
   }
 
-  Number project(const std::array<Number, 3>& p) const { return y_[0] * p[0] + y_[1] * p[1] + y_[2] * p[2]; }
+  Number project(const std::array<Number, 3>& p) const {
+    return y_[0] * p[0] + y_[1] * p[1] + y_[2] * p[2];
+  }
 
   // The column a_i - b_j that lowers the artificial weight: the steepest, or the first (Bland).
   bool price(bool first, std::size_t& i, std::size_t& j) {

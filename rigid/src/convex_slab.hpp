@@ -1,7 +1,7 @@
 // When a moving body meets another, by separating axes: on an axis L the bodies overlap while
 // low <= t s <= high, s = L . d. The latest entry over all axes is the time of impact.
-// Any axis, rounded as it may be, keeps the bodies apart until its own entry, so an entry minus its error
-// bound is never late.
+// Any axis, rounded as it may be, keeps the bodies apart until its own entry, so an entry minus its
+// error bound is never late.
 #pragma once
 
 #include <cmath>
@@ -51,18 +51,20 @@ struct Entry {
   double reliable = enter;                                  // `enter` plus twice its error
   double normal[3] = {0, 0, 0};                             // of the axis of `enter`, from a to b
 
-  bool usable = true;                                       // sizes are in range
+  bool usable = true;  // sizes are in range
 
   bool miss() const { return usable && (enter > leave || enter > 1.0 || leave < 0.0); }
-  bool hit() const { return usable && certain && surely_in < surely_out && surely_in < 1.0 && surely_out > 0.0; }
+  bool hit() const {
+    return usable && certain && surely_in < surely_out && surely_in < 1.0 && surely_out > 0.0;
+  }
 };
 
-// Errors, with `length` >= |axis|_1 the product of the sizes of its edges: the axis is off by 4 u length
-// (this matters to `hit` only), a vertex by 8 u reach, a projection by 4 u length reach more: 64 u length
-// reach for the difference of two. The speed is off by 8 u length |d|.
+// Errors, with `length` >= |axis|_1 the product of the sizes of its edges: the axis is off by 4 u
+// length (this matters to `hit` only), a vertex by 8 u reach, a projection by 4 u length reach
+// more: 64 u length reach for the difference of two. The speed is off by 8 u length |d|.
 template <class A, class B>
-TAUGUARD_INLINE void cast_axis(const A& a, const B& b, const double* axis, double length, const double* d,
-                               Entry& out) {
+TAUGUARD_INLINE void cast_axis(const A& a, const B& b, const double* axis, double length,
+                               const double* d, Entry& out) {
   if (!(length > 1e-200)) {  // products that may have lost their accuracy to underflow
     out.certain = false;
     return;
@@ -88,7 +90,8 @@ TAUGUARD_INLINE void cast_axis(const A& a, const B& b, const double* axis, doubl
   }
   const double first = (speed > 0 ? low : -high) / size, last = (speed > 0 ? high : -low) / size;
   const double relative = 2 * speed_error / size + 4 * unit, margin = 2 * error / size;
-  const double first_error = margin + std::fabs(first) * relative, last_error = margin + std::fabs(last) * relative;
+  const double first_error = margin + std::fabs(first) * relative,
+               last_error = margin + std::fabs(last) * relative;
   out.leave = std::min(out.leave, last + last_error);
   out.surely_in = std::max(out.surely_in, first + first_error);
   out.surely_out = std::min(out.surely_out, last - last_error);

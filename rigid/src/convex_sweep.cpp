@@ -42,9 +42,12 @@ template <class A, class B>
 TAUGUARD_INLINE Verdict eliminate_row(const Chunk& c, std::size_t i) {
   const double *pa = c.a.row(i), *pb = c.b.row(i), *d = c.d + 3 * i;
   constexpr bool ta = A::edges == 6, tb = B::edges == 6;
-  if constexpr (ta && tb) return swept_tetrahedra(pa, pb, d);
-  else if constexpr (!ta && !tb) return swept_zonotopes(zonotope_of(c.a.kind, pa), zonotope_of(c.b.kind, pb), d);
-  else if constexpr (tb) return swept_zonotope_tetrahedron(zonotope_of(c.a.kind, pa), pb, d);
+  if constexpr (ta && tb)
+    return swept_tetrahedra(pa, pb, d);
+  else if constexpr (!ta && !tb)
+    return swept_zonotopes(zonotope_of(c.a.kind, pa), zonotope_of(c.b.kind, pb), d);
+  else if constexpr (tb)
+    return swept_zonotope_tetrahedron(zonotope_of(c.a.kind, pa), pb, d);
   else {
     const double back[3] = {-d[0], -d[1], -d[2]};
     return swept_zonotope_tetrahedron(zonotope_of(c.b.kind, pb), pa, back);
@@ -57,7 +60,8 @@ void write_miss(double* out) {
 }
 
 // Contact point of a hit at `time` with a normal, or any common point of a pair that overlaps.
-__attribute__((noinline)) void write_hit(const Chunk& c, std::size_t i, double time, const double* normal) {
+__attribute__((noinline)) void write_hit(const Chunk& c, std::size_t i, double time,
+                                         const double* normal) {
   double* out = c.out + 7 * i;
   out[0] = time;
   std::fill(out + 1, out + 7, nan);
@@ -89,13 +93,15 @@ __attribute__((noinline)) void write_exact_hit(const Chunk& c, std::size_t i, co
   double normal[3];
   const double time = advance_exactly(c.a, c.b, c.d + 3 * i, i, normal);
   const double none[3] = {0, 0, 0};
-  if (std::isnan(normal[0])) return write_hit(c, i, time, entry.reliable >= 0 ? entry.normal : none);
+  if (std::isnan(normal[0]))
+    return write_hit(c, i, time, entry.reliable >= 0 ? entry.normal : none);
   write_hit(c, i, time, normal);
 }
 
 void write_entry(const Chunk& c, std::size_t i, const Entry& entry) {
   const double none[3] = {0, 0, 0};
-  write_hit(c, i, std::min(1.0, std::max(0.0, entry.enter)), entry.reliable >= 0 ? entry.normal : none);
+  write_hit(c, i, std::min(1.0, std::max(0.0, entry.enter)),
+            entry.reliable >= 0 ? entry.normal : none);
 }
 
 template <class A, class B, bool Eliminate>
@@ -114,9 +120,12 @@ TAUGUARD_INLINE std::size_t run_rows(const Chunk& c) {
     const bool exact = v == undecided || (v == common && !entry.hit());
     if (v == undecided) v = resolve_sweep_exactly(c.a, c.b, c.d + 3 * i, i);
     c.hit[i] = v == common;
-    if (v != common) write_miss(c.out + 7 * i);
-    else if (exact) write_exact_hit(c, i, Eliminate ? cast_row<A, B>(c, i) : entry);
-    else write_entry(c, i, entry);
+    if (v != common)
+      write_miss(c.out + 7 * i);
+    else if (exact)
+      write_exact_hit(c, i, Eliminate ? cast_row<A, B>(c, i) : entry);
+    else
+      write_entry(c, i, entry);
     left += exact;
   }
   return left;
@@ -125,8 +134,10 @@ TAUGUARD_INLINE std::size_t run_rows(const Chunk& c) {
 std::size_t run_hulls(const Chunk& c) {
   for (std::size_t i = c.begin; i < c.end; ++i) {
     c.hit[i] = resolve_sweep_exactly(c.a, c.b, c.d + 3 * i, i) == common;
-    if (c.hit[i]) write_exact_hit(c, i, Entry());
-    else write_miss(c.out + 7 * i);
+    if (c.hit[i])
+      write_exact_hit(c, i, Entry());
+    else
+      write_miss(c.out + 7 * i);
   }
   return c.end - c.begin;
 }
@@ -156,14 +167,16 @@ Runner choose(Kind a, Kind b, Method method) {
   if (is_cloud(a) || is_cloud(b) || method == Method::exact) return run_hulls;
   const bool eliminate = method != Method::sat;
   if (a == Kind::tetrahedra)
-    return b == Kind::tetrahedra ? runner<Tetrahedron, Tetrahedron>(eliminate) : runner<Tetrahedron, Block>(eliminate);
-  return b == Kind::tetrahedra ? runner<Block, Tetrahedron>(eliminate) : runner<Block, Block>(eliminate);
+    return b == Kind::tetrahedra ? runner<Tetrahedron, Tetrahedron>(eliminate)
+                                 : runner<Tetrahedron, Block>(eliminate);
+  return b == Kind::tetrahedra ? runner<Block, Tetrahedron>(eliminate)
+                               : runner<Block, Block>(eliminate);
 }
 
 }  // namespace
 
-std::size_t sweep(const Bodies& a, const Bodies& b, const double* d, std::size_t n, Method method, int threads,
-                  bool points, std::uint8_t* hit, double* out) {
+std::size_t sweep(const Bodies& a, const Bodies& b, const double* d, std::size_t n, Method method,
+                  int threads, bool points, std::uint8_t* hit, double* out) {
   const Runner run = choose(a.kind, b.kind, method);
   std::atomic<std::size_t> left{0};
   geometry::ThreadPool::shared().parallel_for(n, threads, 256, [&](auto begin, auto end, auto) {

@@ -1,14 +1,15 @@
-// Does a moving body meet another within the step? Body B moves by t d, 0 <= t <= 1. With t as one more
-// unknown, every vertex of B gives two rows, one for each end of the motion (t is eliminated first: the
-// rows of t = 0 and t = 1 span all others), and the hull of both ends has the facets f x d besides B's
-// own. The rest is the elimination of convex_abfme.hpp.
+// Does a moving body meet another within the step? Body B moves by t d, 0 <= t <= 1. With t as one
+// more unknown, every vertex of B gives two rows, one for each end of the motion (t is eliminated
+// first: the rows of t = 0 and t = 1 span all others), and the hull of both ends has the facets f x
+// d besides B's own. The rest is the elimination of convex_abfme.hpp.
 #pragma once
 
 #include "convex_sat.hpp"
 
 namespace tauguard::rigid {
 
-// Points p and p + d are off by 2 u reach, which the bounds of convex_abfme.hpp cover with their slack.
+// Points p and p + d are off by 2 u reach, which the bounds of convex_abfme.hpp cover with their
+// slack.
 TAUGUARD_INLINE void moved(const double (*p)[3], const double* d, double (*out)[3]) {
   for (int j = 0; j < 4; ++j)
     for (int k = 0; k < 3; ++k) out[j][k] = p[j][k] + d[k];
@@ -20,7 +21,8 @@ TAUGUARD_INLINE Verdict swept_tetrahedra(const double* a, const double* b, const
   const double back[3] = {-d[0], -d[1], -d[2]}, length = norm1(d);
   const double reach = offsets_from(b, a, p) + length, far = offsets_from(a, b, q) + length;
   moved(p, d, p + 4), moved(q, back, q + 4);
-  if (!in_range(fa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(length)) return undecided;
+  if (!in_range(fa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(length))
+    return undecided;
   Double4 row[8], top_a, top_b;
   for (int j = 0; j < 8; ++j) {
     row[j] = fa.at(p[j]);
@@ -29,8 +31,7 @@ TAUGUARD_INLINE Verdict swept_tetrahedra(const double* a, const double* b, const
   }
   const double ea = tetrahedron_error(fa.size, reach), eb = tetrahedron_error(fb.size, far);
   if (any((top_a < -ea) | (top_b < -eb))) return separated;
-  bool certain =
-      all((fa.determinant > ea) & (fb.determinant > eb) & (top_a > ea) & (top_b > eb));
+  bool certain = all((fa.determinant > ea) & (fb.determinant > eb) & (top_a > ea) & (top_b > eb));
 
   const TetrahedronEdges f(b);
   Double4 c[3], low, high;
@@ -68,7 +69,8 @@ TAUGUARD_INLINE Verdict swept_tetrahedra(const double* a, const double* b, const
   return certain ? common : undecided;
 }
 
-TAUGUARD_INLINE Verdict swept_zonotope_tetrahedron(const Zonotope& a, const double* b, const double* d) {
+TAUGUARD_INLINE Verdict swept_zonotope_tetrahedron(const Zonotope& a, const double* b,
+                                                   const double* d) {
   const Slabs sa(a);
   const TetrahedronFacets fb(b);
   double p[8][3], q[3], q1[3], far = 0.0;
@@ -84,7 +86,8 @@ TAUGUARD_INLINE Verdict swept_zonotope_tetrahedron(const Zonotope& a, const doub
     q1[k] = q[k] - d[k];
   }
   reach += 3 * sa.size + length;
-  if (!in_range(sa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(length)) return undecided;
+  if (!in_range(sa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(length))
+    return undecided;
   const double ea = 32 * unit * sa.size * sa.size * reach, wall = sa.determinant;
   Double4 row[8], top, bottom;
   for (int j = 0; j < 8; ++j) {
@@ -97,7 +100,8 @@ TAUGUARD_INLINE Verdict swept_zonotope_tetrahedron(const Zonotope& a, const doub
   for (const auto& g : a.g) column += abs(fb.n[0] * g[0] + fb.n[1] * g[1] + fb.n[2] * g[2]);
   const double eb = tetrahedron_error(fb.size, far + 6 * sa.size + length);
   if (any(column < -eb)) return separated;
-  bool certain = wall > ea && all((fb.determinant > eb) & (column > eb) & (bottom < wall - ea) & (top > ea - wall));
+  bool certain = wall > ea && all((fb.determinant > eb) & (column > eb) & (bottom < wall - ea) &
+                                  (top > ea - wall));
 
   const TetrahedronEdges f(b);
   Double4 c[3], low, high;

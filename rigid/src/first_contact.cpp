@@ -1,14 +1,14 @@
 // Conservative advancement along separating directions that turn with the bodies.
 //
 // Take a time t, a unit n and any rate r, and let the direction be n(h) = n + h r. With
-// s(h) = min_b n(h).x_b - max_a n(h).x_a at time t + h, the bodies are apart while s > 0, whatever n and r
-// are. Measured from a's centre c, each projection is its tangent at h = 0 plus at most K h^2 / 2, where K
-// bounds its second derivative |2 r.(x - c)' + n(h).x''|; so s(h) >= G(h) = min_b (tangent) -
-// max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and computable: the step goes to just before
-// its root, and every time passed is certified. The direction is the best separating axis of time t and r its
-// own rate of turning: then all vertices of the touching features keep one tangent, and the steps converge
-// quadratically, as Newton's do, but from below. (With r = 0 a turning face tilts away from n and convergence
-// is linear.)
+// s(h) = min_b n(h).x_b - max_a n(h).x_a at time t + h, the bodies are apart while s > 0, whatever
+// n and r are. Measured from a's centre c, each projection is its tangent at h = 0 plus at most K
+// h^2 / 2, where K bounds its second derivative |2 r.(x - c)' + n(h).x''|; so s(h) >= G(h) = min_b
+// (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and computable: the step
+// goes to just before its root, and every time passed is certified. The direction is the best
+// separating axis of time t and r its own rate of turning: then all vertices of the touching
+// features keep one tangent, and the steps converge quadratically, as Newton's do, but from below.
+// (With r = 0 a turning face tilts away from n and convergence is linear.)
 #include "tauguard/rigid/first_contact.hpp"
 
 #include <algorithm>
@@ -68,7 +68,8 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
     for (const Vec& eb : b.edge) {
       const Vec n = cross(ea, eb);
       const double square = dot(n, n);
-      if (square > 1e-24 && consider(a, b, (1 / std::sqrt(square)) * n, &best)) chosen = 2, x = ea, y = eb;
+      if (square > 1e-24 && consider(a, b, (1 / std::sqrt(square)) * n, &best))
+        chosen = 2, x = ea, y = eb;
     }
   if (best.separation <= enough && !(a.complete && b.complete)) {
     Axis other;
@@ -81,7 +82,8 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
   if (chosen == 0) best.rate = cross(a.angular(), best.n);
   if (chosen == 1) best.rate = cross(b.angular(), best.n);
   if (chosen == 2) {
-    const Vec c = cross(x, y), turned = cross(cross(a.angular(), x), y) + cross(x, cross(b.angular(), y));
+    const Vec c = cross(x, y),
+              turned = cross(cross(a.angular(), x), y) + cross(x, cross(b.angular(), y));
     best.rate = (dot(c, best.n) < 0 ? -1 : 1) / norm(c) * (turned - dot(turned, best.n) * best.n);
   }
   return best;
@@ -90,7 +92,8 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
 // G and its slope at h, from the projections p + h v of both bodies.
 class Lower {
  public:
-  Lower(const MovingBody& a, const MovingBody& b, const Axis& axis, double horizon, double margin) : margin_(margin) {
+  Lower(const MovingBody& a, const MovingBody& b, const Axis& axis, double horizon, double margin)
+      : margin_(margin) {
     const double turn = norm(axis.rate) * (1 + 0x1p-40), drift = turn * horizon;
     const double speed_b = norm(b.linear() - a.linear()) * (1 + 0x1p-40) + b.turning_speed();
     half_k_ = turn * (a.turning_speed() + speed_b) +
@@ -112,7 +115,8 @@ class Lower {
  private:
   using Tangents = std::vector<std::array<double, 2>>;
 
-  static void project(const MovingBody& body, const Axis& axis, const Vec& centre, const Vec& drift, Tangents* out) {
+  static void project(const MovingBody& body, const Axis& axis, const Vec& centre, const Vec& drift,
+                      Tangents* out) {
     out->resize(body.now.size());
     for (std::size_t i = 0; i < body.now.size(); ++i) {
       const Vec x = body.now[i] - centre;
@@ -124,8 +128,9 @@ class Lower {
   double half_k_, margin_;
 };
 
-// The largest step found with G >= 0 on [0, step]; at_zero = G(0) > 0. Newton from the right stays right of
-// the root of a concave function; the chord from (0, G(0)) to a point right of the root crosses zero left of it.
+// The largest step found with G >= 0 on [0, step]; at_zero = G(0) > 0. Newton from the right stays
+// right of the root of a concave function; the chord from (0, G(0)) to a point right of the root
+// crosses zero left of it.
 double safe_step(const Lower& g, double at_zero, double limit) {
   double slope, h = limit, value = g(h, &slope);
   if (value >= 0) return limit;
@@ -138,10 +143,11 @@ double safe_step(const Lower& g, double at_zero, double limit) {
   return value >= 0 ? h : h * (at_zero / (at_zero - value)) * (1 - 4 * unit_roundoff);
 }
 
-// The direction of contact: the best axis now, or the last certain one turned by `h` where that separates the
-// bodies as well. It does so to second order in h, and flat bodies in one plane leave no other: a normal of
-// that plane separates them by nothing, too.
-Vec contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, double h, const Axis& now) {
+// The direction of contact: the best axis now, or the last certain one turned by `h` where that
+// separates the bodies as well. It does so to second order in h, and flat bodies in one plane leave
+// no other: a normal of that plane separates them by nothing, too.
+Vec contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, double h,
+                   const Axis& now) {
   if (last.separation > -INFINITY) {
     const Vec turned = last.n + h * last.rate, n = (1 / norm(turned)) * turned;
     const double slack = contact_tolerance(a, b), separation = least(b.now, n) - most(a.now, n);
@@ -153,18 +159,22 @@ Vec contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, d
 }  // namespace
 
 Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
-  // Rounding: a projection takes fewer than 40 operations on values up to `magnitude`, once for each body,
-  // and again in the tangents; 128 covers both.
+  // Rounding: a projection takes fewer than 40 operations on values up to `magnitude`, once for
+  // each body, and again in the tangents; 128 covers both.
   const double margin = 128 * unit_roundoff * (a.magnitude() + b.magnitude());
   double t = start, before = start;
-  Axis last;  // of time `before`, certainly separating: at contact itself rounding may leave no direction
+  Axis last;  // of time `before`, certainly separating: at contact itself rounding may leave no
+              // direction
   for (int step = 0; step < most_steps; ++step) {
     a.move_to(t), b.move_to(t);
     const Axis axis = best_axis(a, b, 2 * margin);
-    const auto touch = [&] { return Impact{t, true, contact_normal(a, b, last, t - before, axis)}; };
+    const auto touch = [&] {
+      return Impact{t, true, contact_normal(a, b, last, t - before, axis)};
+    };
     if (axis.separation <= 2 * margin) return touch();
     // Beyond the time that the direction takes to turn by a radian its tangent says nothing.
-    const double turn = norm(axis.rate), left = end - t, horizon = turn * left > 1 ? 1 / turn : left;
+    const double turn = norm(axis.rate), left = end - t,
+                 horizon = turn * left > 1 ? 1 / turn : left;
     const Lower lower(a, b, axis, horizon, margin);
     const double h = safe_step(lower, axis.separation - margin, horizon);
     if (h >= left) return {end, false, axis.n};

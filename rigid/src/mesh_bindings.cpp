@@ -1,4 +1,5 @@
-// tauguard.rigid._rigid_mesh: meshes and their queries over batches of poses. Arguments are checked in Python.
+// tauguard.rigid._rigid_mesh: meshes and their queries over batches of poses. Arguments are checked
+// in Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
@@ -17,7 +18,8 @@ using Poses = nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::d
 using Vectors = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Packed = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Offsets = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Touches = nb::ndarray<double, nb::shape<-1, 7>, nb::c_contig, nb::device::cpu>;  // toi, point, normal
+using Touches =
+    nb::ndarray<double, nb::shape<-1, 7>, nb::c_contig, nb::device::cpu>;  // toi, point, normal
 using Pairs = nb::ndarray<std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 
 namespace {
@@ -46,12 +48,14 @@ nb::tuple contacts(const Mesh& a, const Mesh& b, Poses poses, int threads) {
     std::vector<std::vector<Contact>> found(n);
     ThreadPool::shared().parallel_for(n, threads, 4, [&](auto begin, auto end, auto) {
       Scratch scratch;
-      for (auto i = begin; i < end; ++i) all_contacts(a, b, Pose(poses.data() + 16 * i), scratch, found[i]);
+      for (auto i = begin; i < end; ++i)
+        all_contacts(a, b, Pose(poses.data() + 16 * i), scratch, found[i]);
     });
     for (std::size_t i = 0; i < n; ++i)
       for (const Contact& c : found[i]) {
         rows.insert(rows.end(), {static_cast<std::int32_t>(i), c.a, c.b});
-        values.insert(values.end(), {c.point[0], c.point[1], c.point[2], c.normal[0], c.normal[1], c.normal[2], c.depth});
+        values.insert(values.end(), {c.point[0], c.point[1], c.point[2], c.normal[0], c.normal[1],
+                                     c.normal[2], c.depth});
       }
   }
   const std::size_t count = rows.size() / 3;
@@ -71,7 +75,8 @@ struct Motions {
 
 Bodies view(int kind, const Packed& data, const Offsets& offsets) {
   const bool hulls = kind == static_cast<int>(Kind::hulls);
-  return {static_cast<Kind>(kind), data.data(), offsets.data(), hulls ? offsets.shape(0) - 1 : data.shape(0)};
+  return {static_cast<Kind>(kind), data.data(), offsets.data(),
+          hulls ? offsets.shape(0) - 1 : data.shape(0)};
 }
 
 void store(const FirstTouch& t, double* out) {
@@ -79,19 +84,21 @@ void store(const FirstTouch& t, double* out) {
   for (int k = 0; k < 3; ++k) out[1 + k] = t.point[k], out[4 + k] = t.normal[k];
 }
 
-void impact_of_bodies(int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b, Poses pose_a,
-                      Vectors linear_a, Vectors angular_a, Poses pose_b, Vectors linear_b, Vectors angular_b,
-                      Touches out, int threads) {
+void impact_of_bodies(int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b,
+                      Offsets offsets_b, Poses pose_a, Vectors linear_a, Vectors angular_a,
+                      Poses pose_b, Vectors linear_b, Vectors angular_b, Touches out, int threads) {
   nb::gil_scoped_release release;
   const Bodies x = view(kind_a, a, offsets_a), y = view(kind_b, b, offsets_b);
   const Motions mx{pose_a, linear_a, angular_a}, my{pose_b, linear_b, angular_b};
   ThreadPool::shared().parallel_for(out.shape(0), threads, 16, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) store(bodies_impact(x, y, i, mx[i], my[i]), out.data() + 7 * i);
+    for (auto i = begin; i < end; ++i)
+      store(bodies_impact(x, y, i, mx[i], my[i]), out.data() + 7 * i);
   });
 }
 
-void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear_a, Vectors angular_a, Poses pose_b,
-                      Vectors linear_b, Vectors angular_b, Touches out, Pairs faces, int threads) {
+void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear_a,
+                      Vectors angular_a, Poses pose_b, Vectors linear_b, Vectors angular_b,
+                      Touches out, Pairs faces, int threads) {
   nb::gil_scoped_release release;
   const Motions mx{pose_a, linear_a, angular_a}, my{pose_b, linear_b, angular_b};
   ThreadPool::shared().parallel_for(out.shape(0), threads, 1, [&](auto begin, auto end, auto) {
@@ -118,26 +125,28 @@ NB_MODULE(_rigid_mesh, m) {
       .def("overlap",
            [](const Mesh& a, const Mesh& b, Poses poses, Pairs out, int threads) {
              nb::gil_scoped_release release;
-             ThreadPool::shared().parallel_for(poses.shape(0), threads, 8, [&](auto begin, auto end, auto) {
-               Scratch scratch;
-               for (auto i = begin; i < end; ++i) {
-                 const FacePair p = first_overlap(a, b, Pose(poses.data() + 16 * i), scratch);
-                 out.data()[2 * i] = p.a;
-                 out.data()[2 * i + 1] = p.b;
-               }
-             });
+             ThreadPool::shared().parallel_for(
+                 poses.shape(0), threads, 8, [&](auto begin, auto end, auto) {
+                   Scratch scratch;
+                   for (auto i = begin; i < end; ++i) {
+                     const FacePair p = first_overlap(a, b, Pose(poses.data() + 16 * i), scratch);
+                     out.data()[2 * i] = p.a;
+                     out.data()[2 * i + 1] = p.b;
+                   }
+                 });
            })
       .def("contacts", &contacts)
       .def("time_of_impact", &impact_of_meshes);
   m.def("time_of_impact", &impact_of_bodies);
   // Row by row, for tests of the exact answer.
-  m.def("triangles_overlap", [](nb::ndarray<const double, nb::shape<-1, 2, 3, 3>, nb::c_contig, nb::device::cpu> pairs,
-                                nb::ndarray<bool, nb::shape<-1>, nb::c_contig, nb::device::cpu> out) {
-    nb::gil_scoped_release release;
-    const tauguard::geometry::RoundToNearest guard;
-    for (std::size_t i = 0; i < pairs.shape(0); ++i) {
-      const auto* t = reinterpret_cast<const Triangle*>(pairs.data() + 18 * i);
-      out.data()[i] = triangles_overlap(t[0], t[1]);
-    }
-  });
+  m.def("triangles_overlap",
+        [](nb::ndarray<const double, nb::shape<-1, 2, 3, 3>, nb::c_contig, nb::device::cpu> pairs,
+           nb::ndarray<bool, nb::shape<-1>, nb::c_contig, nb::device::cpu> out) {
+          nb::gil_scoped_release release;
+          const tauguard::geometry::RoundToNearest guard;
+          for (std::size_t i = 0; i < pairs.shape(0); ++i) {
+            const auto* t = reinterpret_cast<const Triangle*>(pairs.data() + 18 * i);
+            out.data()[i] = triangles_overlap(t[0], t[1]);
+          }
+        });
 }

@@ -4,15 +4,19 @@
 
 namespace tauguard::rigid {
 
-TAUGUARD_WIDE unsigned overlap_mask(const Node& node, const Box& box, const Relative& rel, float* distance2) {
+TAUGUARD_WIDE unsigned overlap_mask(const Node& node, const Box& box, const Relative& rel,
+                                    float* distance2) {
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
   const Wide* e = reinterpret_cast<const Wide*>(node.extent);
   Wide d[3];
   Bits hit = (Bits){} - 1;
   for (int i = 0; i < 3; ++i) {
-    const float c = ((rel.r[i][0] * box.centre[0] + rel.r[i][1] * box.centre[1]) + rel.r[i][2] * box.centre[2]) + rel.t[i];
+    const float c = ((rel.r[i][0] * box.centre[0] + rel.r[i][1] * box.centre[1]) +
+                     rel.r[i][2] * box.centre[2]) +
+                    rel.t[i];
     const float reach = ((rel.abs_r[i][0] * box.extent[0] + rel.abs_r[i][1] * box.extent[1]) +
-                         rel.abs_r[i][2] * box.extent[2]) + rel.pad;
+                         rel.abs_r[i][2] * box.extent[2]) +
+                        rel.pad;
     d[i] = c - centre[i];
     hit &= (Bits)(TAUGUARD_WIDE_ABS(d[i]) <= e[i] + reach);
   }
@@ -30,7 +34,8 @@ TAUGUARD_WIDE unsigned overlap_mask(const Node& node, const Box& box, const Rela
     const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
     for (int j = 0; j < 3; ++j) {
       const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-      const float own = (box.extent[j1] * rel.abs_r[i][j2] + box.extent[j2] * rel.abs_r[i][j1]) + rel.pad;
+      const float own =
+          (box.extent[j1] * rel.abs_r[i][j2] + box.extent[j2] * rel.abs_r[i][j1]) + rel.pad;
       const Wide reach = (e[i1] * rel.abs_r[i2][j] + e[i2] * rel.abs_r[i1][j]) + own;
       hit &= (Bits)(TAUGUARD_WIDE_ABS(d[i2] * rel.r[i1][j] - d[i1] * rel.r[i2][j]) <= reach);
     }

@@ -1,18 +1,20 @@
-// Boxes of one tree against a box of the other, under a pose: the separating-axis test of two boxes that
-// share one rotation, eight at a time (Gottschalk, Lin and Manocha 1996). Never a wrong "clear".
+// Boxes of one tree against a box of the other, under a pose: the separating-axis test of two boxes
+// that share one rotation, eight at a time (Gottschalk, Lin and Manocha 1996). Never a wrong
+// "clear".
 #pragma once
 
 #include "mesh_tree.hpp"
 
 namespace tauguard::rigid {
 
-// The pose of one tree's centred frame in another's, in float, with the pad that covers all rounding.
+// The pose of one tree's centred frame in another's, in float, with the pad that covers all
+// rounding.
 struct Relative {
   float r[3][3], abs_r[3][3], t[3], pad;
 };
 
-// A pose as given: x -> R x + t, the products summed left to right. The transformed corner of a triangle
-// is this expression rounded to doubles, once; every exact answer is about those doubles.
+// A pose as given: x -> R x + t, the products summed left to right. The transformed corner of a
+// triangle is this expression rounded to doubles, once; every exact answer is about those doubles.
 struct Pose {
   double r[3][3], t[3];
   explicit Pose(const double* m) {
@@ -22,7 +24,8 @@ struct Pose {
     }
   }
   void apply(const double* x, double* out) const {
-    for (int i = 0; i < 3; ++i) out[i] = ((r[i][0] * x[0] + r[i][1] * x[1]) + r[i][2] * x[2]) + t[i];
+    for (int i = 0; i < 3; ++i)
+      out[i] = ((r[i][0] * x[0] + r[i][1] * x[1]) + r[i][2] * x[2]) + t[i];
   }
   Triangle apply(const Triangle& s) const {
     Triangle out;
@@ -36,18 +39,20 @@ struct Placement {
   Relative b_in_a, a_in_b;
   bool apart;  // the bounding balls do not meet
 
-  // The pad. With S the sum of both radii (every centred coordinate is at most 2 S once the balls meet),
-  // a float test of two boxes makes fewer than 60 roundings of values at most 6 S, counting those behind
-  // oriented boxes' axes (12 in an entry of the relative rotation, which multiplies lengths of at most 4 S):
-  // 2^-24 * 2^8 S covers them, and 2^-140 those below the normal range. The doubles behind them (centres,
-  // transformed corners) err by at most 16 * 2^-53 of the largest magnitude in play. R is within `skew` of
-  // orthonormal in every entry of R^T R - I, and R^T stands for its inverse: 6 * skew * S covers a vector of
-  // length 2 S whose three coordinates each meet three entries.
+  // The pad. With S the sum of both radii (every centred coordinate is at most 2 S once the balls
+  // meet), a float test of two boxes makes fewer than 60 roundings of values at most 6 S, counting
+  // those behind oriented boxes' axes (12 in an entry of the relative rotation, which multiplies
+  // lengths of at most 4 S): 2^-24 * 2^8 S covers them, and 2^-140 those below the normal range.
+  // The doubles behind them (centres, transformed corners) err by at most 16 * 2^-53 of the largest
+  // magnitude in play. R is within `skew` of orthonormal in every entry of R^T R - I, and R^T
+  // stands for its inverse: 6 * skew * S covers a vector of length 2 S whose three coordinates each
+  // meet three entries.
   Placement(const Tree& a, const Tree& b, const Pose& pose, double margin = 0) {
     double t[3], skew = 0, square = 0, largest = a.magnitude;
     for (int i = 0; i < 3; ++i) {
-      t[i] = ((pose.r[i][0] * b.centre[0] + pose.r[i][1] * b.centre[1]) + pose.r[i][2] * b.centre[2]) +
-             (pose.t[i] - a.centre[i]);
+      t[i] =
+          ((pose.r[i][0] * b.centre[0] + pose.r[i][1] * b.centre[1]) + pose.r[i][2] * b.centre[2]) +
+          (pose.t[i] - a.centre[i]);
       square += t[i] * t[i];
       largest = std::max(largest, 2 * b.magnitude + std::fabs(pose.t[i]));
       for (int j = 0; j < 3; ++j) {
@@ -61,7 +66,8 @@ struct Placement {
     apart = std::sqrt(square) > (reach + pad) * (1 + 4 * skew + 0x1p-40);
     for (int i = 0; i < 3; ++i) {
       b_in_a.t[i] = static_cast<float>(t[i]);
-      a_in_b.t[i] = static_cast<float>(-(pose.r[0][i] * t[0] + pose.r[1][i] * t[1] + pose.r[2][i] * t[2]));
+      a_in_b.t[i] =
+          static_cast<float>(-(pose.r[0][i] * t[0] + pose.r[1][i] * t[1] + pose.r[2][i] * t[2]));
       for (int j = 0; j < 3; ++j) {
         b_in_a.r[i][j] = static_cast<float>(pose.r[i][j]);
         a_in_b.r[i][j] = static_cast<float>(pose.r[j][i]);
@@ -73,8 +79,8 @@ struct Placement {
   }
 };
 
-// Bit s is set where the box of child s of `node` may meet `box`, which lives in the frame that `rel`
-// places in the node's. `distance2` gets the squared distances of the centres.
+// Bit s is set where the box of child s of `node` may meet `box`, which lives in the frame that
+// `rel` places in the node's. `distance2` gets the squared distances of the centres.
 unsigned overlap_mask(const Node& node, const Box& box, const Relative& rel, float* distance2);
 
 }  // namespace tauguard::rigid

@@ -1,5 +1,6 @@
-// Building a Tree: the range with the most triangles is split until a node has its eight children. A split
-// takes the cheapest of 15 planes across the longest axis of the centres by the surface-area heuristic.
+// Building a Tree: the range with the most triangles is split until a node has its eight children.
+// A split takes the cheapest of 15 planes across the longest axis of the centres by the
+// surface-area heuristic.
 #include <algorithm>
 #include <cstring>
 
@@ -65,7 +66,8 @@ Tree::Tree(const double* vertices, const std::int32_t* faces, std::size_t n_face
   }
   radius = std::sqrt(square) * (1 + 1e-14);
   double lo[3], hi[3];
-  for (int k = 0; k < 3; ++k) lo[k] = round_down(all.lo[k] - centre[k]), hi[k] = round_up(all.hi[k] - centre[k]);
+  for (int k = 0; k < 3; ++k)
+    lo[k] = round_down(all.lo[k] - centre[k]), hi[k] = round_up(all.hi[k] - centre[k]);
   root = outward(lo, hi);
 
   nodes.reserve(n_faces / 2 + 1);
@@ -104,9 +106,11 @@ std::int32_t Tree::build(Range all) {
     const Range r = part[slot];
     FloatBox box;
     for (auto i = r.begin; i < r.end; ++i) box.add(four(items_[i].lo), four(items_[i].hi));
-    const double lo[3] = {box.lo[0], box.lo[1], box.lo[2]}, hi[3] = {box.hi[0], box.hi[1], box.hi[2]};
+    const double lo[3] = {box.lo[0], box.lo[1], box.lo[2]},
+                 hi[3] = {box.hi[0], box.hi[1], box.hi[2]};
     const Box b = outward(lo, hi);
-    for (int k = 0; k < 3; ++k) node.centre[k][slot] = b.centre[k], node.extent[k][slot] = b.extent[k];
+    for (int k = 0; k < 3; ++k)
+      node.centre[k][slot] = b.centre[k], node.extent[k][slot] = b.extent[k];
     if (r.count() <= leaf_size)
       node.child[slot] = ~(r.begin * 8 + r.count());
     else {
@@ -117,7 +121,8 @@ std::int32_t Tree::build(Range all) {
   return index;
 }
 
-// Reorders items [begin, end) around a plane and returns the first item behind it; both sides non-empty.
+// Reorders items [begin, end) around a plane and returns the first item behind it; both sides
+// non-empty.
 std::int32_t Tree::split(Range r) {
   FloatBox middles;
   for (auto i = r.begin; i < r.end; ++i) {
@@ -130,7 +135,9 @@ std::int32_t Tree::split(Range r) {
     if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
   const auto half = r.begin + r.count() / 2;
   const auto first = items_.begin();
-  const auto less = [axis](const Item& a, const Item& b) { return a.middle(axis) < b.middle(axis); };
+  const auto less = [axis](const Item& a, const Item& b) {
+    return a.middle(axis) < b.middle(axis);
+  };
   const int bins = r.count() < 4 * most_bins ? most_bins / 2 : most_bins;
   const float scale = static_cast<float>(bins) * 0.9999f / (hi[axis] - lo[axis]), origin = lo[axis];
   if (!std::isfinite(scale) || r.count() <= 4) {  // no extent, or too little for a quotient
@@ -170,7 +177,8 @@ std::int32_t Tree::split(Range r) {
     std::nth_element(first + r.begin, first + half, first + r.end, less);
     return half;
   }
-  const auto middle = std::partition(first + r.begin, first + r.end, [=](const Item& i) { return bin_of(i) < best; });
+  const auto middle = std::partition(first + r.begin, first + r.end,
+                                     [=](const Item& i) { return bin_of(i) < best; });
   return static_cast<std::int32_t>(middle - first);
 }
 

@@ -11,8 +11,8 @@ namespace {
 
 constexpr FirstTouch no_touch = {INFINITY, {NAN, NAN, NAN}, {NAN, NAN, NAN}};
 
-// Point and normal of a hit. The normal is undefined where the bodies were in each other from the start; the
-// point comes from the features that touch along the normal, or from the nearest points.
+// Point and normal of a hit. The normal is undefined where the bodies were in each other from the
+// start; the point comes from the features that touch along the normal, or from the nearest points.
 FirstTouch touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& origin) {
   if (!impact.hit) return no_touch;
   FirstTouch out = no_touch;
@@ -24,8 +24,10 @@ FirstTouch touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& 
   const double tolerance = contact_tolerance(a, b);
   const bool along = norm(impact.normal) > 0 && bottom - top >= -tolerance;
   Vec point;
-  if (along) contact_point(a.now, b.now, impact.normal.data(), tolerance, point.data());
-  else point = middle_point(a.now, b.now);
+  if (along)
+    contact_point(a.now, b.now, impact.normal.data(), tolerance, point.data());
+  else
+    point = middle_point(a.now, b.now);
   for (int k = 0; k < 3; ++k) {
     out.point[k] = point[k] + origin[k];
     if (along) out.normal[k] = impact.normal[k];
@@ -33,8 +35,8 @@ FirstTouch touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& 
   return out;
 }
 
-// Pieces of the step turn by at most this much [rad] and move by at most this share of the meshes' size, or are
-// split where the balls around the meshes do not already keep them apart.
+// Pieces of the step turn by at most this much [rad] and move by at most this share of the meshes'
+// size, or are split where the balls around the meshes do not already keep them apart.
 constexpr double most_turn = 1.0 / 16, most_move = 0.5;
 
 struct Found {
@@ -46,15 +48,22 @@ struct Found {
 class MeshImpact {
  public:
   MeshImpact(const Mesh& a, const Mesh& b, const RigidMotion& ma, const RigidMotion& mb)
-      : mesh_a_(a), mesh_b_(b), a_(a.tree), b_(b.tree), ma_(ma), mb_(mb),
+      : mesh_a_(a),
+        mesh_b_(b),
+        a_(a.tree),
+        b_(b.tree),
+        ma_(ma),
+        mb_(mb),
         centre_a_{a_.centre[0], a_.centre[1], a_.centre[2]},
         centre_b_{b_.centre[0], b_.centre[1], b_.centre[2]},
         origin_(ma.x0 + ma.turn(centre_a_)) {
-    const double arm_a = (norm(centre_a_) + a_.radius) * more, arm_b = (norm(centre_b_) + b_.radius) * more;
+    const double arm_a = (norm(centre_a_) + a_.radius) * more,
+                 arm_b = (norm(centre_b_) + b_.radius) * more;
     drift_ = norm(mb.linear - ma.linear) * more;
     speed_ = drift_ + (ma.speed * arm_a + mb.speed * arm_b) * more;
     const double skew = skewness(ma) + skewness(mb);
-    const double largest = a_.magnitude + b_.magnitude + norm(ma.x0) + norm(mb.x0) + norm(ma.linear) + norm(mb.linear);
+    const double largest =
+        a_.magnitude + b_.magnitude + norm(ma.x0) + norm(mb.x0) + norm(ma.linear) + norm(mb.linear);
     // As in Placement (mesh_boxes.hpp), for both rotations; an angle's rounding turns a body.
     coarse_ = 0x1p-16 + 12 * skew;
     fine_ = 0x1p-44 + 12 * skew;
@@ -77,7 +86,8 @@ class MeshImpact {
   static double skewness(const RigidMotion& m) {
     double skew = 0;
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) skew = std::max(skew, std::fabs(dot(m.r0[i], m.r0[j]) - (i == j)));
+      for (int j = 0; j < 3; ++j)
+        skew = std::max(skew, std::fabs(dot(m.r0[i], m.r0[j]) - (i == j)));
     return skew;
   }
 
@@ -92,7 +102,8 @@ class MeshImpact {
     const double both = (a_.radius + b_.radius) * more, gap = apart(begin + 0.5 * length);
     const double slack = fine_ * (both + gap) + shift_;
     if (gap > (both + 0.5 * length * speed_ + slack) * more) return;
-    const bool short_enough = (ma_.speed + mb_.speed) * length <= most_turn && speed_ * length <= most_move * both;
+    const bool short_enough =
+        (ma_.speed + mb_.speed) * length <= most_turn && speed_ * length <= most_move * both;
     // Below 2^-50 of the step the ends of a piece are hardly told apart, whatever moves how fast.
     if (short_enough || length < 0x1p-50) return open(begin, length, both);
     piece(begin, 0.5 * length);
@@ -101,25 +112,31 @@ class MeshImpact {
 
   void open(double begin, double length, double both) {
     begin_ = begin, length_ = length;
-    const Place a[3] = {place_at(ma_, begin), place_at(ma_, begin + 0.5 * length), place_at(ma_, begin + length)};
-    const Place b[3] = {place_at(mb_, begin), place_at(mb_, begin + 0.5 * length), place_at(mb_, begin + length)};
+    const Place a[3] = {place_at(ma_, begin), place_at(ma_, begin + 0.5 * length),
+                        place_at(ma_, begin + length)};
+    const Place b[3] = {place_at(mb_, begin), place_at(mb_, begin + 0.5 * length),
+                        place_at(mb_, begin + length)};
     const double reach = both + apart(begin) + speed_ * length;
     const Vec from_a = mb_.x0 - ma_.x0 + begin * (mb_.linear - ma_.linear);
     const double far = norm(from_a) + length * drift_;
-    fill(in_a_, a, b, centre_a_, centre_b_, mb_.speed, ma_.speed, norm(centre_b_) + b_.radius, far, reach);
-    fill(in_b_, b, a, centre_b_, centre_a_, ma_.speed, mb_.speed, norm(centre_a_) + a_.radius, far, reach);
+    fill(in_a_, a, b, centre_a_, centre_b_, mb_.speed, ma_.speed, norm(centre_b_) + b_.radius, far,
+         reach);
+    fill(in_b_, b, a, centre_b_, centre_a_, ma_.speed, mb_.speed, norm(centre_a_) + a_.radius, far,
+         reach);
     traverse_piece();
   }
 
-  // `moved` seen from `at`, both from their centres. Seen from a frame that turns at w, a point at x from its
-  // origin that itself turns at v about an origin that drifts is accelerated by at most
-  // v^2 arm + 2 w (drift + v arm) + w^2 |x|; over a time h its path leaves its chord by an eighth of that h^2.
-  void fill(Chord& chord, const Place* at, const Place* moved, const Vec& centre, const Vec& moved_centre, double v,
-            double w, double arm, double far, double reach) {
+  // `moved` seen from `at`, both from their centres. Seen from a frame that turns at w, a point at
+  // x from its origin that itself turns at v about an origin that drifts is accelerated by at most
+  // v^2 arm + 2 w (drift + v arm) + w^2 |x|; over a time h its path leaves its chord by an eighth
+  // of that h^2.
+  void fill(Chord& chord, const Place* at, const Place* moved, const Vec& centre,
+            const Vec& moved_centre, double v, double w, double arm, double far, double reach) {
     Place* out[3] = {&chord.start, &chord.middle, &chord.end};
     for (int k = 0; k < 3; ++k) {
       Vec column[3];
-      for (int j = 0; j < 3; ++j) column[j] = at[k].turn_back({moved[k].r[0][j], moved[k].r[1][j], moved[k].r[2][j]});
+      for (int j = 0; j < 3; ++j)
+        column[j] = at[k].turn_back({moved[k].r[0][j], moved[k].r[1][j], moved[k].r[2][j]});
       for (int i = 0; i < 3; ++i) out[k]->r[i] = {column[0][i], column[1][i], column[2][i]};
       out[k]->t = at[k].turn_back(moved[k](moved_centre) - at[k].t) - centre;
     }
@@ -162,7 +179,8 @@ class MeshImpact {
         const int s = __builtin_ctz(mask);
         stack_.push_back({open_a ? SlotPair{{node, s}, sb} : SlotPair{sa, {node, s}}, enter[s]});
       }
-      std::stable_sort(stack_.begin() + base, stack_.end(), [](const Open& x, const Open& y) { return x.enter > y.enter; });
+      std::stable_sort(stack_.begin() + base, stack_.end(),
+                       [](const Open& x, const Open& y) { return x.enter > y.enter; });
     }
   }
 
@@ -218,17 +236,18 @@ class MeshImpact {
 
 }  // namespace
 
-FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, const RigidMotion& motion_a,
-                         const RigidMotion& motion_b) {
-  // Positions relative to a's first vertex at the start, so that a far-away scene costs no digits twice.
+FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row,
+                         const RigidMotion& motion_a, const RigidMotion& motion_b) {
+  // Positions relative to a's first vertex at the start, so that a far-away scene costs no digits
+  // twice.
   const double* p = a.row(row);
   const Vec origin = motion_a.x0 + motion_a.turn({p[0], p[1], p[2]});
   MovingBody x = moving_body(a, row, motion_a, origin), y = moving_body(b, row, motion_b, origin);
   return touch(first_contact(x, y, 0, 1), x, y, origin);
 }
 
-FirstTouch meshes_impact(const Mesh& a, const Mesh& b, const RigidMotion& motion_a, const RigidMotion& motion_b,
-                         FacePair* faces) {
+FirstTouch meshes_impact(const Mesh& a, const Mesh& b, const RigidMotion& motion_a,
+                         const RigidMotion& motion_b, FacePair* faces) {
   MeshImpact search(a, b, motion_a, motion_b);
   const Found found = search.run();
   *faces = {-1, -1};

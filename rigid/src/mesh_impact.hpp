@@ -11,11 +11,12 @@ struct FirstTouch {
   double toi, point[3], normal[3];
 };
 
-FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, const RigidMotion& motion_a,
-                         const RigidMotion& motion_b);
+FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row,
+                         const RigidMotion& motion_a, const RigidMotion& motion_b);
 
-// `faces` gets the triangles that touch first, {-1, -1} where none do. Surfaces count, not what they enclose.
-FirstTouch meshes_impact(const Mesh& a, const Mesh& b, const RigidMotion& motion_a, const RigidMotion& motion_b,
-                         FacePair* faces);
+// `faces` gets the triangles that touch first, {-1, -1} where none do. Surfaces count, not what
+// they enclose.
+FirstTouch meshes_impact(const Mesh& a, const Mesh& b, const RigidMotion& motion_a,
+                         const RigidMotion& motion_b, FacePair* faces);
 
 }  // namespace tauguard::rigid

@@ -24,18 +24,22 @@ FloatObb placed(const FloatObb& box, const Relative& at) {
   FloatObb out;
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < 3; ++i)
-      out.axis[i][k] = (at.r[k][0] * box.axis[i][0] + at.r[k][1] * box.axis[i][1]) + at.r[k][2] * box.axis[i][2];
+      out.axis[i][k] =
+          (at.r[k][0] * box.axis[i][0] + at.r[k][1] * box.axis[i][1]) + at.r[k][2] * box.axis[i][2];
     out.centre[k] =
-        ((at.r[k][0] * box.centre[0] + at.r[k][1] * box.centre[1]) + at.r[k][2] * box.centre[2]) + at.t[k];
+        ((at.r[k][0] * box.centre[0] + at.r[k][1] * box.centre[1]) + at.r[k][2] * box.centre[2]) +
+        at.t[k];
     out.extent[k] = box.extent[k];
   }
   return out;
 }
 
-TAUGUARD_WIDE unsigned overlap_mask(const ObbNode& node, const FloatObb& box, float pad, float* distance2) {
+TAUGUARD_WIDE unsigned overlap_mask(const ObbNode& node, const FloatObb& box, float pad,
+                                    float* distance2) {
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
   const Wide* e = reinterpret_cast<const Wide*>(node.extent);
-  const Wide d0 = box.centre[0] - centre[0], d1 = box.centre[1] - centre[1], d2 = box.centre[2] - centre[2];
+  const Wide d0 = box.centre[0] - centre[0], d1 = box.centre[1] - centre[1],
+             d2 = box.centre[2] - centre[2];
   const Wide square = d0 * d0 + d1 * d1 + d2 * d2;
   std::memcpy(distance2, &square, sizeof square);
   Wide d[3], r[3][3], s[3][3];
@@ -47,7 +51,8 @@ TAUGUARD_WIDE unsigned overlap_mask(const ObbNode& node, const FloatObb& box, fl
       r[i][j] = (n[0] * box.axis[j][0] + n[1] * box.axis[j][1]) + n[2] * box.axis[j][2];
       s[i][j] = TAUGUARD_WIDE_ABS(r[i][j]);
     }
-    const Wide reach = (s[i][0] * box.extent[0] + s[i][1] * box.extent[1]) + (s[i][2] * box.extent[2] + pad);
+    const Wide reach =
+        (s[i][0] * box.extent[0] + s[i][1] * box.extent[1]) + (s[i][2] * box.extent[2] + pad);
     hit &= (Bits)(TAUGUARD_WIDE_ABS(d[i]) <= e[i] + reach);
   }
   for (int j = 0; j < 3; ++j) {

@@ -1,5 +1,5 @@
-// Oriented boxes of a tree's children, eight side by side in float: one vector instruction works on all
-// eight, each with axes of its own (Gottschalk, Lin and Manocha 1996).
+// Oriented boxes of a tree's children, eight side by side in float: one vector instruction works on
+// all eight, each with axes of its own (Gottschalk, Lin and Manocha 1996).
 #pragma once
 
 #include "mesh_traverse.hpp"
@@ -31,8 +31,8 @@ struct ObbTree {
   }
 };
 
-// Axes are the principal ones of the surface's second moments, which are summed from the leaves up; a leaf
-// takes its normal and its longest edge. Extents are those of all corners along the axes.
+// Axes are the principal ones of the surface's second moments, which are summed from the leaves up;
+// a leaf takes its normal and its longest edge. Extents are those of all corners along the axes.
 ObbTree fit_obbs(const Tree& tree);
 
 // Bit s is set where child s of `node` may meet `box`, already in the node's frame.
@@ -50,7 +50,9 @@ struct ObbBounds {
   unsigned open_b(std::int32_t node, const Slot& a_slot, float* key) const {
     return overlap_mask(b.nodes[node], placed(a.box(a_slot), at.a_in_b), at.a_in_b.pad, key);
   }
-  bool a_is_larger(const Slot& a_slot, const Slot& b_slot) const { return a.size(a_slot) >= b.size(b_slot); }
+  bool a_is_larger(const Slot& a_slot, const Slot& b_slot) const {
+    return a.size(a_slot) >= b.size(b_slot);
+  }
 };
 
 }  // namespace tauguard::rigid

@@ -8,8 +8,8 @@
 namespace tauguard::rigid {
 namespace {
 
-// Surface moments about the tree's centre: twice the area, and the integrals of x and x x^T times the same
-// constants for every triangle, so that sums of them are the moments of the union.
+// Surface moments about the tree's centre: twice the area, and the integrals of x and x x^T times
+// the same constants for every triangle, so that sums of them are the moments of the union.
 struct Moments {
   double weight = 0, first[3] = {}, second[6] = {};  // second: xx, xy, xz, yy, yz, zz
   void add(const Moments& o) {
@@ -19,7 +19,8 @@ struct Moments {
   }
 };
 
-// The corners of all triangles in leaf order, relative to the tree's centre, one array a coordinate.
+// The corners of all triangles in leaf order, relative to the tree's centre, one array a
+// coordinate.
 struct Corners {
   std::vector<float> x[3];
   explicit Corners(const Tree& tree) {
@@ -60,13 +61,15 @@ TAUGUARD_WIDE Span span_wide(const float* x, const float* y, const float* z, std
   Span out;
   for (int i = 0; i < 3; ++i) {
     out.lo[i] = lo[i][0], out.hi[i] = hi[i][0];
-    for (int s = 1; s < 8; ++s) out.lo[i] = std::min(out.lo[i], lo[i][s]), out.hi[i] = std::max(out.hi[i], hi[i][s]);
+    for (int s = 1; s < 8; ++s)
+      out.lo[i] = std::min(out.lo[i], lo[i][s]), out.hi[i] = std::max(out.hi[i], hi[i][s]);
   }
   return out;
 }
 
 Span span(const Corners& c, const Run& run, const float axis[3][3]) {
-  const std::size_t begin = 3 * std::size_t(run.begin), count = 3 * std::size_t(run.end - run.begin);
+  const std::size_t begin = 3 * std::size_t(run.begin),
+                    count = 3 * std::size_t(run.end - run.begin);
   const float *x = c.x[0].data() + begin, *y = c.x[1].data() + begin, *z = c.x[2].data() + begin;
   if (count >= 8) return span_wide(x, y, z, count, axis);
   Span out = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
@@ -100,9 +103,11 @@ void cross(const double* a, const double* b, double* out) {
 // Axes from a normal and a direction across it; the coordinate axes where either vanishes.
 void set_axes(const double* normal, const double* along, FloatObb* box) {
   const double nn = dot(normal, normal), part = dot(along, normal) / nn;
-  const double flat[3] = {along[0] - part * normal[0], along[1] - part * normal[1], along[2] - part * normal[2]};
+  const double flat[3] = {along[0] - part * normal[0], along[1] - part * normal[1],
+                          along[2] - part * normal[2]};
   const double ff = dot(flat, flat);
-  const bool proper = nn > 1e-200 && ff > 1e-6 * dot(along, along) && ff > 1e-200 && std::isfinite(nn) && std::isfinite(ff);
+  const bool proper = nn > 1e-200 && ff > 1e-6 * dot(along, along) && ff > 1e-200 &&
+                      std::isfinite(nn) && std::isfinite(ff);
   double third[3];
   cross(normal, flat, third);
   const double a = 1 / std::sqrt(ff), b = 1 / std::sqrt(nn), c = a * b;
@@ -137,7 +142,8 @@ Moments leaf_moments(const Tree& tree, const Run& run, FloatObb* box) {
     int at = 0;
     for (int k = 0; k < 3; ++k)
       for (int l = k; l < 3; ++l)
-        m.second[at++] = weight / 12 * (q[k] * q[l] + p[0][k] * p[0][l] + p[1][k] * p[1][l] + p[2][k] * p[2][l]);
+        m.second[at++] =
+            weight / 12 * (q[k] * q[l] + p[0][k] * p[0][l] + p[1][k] * p[1][l] + p[2][k] * p[2][l]);
     sum.add(m);
   }
   set_axes(normal, longest, box);
@@ -150,7 +156,8 @@ void principal_axes(const Moments& m, FloatObb* box) {
   const double w = m.weight > 0 ? 1 / m.weight : 0;
   int at = 0;
   for (int k = 0; k < 3; ++k)
-    for (int l = k; l < 3; ++l) spread[k][l] = spread[l][k] = w * (m.second[at++] - w * m.first[k] * m.first[l]);
+    for (int l = k; l < 3; ++l)
+      spread[k][l] = spread[l][k] = w * (m.second[at++] - w * m.first[k] * m.first[l]);
   eigenvectors(spread, axis);
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) box->axis[i][k] = static_cast<float>(axis[i][k]);
@@ -173,8 +180,10 @@ ObbTree fit_obbs(const Tree& tree) {
       const Child c = node.child[s];
       if (c != no_child) {
         const Run r = is_leaf(c) ? Run{leaf_first(c), leaf_first(c) + leaf_count(c)} : run[c];
-        if (is_leaf(c)) moments[n].add(leaf_moments(tree, r, &box));
-        else moments[n].add(moments[c]), principal_axes(moments[c], &box);
+        if (is_leaf(c))
+          moments[n].add(leaf_moments(tree, r, &box));
+        else
+          moments[n].add(moments[c]), principal_axes(moments[c], &box);
         bound(corners, r, &box);
         run[n] = {std::min(run[n].begin, r.begin), std::max(run[n].end, r.end)};
       }

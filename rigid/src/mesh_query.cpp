@@ -34,7 +34,8 @@ void edge(const Triangle& t, int i, double* out) {
   for (int k = 0; k < 3; ++k) out[k] = t.v[(i + 1) % 3][k] - t.v[i][k];
 }
 
-// The cheaper of moving b along +axis or -axis until its interval leaves a's; keeps the least depth.
+// The cheaper of moving b along +axis or -axis until its interval leaves a's; keeps the least
+// depth.
 void separate(const Triangle& a, const Triangle& b, const double* axis, double size, Contact& c) {
   const double length = std::sqrt(dot(axis, axis));
   if (!(length > size)) return;
@@ -55,9 +56,9 @@ void separate(const Triangle& a, const Triangle& b, const double* axis, double s
   for (int k = 0; k < 3; ++k) c.normal[k] = sign * axis[k] / length;
 }
 
-// The mean of the points where edges of one triangle pierce the other: the middle of the common segment in
-// general position; where nothing is pierced (coplanar or degenerate) the corners nearest to the middle of
-// both triangles stand in.
+// The mean of the points where edges of one triangle pierce the other: the middle of the common
+// segment in general position; where nothing is pierced (coplanar or degenerate) the corners
+// nearest to the middle of both triangles stand in.
 void common_point(const Triangle& a, const Triangle& b, double* point) {
   double sum[3] = {}, lo[3] = {}, n = 0;
   for (int side = 0; side < 2; ++side) {
@@ -81,8 +82,10 @@ void common_point(const Triangle& a, const Triangle& b, double* point) {
   }
   // Coplanar or touching at the rim: the middle of the overlap of both boxes.
   for (int k = 0; k < 3; ++k) {
-    lo[k] = std::max(std::min({a.v[0][k], a.v[1][k], a.v[2][k]}), std::min({b.v[0][k], b.v[1][k], b.v[2][k]}));
-    const double hi = std::min(std::max({a.v[0][k], a.v[1][k], a.v[2][k]}), std::max({b.v[0][k], b.v[1][k], b.v[2][k]}));
+    lo[k] = std::max(std::min({a.v[0][k], a.v[1][k], a.v[2][k]}),
+                     std::min({b.v[0][k], b.v[1][k], b.v[2][k]}));
+    const double hi = std::min(std::max({a.v[0][k], a.v[1][k], a.v[2][k]}),
+                               std::max({b.v[0][k], b.v[1][k], b.v[2][k]}));
     point[k] = 0.5 * (lo[k] + hi);
   }
 }
@@ -95,7 +98,8 @@ Contact describe(const Triangle& a, const Triangle& b) {
     edge(a, i, ea[i]), edge(b, i, eb[i]);
     longest = std::max({longest, dot(ea[i], ea[i]), dot(eb[i], eb[i])});
   }
-  // Cross products this small carry no direction: their rounding error is about 2^-52 of the edges' product.
+  // Cross products this small carry no direction: their rounding error is about 2^-52 of the edges'
+  // product.
   const double size = 0x1p-40 * longest;
   cross(ea[0], ea[1], na), cross(eb[0], eb[1], nb);
   separate(a, b, na, size, c);
@@ -112,7 +116,8 @@ Contact describe(const Triangle& a, const Triangle& b) {
 
 }  // namespace
 
-void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, std::vector<Contact>& out) {
+void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch,
+                  std::vector<Contact>& out) {
   const auto first = static_cast<std::ptrdiff_t>(out.size());
   each_overlap(a, b, pose, scratch, [&](int i, int j, const Triangle& moved) {
     Contact c = describe(a.tree.triangles[i], moved);

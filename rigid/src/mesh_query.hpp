@@ -23,8 +23,8 @@ struct Mesh {
 // Scratch space of one thread.
 using Scratch = std::vector<SlotPair>;
 
-// leaf(index of a triangle of a, index of a triangle of b (both in leaf order), b's triangle posed) for every
-// pair of triangles that share a point, until it returns true.
+// leaf(index of a triangle of a, index of a triangle of b (both in leaf order), b's triangle posed)
+// for every pair of triangles that share a point, until it returns true.
 template <class Visit>
 bool each_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, Visit visit) {
   const Placement at(a.tree, b.tree, pose);
@@ -38,7 +38,8 @@ bool each_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scrat
     return false;
   };
   switch (a.kind) {
-    case VolumeKind::obb: return traverse(a.tree, b.tree, ObbBounds{a.obbs, b.obbs, at}, scratch, leaf);
+    case VolumeKind::obb:
+      return traverse(a.tree, b.tree, ObbBounds{a.obbs, b.obbs, at}, scratch, leaf);
     case VolumeKind::k_dop: {
       const VolumeBounds<KDop> bounds{a.tree, b.tree, a.k_dops, b.k_dops, {a.tree, b.tree, pose}};
       return traverse(a.tree, b.tree, bounds, scratch, leaf);
@@ -47,7 +48,8 @@ bool each_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scrat
       const VolumeBounds<Ball> bounds{a.tree, b.tree, a.balls, b.balls, {a.tree, b.tree, pose}};
       return traverse(a.tree, b.tree, bounds, scratch, leaf);
     }
-    default: return traverse(a.tree, b.tree, BoxBounds{a.tree, b.tree, at}, scratch, leaf);
+    default:
+      return traverse(a.tree, b.tree, BoxBounds{a.tree, b.tree, at}, scratch, leaf);
   }
 }
 
@@ -57,12 +59,13 @@ struct FacePair {
 };
 FacePair first_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch);
 
-// Where and how two overlapping triangles touch: point on both, unit normal from a to b, and how far b must
-// move along the normal to come free of a.
+// Where and how two overlapping triangles touch: point on both, unit normal from a to b, and how
+// far b must move along the normal to come free of a.
 struct Contact {
   std::int32_t a, b;  // rows of the faces
   double point[3], normal[3], depth;
 };
-void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch, std::vector<Contact>& out);
+void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch,
+                  std::vector<Contact>& out);
 
 }  // namespace tauguard::rigid

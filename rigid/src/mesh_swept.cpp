@@ -7,7 +7,8 @@ namespace tauguard::rigid {
 Place place_at(const RigidMotion& m, double t) {
   const double c = std::cos(m.speed * t), s = std::sin(m.speed * t);
   Vec column[3];
-  for (int k = 0; k < 3; ++k) column[k] = Swing(m, Vec{m.r0[0][k], m.r0[1][k], m.r0[2][k]}).at(c, s);
+  for (int k = 0; k < 3; ++k)
+    column[k] = Swing(m, Vec{m.r0[0][k], m.r0[1][k], m.r0[2][k]}).at(c, s);
   Place out;
   for (int i = 0; i < 3; ++i) out.r[i] = {column[0][i], column[1][i], column[2][i]};
   out.t = m.x0 + t * m.linear;
@@ -30,20 +31,25 @@ MovingObb moving(const FloatObb& box, const Chord& chord) {
     out.box.extent[k] = box.extent[k];
     square += double(box.extent[k]) * box.extent[k];
   }
-  out.pad = static_cast<float>((std::sqrt(square) * chord.turn + chord.sagitta) * (1 + 0x1p-20)) + chord.float_rounding;
+  out.pad = static_cast<float>((std::sqrt(square) * chord.turn + chord.sagitta) * (1 + 0x1p-20)) +
+            chord.float_rounding;
   return out;
 }
 
-// As overlap_mask in mesh_obb.cpp, with the time at which each axis stops separating. A motion of less than the
-// pad along an axis is taken as the pad, so that no quotient is without bound; the second pad pays for it.
-TAUGUARD_WIDE unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave, float* enter) {
+// As overlap_mask in mesh_obb.cpp, with the time at which each axis stops separating. A motion of
+// less than the pad along an axis is taken as the pad, so that no quotient is without bound; the
+// second pad pays for it.
+TAUGUARD_WIDE unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave,
+                                  float* enter) {
   const FloatObb& box = m.box;
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
   const Wide* e = reinterpret_cast<const Wide*>(node.extent);
-  const Wide d0 = box.centre[0] - centre[0], d1 = box.centre[1] - centre[1], d2 = box.centre[2] - centre[2];
+  const Wide d0 = box.centre[0] - centre[0], d1 = box.centre[1] - centre[1],
+             d2 = box.centre[2] - centre[2];
   const Wide pad = (Wide){} + m.pad;
   Wide d[3], v[3], r[3][3], s[3][3], first = (Wide){}, last = (Wide){} + leave;
-  const auto axis = [&](const Wide& at, const Wide& speed, const Wide& reach) __attribute__((always_inline)) {
+  const auto axis = [&](const Wide& at, const Wide& speed,
+                        const Wide& reach) __attribute__((always_inline)) {
     const Wide size = TAUGUARD_WIDE_ABS(speed), share = 1.0f / (size < pad ? pad : size);
     const Wide toward = speed < 0.0f ? -at : at, bound = reach + 2.0f * pad;
     const Wide in = (-bound - toward) * share, out = (bound - toward) * share;
@@ -58,10 +64,12 @@ TAUGUARD_WIDE unsigned swept_mask(const ObbNode& node, const MovingObb& m, float
       r[i][j] = (n[0] * box.axis[j][0] + n[1] * box.axis[j][1]) + n[2] * box.axis[j][2];
       s[i][j] = TAUGUARD_WIDE_ABS(r[i][j]);
     }
-    axis(d[i], v[i], e[i] + ((s[i][0] * box.extent[0] + s[i][1] * box.extent[1]) + s[i][2] * box.extent[2]));
+    axis(d[i], v[i],
+         e[i] + ((s[i][0] * box.extent[0] + s[i][1] * box.extent[1]) + s[i][2] * box.extent[2]));
   }
   for (int j = 0; j < 3; ++j)
-    axis((d[0] * r[0][j] + d[1] * r[1][j]) + d[2] * r[2][j], (v[0] * r[0][j] + v[1] * r[1][j]) + v[2] * r[2][j],
+    axis((d[0] * r[0][j] + d[1] * r[1][j]) + d[2] * r[2][j],
+         (v[0] * r[0][j] + v[1] * r[1][j]) + v[2] * r[2][j],
          ((e[0] * s[0][j] + e[1] * s[1][j]) + e[2] * s[2][j]) + box.extent[j]);
   unsigned lanes;
   TAUGUARD_WIDE_LANES((Bits)(first <= last), lanes);
@@ -71,7 +79,8 @@ TAUGUARD_WIDE unsigned swept_mask(const ObbNode& node, const MovingObb& m, float
     for (int j = 0; j < 3; ++j) {
       const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
       axis(d[i2] * r[i1][j] - d[i1] * r[i2][j], v[i2] * r[i1][j] - v[i1] * r[i2][j],
-           (e[i1] * s[i2][j] + e[i2] * s[i1][j]) + (s[i][j2] * box.extent[j1] + s[i][j1] * box.extent[j2]));
+           (e[i1] * s[i2][j] + e[i2] * s[i1][j]) +
+               (s[i][j2] * box.extent[j1] + s[i][j1] * box.extent[j2]));
     }
   }
   TAUGUARD_WIDE_LANES((Bits)(first <= last), lanes);
@@ -81,8 +90,8 @@ TAUGUARD_WIDE unsigned swept_mask(const ObbNode& node, const MovingObb& m, float
 
 namespace {
 
-// The share of the chord up to which the axis separates b's corners from a's: every corner's height above a is
-// linear in the share, so the lowest is reached first at one of the three roots.
+// The share of the chord up to which the axis separates b's corners from a's: every corner's height
+// above a is linear in the share, so the lowest is reached first at one of the three roots.
 double separated_until(const Vec& n, const Vec* a, const Vec* b0, const Vec* b1, double pad) {
   const double slack = pad * norm(n) * (1 + 0x1p-40);
   double lo = INFINITY, hi = -INFINITY, p[3], q[3], p_lo = INFINITY, p_hi = -INFINITY;

@@ -1,6 +1,6 @@
-// Boxes and triangles of two meshes during a piece of the step so short that they hardly turn: how long are
-// they certainly apart? Positions are seen from one of the meshes; a point of the other moves on its chord,
-// give or take the sagitta of its path.
+// Boxes and triangles of two meshes during a piece of the step so short that they hardly turn: how
+// long are they certainly apart? Positions are seen from one of the meshes; a point of the other
+// moves on its chord, give or take the sagitta of its path.
 #pragma once
 
 #include "mesh_query.hpp"
@@ -19,8 +19,8 @@ Place place_at(const RigidMotion& m, double t);
 // One mesh in the other's frame at the start, the middle and the end of a piece of the step.
 struct Chord {
   Place start, middle, end;
-  double sagitta;  // of any point's path, m
-  double turn;     // half of the angle that is turned, rad
+  double sagitta;   // of any point's path, m
+  double turn;      // half of the angle that is turned, rad
   double rounding;  // of positions in double, and of rotations that are only nearly orthonormal, m
   float float_rounding;  // the same in float
 };
@@ -32,15 +32,16 @@ struct MovingObb {
 };
 MovingObb moving(const FloatObb& box, const Chord& chord);
 
-// Bit s is set where child s may meet the box before the share `leave` of the chord; `enter` gets the share up
-// to which they are certainly apart.
+// Bit s is set where child s may meet the box before the share `leave` of the chord; `enter` gets
+// the share up to which they are certainly apart.
 unsigned swept_mask(const ObbNode& node, const MovingObb& moving, float leave, float* enter);
 
-// The share of the chord up to which two triangles are certainly apart, inf for all of it. `b0`, `b1`: the other
-// triangle at the chord's ends, in the frame of `a`.
+// The share of the chord up to which two triangles are certainly apart, inf for all of it. `b0`,
+// `b1`: the other triangle at the chord's ends, in the frame of `a`.
 double certainly_apart(const Vec* a, const Vec* b0, const Vec* b1, double pad);
 
-// The children of a node as oriented boxes, whatever the mesh bounds them by; `scratch` may hold the answer.
+// The children of a node as oriented boxes, whatever the mesh bounds them by; `scratch` may hold
+// the answer.
 const ObbNode& oriented(const Mesh& mesh, std::int32_t node, ObbNode& scratch);
 FloatObb oriented_box(const Mesh& mesh, const Slot& slot);
 

@@ -1,5 +1,5 @@
-// The one traversal that every mesh query shares: depth first, the larger box opened first, the child whose
-// centre is nearest visited first.
+// The one traversal that every mesh query shares: depth first, the larger box opened first, the
+// child whose centre is nearest visited first.
 #pragma once
 
 #include <vector>
@@ -34,10 +34,11 @@ struct BoxBounds {
   }
 };
 
-// Calls leaf(child of a, child of b) for every pair of leaves whose bounds may meet, until it returns true.
-// Returns whether it did. `stack` is scratch space, kept between calls.
+// Calls leaf(child of a, child of b) for every pair of leaves whose bounds may meet, until it
+// returns true. Returns whether it did. `stack` is scratch space, kept between calls.
 template <class Bounds, class Leaf>
-bool traverse(const Tree& a, const Tree& b, const Bounds& bounds, std::vector<SlotPair>& stack, Leaf leaf) {
+bool traverse(const Tree& a, const Tree& b, const Bounds& bounds, std::vector<SlotPair>& stack,
+              Leaf leaf) {
   stack.clear();
   stack.push_back({{-1, 0}, {-1, 0}});
   float key[width];

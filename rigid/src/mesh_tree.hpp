@@ -1,6 +1,6 @@
-// A tree over the triangles of one rigid mesh: eight children a node, their boxes side by side in float
-// so that one vector instruction tests all eight. Boxes are relative to the tree's centre and rounded
-// outward; a child is an inner node, a leaf of a few triangles, or empty.
+// A tree over the triangles of one rigid mesh: eight children a node, their boxes side by side in
+// float so that one vector instruction tests all eight. Boxes are relative to the tree's centre and
+// rounded outward; a child is an inner node, a leaf of a few triangles, or empty.
 #pragma once
 
 #include <array>
@@ -15,11 +15,12 @@
 
 namespace tauguard::rigid {
 
-inline constexpr int width = 8;      // children a node: one AVX register of floats
+inline constexpr int width = 8;       // children a node: one AVX register of floats
 inline constexpr int leaf_size = 4;   // triangles a leaf, at most
 inline constexpr int small_leaf = 2;  // triangles that are not split while their node has room
 
-// A child: inner node (>= 0), or ~(first * 8 + count) for the leaf of triangles [first, first + count).
+// A child: inner node (>= 0), or ~(first * 8 + count) for the leaf of triangles [first, first +
+// count).
 using Child = std::int32_t;
 inline constexpr Child no_child = std::numeric_limits<Child>::min();
 inline bool is_leaf(Child c) { return c < 0; }
@@ -68,7 +69,8 @@ class Tree {
   Box root;          // the whole mesh, relative to the centre
 
  private:
-  struct alignas(16) Item {  // a triangle while the tree is built: its box relative to the centre, its row
+  struct alignas(16)
+      Item {  // a triangle while the tree is built: its box relative to the centre, its row
     float lo[3];
     std::int32_t row;
     float hi[3], unused;

@@ -1,9 +1,9 @@
-// Do two closed triangles share a point? Exact for any finite doubles, degenerate triangles included
-// (a collinear triangle is a segment, three equal corners are a point).
+// Do two closed triangles share a point? Exact for any finite doubles, degenerate triangles
+// included (a collinear triangle is a segment, three equal corners are a point).
 //
 // General position is answered by the interval test of Guigue and Devillers ("Fast and robust
-// triangle-triangle overlap test using orientation predicates", 2003); as soon as one orientation is
-// zero the answer comes from edge-against-triangle tests that assume nothing.
+// triangle-triangle overlap test using orientation predicates", 2003); as soon as one orientation
+// is zero the answer comes from edge-against-triangle tests that assume nothing.
 #pragma once
 
 #include <algorithm>
@@ -40,11 +40,13 @@ inline int dropped_axis(const double* a, const double* b, const double* c) {
   return -1;
 }
 
-// p on the closed segment ab, all three known to be collinear: lexicographic order is order on the line.
+// p on the closed segment ab, all three known to be collinear: lexicographic order is order on the
+// line.
 inline bool between(const double* a, const double* b, const double* p) {
   const bool forward = std::lexicographical_compare(a, a + 3, b, b + 3);
   const double *lo = forward ? a : b, *hi = forward ? b : a;
-  return !std::lexicographical_compare(p, p + 3, lo, lo + 3) && !std::lexicographical_compare(hi, hi + 3, p, p + 3);
+  return !std::lexicographical_compare(p, p + 3, lo, lo + 3) &&
+         !std::lexicographical_compare(hi, hi + 3, p, p + 3);
 }
 
 inline bool on_segment(const double* a, const double* b, const double* p) {
@@ -53,7 +55,8 @@ inline bool on_segment(const double* a, const double* b, const double* p) {
 
 // Closed segments pq and ab in space.
 inline bool segments_meet(const double* p, const double* q, const double* a, const double* b) {
-  if (on_segment(a, b, p) || on_segment(a, b, q) || on_segment(p, q, a) || on_segment(p, q, b)) return true;
+  if (on_segment(a, b, p) || on_segment(a, b, q) || on_segment(p, q, a) || on_segment(p, q, b))
+    return true;
   if (orient3d(p, q, a, b) != 0) return false;
   int k = dropped_axis(p, q, a);
   if (k < 0) k = dropped_axis(p, q, b);
@@ -81,7 +84,8 @@ inline bool segment_meets(const double* p, const double* q, const Triangle& t) {
   if (k < 0) return meets_an_edge(p, q, t);
   const int sp = orient3d(t.v[0], t.v[1], t.v[2], p), sq = orient3d(t.v[0], t.v[1], t.v[2], q);
   if (sp * sq > 0) return false;
-  if (sp == 0 && sq == 0) return inside_flat(p, t, k) || inside_flat(q, t, k) || meets_an_edge(p, q, t);
+  if (sp == 0 && sq == 0)
+    return inside_flat(p, t, k) || inside_flat(q, t, k) || meets_an_edge(p, q, t);
   if (sp == 0) return inside_flat(p, t, k);
   if (sq == 0) return inside_flat(q, t, k);
   int lo = 0, hi = 0;
@@ -96,7 +100,8 @@ inline bool segment_meets(const double* p, const double* q, const Triangle& t) {
 // Two closed triangles meet exactly where an edge of one meets the other.
 inline bool triangles_meet(const Triangle& a, const Triangle& b) {
   for (int i = 0; i < 3; ++i)
-    if (segment_meets(a.v[i], a.v[(i + 1) % 3], b) || segment_meets(b.v[i], b.v[(i + 1) % 3], a)) return true;
+    if (segment_meets(a.v[i], a.v[(i + 1) % 3], b) || segment_meets(b.v[i], b.v[(i + 1) % 3], a))
+      return true;
   return false;
 }
 
@@ -109,7 +114,8 @@ inline void plane_signs(const Triangle& p, const Triangle& q, int* sign) {
   const double vx = p.v[2][0] - p.v[0][0], vy = p.v[2][1] - p.v[0][1], vz = p.v[2][2] - p.v[0][2];
   const double yz = uy * vz, zy = uz * vy, zx = uz * vx, xz = ux * vz, xy = ux * vy, yx = uy * vx;
   const double nx = yz - zy, ny = zx - xz, nz = xy - yx;
-  const double mx = std::fabs(yz) + std::fabs(zy), my = std::fabs(zx) + std::fabs(xz), mz = std::fabs(xy) + std::fabs(yx);
+  const double mx = std::fabs(yz) + std::fabs(zy), my = std::fabs(zx) + std::fabs(xz),
+               mz = std::fabs(xy) + std::fabs(yx);
   for (int i = 0; i < 3; ++i) {
     const double wx = q.v[i][0] - p.v[0][0], wy = q.v[i][1] - p.v[0][1], wz = q.v[i][2] - p.v[0][2];
     const double det = nx * wx + ny * wy + nz * wz;

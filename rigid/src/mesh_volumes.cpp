@@ -26,10 +26,12 @@ void project(const double* p, double* out) {
   out[7] = p[1] + p[2], out[8] = p[1] - p[2];
 }
 
-constexpr double direction[KDop::directions][3] = {{1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 0}, {1, -1, 0},
-                                                   {1, 0, 1}, {1, 0, -1}, {0, 1, 1}, {0, 1, -1}};
+constexpr double direction[KDop::directions][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},
+                                                   {1, 1, 0},  {1, -1, 0}, {1, 0, 1},
+                                                   {1, 0, -1}, {0, 1, 1},  {0, 1, -1}};
 
-// The index of the normal sx e_x + sy e_y (x != y) and whether that or its opposite is the stored one.
+// The index of the normal sx e_x + sy e_y (x != y) and whether that or its opposite is the stored
+// one.
 int pair_index(int x, int y, double sx, double sy, double* flip) {
   if (x > y) std::swap(x, y), std::swap(sx, sy);
   *flip = sx;
@@ -50,12 +52,14 @@ void bounds(const KDop& k, const KDop::Cone& cone, double* lo, double* hi) {
 
 }  // namespace
 
-// Pad: the chains below have at most 40 operations on values up to 3 (ra + rb): 2^-53 * 40 * 3 < 2^-45.
+// Pad: the chains below have at most 40 operations on values up to 3 (ra + rb): 2^-53 * 40 * 3 <
+// 2^-45.
 Frame::Frame(const Tree& a, const Tree& b, const Pose& pose) {
   double skew = 0, largest = a.magnitude;
   for (int i = 0; i < 3; ++i) {
-    t[i] = ((pose.r[i][0] * b.centre[0] + pose.r[i][1] * b.centre[1]) + pose.r[i][2] * b.centre[2]) +
-           (pose.t[i] - a.centre[i]);
+    t[i] =
+        ((pose.r[i][0] * b.centre[0] + pose.r[i][1] * b.centre[1]) + pose.r[i][2] * b.centre[2]) +
+        (pose.t[i] - a.centre[i]);
     largest = std::max(largest, 2 * b.magnitude + std::fabs(pose.t[i]));
     for (int j = 0; j < 3; ++j) {
       r[i][j] = pose.r[i][j];
@@ -114,7 +118,8 @@ Obb Obb::fit(const Cluster& c) {
     box.extent[k] = 0.5 * (bound.hi[k] - bound.lo[k]) * up;
   }
   for (int k = 0; k < 3; ++k)
-    box.centre[k] = box.axis[0][k] * middle[0] + box.axis[1][k] * middle[1] + box.axis[2][k] * middle[2];
+    box.centre[k] =
+        box.axis[0][k] * middle[0] + box.axis[1][k] * middle[1] + box.axis[2][k] * middle[2];
   return box;
 }
 
@@ -139,8 +144,8 @@ bool Obb::meet(const Obb& a, const Obb& b, const Relation& at) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-      const double reach = a.extent[i1] * s[i2][j] + a.extent[i2] * s[i1][j] + b.extent[j1] * s[i][j2] +
-                           b.extent[j2] * s[i][j1];
+      const double reach = a.extent[i1] * s[i2][j] + a.extent[i2] * s[i1][j] +
+                           b.extent[j1] * s[i][j2] + b.extent[j2] * s[i][j1];
       if (std::fabs(d[i2] * r[i1][j] - d[i1] * r[i2][j]) > reach + at.pad) return false;
     }
   return true;
@@ -153,7 +158,8 @@ KDop KDop::fit(const Cluster& c) {
   each_corner(c, [&](const double* p) {
     double h[directions];
     project(p, h);
-    for (int i = 0; i < directions; ++i) k.lo[i] = std::min(k.lo[i], h[i]), k.hi[i] = std::max(k.hi[i], h[i]);
+    for (int i = 0; i < directions; ++i)
+      k.lo[i] = std::min(k.lo[i], h[i]), k.hi[i] = std::max(k.hi[i], h[i]);
   });
   for (int i = 0; i < 3; ++i) k.centre[i] = 0.5 * (k.lo[i] + k.hi[i]);
   return k;
@@ -175,7 +181,8 @@ KDop::Cone KDop::Cone::around(const double* d) {
     c.weight[0] = q, c.weight[1] = s, c.weight[2] = p - q - s;
   } else {
     c.index[2] = pair_index(y, z, sy, sz, &flip[2]);
-    c.weight[0] = 0.5 * (p + q - s), c.weight[1] = 0.5 * (p + s - q), c.weight[2] = 0.5 * (q + s - p);
+    c.weight[0] = 0.5 * (p + q - s), c.weight[1] = 0.5 * (p + s - q),
+    c.weight[2] = 0.5 * (q + s - p);
   }
   for (int i = 0; i < 3; ++i) c.weight[i] *= flip[i];
   return c;
@@ -186,7 +193,8 @@ KDop::Relation::Relation(const Tree& a, const Tree& b, const Pose& pose) : at(a,
   for (int k = 0; k < directions; ++k) {
     double in_b[3], in_a[3];
     for (int i = 0; i < 3; ++i) {
-      in_b[i] = at.r[0][i] * direction[k][0] + at.r[1][i] * direction[k][1] + at.r[2][i] * direction[k][2];
+      in_b[i] = at.r[0][i] * direction[k][0] + at.r[1][i] * direction[k][1] +
+                at.r[2][i] * direction[k][2];
       in_a[i] = dot(at.r[i], direction[k]);
     }
     a_from_b[k] = Cone::around(in_b);
@@ -200,9 +208,11 @@ bool KDop::meet(const KDop& a, const KDop& b, const Relation& at) {
   double lo, hi;
   for (int k = 0; k < directions; ++k) {
     bounds(b, at.a_from_b[k], &lo, &hi);
-    if (lo + at.shift_a[k] > a.hi[k] + at.at.pad || hi + at.shift_a[k] < a.lo[k] - at.at.pad) return false;
+    if (lo + at.shift_a[k] > a.hi[k] + at.at.pad || hi + at.shift_a[k] < a.lo[k] - at.at.pad)
+      return false;
     bounds(a, at.b_from_a[k], &lo, &hi);
-    if (lo + at.shift_b[k] > b.hi[k] + at.at.pad || hi + at.shift_b[k] < b.lo[k] - at.at.pad) return false;
+    if (lo + at.shift_b[k] > b.hi[k] + at.at.pad || hi + at.shift_b[k] < b.lo[k] - at.at.pad)
+      return false;
   }
   return true;
 }
@@ -219,7 +229,8 @@ std::vector<Volume> fit_all(const Tree& tree) {
     run[n] = {std::numeric_limits<int>::max(), 0};
     for (int s = 0; s < width && node.child[s] != no_child; ++s) {
       const Child c = node.child[s];
-      const auto r = is_leaf(c) ? std::make_pair(leaf_first(c), leaf_first(c) + leaf_count(c)) : run[c];
+      const auto r =
+          is_leaf(c) ? std::make_pair(leaf_first(c), leaf_first(c) + leaf_count(c)) : run[c];
       run[n] = {std::min(run[n].first, r.first), std::max(run[n].second, r.second)};
       out[1 + width * n + s] = Volume::fit({t + r.first, t + r.second, tree.centre});
     }

@@ -1,5 +1,6 @@
-// The bounding volumes besides the axis-aligned box: ball, oriented box, 18-direction polytope. All are in
-// their tree's centred frame, in double, and tested with a pad that covers rounding: never a wrong "clear".
+// The bounding volumes besides the axis-aligned box: ball, oriented box, 18-direction polytope. All
+// are in their tree's centred frame, in double, and tested with a pad that covers rounding: never a
+// wrong "clear".
 #pragma once
 
 #include "mesh_traverse.hpp"
@@ -54,8 +55,8 @@ struct KDop {
   static KDop fit(const Cluster& c);
 
   // A direction d as a non-negative sum of three of the 18 half-space normals: by duality
-  // max d.x <= sum of weight * bound, and the three adjacent normals give the least such bound known
-  // without solving a linear program.
+  // max d.x <= sum of weight * bound, and the three adjacent normals give the least such bound
+  // known without solving a linear program.
   struct Cone {
     int index[3];
     double weight[3];  // negative: the opposite normal with weight -weight
@@ -70,7 +71,8 @@ struct KDop {
   static bool meet(const KDop& a, const KDop& b, const Relation& at);
 };
 
-// The volumes of every child of a tree: entry 0 is the whole mesh, entry 1 + 8 node + slot that child.
+// The volumes of every child of a tree: entry 0 is the whole mesh, entry 1 + 8 node + slot that
+// child.
 template <class Volume>
 std::vector<Volume> fit_all(const Tree& tree);
 
@@ -80,7 +82,9 @@ struct VolumeBounds {
   const std::vector<Volume>&va, &vb;
   typename Volume::Relation at;
 
-  static std::size_t index(const Slot& s) { return s.node < 0 ? 0 : 1 + std::size_t(width) * s.node + s.slot; }
+  static std::size_t index(const Slot& s) {
+    return s.node < 0 ? 0 : 1 + std::size_t(width) * s.node + s.slot;
+  }
 
   unsigned open(bool first, std::int32_t node, const Slot& fixed, float* key) const {
     unsigned mask = 0;
@@ -94,8 +98,12 @@ struct VolumeBounds {
     }
     return mask;
   }
-  unsigned open_a(std::int32_t node, const Slot& b_slot, float* key) const { return open(true, node, b_slot, key); }
-  unsigned open_b(std::int32_t node, const Slot& a_slot, float* key) const { return open(false, node, a_slot, key); }
+  unsigned open_a(std::int32_t node, const Slot& b_slot, float* key) const {
+    return open(true, node, b_slot, key);
+  }
+  unsigned open_b(std::int32_t node, const Slot& a_slot, float* key) const {
+    return open(false, node, a_slot, key);
+  }
   bool a_is_larger(const Slot& a_slot, const Slot& b_slot) const {
     return a_slot.box(a).size() >= b_slot.box(b).size();
   }

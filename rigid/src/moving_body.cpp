@@ -2,7 +2,8 @@
 
 namespace tauguard::rigid {
 
-MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& motion, const Vec& origin) {
+MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& motion,
+                       const Vec& origin) {
   MovingBody body(motion, origin);
   const Points<double> v = vertices_of<double>(bodies, r);
   for (const Vec& p : v) body.add_vertex(p);
@@ -13,9 +14,11 @@ MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& m
       body.add_normal(axis), body.add_edge(axis);
     }
   } else if (bodies.kind == Kind::parallelepipeds) {
-    const Vec e[3] = {{row[3], row[4], row[5]}, {row[6], row[7], row[8]}, {row[9], row[10], row[11]}};
+    const Vec e[3] = {
+        {row[3], row[4], row[5]}, {row[6], row[7], row[8]}, {row[9], row[10], row[11]}};
     for (int k = 0; k < 3; ++k) body.add_normal(cross(e[k], e[(k + 1) % 3])), body.add_edge(e[k]);
-    body.complete = std::fabs(dot(e[0], cross(e[1], e[2]))) > 1e-9 * norm(e[0]) * norm(e[1]) * norm(e[2]);
+    body.complete =
+        std::fabs(dot(e[0], cross(e[1], e[2]))) > 1e-9 * norm(e[0]) * norm(e[1]) * norm(e[2]);
   } else if (bodies.kind == Kind::tetrahedra) {
     for (int i = 0; i < 4; ++i)
       for (int j = i + 1; j < 4; ++j) {

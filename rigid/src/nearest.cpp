@@ -6,14 +6,15 @@
 namespace tauguard::rigid {
 namespace {
 
-// A corner of the simplex: the difference and the points it comes from; its weight in the nearest point.
+// A corner of the simplex: the difference and the points it comes from; its weight in the nearest
+// point.
 struct Corner {
   Vec w, a, b;
   double weight;
 };
 
-// The weights of the point nearest to the origin in the affine hull of c[0..m); false where the corners are
-// dependent or the point lies outside.
+// The weights of the point nearest to the origin in the affine hull of c[0..m); false where the
+// corners are dependent or the point lies outside.
 bool weigh(const Corner* c, int m, double* l) {
   l[0] = 1;
   if (m == 1) return true;
@@ -56,8 +57,8 @@ class Simplex {
     for (int i = 0; i < m_; ++i) sum = sum + 0.5 * c_[i].weight * (c_[i].a + c_[i].b);
     return sum;
   }
-  // Takes b - a in and keeps the face nearest to the origin among those that hold it; false, and no change to
-  // what was kept, where that is no nearer.
+  // Takes b - a in and keeps the face nearest to the origin among those that hold it; false, and no
+  // change to what was kept, where that is no nearer.
   bool add(const Vec& a, const Vec& b) {
     c_[m_] = {b - a, a, b, 0};
     double best = dot(nearest_, nearest_), weight[4] = {};
@@ -71,7 +72,8 @@ class Simplex {
       if (!weigh(face, size, l)) continue;
       Vec p = face[0].w;  // as an offset: a sum of weighted corners would cancel
       for (int i = 1; i < size; ++i) p = p + l[i] * (face[i].w - face[0].w);
-      if (dot(p, p) < best) best = dot(p, p), kept = mask, nearest_ = p, std::copy(l, l + size, weight);
+      if (dot(p, p) < best)
+        best = dot(p, p), kept = mask, nearest_ = p, std::copy(l, l + size, weight);
     }
     if (!kept) return false;
     int size = 0;
@@ -88,10 +90,12 @@ class Simplex {
 };
 
 const Vec& extreme(const std::vector<Vec>& points, const Vec& n) {
-  return *std::max_element(points.begin(), points.end(), [&](auto& x, auto& y) { return dot(n, x) < dot(n, y); });
+  return *std::max_element(points.begin(), points.end(),
+                           [&](auto& x, auto& y) { return dot(n, x) < dot(n, y); });
 }
 
-// Runs until the nearest point is found or rounding stops the descent. `attempt` sees the directions on the way.
+// Runs until the nearest point is found or rounding stops the descent. `attempt` sees the
+// directions on the way.
 template <class Attempt>
 Simplex descend(const std::vector<Vec>& a, const std::vector<Vec>& b, Attempt attempt) {
   Simplex s(a[0], b[0]);
@@ -116,9 +120,10 @@ Simplex descend(const std::vector<Vec>& a, const std::vector<Vec>& b, Attempt at
 
 }  // namespace
 
-// Close to contact the nearest point itself is all cancellation, so the normals of the last simplex's triangles
-// are tried as well; the best of them wins.
-bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, Vec* n, double* separation) {
+// Close to contact the nearest point itself is all cancellation, so the normals of the last
+// simplex's triangles are tried as well; the best of them wins.
+bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, Vec* n,
+                          double* separation) {
   *separation = -INFINITY;
   descend(a, b, [&](const Vec& d) {
     const double length = norm(d);

@@ -5,8 +5,10 @@
 
 namespace tauguard::rigid {
 
-// The direction (unit, from a to b) along which the sets are furthest apart; false where they meet to rounding.
-bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, Vec* n, double* separation);
+// The direction (unit, from a to b) along which the sets are furthest apart; false where they meet
+// to rounding.
+bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, Vec* n,
+                          double* separation);
 
 // A point of both hulls where they meet; the middle of their nearest points where they are apart.
 Vec middle_point(const std::vector<Vec>& a, const std::vector<Vec>& b);

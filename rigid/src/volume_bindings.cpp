@@ -1,6 +1,7 @@
-// The bounding volumes side by side as textbooks use them: fitted in the body's frame, brought to the world
-// under a pose (a ball and an oriented box move, bounds along fixed directions are taken anew over the posed
-// corners), tested against each other there. What each of the three costs is what the study wants to know.
+// The bounding volumes side by side as textbooks use them: fitted in the body's frame, brought to
+// the world under a pose (a ball and an oriented box move, bounds along fixed directions are taken
+// anew over the posed corners), tested against each other there. What each of the three costs is
+// what the study wants to know.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -67,13 +68,17 @@ struct ObbVolume : Obb {
     pose.apply(v.centre, out.centre);
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k)
-        out.axis[i][k] = pose.r[k][0] * v.axis[i][0] + pose.r[k][1] * v.axis[i][1] + pose.r[k][2] * v.axis[i][2];
+        out.axis[i][k] =
+            pose.r[k][0] * v.axis[i][0] + pose.r[k][1] * v.axis[i][1] + pose.r[k][2] * v.axis[i][2];
     return out;
   }
-  static bool meet(const ObbVolume& a, const ObbVolume& b) { return Obb::meet(a, b, Frame::same()); }
+  static bool meet(const ObbVolume& a, const ObbVolume& b) {
+    return Obb::meet(a, b, Frame::same());
+  }
   static constexpr std::size_t numbers = 15;
   void write(double* out) const {
-    std::copy_n(centre, 3, out), std::copy_n(extent, 3, out + 3), std::copy_n(&axis[0][0], 9, out + 6);
+    std::copy_n(centre, 3, out), std::copy_n(extent, 3, out + 3),
+        std::copy_n(&axis[0][0], 9, out + 6);
   }
 };
 
@@ -88,7 +93,9 @@ struct KDopVolume : KDop {
     return true;
   }
   static constexpr std::size_t numbers = 2 * directions;
-  void write(double* out) const { std::copy_n(lo, directions, out), std::copy_n(hi, directions, out + directions); }
+  void write(double* out) const {
+    std::copy_n(lo, directions, out), std::copy_n(hi, directions, out + directions);
+  }
 };
 
 // Bodies as runs of triangles, a volume each, one row a body.
@@ -115,7 +122,8 @@ class Volumes {
   }
   // The numbers of every volume, in the world.
   void write(Bounds out) const {
-    for (std::size_t i = 0; i < placed_.size(); ++i) placed_[i].write(out.data() + Volume::numbers * i);
+    for (std::size_t i = 0; i < placed_.size(); ++i)
+      placed_[i].write(out.data() + Volume::numbers * i);
   }
 
  private:

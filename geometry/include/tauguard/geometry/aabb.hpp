@@ -1,4 +1,5 @@
-// Axis-aligned bounding box. Bounds are exact minima and maxima of doubles: no rounding, no padding.
+// Axis-aligned bounding box. Bounds are exact minima and maxima of doubles: no rounding, no
+// padding.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +10,8 @@ namespace tauguard::geometry {
 struct Aabb {
   double lo[3] = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
                   std::numeric_limits<double>::infinity()};
-  double hi[3] = {-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
+  double hi[3] = {-std::numeric_limits<double>::infinity(),
+                  -std::numeric_limits<double>::infinity(),
                   -std::numeric_limits<double>::infinity()};
 
   void add(const double* p) {

@@ -1,7 +1,7 @@
-// Exact arithmetic on dyadic rationals m * 2^e. Every finite double is one, and sums, differences and
-// products of dyadics are dyadics, so polynomial signs computed here are right for *any* finite input:
-// no overflow, no underflow, no dependence on the rounding mode. It is the last resort behind a
-// floating-point filter (a product costs tens of nanoseconds), never the common path.
+// Exact arithmetic on dyadic rationals m * 2^e. Every finite double is one, and sums, differences
+// and products of dyadics are dyadics, so polynomial signs computed here are right for *any* finite
+// input: no overflow, no underflow, no dependence on the rounding mode. It is the last resort
+// behind a floating-point filter (a product costs tens of nanoseconds), never the common path.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +32,8 @@ class Dyadic {
   static Dyadic from_int(std::int64_t x) {
     Dyadic r;
     if (x == 0) return r;
-    const std::uint64_t m = x < 0 ? ~static_cast<std::uint64_t>(x) + 1 : static_cast<std::uint64_t>(x);
+    const std::uint64_t m =
+        x < 0 ? ~static_cast<std::uint64_t>(x) + 1 : static_cast<std::uint64_t>(x);
     r.sign_ = x < 0 ? -1 : 1;
     r.limbs_ = {static_cast<std::uint32_t>(m), static_cast<std::uint32_t>(m >> 32)};
     r.normalize();
@@ -113,7 +114,8 @@ class Dyadic {
     return exponent_ + 32 * static_cast<std::int64_t>(limbs_.size() - 1) + bits;
   }
 
-  // Truncation towards zero to about 53 bits; +-inf or 0 where the value leaves the range of double.
+  // Truncation towards zero to about 53 bits; +-inf or 0 where the value leaves the range of
+  // double.
   double to_double() const {
     if (is_zero()) return 0.0;
     // The three leading limbs hold at least 65 significant bits: keep the upper 53.
@@ -169,7 +171,8 @@ class Dyadic {
     std::uint32_t operator[](std::size_t i) const {
       if (i < zeros_) return 0;
       i -= zeros_;
-      const std::uint64_t high = i < count_ ? limbs_[i] : 0, low = i > 0 && i <= count_ ? limbs_[i - 1] : 0;
+      const std::uint64_t high = i < count_ ? limbs_[i] : 0,
+                          low = i > 0 && i <= count_ ? limbs_[i - 1] : 0;
       return static_cast<std::uint32_t>((high << 32 | low) << bits_ >> 32);
     }
 

@@ -1,6 +1,6 @@
-// Signed integers of a width known to the compiler, in two's complement: exact signs without allocations and
-// without loops of unknown length. A product is as wide as both factors together, so that it always fits; who
-// adds sees to it that the sum does.
+// Signed integers of a width known to the compiler, in two's complement: exact signs without
+// allocations and without loops of unknown length. A product is as wide as both factors together,
+// so that it always fits; who adds sees to it that the sum does.
 #pragma once
 
 #include <array>

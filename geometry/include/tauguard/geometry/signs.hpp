@@ -11,14 +11,15 @@ inline constexpr double unit_roundoff = 0x1p-53;
 
 inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
-// Sign of det[b - a, c - a, d - a] (positive where d sees a, b, c counter-clockwise from the far side:
-// the triple product (b - a) x (c - a) . (d - a)). Exact for all finite doubles; needs RoundToNearest.
+// Sign of det[b - a, c - a, d - a] (positive where d sees a, b, c counter-clockwise from the far
+// side: the triple product (b - a) x (c - a) . (d - a)). Exact for all finite doubles; needs
+// RoundToNearest.
 //
-// Bound: each difference carries a relative error u, each of the six triple products 3 differences and
-// 2 products, their sum of 6 terms at most 5 more roundings: (3 + 2 + 5) u of the permanent, and the
-// permanent is itself computed with the same relative error, so 16 u of the computed one covers both.
-// Underflow in a product adds at most 2^-1074 per operation, scaled by the other factor; the filter is
-// left where the permanent is below 1e-250 or not finite.
+// Bound: each difference carries a relative error u, each of the six triple products 3 differences
+// and 2 products, their sum of 6 terms at most 5 more roundings: (3 + 2 + 5) u of the permanent,
+// and the permanent is itself computed with the same relative error, so 16 u of the computed one
+// covers both. Underflow in a product adds at most 2^-1074 per operation, scaled by the other
+// factor; the filter is left where the permanent is below 1e-250 or not finite.
 inline int orient3d(const double* a, const double* b, const double* c, const double* d) {
   const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2];
   const double vx = c[0] - a[0], vy = c[1] - a[1], vz = c[2] - a[2];
@@ -51,7 +52,8 @@ inline int orient2d(const double* a, const double* b, const double* c) {
   if (permanent > 1e-250 && permanent < 1e300 && std::fabs(det) > 8 * unit_roundoff * permanent)
     return sign_of(det);
   const Dyadic ax(a[0]), ay(a[1]);
-  return ((Dyadic(b[0]) - ax) * (Dyadic(c[1]) - ay) - (Dyadic(b[1]) - ay) * (Dyadic(c[0]) - ax)).sign();
+  return ((Dyadic(b[0]) - ax) * (Dyadic(c[1]) - ay) - (Dyadic(b[1]) - ay) * (Dyadic(c[0]) - ax))
+      .sign();
 }
 
 }  // namespace tauguard::geometry

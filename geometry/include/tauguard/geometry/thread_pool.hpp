@@ -1,6 +1,6 @@
-// A small persistent thread pool. Work is cut into chunks whose bounds depend on the problem alone, never
-// on the number of threads: a kernel that writes into slots indexed by item or by chunk gives the same
-// bits for any thread count.
+// A small persistent thread pool. Work is cut into chunks whose bounds depend on the problem alone,
+// never on the number of threads: a kernel that writes into slots indexed by item or by chunk gives
+// the same bits for any thread count.
 #pragma once
 
 #include <algorithm>
@@ -29,8 +29,8 @@ class ThreadPool {
   static int hardware() { return std::max(1u, std::thread::hardware_concurrency()); }
 
   // Calls body(begin, end, chunk) for consecutive chunks of `grain` items covering [0, n), on up to
-  // `threads` threads (the caller is one of them; 0 means all processors). Rounding is to nearest in
-  // every thread. The first exception thrown is rethrown here after all chunks have stopped.
+  // `threads` threads (the caller is one of them; 0 means all processors). Rounding is to nearest
+  // in every thread. The first exception thrown is rethrown here after all chunks have stopped.
   void parallel_for(std::size_t n, int threads, std::size_t grain,
                     const std::function<void(std::size_t, std::size_t, std::size_t)>& body) {
     if (n == 0) return;
@@ -51,7 +51,8 @@ class ThreadPool {
     job_.error = nullptr;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      while (workers_.size() + 1 < wanted) workers_.emplace_back([this, i = workers_.size()] { serve(i); });
+      while (workers_.size() + 1 < wanted)
+        workers_.emplace_back([this, i = workers_.size()] { serve(i); });
       helpers_ = wanted - 1;
       busy_ = helpers_;
       ++generation_;
@@ -87,7 +88,7 @@ class ThreadPool {
       const std::size_t c = job_.next.fetch_add(1);
       if (c >= job_.chunks) return;
       try {
-        (*job_.body)(c * job_.grain, std::min(job_.n, (c + 1) * job_.grain), c);
+        (*job_.body)(c* job_.grain, std::min(job_.n, (c + 1) * job_.grain), c);
       } catch (...) {
         const std::lock_guard<std::mutex> lock(job_.error_mutex);
         if (!job_.error) job_.error = std::current_exception();

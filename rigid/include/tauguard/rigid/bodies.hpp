@@ -17,8 +17,9 @@ enum class Kind : int { tetrahedra = 0, boxes = 1, parallelepipeds = 2, hulls = 
 // Bodies of any number of vertices.
 inline bool is_cloud(Kind kind) { return kind == Kind::hulls || kind == Kind::polygons; }
 
-// One body a row: tetrahedra 12 doubles (vertices), boxes 15 (centre, half extents, rotation by rows),
-// parallelepipeds 12 (origin, edges); hulls and polygons share one vertex array cut by offsets.
+// One body a row: tetrahedra 12 doubles (vertices), boxes 15 (centre, half extents, rotation by
+// rows), parallelepipeds 12 (origin, edges); hulls and polygons share one vertex array cut by
+// offsets.
 struct Bodies {
   Kind kind;
   const double* data;
@@ -30,7 +31,8 @@ struct Bodies {
   std::size_t index(std::size_t row) const { return count == 1 ? 0 : row; }
   const double* row(std::size_t r) const {
     const std::size_t i = index(r);
-    return data + strides[static_cast<int>(kind)] * (is_cloud(kind) ? static_cast<std::size_t>(offsets[i]) : i);
+    return data + strides[static_cast<int>(kind)] *
+                      (is_cloud(kind) ? static_cast<std::size_t>(offsets[i]) : i);
   }
   std::size_t vertex_count(std::size_t r) const {
     if (kind == Kind::tetrahedra) return 4;
@@ -49,7 +51,8 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
   const double* p = bodies.row(r);
   Points<Number> out(bodies.vertex_count(r));
   if (bodies.kind == Kind::polygons) {  // in the plane z = 0
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] = {Number(p[2 * i]), Number(p[2 * i + 1]), Number(0.0)};
+    for (std::size_t i = 0; i < out.size(); ++i)
+      out[i] = {Number(p[2 * i]), Number(p[2 * i + 1]), Number(0.0)};
     return out;
   }
   if (bodies.kind == Kind::tetrahedra || bodies.kind == Kind::hulls) {
@@ -62,7 +65,8 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
     const Number origin(p[k]);
     Number g[3];
     for (int axis = 0; axis < 3; ++axis)
-      g[axis] = box ? Number(p[6 + 3 * k + axis]) * Number(p[3 + axis]) : Number(p[3 + 3 * axis + k]);
+      g[axis] =
+          box ? Number(p[6 + 3 * k + axis]) * Number(p[3 + axis]) : Number(p[3 + 3 * axis + k]);
     for (int corner = 0; corner < 8; ++corner) {
       Number x = origin;
       for (int axis = 0; axis < 3; ++axis) {
@@ -77,9 +81,9 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
   return out;
 }
 
-// A centrally symmetric body as the kernels use it: twice the centre is kept apart from the origin so
-// that a far origin costs no accuracy. centre = origin + shift, set = centre + sum u_k g_k, |u_k| <= 1.
-// Relative errors: g and each entry of shift at most 3 u of the edges they come from.
+// A centrally symmetric body as the kernels use it: twice the centre is kept apart from the origin
+// so that a far origin costs no accuracy. centre = origin + shift, set = centre + sum u_k g_k,
+// |u_k| <= 1. Relative errors: g and each entry of shift at most 3 u of the edges they come from.
 struct Zonotope {
   double origin[3], shift[3], g[3][3];
 };

@@ -1,6 +1,7 @@
 // A convex body under constant linear and angular velocity, in closed form: a vertex is
 //   x(t) = fixed + t linear + cos(speed t) swing + sin(speed t) side,
-// with `fixed` the part along the rotation axis and `swing`, `side` across it. No integration, no drift.
+// with `fixed` the part along the rotation axis and `swing`, `side` across it. No integration, no
+// drift.
 #pragma once
 
 #include <array>
@@ -45,14 +46,16 @@ struct RigidMotion {
 // A vector that turns with a body.
 struct Swing {
   Vec along, swing, side;
-  Swing(const RigidMotion& m, const Vec& w) : along(dot(m.axis, w) * m.axis), swing(w - along), side(cross(m.axis, w)) {}
+  Swing(const RigidMotion& m, const Vec& w)
+      : along(dot(m.axis, w) * m.axis), swing(w - along), side(cross(m.axis, w)) {}
   Vec at(double c, double s) const { return along + (c * swing + s * side); }
 };
 
 class MovingBody {
  public:
   // `origin` is subtracted from every position: the caller picks one near both bodies.
-  MovingBody(const RigidMotion& motion, const Vec& origin) : motion_(motion), shift_(motion.x0 - origin) {}
+  MovingBody(const RigidMotion& motion, const Vec& origin)
+      : motion_(motion), shift_(motion.x0 - origin) {}
 
   void add_vertex(const Vec& y) {
     const Vec w = motion_.turn(y);
@@ -78,10 +81,12 @@ class MovingBody {
     for (const Swing& e : edges_) edge.push_back(e.at(c, s));
   }
 
-  // Bound on |n . x''| over all vertices and times, for every n within `drift` of the given unit one.
+  // Bound on |n . x''| over all vertices and times, for every n within `drift` of the given unit
+  // one.
   double acceleration(const Vec& n, double drift) const {
     const Vec across = n - dot(n, motion_.axis) * motion_.axis;
-    return motion_.speed * motion_.speed * sweep_ * (norm(across) + drift + 0x1p-40) * (1 + 0x1p-40);
+    return motion_.speed * motion_.speed * sweep_ * (norm(across) + drift + 0x1p-40) *
+           (1 + 0x1p-40);
   }
   // Bound on the speed of any vertex about the centre.
   double turning_speed() const { return motion_.speed * sweep_ * (1 + 0x1p-40); }
@@ -94,7 +99,7 @@ class MovingBody {
   const Vec& linear() const { return motion_.linear; }
 
   std::vector<Vec> now, velocity, normal, edge;
-  Vec centre{};  // of the rotation
+  Vec centre{};          // of the rotation
   bool complete = true;  // normals and crossed edges hold a separating axis of any disjoint pair
 
  private:
@@ -111,7 +116,8 @@ class MovingBody {
 };
 
 // Row `r` of a batch, placed by `motion`.
-MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& motion, const Vec& origin);
+MovingBody moving_body(const Bodies& bodies, std::size_t r, const RigidMotion& motion,
+                       const Vec& origin);
 MovingBody moving_triangle(const double v[3][3], const RigidMotion& motion, const Vec& origin);
 
 }  // namespace tauguard::rigid
