@@ -17,8 +17,8 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tauguard.detectors.conformal import EpisodeLevels
     from tauguard.detectors.detector import Detector
+    from tauguard.detectors.thresholds.conformal import EpisodeLevels
     from tauguard.envs import Episode
     from tauguard.models import Mismatch
 
@@ -71,7 +71,7 @@ def episodes(seed: int, count: int, seconds: float, arm: Mismatch) -> Iterator[E
 def levels_of(job: tuple[Sequence[Detector], Episode]) -> list[EpisodeLevels]:
     """The levels of every detector on one episode; its trace is not kept."""
     from tauguard.detectors import Thresholded
-    from tauguard.detectors.conformal import EpisodeLevels
+    from tauguard.detectors.thresholds.conformal import EpisodeLevels
     from tauguard.envs import simulate
 
     detectors, episode = job
@@ -115,7 +115,7 @@ def promise_rows(
 
 def _row(name: str, levels: Sequence[EpisodeLevels], asked: float, plan: Plan, seed: int) -> Row:
     from tauguard.detectors import poisson_rate
-    from tauguard.detectors.conformal import calibrate_threshold
+    from tauguard.detectors.thresholds.conformal import calibrate_threshold
 
     rng = np.random.default_rng([seed, 8])
     outcomes = []

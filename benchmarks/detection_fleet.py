@@ -12,8 +12,8 @@ from tauguard.benchmarks.detection_thresholds import Pieces, free_pieces
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.zoo.front_end import FrontEnd, shared_front_ends
-from tauguard.detectors.zoo.table import make_detector
+from tauguard.detectors.features.front_end import FrontEnd, shared_front_ends
+from tauguard.detectors.registry import make_detector
 from tauguard.envs import simulate
 from tauguard.models import SceneSpec, compose, cura6_drive, pin_model
 from tauguard.traces import Trace

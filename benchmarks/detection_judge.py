@@ -13,7 +13,7 @@ from tauguard.benchmarks.detection_pool import Struck
 from tauguard.benchmarks.detection_thresholds import Fleet
 from tauguard.datasets.plans import BEGIN
 from tauguard.detectors import find_alarms, match
-from tauguard.detectors.events import detection_window
+from tauguard.detectors.evaluation.events import detection_window
 from tauguard.traces import Collision, Trace
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tauguard.detectors import CollisionDetector
-    from tauguard.detectors.svr import SrqSVR
+    from tauguard.detectors.methods.svr_regressor import SrqSVR
     from tauguard.traces import Trace
 
 Array = NDArray[np.float64]

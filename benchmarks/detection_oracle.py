@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.benchmarks.detection_thresholds import Watched
-from tauguard.detectors.estimator import ArmModel
+from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.traces import Trace
 
 Array = NDArray[np.float64]

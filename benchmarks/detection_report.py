@@ -12,7 +12,7 @@ from tauguard.benchmarks.detection_judge import Outcome, Tallies, Tally
 from tauguard.benchmarks.detection_oracle import LEVELS, ORACLE, at_level
 from tauguard.benchmarks.detection_thresholds import AMPERES, HOURLY, POINTS, Fleet
 from tauguard.benchmarks.report import Row
-from tauguard.detectors.metrics import HEADLINE, poisson_rate, wilson
+from tauguard.detectors.evaluation.metrics import HEADLINE, poisson_rate, wilson
 from tauguard.traces import stratum
 
 #: The dissertation's confusion matrices (TP, FN, FP, TN; 65 collisions) by speed [%]:

@@ -1,7 +1,7 @@
 """Thresholds of one arm's detectors, from that arm's collision-free calibration motion.
 
-First every score is levelled (see :mod:`tauguard.detectors.levelling`), so that one threshold of a
-detector serves all speeds of its arm; then it is chosen at each operating point.
+First every score is levelled (see :mod:`tauguard.detectors.thresholds.speed_levels`), so that
+one threshold of a detector serves all speeds of its arm; then it is chosen at each operating point.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from tauguard.datasets.plans import BEGIN
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.events import CASE_SECONDS, MERGE_GAP
-from tauguard.detectors.filter import CONFIRMATION, confirmation_samples
-from tauguard.detectors.levelling import SpeedLevels, recent_speed
-from tauguard.detectors.operating_point import block_maxima, sustained, tail_level
+from tauguard.detectors.evaluation.events import CASE_SECONDS, MERGE_GAP
+from tauguard.detectors.thresholds.confirmation import CONFIRMATION, confirmation_samples
+from tauguard.detectors.thresholds.rates import block_maxima, sustained, tail_level
+from tauguard.detectors.thresholds.speed_levels import SpeedLevels, recent_speed
 from tauguard.traces import Trace
 
 Array = NDArray[np.float64]

@@ -32,8 +32,8 @@ from tauguard.benchmarks.detection_thresholds import (
 from tauguard.benchmarks.report import Row
 from tauguard.detectors import CollisionDetector, DetectorSettings
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.zoo.srq_svr import SvrDetector
-from tauguard.detectors.zoo.table import make_detector
+from tauguard.detectors.methods.srq_svr import SvrDetector
+from tauguard.detectors.registry import make_detector
 from tauguard.envs import PayloadPick, simulate
 from tauguard.traces import Trace
 

@@ -1,7 +1,7 @@
 """After the alarm: which link, which force, where, and what kind of event, against the truth.
 
 Four ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
-hypothesis (tauguard.detectors.after_alarm.diagnosis). ``exposed``: the same, told that nothing
+hypothesis (tauguard.detectors.diagnosis.diagnosis). ``exposed``: the same, told that nothing
 reaches link 1, the shoulder on its base. ``usual``: the link of the last joint with a significant
 residual, and the damped least-squares force at the middle of that link. ``told``: as ``surface``,
 but with the true external torque instead of the observer's estimate: what is wrong then is not the
@@ -27,12 +27,12 @@ from tauguard.benchmarks.diagnosis_pool import (
 )
 from tauguard.benchmarks.report import Row, measure, rate
 from tauguard.detectors import Diagnoser, Diagnosis, Thresholded, make_detector
-from tauguard.detectors.after_alarm.aftermath import Aftermath, AftermathOf
-from tauguard.detectors.after_alarm.classification import KINDS
-from tauguard.detectors.after_alarm.contact_force import link_poses, point_jacobians
-from tauguard.detectors.after_alarm.diagnosis import believed
-from tauguard.detectors.after_alarm.diagnosis_metrics import ContactErrors, contact_at
-from tauguard.detectors.operating_point import threshold_for_rate
+from tauguard.detectors.diagnosis.aftermath import Aftermath, AftermathOf
+from tauguard.detectors.diagnosis.classification import KINDS
+from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
+from tauguard.detectors.diagnosis.diagnosis import believed
+from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors, contact_at
+from tauguard.detectors.thresholds.rates import threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.models import LinkSurface, cura6, link_surface
 from tauguard.traces import STRATA, Collision, stratum

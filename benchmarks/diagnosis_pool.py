@@ -10,8 +10,8 @@ import numpy as np
 from tauguard.benchmarks.detection_pool import FORCES, PAYLOADS, Conditions, struck_pool
 from tauguard.datasets.plans import BEGIN, collision_plans, episode_seconds
 from tauguard.detectors import Thresholded
-from tauguard.detectors.after_alarm.aftermath import AFTER
-from tauguard.detectors.events import detection_window
+from tauguard.detectors.diagnosis.aftermath import AFTER
+from tauguard.detectors.evaluation.events import detection_window
 from tauguard.envs import Episode, PayloadPick, simulate
 from tauguard.traces import STRATA, Alarm, Collision, Trace
 
@@ -31,7 +31,7 @@ class Event:
 
     arm: int  #: mismatch seed
     speed: float  #: percent
-    kind: str  #: of :data:`~tauguard.detectors.after_alarm.classification.KINDS`
+    kind: str  #: of :data:`~tauguard.detectors.diagnosis.classification.KINDS`
     trace: Trace
     alarm: Alarm | None
     collision: Collision | None  #: None for a payload change

@@ -48,12 +48,12 @@ from tauguard.benchmarks.report import Row
 from tauguard.datasets import read_log
 from tauguard.datasets.drives import UR10E
 from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers, Unknowns, poisson_rate
-from tauguard.detectors.real_arm.assessment import left_out, residual_rms
-from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
-from tauguard.detectors.real_arm.identification import identify
-from tauguard.detectors.real_arm.recording import Load, Recording
-from tauguard.detectors.real_arm.semi_real import moments, smallest_found
-from tauguard.detectors.real_arm.watch import watch
+from tauguard.detectors.calibration.assessment import left_out, residual_rms
+from tauguard.detectors.calibration.identification import identify
+from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.detectors.evaluation.semi_real import moments, smallest_found
+from tauguard.detectors.methods.free_motion import FreeMotionDetector
+from tauguard.detectors.thresholds.quiet_start import watch
 from tauguard.models import pin_model
 from tauguard.traces import Trace
 
@@ -263,8 +263,8 @@ def _alarm_row(
 
 def _held(detector: FreeMotionDetector, trace: Trace) -> float:
     """The highest score that lasts as long as an alarm needs; 1 is the threshold."""
-    from tauguard.detectors.filter import confirmation_samples
-    from tauguard.detectors.operating_point import sustained
+    from tauguard.detectors.thresholds.confirmation import confirmation_samples
+    from tauguard.detectors.thresholds.rates import sustained
 
     samples = confirmation_samples(detector.settings.confirmation, detector.dt)
     score = sustained(detector.scores(trace), samples)

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from tauguard.benchmarks.report import Row, rate
 from tauguard.detectors import RobotNumbers
-from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
-from tauguard.detectors.real_arm.semi_real import Push, add_torque, moments, push_torque
+from tauguard.detectors.evaluation.semi_real import Push, add_torque, moments, push_torque
+from tauguard.detectors.methods.free_motion import FreeMotionDetector
 from tauguard.traces import Trace
 
 Alarms = Callable[[Trace], NDArray[np.bool_]]

@@ -1,21 +1,11 @@
 """Momentum observer, features, collision detectors, event matching and metrics."""
 
-from tauguard.detectors.after_alarm.diagnosis import Diagnoser, Diagnosis, diagnose
-from tauguard.detectors.after_alarm.diagnosis_metrics import diagnosis_figures, judge_diagnoses
-from tauguard.detectors.calibrate import Calibration, Priors, calibrate
-from tauguard.detectors.conformal import (
-    EpisodeLevels,
-    Promise,
-    calibrate_threshold,
-    promised,
-)
+from tauguard.detectors.calibration.calibrate import Calibration, Priors, calibrate
 from tauguard.detectors.detector import Detector
-from tauguard.detectors.estimator import ArmModel, Estimate, Estimator, Unknowns
-from tauguard.detectors.events import Matching, find_alarms, judge, match
-from tauguard.detectors.filter import Confirmation, confirmed
-from tauguard.detectors.friction import FrictionModel
-from tauguard.detectors.metrics import figures, poisson_rate, wilson
-from tauguard.detectors.numbers import (
+from tauguard.detectors.diagnosis.diagnosis import Diagnoser, Diagnosis, diagnose
+from tauguard.detectors.diagnosis.diagnosis_metrics import diagnosis_figures, judge_diagnoses
+from tauguard.detectors.dynamics.friction import FrictionModel
+from tauguard.detectors.dynamics.robot import (
     RobotNumbers,
     gravity_torque,
     inverse_dynamics,
@@ -23,13 +13,23 @@ from tauguard.detectors.numbers import (
     momentum_regressor,
     momentum_terms,
 )
-from tauguard.detectors.observer import MomentumObserver, observe
-from tauguard.detectors.pipeline import CollisionDetector, DetectorSettings
-from tauguard.detectors.svr import SrqSVR, srq_kernel
-from tauguard.detectors.thresholded import Thresholded
-from tauguard.detectors.thresholds import QuietDetector, QuietThresholds
-from tauguard.detectors.zoo.file import load_model, save_model
-from tauguard.detectors.zoo.table import DETECTORS, make_detector
+from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
+from tauguard.detectors.estimation.observer import MomentumObserver, observe
+from tauguard.detectors.evaluation.events import Matching, find_alarms, judge, match
+from tauguard.detectors.evaluation.metrics import figures, poisson_rate, wilson
+from tauguard.detectors.methods.pipeline import CollisionDetector, DetectorSettings
+from tauguard.detectors.methods.svr_regressor import SrqSVR, srq_kernel
+from tauguard.detectors.ranking_file import load_model, save_model
+from tauguard.detectors.registry import DETECTORS, make_detector
+from tauguard.detectors.thresholds.confirmation import Confirmation, confirmed
+from tauguard.detectors.thresholds.conformal import (
+    EpisodeLevels,
+    Promise,
+    calibrate_threshold,
+    promised,
+)
+from tauguard.detectors.thresholds.quiet import QuietDetector, QuietThresholds
+from tauguard.detectors.thresholds.thresholded import Thresholded
 
 __all__ = [
     "DETECTORS",

@@ -1,9 +1,10 @@
 """The interface that every collision detector shares: fit on traces, then one score a sample.
 
 A detector ranks; what counts as an alarm is decided outside of it, the same way for all: a
-threshold on the score and the confirmation filter (:class:`~tauguard.detectors.thresholded.\
-Thresholded`), and the threshold from a rate (:mod:`~tauguard.detectors.operating_point`) or by
-calibration on episodes (:mod:`~tauguard.detectors.conformal`).
+threshold on the score and the confirmation filter
+(:class:`~tauguard.detectors.thresholds.thresholded.Thresholded`), and the threshold from a rate
+(:mod:`~tauguard.detectors.thresholds.rates`) or by calibration on episodes
+(:mod:`~tauguard.detectors.thresholds.conformal`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.estimator import ArmModel
+from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]

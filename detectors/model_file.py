@@ -13,13 +13,13 @@ import numpy as np
 import skops.io
 from sklearn.svm import SVR
 
-from tauguard.detectors.features import Envelope, Features, WindowShape
+from tauguard.detectors.features.windows import Envelope, Features, WindowShape
+from tauguard.detectors.methods.pipeline import CollisionDetector, DetectorSettings
+from tauguard.detectors.methods.svr_regressor import SrqSVR
 from tauguard.detectors.model_parts import arm_from_parts, arm_parts, plain
-from tauguard.detectors.pipeline import CollisionDetector, DetectorSettings
-from tauguard.detectors.svr import SrqSVR
 
 FORMAT = "tauguard detector 1"
-#: Of :mod:`tauguard.detectors.zoo.file`: any other detector, with its threshold.
+#: Of :mod:`tauguard.detectors.ranking_file`: any other detector, with its threshold.
 RANKING = "tauguard ranking detector 2"
 #: What another kind of detector is told where samples come one at a time.
 _WHOLE = (
@@ -120,7 +120,7 @@ def load_detector(path: str | os.PathLike[str]) -> CollisionDetector:
         ValueError: missing, truncated or of another kind (the message says which would do), or
             holding types that a detector does not need (nothing of them is built).
     """
-    from tauguard.detectors.real_arm.free_motion_file import is_free_motion
+    from tauguard.detectors.methods.free_motion_file import is_free_motion
 
     if is_free_motion(path):
         raise ValueError(f"{path}: a real arm's detector (train --free), {_WHOLE}")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from tauguard.detectors.estimator import ArmModel
-from tauguard.detectors.friction import FrictionModel
-from tauguard.detectors.numbers import RobotNumbers
-from tauguard.detectors.velocity import SensorNoise
+from tauguard.detectors.dynamics.friction import FrictionModel
+from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.estimation.velocity import SensorNoise
 
 
 def plain(value: object) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from tauguard.benchmarks.detection_pool import (
 )
 from tauguard.benchmarks.detection_thresholds import POINTS, Peaks, Pieces, Watched, watched
 from tauguard.benchmarks.detection_variations import every
-from tauguard.detectors.events import find_alarms
+from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.envs import simulate
 from tauguard.traces import STRATA, Collision, Trace
 

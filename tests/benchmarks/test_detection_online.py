@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tauguard.benchmarks.detection_online import allocated, kernel_rows, peer, spread, timed
-from tauguard.detectors.svr import SrqSVR, srq_kernel
+from tauguard.detectors.methods.svr_regressor import SrqSVR, srq_kernel
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from tauguard.benchmarks import report
 from tauguard.benchmarks.detection_report import DISSERTATION
 from tauguard.benchmarks.detection_table import headline, shown
-from tauguard.detectors.metrics import wilson
+from tauguard.detectors.evaluation.metrics import wilson
 
 
 def cell(name: str, speed: float, point: float, hits: int, quiet: int) -> dict[str, object]:

@@ -8,8 +8,8 @@ from tauguard.benchmarks.detection_fleet import Training
 from tauguard.benchmarks.diagnosis import Judged
 from tauguard.benchmarks.diagnosis_pool import contact_kind, first_alarm
 from tauguard.detectors import Diagnosis
-from tauguard.detectors.after_alarm.classification import Signs
-from tauguard.detectors.after_alarm.diagnosis_metrics import ContactErrors
+from tauguard.detectors.diagnosis.classification import Signs
+from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors
 from tauguard.traces import Alarm, Collision, Trace, Truth
 
 T = np.arange(0, 2, 1e-3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tauguard.benchmarks import real_arm
-from tauguard.detectors.real_arm.recording import Load, Recording
+from tauguard.detectors.calibration.recording import Load, Recording
 
 
 def test_says_so_where_there_are_no_logs(tmp_path, monkeypatch):

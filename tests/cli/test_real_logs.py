@@ -7,8 +7,8 @@ import pytest
 
 from tauguard.cli import main, real_logs
 from tauguard.cli.train import never_moved
-from tauguard.detectors.real_arm.arm_file import load_arm
-from tauguard.detectors.real_arm.recording import Load
+from tauguard.detectors.calibration.arm_file import load_arm
+from tauguard.detectors.calibration.recording import Load
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 
 COLUMNS = {"t": 0, "q": [1, 2, 3], "qd": [4, 5, 6], "current": [7, 8, 9]}

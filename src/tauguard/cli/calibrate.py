@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 if TYPE_CHECKING:
-    from tauguard.detectors.real_arm.identification import Identified
+    from tauguard.detectors.calibration.identification import Identified
 
 SOURCES = {
     "gains": "the gains that were given",
@@ -49,9 +49,9 @@ def command(
     """
     from tauguard.benchmarks.report import write_json
     from tauguard.cli.real_logs import doubts, loaded, read_logs, robot_numbers, start
-    from tauguard.detectors.real_arm.arm_file import save_arm
-    from tauguard.detectors.real_arm.assessment import left_out
-    from tauguard.detectors.real_arm.identification import identify
+    from tauguard.detectors.calibration.arm_file import save_arm
+    from tauguard.detectors.calibration.assessment import left_out
+    from tauguard.detectors.calibration.identification import identify
 
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tauguard.detectors import Diagnosis
-    from tauguard.detectors.real_arm.watch import Watch
+    from tauguard.detectors.thresholds.quiet_start import Watch
     from tauguard.traces import Trace
 
 
@@ -107,8 +107,8 @@ def command(
 def watched(model: Path, trace: Trace) -> tuple[Any, Watch]:
     """The detector of a model file, of any kind that ``tauguard train`` writes, and what it saw."""
     from tauguard.detectors import load_model
-    from tauguard.detectors.real_arm.free_motion_file import is_free_motion, load_free_motion
-    from tauguard.detectors.real_arm.watch import watch_free, watch_with
+    from tauguard.detectors.methods.free_motion_file import is_free_motion, load_free_motion
+    from tauguard.detectors.thresholds.quiet_start import watch_free, watch_with
 
     if is_free_motion(model):
         free = load_free_motion(model)
@@ -122,8 +122,8 @@ def plainly(
 ) -> tuple[Trace, Watch, tuple[str, ...]]:
     """The log, what a detector that nobody trained saw in it, and where its numbers come from."""
     from tauguard.cli.real_logs import read_matched, robot_numbers, watched_arm
-    from tauguard.detectors.real_arm.plausible import drive_torque
-    from tauguard.detectors.real_arm.watch import watch
+    from tauguard.detectors.calibration.plausible import drive_torque
+    from tauguard.detectors.thresholds.quiet_start import watch
 
     trace = read_matched(log, columns, robot_numbers(robot))
     arm, source = watched_arm(robot, columns, plain.gains, plain.viscous, plain.coulomb)
@@ -164,7 +164,7 @@ def summary(
     import numpy as np
 
     from tauguard.detectors import poisson_rate
-    from tauguard.detectors.real_arm.watch import loudest_joint
+    from tauguard.detectors.thresholds.quiet_start import loudest_joint
 
     watched = float(trace.t[-1] - found.quiet_until)
     events: list[dict[str, Any]] = []

@@ -29,7 +29,7 @@ def command(
     from tauguard.cli.folder import labelled
     from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.detectors import figures, judge, load_model
-    from tauguard.detectors.real_arm.free_motion_file import is_free_motion
+    from tauguard.detectors.methods.free_motion_file import is_free_motion
 
     if is_free_motion(model):
         raise ValueError(f"{model}: a real arm's detector (train --free); use `tauguard detect`")

@@ -33,7 +33,7 @@ def fitted(name: str, traces: Sequence[Trace], false_alarms_per_hour: float) -> 
         ValueError: as :func:`trained`.
     """
     from tauguard.detectors import Thresholded, make_detector
-    from tauguard.detectors.zoo.srq_svr import SvrDetector
+    from tauguard.detectors.methods.srq_svr import SvrDetector
 
     if name == "srq-svr":
         chain = trained(traces, false_alarms_per_hour)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tauguard.datasets import ColumnMap
     from tauguard.detectors import ArmModel, RobotNumbers
-    from tauguard.detectors.real_arm.recording import Load, Recording
+    from tauguard.detectors.calibration.recording import Load, Recording
     from tauguard.traces import Trace
 
 
@@ -145,7 +145,7 @@ def loaded(traces: dict[str, Trace], payload: tuple[str, ...]) -> list[Recording
     Raises:
         ValueError: a payload that cannot be read or belongs to no log.
     """
-    from tauguard.detectors.real_arm.recording import Load, Recording
+    from tauguard.detectors.calibration.recording import Load, Recording
 
     loads: dict[str, Load | None] = {}
     for text in payload:
@@ -164,7 +164,7 @@ def _log_named(name: str, text: str, logs: list[str]) -> str:
 
 
 def _load(text: str, value: str) -> Load | None:
-    from tauguard.detectors.real_arm.recording import Load
+    from tauguard.detectors.calibration.recording import Load
 
     if value == "unknown":
         return None
@@ -197,13 +197,13 @@ def doubts(
     Raises:
         ValueError: so much is left that the logs cannot be the arm's as told.
     """
-    from tauguard.detectors.real_arm.assessment import (
+    from tauguard.detectors.calibration.assessment import (
         OUTLYING,
         OUTLYING_IN_DOUBT,
         explained,
         outlier,
     )
-    from tauguard.detectors.real_arm.recording import Load
+    from tauguard.detectors.calibration.recording import Load
 
     bare = [k for k, r in enumerate(recordings) if r.load == Load()]
     names, refused = list(traces), ""
@@ -250,7 +250,7 @@ def start(
 
     from tauguard.datasets.drives import DRIVES
     from tauguard.detectors import ArmModel
-    from tauguard.detectors.real_arm.assessment import start_gains
+    from tauguard.detectors.calibration.assessment import start_gains
 
     preset = DRIVES.get(columns or "")
     known = any(r.load is not None and r.load.mass > 0 for r in recordings)
@@ -284,7 +284,7 @@ def watched_arm(
 
     from tauguard.datasets.drives import DRIVES, REVERSAL, DriveNumbers
     from tauguard.detectors import ArmModel, FrictionModel
-    from tauguard.detectors.real_arm.arm_file import load_arm
+    from tauguard.detectors.calibration.arm_file import load_arm
 
     calibrated = load_arm(robot)
     if calibrated is not None:

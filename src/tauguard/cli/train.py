@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tauguard.detectors.real_arm.free_motion import FreeMotionDetector
+    from tauguard.detectors.methods.free_motion import FreeMotionDetector
     from tauguard.traces import Trace
 
 
@@ -110,8 +110,8 @@ def labelled_motion(
     from tauguard.cli.fitting import fitted
     from tauguard.cli.folder import labelled
     from tauguard.detectors import DETECTORS, make_detector, promised, save_model
-    from tauguard.detectors.conformal import check_promise
-    from tauguard.detectors.levelling import Levelled
+    from tauguard.detectors.thresholds.conformal import check_promise
+    from tauguard.detectors.thresholds.speed_levels import Levelled
 
     if name not in DETECTORS:
         make_detector(name)  # says which there are
@@ -158,10 +158,10 @@ def free_motion(
 ) -> None:
     """Train on collision-free logs."""
     from tauguard.cli.real_logs import doubts, loaded, read_logs, robot_numbers, start
-    from tauguard.detectors.real_arm.arm_file import load_arm
-    from tauguard.detectors.real_arm.assessment import left_out
-    from tauguard.detectors.real_arm.free_motion import FreeMotionDetector, FreeMotionSettings
-    from tauguard.detectors.real_arm.free_motion_file import save_free_motion
+    from tauguard.detectors.calibration.arm_file import load_arm
+    from tauguard.detectors.calibration.assessment import left_out
+    from tauguard.detectors.methods.free_motion import FreeMotionDetector, FreeMotionSettings
+    from tauguard.detectors.methods.free_motion_file import save_free_motion
 
     numbers = robot_numbers(robot)
     traces = read_logs(free, columns, numbers)
@@ -183,7 +183,7 @@ def free_motion(
 
 def never_moved(traces: list[Trace]) -> list[str]:
     """A note on each joint that all logs show standing still only."""
-    from tauguard.detectors.real_arm.free_motion import resting
+    from tauguard.detectors.methods.free_motion import resting
 
     still = [resting(t.q, t.qd, t.dt).all(axis=0) for t in traces]
     return [
@@ -216,7 +216,7 @@ def blows(detector: FreeMotionDetector, traces: list[Trace]) -> None:
     """The smallest semi-real blow on each joint that is found in 95 % of trials."""
     import numpy as np
 
-    from tauguard.detectors.real_arm.semi_real import moments, smallest_found
+    from tauguard.detectors.evaluation.semi_real import moments, smallest_found
 
     quiet = [t for t in traces if not detector.detect(t).alarms]
     for joint, name in enumerate(detector.arm.robot.joint_names):

@@ -1,1 +1,0 @@
-"""After the alarm: which link, which force, where, and what kind of contact it is."""

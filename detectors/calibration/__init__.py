@@ -1,0 +1,1 @@
+"""An arm model from collision-free motion: simulated arms and real ones."""

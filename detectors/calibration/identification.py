@@ -1,0 +1,270 @@
+"""Identification of a real arm from collision-free logs, and what fixes the scale of its torques.
+
+The residual of the nominal observer is linear in the errors of the inertial numbers and of the
+reflected rotor inertias, in the weights of the friction columns, in the drives' torque per ampere
+and in the payloads. All pass through the detector's own causal filter, so no acceleration is
+needed. The solution is restricted to bodies that can exist
+(:mod:`~tauguard.detectors.calibration.consistent`).
+
+Currents alone tell torques only up to a factor a joint: if every gain, mass and friction shrinks
+together, every current is explained as well. Something from outside has to fix the scale, and
+the regression has to predict currents from torques, not torques from currents, or a small scale
+looks like a good fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.calibration.consistent import solve_consistent
+from tauguard.detectors.calibration.recording import Recording, is_told, known_load, moving_span
+from tauguard.detectors.calibration.regression import Filtered, System, filtered
+from tauguard.detectors.dynamics.friction import FrictionModel
+from tauguard.detectors.dynamics.robot import (
+    INERTIAL,
+    RobotNumbers,
+    mass_matrix,
+)
+from tauguard.detectors.estimation.estimator import ArmModel
+
+Array = NDArray[np.float64]
+
+#: Columns that a real geared joint needs: presliding of several lengths, Stribeck, viscous friction
+#: that flattens at speed, load-dependent friction, and a torque per ampere that changes with the
+#: current.
+REAL_FRICTION = FrictionModel(
+    bristles=(),
+    stops=(1e-3, 3e-3, 1e-2, 3e-2),
+    stribeck=(0.02, 0.05),
+    slopes=(0.01, 0.05, 0.1, 0.3, 1.0),
+    loaded=(0.02, 0.1, 0.3),
+    saturation=True,
+    modelled=True,
+)
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """Standard deviations of what is identified around what is believed."""
+
+    mass: float = 0.1  #: relative
+    centre: float = 0.02  #: of the centre of mass, each axis [m]
+    inertia: float = 0.1  #: relative to the link's largest entry
+    armature: float = 1.0
+    """Relative to the joint's largest entry of the mass matrix, or to a twentieth of the arm's
+    largest: the rotor of a wrist weighs more, through its gear, than all that it turns."""
+    gain: float = 0.5  #: relative, where gains are identified
+    friction: float = 0.3
+    """Of a friction weight, per median torque of the joint in the log that asks most of it, but for
+    the following: columns that are alike at the logged speeds share what they explain, and do not
+    cancel each other beyond."""
+    loaded: float = 0.3  #: of friction per load [1]
+    saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
+    payload: float = 5.0  #: of a load that was not told [kg]
+    moment: float = 0.5  #: of its first moment [kg m]
+    spread: float = 0.2  #: of its inertia about the last link's origin [kg m^2]
+    softness: float = 5.0  #: a sample counts 1/softness^2: model errors are not white
+    evenness: float = 0.15  #: a joint's level of error is at least this share of the largest
+    rest: float = 0.5  #: a joint that has stood still for longer counts no more [s]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """An identified arm and how it was found."""
+
+    arm: ArmModel
+    loads: Array
+    """Inertial numbers of what each recording carried, in the last link's frame: mass [kg], first
+    moment [kg m], inertia [kg m^2], shape (recordings, 10)."""
+    rms: Array  #: of the residual on the recordings used [N m], shape (n,)
+    scale: str  #: "gains", "payload" or "masses": what fixed the scale of the torques
+    gain_error: Array  #: relative standard deviation of each gain, 0 where it was given, (n,)
+    notes: tuple[str, ...]  #: what a reader should know
+
+
+def _deviations(
+    system: System,
+    robot: RobotNumbers,
+    recordings: Sequence[Recording],
+    beliefs: Beliefs,
+    gain: Array,
+    free_masses: bool,
+    friction: Array,
+) -> tuple[Array, Array]:
+    """Standard deviations and means of all unknowns."""
+    spread = 4.0 if free_masses else 1.0
+    body = []
+    for numbers in robot.inertial:
+        mass, inertia = max(float(numbers[0]), 1e-3), float(np.abs(numbers[4:]).max()) + 1e-3
+        body += [spread * beliefs.mass * mass, *[spread * beliefs.centre * mass] * 3]
+        body += [spread * beliefs.inertia * inertia] * 6
+    poses = np.concatenate([r.trace.q[:: max(1, len(r.trace.q) // 20)] for r in recordings])
+    heaviest = np.diagonal(mass_matrix(robot, poses), axis1=1, axis2=2).max(axis=0)
+    loads, means = [], []
+    for recording in recordings:
+        load, told = recording.load, is_told(recording)
+        loads += [1e-6 if load is not None else beliefs.payload]
+        loads += [1e-6 if told else beliefs.moment] * 3
+        nothing = load is not None and load.mass == 0
+        loads += [1e-6 if nothing else beliefs.spread] * 6
+        means.append(known_load(recording))
+    deviations = np.concatenate(
+        [
+            body,
+            beliefs.armature * np.maximum(heaviest, 0.05 * heaviest.max()),
+            friction.ravel(),
+            np.maximum(gain, 1e-9),
+            loads,
+        ]
+    )
+    return deviations, np.concatenate([np.zeros(system.load), *means])
+
+
+def _friction_beliefs(
+    friction: FrictionModel, beliefs: Beliefs, gain: Array, recordings: Sequence[Recording]
+) -> Array:
+    """Standard deviations of the friction weights, shape (n, columns)."""
+    sizes = [np.abs(r.trace.current * gain) for r in recordings]
+    moving = [size[moving_span(r.trace)] for size, r in zip(sizes, recordings, strict=True)]
+    usual = np.max([np.median(size, axis=0) for size in moving], axis=0)
+    out = np.repeat(np.maximum(beliefs.friction * usual, 1e-6)[:, None], friction.columns, axis=1)
+    out[:, friction.load_columns] = beliefs.loaded
+    if friction.saturation:
+        peaks = np.max([size.max(axis=0) for size in sizes], axis=0)
+        out[:, -1] = beliefs.saturation / np.maximum(peaks, 1e-9)
+    return out
+
+
+def identify(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    *,
+    scale: str = "gains",
+    friction: FrictionModel = REAL_FRICTION,
+    beliefs: Beliefs | None = None,
+    rate: float = 20.0,
+    data: Sequence[Filtered] | None = None,
+) -> Identified:
+    """Identify inertia, friction, and where something fixes their scale the drive gains.
+
+    Args:
+        arm: what is believed; the gains are a start, or hold (``scale="gains"``).
+        recordings: collision-free logs of this arm, at least 20 s of motion in all.
+        scale: what fixes the scale of the torques: "gains" (those of ``arm`` hold), "payload" (a
+            recording with a known load above 0 does) or "masses" (those of ``arm`` do).
+        friction: its columns.
+        beliefs: how far to trust what is believed.
+        rate: of the filter that everything passes through [1/s].
+        data: of each recording, from :func:`filtered` (default: made here); only for "gains".
+
+    Raises:
+        ValueError: another scale, no load to take it from, too little motion, or another arm's log.
+    """
+    beliefs = beliefs or Beliefs()
+    _check(recordings, arm.robot, scale)
+    if scale == "gains":
+        found, _ = _fit(arm, recordings, scale, friction, beliefs, rate, data, 2)
+        return found
+    # A torque per ampere that may change with the current takes up what a load does: it stays out
+    # while the scale is sought.
+    constant = replace(friction, saturation=False, weights=np.empty((0, 0)))
+    sought, error = _fit(arm, recordings, scale, constant, beliefs, rate, None, 6)
+    unsure = error > 0.5 * beliefs.gain
+    start = ArmModel(arm.robot, np.where(unsure, arm.drive_gain, sought.arm.drive_gain))
+    found, _ = _fit(start, recordings, "gains", friction, beliefs, rate, None, 2)
+    notes = tuple(
+        f"{arm.robot.joint_names[j]}: nothing fixes the scale of its torques (gain known to "
+        f"{100 * error[j]:.0f} %); {arm.drive_gain[j]:.2f} N m/A is kept, give it with --gains"
+        for j in np.flatnonzero(unsure)
+    )
+    return replace(found, scale=scale, gain_error=error, notes=notes)
+
+
+def _fit(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    scale: str,
+    friction: FrictionModel,
+    beliefs: Beliefs,
+    rate: float,
+    data: Sequence[Filtered] | None,
+    rounds: int,
+) -> tuple[Identified, Array]:
+    """Rounds of least squares, each weighing joints by what the last left; gains' deviations."""
+    robot, held = arm.robot, scale == "gains"
+    gain, error = arm.drive_gain.copy(), np.zeros(robot.joints)
+    level: Array = np.ones(robot.joints)
+    known = [known_load(recording) for recording in recordings]
+    loads = np.array(known)
+    for turn in range(rounds):
+        if data is None or not held:
+            data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
+        if turn and friction.modelled:  # loads that were not told are known by now
+            data = [
+                d if is_told(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)
+                for d, r, load in zip(data, recordings, loads, strict=True)
+            ]
+        if turn == 0:
+            if sum(len(d.current) for d in data) < 500:
+                raise ValueError("fewer than 10 s of motion in all: give 20 s or more")
+            level = np.array([np.abs(d.current).mean(axis=0) for d in data]).mean(axis=0) / 5
+        system = System(robot, friction.columns, len(recordings))
+        loose = np.full(robot.joints, 0.0 if held else beliefs.gain)
+        weights = _friction_beliefs(friction, beliefs, gain, recordings)
+        deviations, means = _deviations(
+            system, robot, recordings, beliefs, loose, scale != "masses", weights
+        )
+        means[system.gain : system.load] = gain / arm.drive_gain - 1
+        for k, one in enumerate(data):
+            system.add(one, k, 1 / (beliefs.softness * np.maximum(level, 1e-6)), known[k])
+        precision = deviations**-2.0
+        matrix = system.matrix + np.diag(precision)
+        solution = solve_consistent(
+            matrix, system.vector + precision * means, robot.inertial, robot.armature
+        )
+        left = np.concatenate([system.left(d, k, solution, known[k]) for k, d in enumerate(data)])
+        loads = solution[system.load :].reshape(-1, INERTIAL)
+        rms = np.sqrt((left**2).mean(axis=0))
+        level = np.maximum(rms, beliefs.evenness * rms.max())
+        if not held:
+            error = np.sqrt(np.diag(np.linalg.inv(matrix))[system.gain : system.load])
+            gain = gain / np.clip(1 + solution[system.gain : system.load], 0.5, 2.0)
+    return _result(arm, system, solution, gain, rms, friction), error
+
+
+def _check(recordings: Sequence[Recording], robot: RobotNumbers, scale: str) -> None:
+    if scale not in ("gains", "payload", "masses"):
+        raise ValueError(f"scale {scale!r}: expected gains, payload or masses")
+    if not recordings:
+        raise ValueError("no recordings to identify from")
+    if scale == "payload" and not any(r.load and r.load.mass > 0 for r in recordings):
+        raise ValueError("scale payload: no recording has a known load above 0 kg")
+    for recording in recordings:
+        joints = len(recording.trace.joint_names)
+        if joints != robot.joints:
+            raise ValueError(f"a log of {joints} joints, the robot has {robot.joints}")
+
+
+def _result(
+    arm: ArmModel,
+    system: System,
+    solution: Array,
+    gain: Array,
+    rms: Array,
+    friction: FrictionModel,
+) -> Identified:
+    robot, n = arm.robot, system.n
+    found = replace(
+        robot,
+        inertial=robot.inertial - solution[: INERTIAL * n].reshape(n, INERTIAL),
+        armature=robot.armature - solution[INERTIAL * n : system.friction],
+    )
+    weights: Array = solution[system.friction : system.gain].reshape(n, -1)
+    loads: NDArray[Any] = solution[system.load :].reshape(-1, INERTIAL)
+    identified = ArmModel(found, gain, replace(friction, weights=weights), np.maximum(rms, 1e-6))
+    return Identified(identified, loads, rms, "gains", np.zeros(n), ())

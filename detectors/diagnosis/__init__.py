@@ -1,0 +1,1 @@
+"""After an alarm: link, force, and kind of contact."""

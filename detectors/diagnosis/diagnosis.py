@@ -1,0 +1,168 @@
+"""After the alarm: which link, where, which force, and what kind of event it was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.diagnosis.aftermath import AFTER, Aftermath, AftermathOf
+from tauguard.detectors.diagnosis.classification import Signs, signs
+from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
+from tauguard.detectors.diagnosis.isolation import Trust, isolate, last_joint, moments
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.features.windows import Envelope
+from tauguard.models.link_surface import LinkSurface, link_surface
+from tauguard.traces.trace import Alarm, Detection, Trace
+
+Array = NDArray[np.float64]
+
+#: Link and point are found from the samples up to this long after the alarm, and from those this
+#: long before it [s]; longer after it, by so many lags, where the observer is slow.
+ISOLATE, EARLY, ISOLATE_LAGS = 0.1, 0.01, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What is said about one alarm."""
+
+    alarm: Alarm
+    link: int  #: the most likely link, 1-based: link i moves with joint i
+    links: Array  #: probability of each link, shape (n,)
+    last_joint: int  #: what the usual rule says: the last joint with a significant residual
+    time: float  #: of the force [s]: its peak within the look
+    force: Array  #: on the arm at that time, world frame [N], shape (3,)
+    point: Array  #: where, at that time, world frame [m], shape (3,)
+    kind: str  #: the most likely of :data:`~tauguard.detectors.diagnosis.classification.KINDS`
+    kinds: dict[str, float]  #: probability of each kind
+    signs: Signs  #: what the kind was decided by
+
+    @property
+    def collision(self) -> bool:
+        """Whether something touched the arm: a payload change is no collision."""
+        return self.kind != "payload"
+
+    @property
+    def intended(self) -> bool:
+        """Whether somebody meant to push."""
+        return self.kind == "push"
+
+
+class Watcher(Protocol):
+    """A detector with a threshold: a ``CollisionDetector`` or a ``Thresholded``."""
+
+    def detect(self, trace: Trace) -> Detection:
+        """Judge a trace."""
+
+
+def diagnose(
+    detector: Watcher,
+    trace: Trace,
+    detection: Detection | None = None,
+    robot: str | Path | LinkSurface | None = None,
+    after: float = AFTER,
+) -> list[Diagnosis]:
+    """Explain every alarm of a detector on a trace.
+
+    Args:
+        detector: fitted, with a threshold.
+        trace: of its arm.
+        detection: what the detector said about the trace, if it is known already.
+        robot: MJCF or URDF of the arm with its collision shapes, or its sampled surface (default:
+            the ``arm.xml`` that simulated traces carry).
+        after: how long an alarm is looked at [s].
+
+    Returns:
+        A diagnosis for each alarm, in order.
+
+    Raises:
+        ValueError: not fitted, no shapes to look for a contact on, or another arm.
+    """
+    found = detection or detector.detect(trace)
+    if robot is None:
+        if "arm.xml" not in trace.attachments:
+            raise ValueError("the trace has no arm.xml: give the robot's file with its shapes")
+        robot = trace.attachments["arm.xml"]
+    surface = robot if isinstance(robot, LinkSurface) else link_surface(robot)
+    arm, envelope = believed(detector)
+    return Diagnoser(arm, surface, envelope).diagnose(trace, found.alarms, after)
+
+
+def believed(detector: Any) -> tuple[ArmModel, Envelope | None]:
+    """What a detector has learned of its arm, and the envelope of free motion if it has one.
+
+    Raises:
+        ValueError: not fitted.
+    """
+    inner = getattr(detector, "detector", detector)
+    inner = getattr(inner, "chain", inner)
+    arm = inner.arm
+    if arm is None:
+        raise ValueError("this detector is not fitted: call fit or load first")
+    for holder in (getattr(inner, "front", None), getattr(inner, "features", None)):
+        envelope: Envelope | None = getattr(holder, "envelope", None)
+        if envelope is not None:
+            # A detector that doubts a payload counts the joints that carry it less, so that their
+            # envelope is less than what the residual itself does.
+            return arm, envelope.at_least(arm.noise)
+    return arm, None
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnoser:
+    """Explains alarms of one arm."""
+
+    arm: ArmModel
+    surface: LinkSurface
+    envelope: Envelope | None = None  #: of free motion; None: the arm's noise at every speed
+    trust: Trust = field(default_factory=Trust)
+
+    def diagnose(
+        self, trace: Trace, alarms: Iterable[Alarm], after: float = AFTER
+    ) -> list[Diagnosis]:
+        """A diagnosis for each alarm, in order; ``after`` is how long it is looked at [s]."""
+        looked = AftermathOf(self.arm, self.envelope, trace)
+        return [self.explain(alarm, looked.at(alarm.start, after)) for alarm in alarms]
+
+    def explain(self, alarm: Alarm, after: Aftermath) -> Diagnosis:
+        """The diagnosis from the residual around an alarm."""
+        robot, level = self.arm.robot, after.level
+        last = max(ISOLATE, ISOLATE_LAGS * after.lag)
+        first = np.flatnonzero((after.t >= -EARLY) & (after.t <= last))
+        rows = first[moments(level[first])]
+        residual, noise = after.residual[rows], self._noise(after)[rows]
+        belief = isolate(robot, self.surface, after.q[rows], residual, noise)
+        links = belief.links(robot.joints)
+        link, peak = int(links.argmax()), int(level.argmax())
+        at_peak = contact_belief(
+            robot, self.surface, after.q[peak], after.residual[peak], self._noise(after)[peak]
+        )
+        force, point = at_peak.weighted(belief.probability).on(link)
+        kinds = signs(after, force, self._velocity(link, point, after, peak))
+        shares = kinds.probabilities()
+        return Diagnosis(
+            alarm,
+            link + 1,
+            links,
+            last_joint(residual[-1], after.envelope[rows[-1]]),
+            alarm.start + float(after.t[peak]),
+            force,
+            point,
+            max(shares, key=lambda kind: shares[kind]),
+            shares,
+            kinds,
+        )
+
+    def _noise(self, after: Aftermath) -> Array:
+        return self.trust.noise(after.residual, after.envelope)
+
+    def _velocity(self, link: int, point: Array, after: Aftermath, peak: int) -> Array:
+        """Of the touched point with the joint speeds before the alarm [m/s]."""
+        poses = link_poses(self.arm.robot, after.q[peak])
+        jacobian = point_jacobians(self.arm.robot, poses, np.array([link]), point[None])[0]
+        velocity: Array = jacobian @ after.qd[0]
+        return velocity

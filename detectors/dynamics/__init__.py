@@ -1,0 +1,1 @@
+"""The arm as numbers: rigid bodies, friction, drive gains."""

@@ -1,0 +1,165 @@
+"""A nominal friction model: presliding, Coulomb, Stribeck, viscous, load-dependent, ripple.
+
+It is linear in its weights, so that they can be identified by least squares, and rate-independent
+in its presliding part, so that a joint that stands still keeps the friction it came to rest with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.detectors import _observer
+from tauguard.detectors.dynamics.robot import same_rows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionModel:
+    """Friction torque of n joints: per joint a weighted sum of the same columns.
+
+    Columns: 1; qd; a Dahl bristle b for each settling length; a stop operator for each width;
+    b exp(-(qd/w)^2) for each Stribeck velocity; tanh(qd/w) for each slope; |load| b;
+    |load| tanh(qd/w) for each loaded slope; cos(c q) and sin(c q) for each ripple frequency c of
+    the joint; tau |tau| where ``saturation`` says so.
+    """
+
+    bristles: tuple[float, ...] = (1.5e-3, 3e-3)  #: settling lengths [rad]
+    stops: tuple[float, ...] = (1e-3,)  #: widths [rad]
+    stribeck: tuple[float, ...] = (0.02, 0.05)  #: [rad/s]
+    slopes: tuple[float, ...] = (0.05, 0.3)  #: [rad/s]
+    loaded: tuple[float, ...] = ()  #: slopes of load-dependent friction [rad/s]
+    saturation: bool = False  #: the torque per ampere changes with the current
+    modelled: bool = False
+    """The load is what the arm's model says that gravity and speed ask of the joint, not the torque
+    of its drive: where that is mostly friction, friction would be predicted from itself, and the
+    torque of a contact would vanish in it."""
+    cycles: Array = field(default_factory=lambda: np.empty((0, 0)))
+    """Ripple frequencies [1/rad at the joint], shape (n, h); empty: none."""
+    play: float = 5e-6  #: dead zone of the bristles' position, a few quanta of the sensor [rad]
+    weights: Array = field(default_factory=lambda: np.empty((0, 0)))
+    """Shape (n, columns); units follow from the columns' [N m per unit]."""
+
+    def __post_init__(self) -> None:
+        """Check the widths: ``ValueError`` names what is not above 0."""
+        for name in ("bristles", "stops", "stribeck", "slopes", "loaded"):
+            widths = tuple(float(w) for w in getattr(self, name))
+            if not all(np.isfinite(w) and w > 0 for w in widths):
+                raise ValueError(f"FrictionModel.{name}: {widths}, expected widths above 0")
+            object.__setattr__(self, name, widths)
+        if not self.bristles and not self.stops:
+            raise ValueError("FrictionModel: at least one bristle or one stop is needed")
+        weights = np.array(self.weights, dtype=np.float64, ndmin=2)
+        cycles = np.array(self.cycles, dtype=np.float64, ndmin=2)
+        if not (np.isfinite(weights).all() and np.isfinite(cycles).all()):
+            raise ValueError("FrictionModel: weights and cycles must be finite")
+        object.__setattr__(self, "cycles", cycles)
+        if weights.size and weights.shape[1] != self.columns:
+            raise ValueError(
+                f"FrictionModel.weights: {weights.shape[1]} columns, expected {self.columns}"
+            )
+        object.__setattr__(self, "weights", weights)
+
+    @property
+    def columns(self) -> int:
+        """How many weights a joint has."""
+        groups = self.bristles, self.stops, self.stribeck, self.slopes, self.loaded
+        return 3 + sum(map(len, groups)) + 2 * int(self.cycles.shape[1]) + int(self.saturation)
+
+    @property
+    def load_columns(self) -> slice:
+        """Which columns grow with the load."""
+        before = 2 + sum(map(len, (self.bristles, self.stops, self.stribeck, self.slopes)))
+        return slice(before, before + 1 + len(self.loaded))
+
+    def basis(self, joints: int) -> _observer.FrictionBasis:
+        """The native form."""
+        if self.cycles.size and len(self.cycles) != joints:
+            raise ValueError(f"FrictionModel.cycles: {len(self.cycles)} rows for {joints} joints")
+        return _observer.FrictionBasis(
+            list(self.bristles),
+            list(self.stops),
+            list(self.stribeck),
+            list(self.slopes),
+            list(self.loaded),
+            self.saturation,
+            self.modelled,
+            [float(c) for c in self.cycles.ravel()],
+            self.play,
+            joints,
+        )
+
+    def evaluate(
+        self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, load: ArrayLike | None = None
+    ) -> Array:
+        """The columns of every sample.
+
+        Args:
+            q: positions [rad], shape (T, n).
+            qd: velocities [rad/s], shape (T, n).
+            tau: drive torques [N m], shape (T, n).
+            load: torques that load-dependent friction grows with [N m], shape (T, n); default: tau.
+
+        Returns:
+            Shape (T, n, columns).
+        """
+        joints = np.asarray(q).shape[-1]
+        force = tau if load is None else load
+        q, qd, tau, force = same_rows(joints, q=q, qd=qd, tau=tau, load=force)
+        out = np.empty((*q.shape, self.columns))
+        self.basis(joints).evaluate(q, qd, tau, force, out)
+        return out
+
+    def torque(
+        self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, load: ArrayLike | None = None
+    ) -> Array:
+        """Friction torque [N m] of a motion, positive against positive velocity, shape (T, n)."""
+        columns = self.evaluate(q, qd, tau, load)
+        if self.weights.shape != columns.shape[1:]:
+            raise ValueError(
+                f"FrictionModel.weights: shape {self.weights.shape}, "
+                f"expected {columns.shape[1:]}: identify them first"
+            )
+        torque: Array = np.einsum("tjc,jc->tj", columns, self.weights)
+        return torque
+
+    def coulomb(self, speed: float = 0.1) -> Array:
+        """Friction at ``speed`` [rad/s] of joints that carry nothing but it [N m], shape (n,)."""
+        n = len(self.weights)
+        q = np.linspace(0.0, 0.5, 500)[:, None].repeat(n, axis=1)
+        level: Array = np.zeros(n)
+        for _ in range(5):  # load-dependent friction counts the torque that overcomes friction
+            there, back = (
+                self.torque(
+                    sign * q,
+                    np.full_like(q, sign * speed),
+                    sign * level + 0 * q,
+                    0 * q if self.modelled else None,
+                )[-1]
+                for sign in (1.0, -1.0)
+            )
+            level = 0.5 * np.abs(there - back)
+        return level
+
+    @classmethod
+    def coulomb_viscous(
+        cls, coulomb: ArrayLike, viscous: ArrayLike, load: ArrayLike = 0.0, width: float = 0.05
+    ) -> FrictionModel:
+        """From published numbers: Coulomb friction as tanh(qd/width), viscous, load-dependent.
+
+        Args:
+            coulomb: [N m], shape (n,).
+            viscous: [N m s/rad], shape (n,).
+            load: friction per drive torque [1], a number or shape (n,).
+            width: [rad/s].
+        """
+        level = np.asarray(coulomb, dtype=np.float64)
+        model = cls(bristles=(), stops=(2e-3,), stribeck=(), slopes=(width,))
+        weights = np.zeros((len(level), model.columns))
+        weights[:, 1] = viscous
+        weights[:, 3] = level
+        weights[:, 4] = load
+        return cls(bristles=(), stops=(2e-3,), stribeck=(), slopes=(width,), weights=weights)

@@ -1,0 +1,1 @@
+"""Momentum observer, velocity fusion, and the estimator of payload and friction errors."""

@@ -1,0 +1,206 @@
+"""From measured signals to a residual that is small without a collision.
+
+Friction compensation, momentum observer, and a Kalman filter for what the model does not know: a
+payload at the last link, and per joint a torque offset and the relative errors of viscous and
+Coulomb friction (temperature). The residual of a wrong model is linear in those unknowns, with
+columns that pass through the observer's own filter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.detectors import _observer
+from tauguard.detectors.dynamics.friction import FrictionModel
+from tauguard.detectors.dynamics.robot import RobotNumbers, same_rows
+from tauguard.detectors.estimation.observer import intervals, per_joint
+from tauguard.detectors.estimation.velocity import SensorNoise
+
+Array = NDArray[np.float64]
+
+#: Unknowns of a joint's own: torque offset [N m], relative viscous and Coulomb error.
+PER_JOINT = 3
+#: Unknowns of the payload: mass [kg] and first moment in the last link's frame [kg m].
+PAYLOAD = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """How far, and how fast, what the model does not know may change.
+
+    Each unknown is an Ornstein-Uhlenbeck process: a standard deviation and a time constant. A
+    standard deviation of 0 leaves an unknown out.
+    """
+
+    payload: float = 2.0  #: mass [kg]
+    moment: float = 0.2  #: first moment of the payload, each axis [kg m]
+    offset: float = 1.0  #: torque offset, in units of the joint's noise
+    viscous: float = 0.1  #: relative
+    coulomb: float = 0.1  #: relative
+    slow: float = 60.0  #: time constant of payload and friction errors [s]
+    fast: float = 1.0  #: time constant of the offset [s]
+    clip: float = 3.0  #: an innovation z above this many standard deviations c counts c^2/z
+    every: float = 0.01  #: time between two corrections [s]
+    doubt: float = 0.0
+    """What is left of joint j counts noise_j / sqrt(noise_j^2 + doubt s_j^2), with s_j the
+    deviation that the uncertain payload gives its residual: until fast motion has shown it, a
+    payload is a guess. 0: all of it counts; above 1 where a model's errors outlast ``every``."""
+
+    def __post_init__(self) -> None:
+        """Check the doubt: ``ValueError``."""
+        if not (np.isfinite(self.doubt) and self.doubt >= 0):
+            raise ValueError(f"doubt {self.doubt}: expected a number, 0 or more")
+
+    @classmethod
+    def wary(cls) -> Unknowns:
+        """For detectors: errors of the model last some 0.2 s, twenty corrections long."""
+        return cls(doubt=20.0)
+
+    @classmethod
+    def none(cls) -> Unknowns:
+        """Nothing is unknown: the plain momentum observer."""
+        return cls(payload=0.0, moment=0.0, offset=0.0, viscous=0.0, coulomb=0.0)
+
+    def deviations(self, noise: Array) -> list[float]:
+        """Standard deviations in the native order."""
+        own = [[self.offset * float(s), self.viscous, self.coulomb] for s in noise]
+        return [self.payload, *[self.moment] * 3, *(x for joint in own for x in joint)]
+
+    def persistences(self, joints: int) -> list[float]:
+        """Time constants in the native order [s]."""
+        return [self.slow] * PAYLOAD + [self.fast, self.slow, self.slow] * joints
+
+
+@dataclass(frozen=True, eq=False)
+class ArmModel:
+    """What a detector believes about an arm."""
+
+    robot: RobotNumbers
+    drive_gain: Array  #: N m per ampere at the joint, shape (n,)
+    friction: FrictionModel | None = None  #: None: no friction model
+    noise: Array | None = None  #: standard deviation of the residual without collision [N m], (n,)
+    sensors: SensorNoise | None = None  #: fuses position and velocity; None: as measured
+
+    def __post_init__(self) -> None:
+        """Check shapes: ``ValueError`` names the field."""
+        joints = self.robot.joints
+        gain = np.asarray(self.drive_gain, dtype=np.float64)
+        if gain.shape != (joints,) or not np.isfinite(gain).all():
+            raise ValueError(f"drive_gain: shape {gain.shape}, expected ({joints},) finite numbers")
+        object.__setattr__(self, "drive_gain", gain)
+        noise = np.ones(joints) if self.noise is None else per_joint("noise", self.noise, joints)
+        object.__setattr__(self, "noise", noise)
+        if self.friction is not None and len(self.friction.weights) != joints:
+            raise ValueError(
+                f"friction: weights of {len(self.friction.weights)} joints, the robot has {joints}"
+            )
+        if self.sensors is not None and len(self.sensors.position) != joints:
+            raise ValueError(
+                f"sensors: noise of {len(self.sensors.position)} joints, the robot has {joints}"
+            )
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the estimator says of a trace; rows are samples."""
+
+    residual: Array  #: the observer's estimate of tau_ext [N m], shape (T, n)
+    left: Array  #: what the unknowns do not explain of it [N m], shape (T, n)
+    acceleration: Array  #: velocity differentiated at 30/s [rad/s^2], shape (T, n)
+    unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
+
+
+class Estimator:
+    """The estimator of one arm, in batch and online with equal bits."""
+
+    def __init__(
+        self,
+        arm: ArmModel,
+        gain: ArrayLike = 100.0,
+        dt: float = 1e-3,
+        unknowns: Unknowns | None = None,
+    ) -> None:
+        """Build the native form.
+
+        Args:
+            arm: the model.
+            gain: rate of the observer [1/s], a number or one a joint.
+            dt: sample interval [s]; intervals of single samples may differ.
+            unknowns: what to track (default: payload, offsets, friction).
+        """
+        self.arm = arm
+        self.dt = float(intervals(dt, 2)[0])
+        self.unknowns = unknowns or Unknowns()
+        joints = arm.robot.joints
+        friction = arm.friction or FrictionModel.coulomb_viscous(np.zeros(joints), 0.0)
+        assert arm.noise is not None
+        self._native = _observer.Estimator(
+            arm.robot.chain,
+            friction.basis(joints),
+            [float(g) for g in arm.drive_gain],
+            [float(k) for k in per_joint("gain", gain, joints)],
+            [float(w) for w in friction.weights.ravel()],
+            self.unknowns.deviations(arm.noise),
+            self.unknowns.persistences(joints),
+            [float(s) for s in arm.noise],
+            self.unknowns.clip,
+            max(1, round(self.unknowns.every / self.dt)),
+            self.unknowns.doubt,
+            arm.sensors.fusion_gains(self.dt) if arm.sensors else [],
+        )
+
+    def run(
+        self, t: ArrayLike, q: ArrayLike, qd: ArrayLike, current: ArrayLike, keep: bool = False
+    ) -> Estimate:
+        """The whole series, from its first sample on; forgets what came before.
+
+        Args:
+            t: times [s], shape (T,), or a constant interval.
+            q: positions [rad], shape (T, n).
+            qd: velocities [rad/s], shape (T, n).
+            current: [A], shape (T, n).
+            keep: also return the unknowns.
+        """
+        joints = self.arm.robot.joints
+        q, qd, current = same_rows(joints, q=q, qd=qd, current=current)
+        residual, left, acceleration = (np.empty_like(q) for _ in range(3))
+        tracked = np.empty((len(q) if keep else 0, PAYLOAD + PER_JOINT * joints))
+        dt = intervals(t, len(q))
+        self._native.run(dt, q, qd, current, residual, left, acceleration, tracked)
+        return Estimate(residual, left, acceleration, tracked if keep else None)
+
+    def reset(self) -> None:
+        """Forget: the next sample is the first."""
+        self._native.reset()
+
+    def step(
+        self,
+        q: Array,
+        qd: Array,
+        current: Array,
+        out: Array | Sequence[Array],
+        dt: float | None = None,
+    ) -> None:
+        """One sample into ``out``, three rows of shape (n,): residual, left, acceleration.
+
+        Raises:
+            ValueError: wrong shapes or numbers that are not finite; the state is as before.
+        """
+        try:
+            step = self.dt if dt is None else dt
+            self._native.step(q, qd, current, step, out[0], out[1], out[2])
+        except TypeError:
+            joints = self.arm.robot.joints
+            raise ValueError(
+                f"q, qd, current: expected float64 arrays of shape ({joints},)"
+            ) from None
+
+    def tracked(self) -> Array:
+        """The unknowns now, shape (4 + 3 n,): payload mass and moment, then three a joint."""
+        out = np.empty(PAYLOAD + PER_JOINT * self.arm.robot.joints)
+        self._native.theta(out)
+        return out

@@ -1,0 +1,175 @@
+"""The generalised-momentum observer: an estimate of ``tau_ext`` without accelerations.
+
+With the momentum p = M(q) qd and beta = C(q, qd)^T qd - g(q), dp/dt = tau + beta + tau_ext. The
+residual r follows tau_ext as a first-order filter of rate K (De Luca & Mattone 2003)::
+
+    r += (1 - exp(-K dt)) ((p_k - p_{k-1}) / dt - (tau_{k-1} + (beta_k + beta_{k-1}) / 2) - r)
+
+which is the exact discretisation for a tau that is held over the step: stable at any K dt.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.detectors import _observer
+from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms, rows, same_rows
+
+Array = NDArray[np.float64]
+
+
+def per_joint(name: str, value: ArrayLike, joints: int) -> Array:
+    """``value`` as one positive number a joint, shape (joints,).
+
+    Raises:
+        ValueError: another shape, or a number that is not finite and above 0.
+    """
+    array = np.asarray(value, dtype=np.float64)
+    if array.ndim == 0:
+        array = np.full(joints, float(array))
+    if array.shape != (joints,):
+        raise ValueError(f"{name}: shape {array.shape}, expected one number or ({joints},)")
+    if not (np.isfinite(array).all() and (array > 0).all()):
+        raise ValueError(f"{name}: {array.tolist()}, every entry must be finite and above 0")
+    return np.ascontiguousarray(array)
+
+
+def intervals(t: ArrayLike, samples: int) -> Array:
+    """Sample intervals [s], shape (samples - 1,), from times or from one constant interval.
+
+    Args:
+        t: times [s], shape (samples,), or the interval itself, a number.
+        samples: how many rows the signals have.
+
+    Raises:
+        ValueError: times that do not fit or do not increase; names the row.
+    """
+    times = np.asarray(t, dtype=np.float64)
+    if times.ndim == 0:
+        if not (np.isfinite(times) and times > 0):
+            raise ValueError(f"t: interval {times}, expected a number above 0")
+        return np.full(max(samples - 1, 0), float(times))
+    if times.shape != (samples,):
+        raise ValueError(f"t: shape {times.shape}, expected ({samples},)")
+    dt = np.diff(times)
+    if not (dt > 0).all():
+        raise ValueError(f"t: not increasing at row {int(np.flatnonzero(~(dt > 0))[0]) + 1}")
+    return dt
+
+
+def low_pass(gain: ArrayLike, dt: Array, p: Array, beta: Array, tau: Array | None = None) -> Array:
+    """The observer's filter on given columns: r of dp/dt - tau - beta, shape (T, c).
+
+    Args:
+        gain: rate of each column [1/s], shape (c,).
+        dt: intervals [s], shape (T - 1,).
+        p: shape (T, c).
+        beta: shape (T, c).
+        tau: held over each step, shape (T, c); ``None``: zero.
+    """
+    out = np.empty(p.shape)
+    driven = np.empty((0, p.shape[1])) if tau is None else tau
+    _observer.filter(per_joint("gain", gain, p.shape[1]), dt, p, beta, driven, out)
+    return out
+
+
+def observe(
+    robot: RobotNumbers,
+    t: ArrayLike,
+    q: ArrayLike,
+    qd: ArrayLike,
+    tau: ArrayLike,
+    gain: ArrayLike = 100.0,
+    *,
+    threads: int = 0,
+) -> Array:
+    """The residual of every sample; equal to :class:`MomentumObserver` fed sample by sample.
+
+    Args:
+        robot: the arm.
+        t: times [s], shape (T,), or a constant interval [s].
+        q: positions [rad], shape (T, n).
+        qd: velocities [rad/s], shape (T, n).
+        tau: drive torques at the joints less what friction takes, as far as known [N m], (T, n).
+        gain: observer rate [1/s], a number or one a joint.
+        threads: 0 takes all processors; the result does not depend on it.
+
+    Returns:
+        Residual [N m], the estimate of ``tau_ext``, shape (T, n); the first row is zero.
+
+    Raises:
+        ValueError: shapes that differ, values that are not finite, times that do not increase.
+    """
+    q, qd, tau = same_rows(robot.joints, q=q, qd=qd, tau=tau)
+    dt = intervals(t, len(q))
+    p, beta = momentum_terms(robot, q, qd, threads=threads)
+    return low_pass(per_joint("gain", gain, robot.joints), dt, p, beta, tau)
+
+
+class MomentumObserver:
+    """The observer online: a few microseconds a sample."""
+
+    def __init__(self, robot: RobotNumbers, gain: ArrayLike = 100.0, dt: float = 1e-3) -> None:
+        """Bind the numbers.
+
+        Args:
+            robot: the arm.
+            gain: observer rate [1/s], a number or one a joint.
+            dt: sample interval for steps that do not say theirs [s].
+        """
+        self.robot = robot
+        self.gain = per_joint("gain", gain, robot.joints)
+        self.dt = float(intervals(dt, 2)[0])
+        self._native = _observer.Observer(robot.chain, self.gain)
+
+    def reset(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike | None = None) -> None:
+        """Forget; the sample ``(q, qd, tau)`` comes before the next step's. The residual is zero.
+
+        Args:
+            q: positions [rad], shape (n,).
+            qd: velocities [rad/s], shape (n,).
+            tau: drive torques held until the next sample [N m], shape (n,) (default: those that
+                leave the momentum as it is, gravity compensation at rest).
+        """
+        n = self.robot.joints
+        at, speed = rows("q", np.atleast_2d(q), n), rows("qd", np.atleast_2d(qd), n)
+        if tau is None:
+            tau = -momentum_terms(self.robot, at, speed, threads=1)[1]
+        self._native.reset(at[0], speed[0], rows("tau", np.atleast_2d(tau), n)[0])
+
+    def step(
+        self,
+        q: Array,
+        qd: Array,
+        tau: Array,
+        dt: float | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """The residual at this sample; the first call after construction resets and returns zero.
+
+        Args:
+            q: positions [rad], float64, shape (n,).
+            qd: velocities [rad/s], shape (n,).
+            tau: drive torques [N m], shape (n,); they count for the next step.
+            dt: time since the last sample [s] (default: the constructor's).
+            out: where to write the residual, shape (n,) (default: a new array).
+
+        Returns:
+            Residual [N m], shape (n,).
+
+        Raises:
+            ValueError: wrong shapes or numbers that are not finite; the state is as before.
+        """
+        if out is None:
+            out = np.empty_like(self.gain)
+        try:
+            if self._native.started:
+                self._native.step(q, qd, tau, self.dt if dt is None else dt, out)
+            else:
+                self._native.reset(q, qd, tau)
+                out[:] = 0.0
+        except TypeError:
+            n = self.robot.joints
+            raise ValueError(f"q, qd, tau: expected float64 arrays of shape ({n},)") from None
+        return out

@@ -1,0 +1,1 @@
+"""Alarms matched with the truth, and the figures that follow."""

@@ -1,0 +1,112 @@
+"""Figures of a detector over many traces, each with its 95 % interval."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from tauguard.detectors.evaluation.events import Matching
+from tauguard.traces.severity import STRATA, stratum
+
+#: The headline is over collisions from here up [N m].
+HEADLINE = 16.0
+
+Rate = dict[str, Any]
+
+
+def wilson(successes: int, trials: int) -> Rate:
+    """A proportion with its Wilson 95 % interval; ``None`` for each where there is no trial."""
+    if not 0 <= successes <= trials:
+        raise ValueError(f"{successes} of {trials}: expected 0 <= successes <= trials")
+    if trials == 0:
+        return {"value": None, "low": None, "high": None, "n": 0}
+    z = float(stats.norm.ppf(0.975))
+    share = successes / trials
+    centre = (share + z * z / (2 * trials)) / (1 + z * z / trials)
+    half = (
+        z / (1 + z * z / trials) * np.sqrt(share * (1 - share) / trials + z * z / (4 * trials**2))
+    )
+    # The exact bounds at the ends; rounding would leave 1e-17 there.
+    low = 0.0 if successes == 0 else float(centre - half)
+    high = 1.0 if successes == trials else float(centre + half)
+    return {"value": share, "low": low, "high": high, "n": trials}
+
+
+def poisson_rate(count: int, hours: float) -> Rate:
+    """Events per hour with the exact (Garwood) Poisson 95 % interval; ``n`` is the count."""
+    if count < 0 or not hours >= 0:
+        raise ValueError(f"{count} events in {hours} h: expected 0 or more")
+    if hours == 0:
+        return {"value": None, "low": None, "high": None, "n": count, "hours": 0.0}
+    low = 0.0 if count == 0 else float(stats.chi2.ppf(0.025, 2 * count) / 2)
+    high = float(stats.chi2.ppf(0.975, 2 * count + 2) / 2)
+    return {
+        "value": count / hours,
+        "low": low / hours,
+        "high": high / hours,
+        "n": count,
+        "hours": hours,
+    }
+
+
+def delay_figures(delays: Iterable[float | None]) -> dict[str, Any]:
+    """Median and 95th percentile of the detected collisions' delays [ms]."""
+    known = np.array([d for d in delays if d is not None]) * 1e3
+    if not len(known):
+        return {"median": None, "p95": None, "n": 0}
+    median, p95 = np.percentile(known, (50, 95))
+    return {"median": float(median), "p95": float(p95), "n": len(known)}
+
+
+def _severity(pairs: Sequence[tuple[float, float | None]]) -> dict[str, Any]:
+    found = [delay is not None for _, delay in pairs]
+    return {
+        "sensitivity": wilson(sum(found), len(found)),
+        "delay_ms": delay_figures(delay for _, delay in pairs),
+    }
+
+
+def figures(matchings: Iterable[Matching]) -> dict[str, Any]:
+    """All figures over the given traces.
+
+    Returns:
+        ``confusion`` (tp, fn over collisions; fp, tn over non-collision cases), ``sensitivity``,
+        ``specificity``, ``ppv``, ``accuracy`` (each value, low, high, n), ``delay_ms`` (median,
+        p95, n), ``false_alarms_per_hour`` (of collision-free time), ``strata`` (by peak torque,
+        each with sensitivity and delay) and ``headline`` (the same from 16 N m up).
+    """
+    several = list(matchings)
+    pairs = [
+        (collision.peak_tau, delay)
+        for m in several
+        for collision, delay in zip(m.collisions, m.delays, strict=True)
+    ]
+    tp = sum(delay is not None for _, delay in pairs)
+    fn = len(pairs) - tp
+    fp = sum(m.false_cases for m in several)
+    tn = sum(m.cases for m in several) - fp
+    alarms = sum(len(m.false_alarms) for m in several)
+    hours = sum(m.free_seconds for m in several) / 3600
+    names = [stratum(peak) for peak, _ in pairs]
+    order = sorted(set(names) | {stratum(low) for low, _ in STRATA}, key=_lower_edge)
+    return {
+        "confusion": {"tp": tp, "fn": fn, "fp": fp, "tn": tn},
+        "sensitivity": wilson(tp, tp + fn),
+        "specificity": wilson(tn, tn + fp),
+        "ppv": wilson(tp, tp + fp),
+        "accuracy": wilson(tp + tn, tp + fn + fp + tn),
+        "delay_ms": delay_figures(delay for _, delay in pairs),
+        "false_alarms_per_hour": poisson_rate(alarms, hours),
+        "strata": {
+            name: _severity([p for p, own in zip(pairs, names, strict=True) if own == name])
+            for name in order
+        },
+        "headline": _severity([p for p in pairs if p[0] >= HEADLINE]),
+    }
+
+
+def _lower_edge(name: str) -> float:
+    return float(name.split("-")[0])

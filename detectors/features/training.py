@@ -1,0 +1,99 @@
+"""Training windows for the regressor: collisions, free motion and its worst moments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.estimation.observer import intervals, low_pass
+from tauguard.detectors.features.windows import Features
+from tauguard.traces.trace import Bools, Trace
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """One training trace after the estimator."""
+
+    signal: Array  #: scaled residual, shape (T, joints of the features)
+    target: Array  #: what the regressor should say, shape (T,)
+    free: Bools  #: rows that are surely collision-free, shape (T,)
+    struck: Bools  #: rows with a collision that can be felt, shape (T,)
+
+
+def severity_target(trace: Trace, joints: Sequence[int], reference: Array, gain: float) -> Array:
+    """The training target: sum over ``joints`` of |tau_ext| / reference, lagged as the observer is.
+
+    Labels 0/1 do not grow with torque and fail as a ranking. x / (1 + x) keeps the target within
+    [0, 1), so that hard blows do not spend the regressor's bounded weights.
+
+    Args:
+        trace: with truth, else the target is 0.
+        joints: 0-based.
+        reference: torque that counts 1, shape (len(joints),) [N m].
+        gain: of the observer [1/s].
+    """
+    if trace.truth is None:
+        return np.zeros(len(trace.t))
+    external = trace.truth.tau_ext[:, list(joints)] / reference
+    nothing = np.zeros_like(external)
+    gains = np.full(external.shape[1], gain)
+    lagged = -low_pass(gains, intervals(trace.t, len(trace.t)), nothing, nothing, external)
+    total = np.abs(lagged).sum(axis=1)
+    squashed: Array = total / (1 + total)
+    return squashed
+
+
+def binary_target(trace: Trace) -> Array:
+    """The dissertation's plain labels: 1 while a collision lasts, else 0."""
+    label = np.zeros(len(trace.t))
+    for collision in trace.truth.collisions if trace.truth else ():
+        label[(trace.t >= collision.onset) & (trace.t <= collision.end)] = 1.0
+    return label
+
+
+def peaks(score: Array, count: int, gap: int) -> NDArray[np.int64]:
+    """Indices of the ``count`` highest scores that are at least ``gap`` apart, in order."""
+    chosen: list[int] = []
+    blocked = np.zeros(len(score), dtype=np.bool_)
+    for index in np.argsort(-score, kind="stable"):
+        if len(chosen) == count:
+            break
+        if not blocked[index]:
+            chosen.append(int(index))
+            blocked[max(0, index - gap) : index + gap + 1] = True
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
+def draw_windows(
+    rng: np.random.Generator,
+    prepared: Sequence[Prepared],
+    features: Features,
+    count: int,
+    positive: float = 0.2,
+) -> tuple[Array, Array]:
+    """Random windows and targets, a share ``positive`` of them from collisions.
+
+    Raises:
+        ValueError: no collision, or no free motion, in the traces.
+    """
+    x, y = [], []
+    for name, share in (("struck", positive), ("free", 1 - positive)):
+        masks = [getattr(p, name) for p in prepared]
+        total = sum(int(m.sum()) for m in masks)
+        if total == 0:
+            what = "collision" if name == "struck" else "collision-free row"
+            raise ValueError(f"the training traces hold no {what}: both kinds are needed")
+        picks = np.sort(rng.choice(total, min(total, round(count * share)), replace=False))
+        start = 0
+        for p, mask in zip(prepared, masks, strict=True):
+            rows = np.flatnonzero(mask)
+            own = rows[picks[(picks >= start) & (picks < start + len(rows))] - start]
+            x.append(features.windows(p.signal, own))
+            y.append(p.target[own] if name == "struck" else np.zeros(len(own)))
+            start += len(rows)
+    return np.concatenate(x), np.concatenate(y)

@@ -1,0 +1,114 @@
+"""Support vector regression with the SRQ kernel 1 / (1 + |x - z|^2 / sigma^2)^2.
+
+The dissertation's regressor: the squared rational quadratic kernel with sigma = 3, C = 1 and
+epsilon = 0.02. scikit-learn fits it on the precomputed kernel; evaluation is native.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.svm import SVR
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from tauguard.detectors import _kernel
+
+Array = NDArray[np.float64]
+
+
+def srq_kernel(a: ArrayLike, b: ArrayLike, sigma: float = 3.0, *, threads: int = 0) -> Array:
+    """K_ij = 1 / (1 + |a_i - b_j|^2 / sigma^2)^2.
+
+    Args:
+        a: shape (N, d).
+        b: shape (M, d).
+        sigma: length scale, above 0.
+        threads: 0 takes all processors; the result does not depend on it.
+
+    Returns:
+        Shape (N, M).
+    """
+    left = np.ascontiguousarray(a, dtype=np.float64)
+    right = np.ascontiguousarray(b, dtype=np.float64)
+    if left.ndim != 2 or right.ndim != 2 or left.shape[1] != right.shape[1]:
+        raise ValueError(f"a, b: shapes {left.shape} and {right.shape}, expected (N, d) and (M, d)")
+    if not sigma > 0:
+        raise ValueError(f"sigma: {sigma}, expected above 0")
+    out = np.empty((len(left), len(right)))
+    _kernel.gram(left, right, float(sigma), out, threads)
+    return out
+
+
+class SrqSVR(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """Epsilon-SVR with the SRQ kernel, a scikit-learn regressor.
+
+    Attributes:
+        svr_: the fitted ``sklearn.svm.SVR(kernel="precomputed")``.
+        support_vectors_: rows of X that carry the solution, shape (S, d).
+        dual_coef_: their coefficients, shape (S,).
+        intercept_: constant term.
+    """
+
+    def __init__(self, sigma: float = 3.0, C: float = 1.0, epsilon: float = 0.02) -> None:
+        """Keep the settings (sigma: kernel length; C, epsilon: those of the SVR)."""
+        self.sigma = sigma
+        self.C = C
+        self.epsilon = epsilon
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> SrqSVR:
+        """Fit on X of shape (N, d) and y of shape (N,)."""
+        rows: Array
+        rows, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
+        svr = SVR(kernel="precomputed", C=self.C, epsilon=self.epsilon, cache_size=500)
+        svr.fit(srq_kernel(rows, rows, self.sigma), y)
+        return self._adopt(svr, rows[svr.support_])
+
+    def _adopt(self, svr: SVR, vectors: Array) -> SrqSVR:
+        self.svr_ = svr
+        self.support_vectors_ = np.ascontiguousarray(vectors)
+        self.dual_coef_ = np.ascontiguousarray(svr.dual_coef_[0])
+        self.intercept_ = float(svr.intercept_[0])
+        return self
+
+    @classmethod
+    def restored(cls, svr: SVR, vectors: Array, sigma: float) -> SrqSVR:
+        """The estimator again from what a model file holds: a fitted SVR and its vectors."""
+        model = cls(sigma=sigma, C=svr.C, epsilon=svr.epsilon)
+        model.n_features_in_ = vectors.shape[1]
+        return model._adopt(svr, vectors)
+
+    def reduced(self, count: int) -> SrqSVR:
+        """The same function, nearly, with at most ``count`` support vectors.
+
+        See :func:`tauguard.detectors.methods.reduced_set.reduced_set`. ``svr_`` stays the full one,
+        which is what a model file keeps: reduce again after loading.
+
+        Raises:
+            ValueError: a count outside 1 to the number of support vectors.
+        """
+        from tauguard.detectors.methods.reduced_set import reduced_set
+
+        check_is_fitted(self)
+        model = SrqSVR(self.sigma, self.C, self.epsilon)
+        model.n_features_in_, model.svr_ = self.n_features_in_, self.svr_
+        model.intercept_ = self.intercept_
+        model.support_vectors_, model.dual_coef_ = reduced_set(
+            self.support_vectors_, self.dual_coef_, self.sigma, count
+        )
+        return model
+
+    def kernel_sum(self) -> _kernel.KernelSum:
+        """The native form of the fitted function."""
+        check_is_fitted(self)
+        return _kernel.KernelSum(
+            self.support_vectors_, self.dual_coef_, self.intercept_, float(self.sigma)
+        )
+
+    def predict(self, X: ArrayLike) -> Array:
+        """Values at the rows of X, shape (N, d) -> (N,)."""
+        check_is_fitted(self)
+        rows: Array = validate_data(self, X, dtype=np.float64, reset=False, order="C")
+        out = np.empty(len(rows))
+        self.kernel_sum().rows(rows, out, 0)
+        return out

@@ -1,0 +1,1 @@
+"""From scores to alarms: thresholds, confirmation, calibrated false-alarm rates."""

@@ -1,0 +1,182 @@
+"""Collisions in a real arm's log: momentum observer, and a threshold a joint from quiet seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauguard.detectors import (
+    RobotNumbers,
+    Thresholded,
+    confirmed,
+    find_alarms,
+    observe,
+)
+from tauguard.detectors.calibration.plausible import drive_torque, plausible
+from tauguard.detectors.methods.free_motion import FreeMotionDetector
+from tauguard.detectors.methods.srq_svr import SvrDetector
+from tauguard.detectors.thresholds.confirmation import confirmation_samples
+from tauguard.traces.trace import Array, Bools, Detection, Trace
+
+GAIN = 20.0  # [1/s] of the observer: what 100 Hz and a real arm's friction allow
+CONFIRMATION = 0.05  # [s]
+FACTOR = 1.5  # threshold over the largest residual of the quiet seconds
+STRANGE = 0.2  # share of a log in alarm that says that the log is another arm's
+SETTLING = 3.0  # time constants of the observer that are not looked at
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What was found in a log, and by which thresholds."""
+
+    detection: Detection
+    thresholds: Array
+    """Residual that counts 1 [N m], inf where not used, shape (n,); of a trained detector, whose
+    bounds change with the motion, only what each joint is measured by to name the loudest."""
+    quiet_until: float  #: [s]; alarms are counted from here on
+    notes: tuple[str, ...]
+
+
+def watch(
+    trace: Trace,
+    robot: RobotNumbers,
+    tau: Array,
+    quiet: float,
+    *,
+    gain: float = GAIN,
+    confirmation: float = CONFIRMATION,
+    factor: float = FACTOR,
+    joints: Sequence[int] | None = None,
+) -> Watch:
+    """Look for collisions with thresholds that are learned from the log's own beginning.
+
+    The score is the largest ratio of |residual| to its joint's threshold; above 1 for
+    ``confirmation`` seconds is an alarm.
+
+    Args:
+        trace: the log.
+        robot: its numbers, joints in the trace's order.
+        tau: torques at the joints less friction [N m], shape (T, n).
+        quiet: seconds from the beginning of the log in which the user vouches for no collision.
+        gain: rate of the observer [1/s].
+        confirmation: [s]; counted in whole samples.
+        factor: threshold over the largest |residual| of the quiet seconds.
+        joints: whose residuals are looked at, 1-based (default: all).
+
+    Raises:
+        ValueError: joints that the robot does not have; too few quiet seconds, or more than the
+            log has; torques that the motion of those seconds does not explain.
+    """
+    learning = _learning(trace, gain, quiet)
+    until = trace.t[0] + quiet
+    if not (np.isfinite(factor) and factor > 0):
+        raise ValueError(f"factor: {factor}, expected above 0")
+    residual = observe(robot, trace.t, trace.q, trace.qd, tau, gain)
+    doubts = plausible(robot, trace, tau, residual, learning, gain)
+    thresholds = factor * np.abs(residual[learning]).max(axis=0)
+    thresholds[~used(joints, robot.joints)] = np.inf
+    score = (np.abs(residual) / thresholds).max(axis=1)
+    samples = confirmation_samples(confirmation, trace.dt)
+    alarm = confirmed((score > 1) & (trace.t >= until), samples)
+    note = (
+        f"{1 / trace.dt:.0f} Hz: a confirmation of {1e3 * confirmation:.0f} ms is counted as "
+        f"{samples} samples ({1e3 * samples * trace.dt:.0f} ms)"
+    )
+    detection = Detection(
+        detector="threshold",
+        t=trace.t,
+        residual=residual,
+        score=score,
+        threshold=1.0,
+        alarm=alarm,
+        alarms=find_alarms(trace.t, alarm),
+    )
+    return Watch(detection, thresholds, float(until), (note, *doubts))
+
+
+def _learning(trace: Trace, gain: float, quiet: float) -> Bools:
+    """The quiet rows after the observer has settled, shape (T,)."""
+    settled = trace.t[0] + SETTLING / gain
+    learning: Bools = (trace.t >= settled) & (trace.t < trace.t[0] + quiet)
+    if not quiet < trace.t[-1] - trace.t[0]:
+        length = trace.t[-1] - trace.t[0]
+        raise ValueError(f"quiet: {quiet} s, but the log is {length:.1f} s long; nothing to watch")
+    if learning.sum() < 10:
+        raise ValueError(
+            f"quiet: {quiet} s leave {learning.sum()} samples after the observer has settled "
+            f"({SETTLING / gain:.2f} s); expected at least 10"
+        )
+    return learning
+
+
+def used(joints: Sequence[int] | None, count: int) -> np.ndarray:
+    """Which of ``count`` joints are meant, shape (count,).
+
+    Raises:
+        ValueError: a joint that there is not.
+    """
+    chosen = range(1, count + 1) if joints is None else joints
+    if not chosen or min(chosen) < 1 or max(chosen) > count:
+        raise ValueError(f"joints: {tuple(chosen)}, expected some of 1 to {count}")
+    return np.isin(np.arange(1, count + 1), list(chosen))
+
+
+def watch_with(watched: Thresholded, trace: Trace) -> Watch:
+    """Look for collisions with a trained detector.
+
+    Raises:
+        ValueError: another number of joints or another sample rate than it was trained at.
+    """
+    detector = watched.detector
+    noise = detector.arm.noise
+    thresholds = np.ones(detector.arm.robot.joints) if noise is None else noise
+    settled = float(trace.t[0] + detector.settle)
+    if not isinstance(detector, SvrDetector):
+        return Watch(watched.detect(trace), thresholds, settled, ())
+    # One pass; its residual is what payload, offsets and friction leave, and names the joint.
+    chain = detector.chain.at(watched.threshold, watched.confirmation)
+    chosen = used(chain.settings.joints, len(thresholds))
+    found = replace(chain.detect(trace), detector=detector.name)
+    return Watch(found, np.where(chosen, thresholds, np.inf), settled, chain.notes)
+
+
+def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
+    """Look for collisions with a detector that was trained on collision-free motion.
+
+    Raises:
+        ValueError: another number of joints or another sample rate than it was trained at, or a
+            log that ends before the detector has settled, or torques that its motion does not
+            explain.
+    """
+    detection = detector.detect(trace)
+    assert detector.moving is not None
+    note = (
+        f"trained on {detector.seconds:.0f} s of collision-free motion for "
+        f"{detector.settings.false_alarms_per_hour:g} false alarms per hour"
+    )
+    settled = float(trace.t[0] + detector.settle)
+    if not trace.t[-1] > settled:
+        raise ValueError(
+            f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector watches from "
+            f"{detector.settle:g} s on"
+        )
+    robot, tau, rows = detector.arm.robot, drive_torque(detector.arm, trace), trace.t >= settled
+    residual = observe(robot, trace.t, trace.q, trace.qd, tau, GAIN)
+    notes = [note, *plausible(robot, trace, tau, residual, rows, GAIN)]
+    if detection.alarm[rows].mean() > STRANGE:
+        notes.append(
+            "alarms fill much of this log: it carries a load that no training log carried, it is "
+            "held all the time, or this is not the arm, the joints' order, the sign or the unit of "
+            "the currents that the detector was trained on"
+        )
+    return Watch(detection, detector.moving.weights[:, 0], settled, tuple(notes))
+
+
+def loudest_joint(found: Watch, start: float, end: float) -> int:
+    """Index of the joint whose residual is highest over its threshold in an alarm."""
+    detection = found.detection
+    rows = (detection.t >= start) & (detection.t <= end)
+    ratio = np.abs(detection.residual[rows]) / found.thresholds
+    return int(np.argmax(ratio.max(axis=0)))

@@ -1,1 +1,0 @@
-"""Every detector that can be asked for by its name, behind the interface of `detector`."""

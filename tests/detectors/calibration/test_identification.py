@@ -1,0 +1,163 @@
+"""Identification against the numbers that Pinocchio's inverse dynamics was run with."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tauguard.detectors import ArmModel, gravity_torque, mass_matrix
+from tauguard.detectors.calibration.arm_file import load_arm, save_arm
+from tauguard.detectors.calibration.assessment import explained, left_out, residual_rms, start_gains
+from tauguard.detectors.calibration.consistent import is_consistent
+from tauguard.detectors.calibration.identification import identify
+from tauguard.detectors.calibration.recording import Load, Recording, moving_span
+from tauguard.detectors.dynamics.robot import RobotNumbers
+from tests.detectors.synthetic_arm import (
+    COULOMB,
+    GAIN,
+    ROTOR,
+    VISCOUS,
+    XML,
+    nominal,
+    record,
+    true_model,
+)
+
+
+@pytest.fixture(scope="module")
+def logs():
+    return [record(seed) for seed in range(3)]
+
+
+@pytest.fixture(scope="module")
+def found(logs):
+    return identify(ArmModel(nominal(), GAIN), [Recording(log) for log in logs])
+
+
+def test_given_gains_fix_the_scale(found):
+    arm = found.arm
+    truth = RobotNumbers.from_pin(true_model())
+    assert found.scale == "gains"
+    assert is_consistent(arm.robot.inertial)
+    poses = np.random.default_rng(5).uniform(-0.8, 0.8, (20, 3))
+    np.testing.assert_allclose(
+        gravity_torque(arm.robot, poses), gravity_torque(truth, poses), atol=0.4
+    )
+    inertia = mass_matrix(arm.robot, poses)
+    np.testing.assert_allclose(inertia[:, 1:, 1:], mass_matrix(truth, poses)[:, 1:, 1:], atol=0.15)
+    # About the vertical axis only accelerations tell inertia from friction.
+    np.testing.assert_allclose(inertia[:, 0, 0], mass_matrix(truth, poses)[:, 0, 0], rtol=0.35)
+    np.testing.assert_allclose(arm.friction.coulomb(0.5), COULOMB + 0.5 * VISCOUS, atol=0.8)
+    assert arm.robot.armature[1:] == pytest.approx(ROTOR[1:], abs=0.2)
+
+
+def test_a_log_it_has_not_seen(found):
+    fresh = record(9)
+    nominal_rms = residual_rms(ArmModel(nominal(), GAIN), fresh)
+    assert (residual_rms(found.arm, fresh) < [0.25, 0.4, 0.2]).all()
+    assert (nominal_rms > 2).all()
+
+
+@pytest.mark.parametrize(("first", "second"), [(1, 2), (0, 1)])
+def test_currents_of_two_joints_exchanged(logs, found, first, second):
+    order = [0, 1, 2]
+    order[first], order[second] = order[second], order[first]
+    mixed = [Recording(dataclasses.replace(log, current=log.current[:, order])) for log in logs]
+    wrong = identify(ArmModel(nominal(), GAIN), mixed)
+    with pytest.raises(ValueError, match="check the order of the joints"):
+        explained(wrong.arm, [r.trace for r in mixed])
+    assert explained(found.arm, logs) == ()
+
+
+def test_each_log_left_out_once(logs, found):
+    held = left_out(ArmModel(nominal(), GAIN), [Recording(log) for log in logs])
+    assert len(held) == 3
+    assert (np.array(held) < [0.4, 0.6, 0.3]).all()
+
+
+def test_a_known_payload_fixes_the_scale(logs):
+    recordings = [Recording(log) for log in logs]
+    recordings += [Recording(record(k, load=3.0), Load(3.0, (0.3, 0.0, 0.05))) for k in (20, 21)]
+    guess = ArmModel(nominal(), 1.4 * GAIN)
+    by_payload = identify(guess, recordings, scale="payload")
+    # The base's axis is vertical: no payload's weight reaches it, only its inertia does.
+    np.testing.assert_allclose(by_payload.arm.drive_gain[1:], GAIN[1:], rtol=0.06)
+    assert (by_payload.gain_error[1:] < by_payload.gain_error[0]).all()
+
+
+def test_the_masses_fix_the_scale_if_nothing_else_does(logs):
+    by_masses = identify(
+        ArmModel(nominal(), 1.4 * GAIN), [Recording(log) for log in logs], scale="masses"
+    )
+    # The file's masses are 15 % too small, and so are the gains that they give.
+    assert by_masses.arm.drive_gain[1:] == pytest.approx(GAIN[1:] / 1.15, rel=0.12)
+
+
+def test_an_unknown_payload_is_found(logs):
+    recordings = [*(Recording(log) for log in logs), Recording(record(30, load=2.0), None)]
+    result = identify(ArmModel(nominal(), GAIN), recordings)
+    assert result.loads[-1, 0] == pytest.approx(2.0, abs=0.3)
+    assert result.loads[:-1, 0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_inertia_of_a_load_is_found():
+    """A load far from the last link's origin, whose inertia matters: without it, 2 N m are left."""
+    logs = [Recording(record(seed)) for seed in range(3)]
+    found = identify(ArmModel(nominal(), GAIN), [*logs, Recording(record(30, load=4.0), None)])
+    mass, inertia = found.loads[-1, 0], found.loads[-1, 6]  # about the joint's axis, y
+    assert mass == pytest.approx(4.0, abs=0.4)
+    assert inertia == pytest.approx(4.0 * (0.3**2 + 0.05**2), abs=0.15)
+
+
+def test_a_wrist_whose_rotor_outweighs_its_link():
+    found = identify(ArmModel(nominal(), GAIN), [Recording(record(seed)) for seed in range(3)])
+    light = mass_matrix(nominal(), np.zeros((1, 3)))[0, 2, 2]
+    assert ROTOR[2] > 2 * light
+    assert found.arm.robot.armature[2] == pytest.approx(ROTOR[2], abs=0.1)
+
+
+def test_first_guess_of_the_gains(logs):
+    assert start_gains(nominal(), logs) == pytest.approx(GAIN, rel=0.6)
+
+
+def test_standstill_at_both_ends_is_trimmed():
+    log = record(3, dwell=(-1.0, 4.0))
+    assert not moving_span(log)[:300].any()
+    with pytest.raises(ValueError, match="without the first 1000 s"):
+        moving_span(log, margin=1000)
+    with pytest.raises(ValueError, match="last 1000 s of its motion"):
+        moving_span(log, stop=1000)
+
+
+def test_file_and_back(tmp_path, found):
+    source, target = tmp_path / "arm.xml", tmp_path / "calibrated.xml"
+    source.write_text(XML)
+    assert load_arm(source) is None
+    save_arm(found.arm, source, target, scale=found.scale)
+    back = load_arm(target)
+    np.testing.assert_allclose(back.robot.inertial, found.arm.robot.inertial, atol=1e-8)
+    np.testing.assert_array_equal(back.drive_gain, found.arm.drive_gain)
+    np.testing.assert_array_equal(back.friction.weights, found.arm.friction.weights)
+    target.write_text(target.read_text().replace("drive_gain", "gain"))
+    with pytest.raises(ValueError, match="calibration cannot be read"):
+        load_arm(target)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"scale": "payload"}, "no recording has a known load"),
+        ({"scale": "guess"}, "expected gains, payload or masses"),
+        ({"recordings": []}, "no recordings"),
+    ],
+)
+def test_what_cannot_be_identified(logs, change, message):
+    arguments = {"recordings": [Recording(logs[0])], "scale": "gains"} | change
+    with pytest.raises(ValueError, match=message):
+        identify(ArmModel(nominal(), GAIN), **arguments)
+
+
+def test_a_log_without_motion():
+    still = record(1, dwell=(-1.0, 99.0))
+    with pytest.raises(ValueError, match="no joint moves"):
+        identify(ArmModel(nominal(), GAIN), [Recording(still)])

@@ -1,0 +1,116 @@
+"""Levelling: causal, and one rate at every speed where the tails grow with it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tauguard.detectors.thresholds.rates import block_maxima, tail_level
+from tauguard.detectors.thresholds.speed_levels import (
+    Levelled,
+    SpeedLevels,
+    recent_speed,
+)
+from tauguard.traces import Trace
+
+
+@given(
+    st.lists(st.floats(-5, 5), min_size=1, max_size=80),
+    st.floats(0, 0.05),
+)
+def test_recent_speed_is_the_maximum_of_the_last_moments(speeds, memory):
+    dt = 2e-3
+    qd = np.column_stack([speeds, np.roll(speeds, 1)])
+    total = np.abs(qd).sum(axis=1)
+    count = max(1, round(memory / dt))
+    expected = [total[max(0, k - count + 1) : k + 1].max() for k in range(len(total))]
+    np.testing.assert_array_equal(recent_speed(qd, dt, memory), expected)
+
+
+def test_one_level_is_passed_as_often_at_every_speed():
+    rng = np.random.default_rng(0)
+    speed = rng.uniform(0, 10, 40_000)
+    peaks = 0.3 + 0.2 * speed + (1 + speed) * rng.exponential(size=len(speed))
+    levels = SpeedLevels.fit(peaks, speed)
+    high = levels(peaks, speed) > 2.0
+    counts = [np.sum(high[(speed >= k) & (speed < k + 2)]) for k in range(0, 10, 2)]
+    assert max(counts) < 2 * min(counts)
+    plain = [np.sum(peaks[(speed >= k) & (speed < k + 2)] > 40) for k in range(0, 10, 2)]
+    assert plain[0] == 0 < plain[-1]  # what one threshold on the score itself does
+
+
+def test_levels_grow_with_the_speed_and_the_levelled_score_with_the_score():
+    rng = np.random.default_rng(1)
+    levels = SpeedLevels.fit(rng.normal(size=3000), rng.uniform(0, 5, 3000))
+    assert (np.diff(levels.speed) > 0).all()
+    assert (np.diff(levels.base) >= 0).all()
+    assert (np.diff(levels.unit) >= 0).all()
+    assert (levels.unit > 0).all()
+    assert levels(2.0, 3.0) > levels(1.0, 3.0)
+    assert levels(2.0, 1e3) == levels(2.0, levels.speed[-1])
+
+
+def test_a_score_that_never_changes_can_be_levelled():
+    levels = SpeedLevels.fit(np.full(10, 0.3), np.arange(10.0))
+    assert np.isfinite(levels(0.3, 4.0))
+
+
+@pytest.mark.parametrize(
+    ("peaks", "speeds", "says"),
+    [
+        ([], [], r"shapes \(0,\) and \(0,\)"),
+        ([1.0], [1.0, 2.0], r"shapes \(1,\) and \(2,\)"),
+        ([np.nan], [1.0], "finite"),
+    ],
+)
+def test_bad_peaks_are_refused(peaks, speeds, says):
+    with pytest.raises(ValueError, match=says):
+        SpeedLevels.fit(peaks, speeds)
+
+
+def test_a_memory_below_zero_is_refused():
+    with pytest.raises(ValueError, match="memory -1"):
+        recent_speed(np.zeros((3, 1)), 1e-3, -1)
+
+
+class Given:
+    """A detector whose score is the first joint's current."""
+
+    name, settle = "given", 0.1
+
+    def scores(self, trace):
+        return trace.current[:, 0]
+
+
+def motion(rng, seconds=60.0, dt=1e-2):
+    t = np.arange(round(seconds / dt)) * dt
+    qd = np.abs(np.sin(t))[:, None] + 0.1
+    return Trace(("j",), t, np.zeros_like(qd), qd, qd * rng.exponential(size=qd.shape))
+
+
+def test_a_detector_is_levelled_on_free_motion_and_stays_causal():
+    rng = np.random.default_rng(2)
+    own = Levelled.on(Given(), [motion(rng) for _ in range(8)])
+    assert (own.name, own.settle) == ("given", 0.1)
+    trace = motion(rng)
+    whole = own.scores(trace)
+    names = ("t", "q", "qd", "current")
+    early = replace(trace, **{name: getattr(trace, name)[:2000] for name in names})
+    np.testing.assert_array_equal(own.scores(early), whole[:2000])
+    with pytest.raises(ValueError, match="no collision-free motion"):
+        Levelled.on(Given(), [])
+
+
+def test_maxima_of_blocks_and_where_they_are():
+    high, where = block_maxima(np.array([1.0, 3.0, 2.0, 5.0, 4.0]), 2)
+    assert high.tolist() == [3.0, 5.0, 4.0]
+    assert where.tolist() == [1, 3, 4]
+
+
+def test_a_tail_of_too_few_peaks_is_the_largest():
+    assert tail_level(np.array([2.0]), 0.5, 10) == 2.0
+    assert tail_level(np.array([2.0, 2.0, 2.0, 2.0]), 0.5, 3) == 2.0
+    with pytest.raises(ValueError, match="0 allowed"):
+        tail_level(np.array([1.0]), 0.0, 1)
