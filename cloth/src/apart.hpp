@@ -7,9 +7,11 @@
 #include <cstdint>
 
 #include "k_dop.hpp"
-#include "lanes.hpp"
+#include "tauguard/geometry/lanes.hpp"
 
 namespace tauguard::cloth {
+
+using namespace geometry;  // lanes.hpp
 
 inline constexpr int ahead = 8;  // queries between asking for positions and using them
 
@@ -20,9 +22,9 @@ TAUGUARD_INLINE void prefetch(const double* x0, const double* x1, const std::int
   }
 }
 
-TAUGUARD_INLINE Wide point(const double* x, std::int32_t v) {
+TAUGUARD_INLINE Double4 point(const double* x, std::int32_t v) {
   const double* p = x + 3 * std::ptrdiff_t(v);
-  return Wide{p[0], p[1], p[2], p[2]};
+  return Double4{p[0], p[1], p[2], p[2]};
 }
 
 // The queries of n that are not: their numbers go to `left`. rows: (n, 4) vertices.
@@ -33,15 +35,15 @@ TAUGUARD_INLINE int not_apart(const double* x0, const double* x1, const std::int
   for (int i = 0; i < n; ++i) {
     prefetch(x0, x1, rows + 4 * std::min(i + ahead, n - 1));
     const std::int32_t* row = rows + 4 * i;
-    Choice above{-1, -1, -1, -1}, below = above;
+    Mask4 above{-1, -1, -1, -1}, below = above;
     for (int e = 0; e < 2; ++e) {
       const double* x = e ? x1 : x0;
-      const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]),
-                 d = point(x, row[3]);
+      const Double4 a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]),
+                    d = point(x, row[3]);
       above &= (vf ? a : min(a, b)) > (vf ? max(max(b, c), d) : max(c, d));
       below &= (vf ? a : max(a, b)) < (vf ? min(min(b, c), d) : min(c, d));
     }
-    const Choice apart = above | below;
+    const Mask4 apart = above | below;
     left[count] = i;
     count += (apart[0] | apart[1] | apart[2]) == 0;
   }
@@ -51,31 +53,19 @@ TAUGUARD_INLINE int not_apart(const double* x0, const double* x1, const std::int
 // What the other looks at: both ends of the step on 7 axes, 64 bytes a vertex (a cache line).
 inline constexpr VolumeKind seven_axes{14, true};
 
-// One end of the step on eight axis slots.
-using Eight = float __attribute__((vector_size(32)));
-using Choice8 = std::int32_t __attribute__((vector_size(32)));
-
-TAUGUARD_INLINE Eight eight(const float* from) {
-  Eight x;
-  std::memcpy(&x, from, sizeof x);
-  return x;
-}
-TAUGUARD_INLINE Eight min(Eight x, Eight y) { return x < y ? x : y; }
-TAUGUARD_INLINE Eight max(Eight x, Eight y) { return x > y ? x : y; }
-
 // Values lie within 2^-24 of the exact images (k_dop.hpp), which are at most 1. Where x > fl(y +
 // gap), the exact ones differ by more than gap - 2^-24 (1 + gap) - 2 * 2^-24 > 0 to the same side.
-TAUGUARD_INLINE Choice8 above(Eight x, Eight y) {
+TAUGUARD_INLINE Mask8 above(Float8 x, Float8 y) {
   constexpr float gap = 0x1p-21f;
   return x > y + gap;
 }
 
 // On which axes the first feature lies over the second, and under it.
 struct Sides {
-  Choice8 over, under;
+  Mask8 over, under;
 };
 template <bool vf>
-TAUGUARD_INLINE Sides sides(Eight a, Eight b, Eight c, Eight d) {
+TAUGUARD_INLINE Sides sides(Float8 a, Float8 b, Float8 c, Float8 d) {
   if (vf) return {above(a, max(max(b, c), d)), above(min(min(b, c), d), a)};
   return {above(min(a, b), max(c, d)), above(min(c, d), max(a, b))};
 }
@@ -91,10 +81,10 @@ TAUGUARD_INLINE int not_apart_on_seven(const float* points, const std::int32_t* 
     const std::int32_t *row = rows + 4 * i, *next = rows + 4 * std::min(i + ahead, n - 1);
     for (int j = 0; j < 4; ++j) __builtin_prefetch(place(next[j]));
     const float *a = place(row[0]), *b = place(row[1]), *c = place(row[2]), *d = place(row[3]);
-    const Sides start = sides<vf>(eight(a), eight(b), eight(c), eight(d));
+    const Sides start = sides<vf>(load8(a), load8(b), load8(c), load8(d));
     const Sides end =
-        sides<vf>(eight(a + slots), eight(b + slots), eight(c + slots), eight(d + slots));
-    const Choice apart = (Choice)((start.over & end.over) | (start.under & end.under));
+        sides<vf>(load8(a + slots), load8(b + slots), load8(c + slots), load8(d + slots));
+    const Mask4 apart = (Mask4)((start.over & end.over) | (start.under & end.under));
     left[count] = i;
     count += (apart[0] | apart[1] | apart[2] | apart[3]) == 0;
   }

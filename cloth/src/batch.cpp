@@ -8,19 +8,19 @@
 namespace tauguard::cloth {
 namespace {
 
-TAUGUARD_INLINE Wide3 field(const Group& g, int f) {
-  return {load(g.value[f]), load(g.value[f + 1]), load(g.value[f + 2])};
+TAUGUARD_INLINE Vec3x4 field(const Group& g, int f) {
+  return {load4(g.value[f]), load4(g.value[f + 1]), load4(g.value[f + 2])};
 }
-TAUGUARD_INLINE void set(Group& g, int f, Wide3 v) {
-  store(g.value[f], v.x);
-  store(g.value[f + 1], v.y);
-  store(g.value[f + 2], v.z);
+TAUGUARD_INLINE void set(Group& g, int f, Vec3x4 v) {
+  store4(g.value[f], v.x);
+  store4(g.value[f + 1], v.y);
+  store4(g.value[f + 2], v.z);
 }
 
 // 2^-e for 2^e <= x < 2^(e + 1), of normal x below 2^1023.
-TAUGUARD_INLINE Wide inverse_power(Wide x) {
-  const Choice exponent = (Choice)x & (std::int64_t{0x7ff} << 52);
-  return (Wide)((std::int64_t{0x7fe} << 52) - exponent);
+TAUGUARD_INLINE Double4 inverse_power(Double4 x) {
+  const Mask4 exponent = (Mask4)x & (std::int64_t{0x7ff} << 52);
+  return (Double4)((std::int64_t{0x7fe} << 52) - exponent);
 }
 
 // With u = 2^-53 and M the product of the largest |p|, |q|, |r|. Differences carry u. A triple
@@ -29,58 +29,59 @@ TAUGUARD_INLINE Wide inverse_power(Wide x) {
 // 64 u M for each coefficient, which is at most 6 M. Each of three cuts adds 54 u M, a value of the
 // polynomial 60 u M, its argument's own rounding 324 u M: 610 u M in all, below the 1024 u M =
 // 2^-43 M in use. Underflow adds less than 2^-1000.
-TAUGUARD_INLINE void finish(const Wide3* p, const Wide3* q, const Wide3* r, Group& g) {
-  Wide sizes[3] = {splat(0), splat(0), splat(0)};
+TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, Group& g) {
+  Double4 sizes[3] = {splat(0), splat(0), splat(0)};
   for (int e = 0; e < 2; ++e) {
-    sizes[0] = max(sizes[0], size(p[e]));
-    sizes[1] = max(sizes[1], size(q[e]));
-    sizes[2] = max(sizes[2], size(r[e]));
+    sizes[0] = max(sizes[0], largest(p[e]));
+    sizes[1] = max(sizes[1], largest(q[e]));
+    sizes[2] = max(sizes[2], largest(r[e]));
   }
-  const Wide big = max(max(sizes[0], sizes[1]), sizes[2]);
-  const Choice fair = (big > 0x1p-900) & (big < 0x1p900);
-  const Wide s = inverse_power(big);
+  const Double4 big = max(max(sizes[0], sizes[1]), sizes[2]);
+  const Mask4 fair = (big > 0x1p-900) & (big < 0x1p900);
+  const Double4 s = inverse_power(big);
   for (int e = 0; e < 2; ++e) {
     set(g, Group::p + 3 * e, s * p[e]);
     set(g, Group::q + 3 * e, s * q[e]);
     set(g, Group::r + 3 * e, s * r[e]);
   }
-  const Wide3 p0 = s * p[0], p1 = s * p[1], q0 = s * q[0], q1 = s * q[1], r0 = s * r[0],
-              r1 = s * r[1];
-  const Wide3 c00 = cross(q0, r0), c11 = cross(q1, r1), mixed = cross(q0, r1) + cross(q1, r0);
-  const Wide b0 = dot(p0, c00), b1 = (1.0 / 3) * (dot(p1, c00) + dot(p0, mixed)),
-             b2 = (1.0 / 3) * (dot(p0, c11) + dot(p1, mixed)), b3 = dot(p1, c11);
-  const Wide error = 0x1p-43 * ((s * sizes[0]) * (s * sizes[1]) * (s * sizes[2])) + 0x1p-1000;
-  const Wide least = min(min(b0, b1), min(b2, b3)), most = max(max(b0, b1), max(b2, b3));
+  const Vec3x4 p0 = s * p[0], p1 = s * p[1], q0 = s * q[0], q1 = s * q[1], r0 = s * r[0],
+               r1 = s * r[1];
+  const Vec3x4 c00 = cross(q0, r0), c11 = cross(q1, r1), mixed = cross(q0, r1) + cross(q1, r0);
+  const Double4 b0 = dot(p0, c00), b1 = (1.0 / 3) * (dot(p1, c00) + dot(p0, mixed)),
+                b2 = (1.0 / 3) * (dot(p0, c11) + dot(p1, mixed)), b3 = dot(p1, c11);
+  const Double4 error = 0x1p-43 * ((s * sizes[0]) * (s * sizes[1]) * (s * sizes[2])) + 0x1p-1000;
+  const Double4 least = min(min(b0, b1), min(b2, b3)), most = max(max(b0, b1), max(b2, b3));
   // One variation: the ends have different signs, and not both coefficients between them the other
   // end's.
-  const Choice falls = (b0 > error) & (b3 < -error) & ((b1 > error) | (b2 < -error));
-  const Choice rises = (b0 < -error) & (b3 > error) & ((b1 < -error) | (b2 > error));
+  const Mask4 falls = (b0 > error) & (b3 < -error) & ((b1 > error) | (b2 < -error));
+  const Mask4 rises = (b0 < -error) & (b3 > error) & ((b1 < -error) | (b2 > error));
   g.odd = static_cast<std::uint8_t>(bits(~fair));
   g.no_root = static_cast<std::uint8_t>(bits(fair & ((least > error) | (most < -error))));
   g.one_root = static_cast<std::uint8_t>(bits(fair & (falls | rises)));
-  store(g.value[Group::cubic], b0);
-  store(g.value[Group::cubic + 1], b1);
-  store(g.value[Group::cubic + 2], b2);
-  store(g.value[Group::cubic + 3], b3);
-  store(g.value[Group::error], error);
-  store(g.value[Group::big], s * big);
+  store4(g.value[Group::cubic], b0);
+  store4(g.value[Group::cubic + 1], b1);
+  store4(g.value[Group::cubic + 2], b2);
+  store4(g.value[Group::cubic + 3], b3);
+  store4(g.value[Group::error], error);
+  store4(g.value[Group::big], s * big);
 }
 
 // Of one query, at one end of the step.
 struct Differences {
-  Wide p, q, r;
+  Double4 p, q, r;
 };
 template <bool vf>
 TAUGUARD_INLINE Differences differences(const double* x, const std::int32_t* row) {
-  const Wide a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]), d = point(x, row[3]);
+  const Double4 a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]),
+                d = point(x, row[3]);
   if (vf) return {a - b, c - b, d - b};
   return {c - a, b - a, d - c};
 }
-TAUGUARD_INLINE Wide3 transposed(Wide a, Wide b, Wide c, Wide d) {
-  const Wide ab = __builtin_shufflevector(a, b, 0, 4, 2, 6),
-             cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
-  const Wide y_ab = __builtin_shufflevector(a, b, 1, 5, 3, 7),
-             y_cd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+TAUGUARD_INLINE Vec3x4 transposed(Double4 a, Double4 b, Double4 c, Double4 d) {
+  const Double4 ab = __builtin_shufflevector(a, b, 0, 4, 2, 6),
+                cd = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+  const Double4 y_ab = __builtin_shufflevector(a, b, 1, 5, 3, 7),
+                y_cd = __builtin_shufflevector(c, d, 1, 5, 3, 7);
   return {__builtin_shufflevector(ab, cd, 0, 1, 4, 5),
           __builtin_shufflevector(y_ab, y_cd, 0, 1, 4, 5),
           __builtin_shufflevector(ab, cd, 2, 3, 6, 7)};
@@ -92,7 +93,7 @@ TAUGUARD_INLINE void gather(const double* x0, const double* x1, const std::int32
   for (int first = 0; first < n; first += width, ++groups) {
     const auto row = [&](int i) { return rows + 4 * std::min(first + i, n - 1); };
     for (int i = 0; i < width; ++i) prefetch(x0, x1, row(i + ahead));
-    Wide3 p[2], q[2], r[2];
+    Vec3x4 p[2], q[2], r[2];
     for (int e = 0; e < 2; ++e) {
       const double* x = e ? x1 : x0;
       const Differences a = differences<vf>(x, row(0)), b = differences<vf>(x, row(1)),
@@ -107,8 +108,8 @@ TAUGUARD_INLINE void gather(const double* x0, const double* x1, const std::int32
 
 // Pieces, transposed, with the differences of their queries.
 struct Pieces {
-  Wide3 p[2], q[2], r[2];
-  Wide start, length, root, cubic[4], error, big;
+  Vec3x4 p[2], q[2], r[2];
+  Double4 start, length, root, cubic[4], error, big;
 };
 TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const double* roots, int n,
                                Pieces& out) {
@@ -125,23 +126,23 @@ TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const d
   }
   for (int e = 0; e < 2; ++e) {
     const auto vector = [&](int f) {
-      return Wide3{load(value[f]), load(value[f + 1]), load(value[f + 2])};
+      return Vec3x4{load4(value[f]), load4(value[f + 1]), load4(value[f + 2])};
     };
     out.p[e] = vector(Group::p + 3 * e);
     out.q[e] = vector(Group::q + 3 * e);
     out.r[e] = vector(Group::r + 3 * e);
   }
-  out.start = load(own[0]);
-  out.length = load(own[1]);
-  for (int j = 0; j < 4; ++j) out.cubic[j] = load(own[2 + j]);
-  out.root = load(own[6]);
-  out.error = load(value[Group::error]);
-  out.big = load(value[Group::big]);
+  out.start = load4(own[0]);
+  out.length = load4(own[1]);
+  for (int j = 0; j < 4; ++j) out.cubic[j] = load4(own[2 + j]);
+  out.root = load4(own[6]);
+  out.error = load4(value[Group::error]);
+  out.big = load4(value[Group::big]);
 }
 
 // In Bernstein form.
-TAUGUARD_INLINE Wide at(const Wide* b, Wide x) {
-  const Wide y = 1 - x;
+TAUGUARD_INLINE Double4 at(const Double4* b, Double4 x) {
+  const Double4 y = 1 - x;
   return y * y * (b[0] * y + 3 * b[1] * x) + x * x * (3 * b[2] * y + b[3] * x);
 }
 
@@ -155,35 +156,36 @@ TAUGUARD_INLINE void find_roots(const Piece* pieces, int n, double* roots) {
   for (int first = 0; first < n; first += together * width) {
     for (int i = 0; i < together * width; ++i)
       for (int j = 0; j < 4; ++j) value[j][i] = pieces[std::min(first + i, n - 1)].cubic[j];
-    Wide b[together][4], lo[together], hi[together], x[together];
-    Choice done[together];
+    Double4 b[together][4], lo[together], hi[together], x[together];
+    Mask4 done[together];
     for (int k = 0; k < together; ++k) {
-      for (int j = 0; j < 4; ++j) b[k][j] = load(value[j] + k * width);
+      for (int j = 0; j < 4; ++j) b[k][j] = load4(value[j] + k * width);
       lo[k] = splat(0);
       hi[k] = splat(1);
       x[k] = b[k][0] / (b[k][0] - b[k][3]);
-      done[k] = Choice{};
+      done[k] = Mask4{};
     }
     for (int i = 0; i < 40; ++i) {
-      Choice all = done[0] | ~done[0];
+      Mask4 all = done[0] | ~done[0];
       for (int k = 0; k < together; ++k) {
-        const Wide* c = b[k];
-        const Wide y = 1 - x[k], yy = y * y, xy = y * x[k], xx = x[k] * x[k];
-        const Wide f = yy * (c[0] * y + 3 * c[1] * x[k]) + xx * (3 * c[2] * y + c[3] * x[k]);
-        const Choice before = (f > 0) == (c[0] > 0);
+        const Double4* c = b[k];
+        const Double4 y = 1 - x[k], yy = y * y, xy = y * x[k], xx = x[k] * x[k];
+        const Double4 f = yy * (c[0] * y + 3 * c[1] * x[k]) + xx * (3 * c[2] * y + c[3] * x[k]);
+        const Mask4 before = (f > 0) == (c[0] > 0);
         lo[k] = before ? x[k] : lo[k];
         hi[k] = before ? hi[k] : x[k];
-        const Wide slope = 3 * ((c[1] - c[0]) * yy + 2 * (c[2] - c[1]) * xy + (c[3] - c[2]) * xx);
-        Wide next = x[k] - f / slope;
+        const Double4 slope =
+            3 * ((c[1] - c[0]) * yy + 2 * (c[2] - c[1]) * xy + (c[3] - c[2]) * xx);
+        Double4 next = x[k] - f / slope;
         next = (next > lo[k]) & (next < hi[k]) ? next : 0.5 * (lo[k] + hi[k]);
-        const Wide step = abs(next - x[k]);
+        const Double4 step = abs(next - x[k]);
         x[k] = done[k] ? x[k] : next;
         done[k] |= step < 0x1p-24;
         all &= done[k];
       }
       if (bits(all) == (1u << width) - 1) break;
     }
-    for (int k = 0; k < together; ++k) store(value[4] + k * width, x[k]);
+    for (int k = 0; k < together; ++k) store4(value[4] + k * width, x[k]);
     for (int i = 0; i < together * width && first + i < n; ++i) roots[first + i] = value[4][i];
   }
 }
@@ -201,21 +203,22 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
   for (int first = 0; first < n; first += width) {
     Pieces k;
     transpose(groups, pieces + first, toi + first, n - first, k);
-    const Wide t = k.start + k.length * k.root;
-    const Wide lo = max(t - 0x1p-33, k.start), hi = min(t + 0x1p-33, k.start + k.length);
-    const Wide f_lo = at(k.cubic, (lo - k.start) / k.length),
-               f_hi = at(k.cubic, (hi - k.start) / k.length);
-    const Choice bracket =
+    const Double4 t = k.start + k.length * k.root;
+    const Double4 lo = max(t - 0x1p-33, k.start), hi = min(t + 0x1p-33, k.start + k.length);
+    const Double4 f_lo = at(k.cubic, (lo - k.start) / k.length),
+                  f_hi = at(k.cubic, (hi - k.start) / k.length);
+    const Mask4 bracket =
         ((f_lo > k.error) & (f_hi < -k.error)) | ((f_lo < -k.error) & (f_hi > k.error));
 
-    const Wide3 p = k.p[0] + t * (k.p[1] - k.p[0]), q = k.q[0] + t * (k.q[1] - k.q[0]),
-                r = k.r[0] + t * (k.r[1] - k.r[0]), normal = cross(q, r);
-    const Wide a = dot(cross(p, r), normal), b = dot(cross(q, p), normal), nn = dot(normal, normal);
-    Wide extent = max(max(size(p), size(p - q)), size(vf ? p - r : p + r));
-    Wide least = vf ? min(min(a, b), nn - a - b) : min(min(a, nn - a), min(-b, nn + b));
-    if (!vf) extent = max(extent, size(p + r - q));
+    const Vec3x4 p = k.p[0] + t * (k.p[1] - k.p[0]), q = k.q[0] + t * (k.q[1] - k.q[0]),
+                 r = k.r[0] + t * (k.r[1] - k.r[0]), normal = cross(q, r);
+    const Double4 a = dot(cross(p, r), normal), b = dot(cross(q, p), normal),
+                  nn = dot(normal, normal);
+    Double4 extent = max(max(largest(p), largest(p - q)), largest(vf ? p - r : p + r));
+    Double4 least = vf ? min(min(a, b), nn - a - b) : min(min(a, nn - a), min(-b, nn + b));
+    if (!vf) extent = max(extent, largest(p + r - q));
     extent += 0x1p-30 * k.big;
-    const Wide margin = 0x1p-23 * k.big * (extent * extent * extent);
+    const Double4 margin = 0x1p-23 * k.big * (extent * extent * extent);
     const unsigned inside = bits(bracket & (least > margin)),
                    outside = bits(bracket & (least < -margin)), rooted = bits(bracket);
     for (int i = 0; i < width && first + i < n; ++i) {
@@ -252,7 +255,7 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
 
 TAUGUARD_VARIANT(portable, )
 #if defined(__x86_64__)
-TAUGUARD_VARIANT(avx2, __attribute__((target("avx2"))))
+TAUGUARD_VARIANT(avx2, TAUGUARD_AVX2)
 #endif
 
 std::atomic<const BatchKernels*> forced{nullptr};
@@ -262,8 +265,7 @@ std::atomic<const BatchKernels*> forced{nullptr};
 const BatchKernels* batch_kernels(const char* wanted) {
   if (std::strcmp(wanted, "portable") == 0) return &portable;
 #if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (std::strcmp(wanted, "avx2") == 0 && __builtin_cpu_supports("avx2")) return &avx2;
+  if (std::strcmp(wanted, "avx2") == 0 && has_avx2()) return &avx2;
 #endif
   return nullptr;
 }

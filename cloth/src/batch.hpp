@@ -4,9 +4,13 @@
 
 #include <cstdint>
 
-#include "lanes.hpp"
+#include "tauguard/geometry/lanes.hpp"
 
 namespace tauguard::cloth {
+
+using namespace geometry;  // lanes.hpp: vector types have no namespace to be found by
+
+inline constexpr int width = 4;
 
 // `width` queries in differences (query.hpp), scaled by powers of two so that the largest is in [1,
 // 2).

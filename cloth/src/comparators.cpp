@@ -35,8 +35,8 @@ Cubic part(const Cubic& c, double from, double to) {
 }
 
 bool inside(const Query& k, double t, bool vf) {
-  const Vec p = mix(k.p[0], k.p[1], t), q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
-  const Vec n = cross(q, r);
+  const Vec3 p = mix(k.p[0], k.p[1], t), q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
+  const Vec3 n = cross(q, r);
   const double nn = dot(n, n);
   if (nn == 0) return false;
   const double low = -inside_tolerance, high = 1 + inside_tolerance;

@@ -132,7 +132,7 @@ void FeatureTree::fill_groups(const Features& features, const Groups& groups) {
 // Both ends of the step on every axis slot, [end][slot], four values at a time.
 template <int slots>
 struct Row {
-  using Four = float __attribute__((vector_size(16)));
+  using Four = geometry::Float4;
   static constexpr int fours = slots / 2;
   Four value[fours];
 

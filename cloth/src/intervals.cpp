@@ -17,9 +17,10 @@ namespace {
 // Does m see every gap on one side by more than the distance, at times a and b? Rounding, against
 // |m|_1 big: u of the difference, 3 u of the dot product, 6 u of the interpolation: 10 u, below the
 // 16 u in use.
-bool separated(const Query& k, Vec m, double a, double b) {
+bool separated(const Query& k, Vec3 m, double a, double b) {
   const double m1 = std::fabs(m.x) + std::fabs(m.y) + std::fabs(m.z);
-  const double margin = 16 * u * m1 * k.big + k.distance * std::sqrt(dot(m, m)) * (1 + 16 * u);
+  const double margin = 16 * unit_roundoff * m1 * k.big +
+                        k.distance * std::sqrt(dot(m, m)) * (1 + 16 * unit_roundoff);
   bool above = true, below = true;
   for (int i = 0; i < k.gaps; ++i) {
     const double g0 = dot(m, k.gap[0][i]), g1 = dot(m, k.gap[1][i]);
@@ -32,17 +33,17 @@ bool separated(const Query& k, Vec m, double a, double b) {
 
 // The directions that separate nearly everything that is apart: the normal and those in the plane.
 bool plane_direction(const Query& k, double t, double a, double b, bool vf) {
-  const Vec q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t), n = cross(q, r);
+  const Vec3 q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t), n = cross(q, r);
   return separated(k, cross(n, q), a, b) || separated(k, cross(n, r), a, b) ||
          (vf && separated(k, cross(n, r - q), a, b)) || separated(k, n, a, b);
 }
 // The rest: between vertices, and between a vertex and an edge.
 bool edge_direction(const Query& k, double t, double a, double b) {
-  const Vec q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
+  const Vec3 q = mix(k.q[0], k.q[1], t), r = mix(k.r[0], k.r[1], t);
   for (int i = 0; i < k.gaps; ++i) {
-    const Vec d = mix(k.gap[0][i], k.gap[1][i], t);
+    const Vec3 d = mix(k.gap[0][i], k.gap[1][i], t);
     if (separated(k, d, a, b)) return true;
-    for (Vec e : {q, r}) {
+    for (Vec3 e : {q, r}) {
       const double ee = dot(e, e);
       if (ee > 0 && separated(k, d - (dot(d, e) / ee) * e, a, b)) return true;
     }
@@ -70,8 +71,8 @@ bool certain(const Query& k, double a, double b, bool vf) {
   if (!((fa > error && fb < -error) || (fa < -error && fb > error))) return false;
   const double t = 0.5 * (a + b), big2 = k.big * k.big,
                margin = (64 * (b - a) + 0x1p-43) * big2 * big2;
-  const Vec n = cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t));
-  Vec g[4];
+  const Vec3 n = cross(mix(k.q[0], k.q[1], t), mix(k.r[0], k.r[1], t));
+  Vec3 g[4];
   for (int i = 0; i < k.gaps; ++i) g[i] = mix(k.gap[0][i], k.gap[1][i], t);
   if (!vf) std::swap(g[2], g[3]);  // in order around the hull
   bool left = true, right = true;

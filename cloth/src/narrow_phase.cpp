@@ -24,21 +24,21 @@ constexpr int batch = 128,
                   512;  // queries at a time, after and before those apart on an axis are left out
 constexpr double never = std::numeric_limits<double>::infinity();
 
-Vec at(const double* x0, const double* x1, std::int32_t v, double t) {
-  return mix(load(x0, v), load(x1, v), t);
+Vec3 at(const double* x0, const double* x1, std::int32_t v, double t) {
+  return mix(position(x0, v), position(x1, v), t);
 }
 
 // Where, along which normal and with which weights the two features meet at time t.
 template <bool vf>
 void describe(const double* x0, const double* x1, const std::int32_t* row, double t,
               ImpactArrays out, std::size_t i) {
-  const Vec a = at(x0, x1, row[0], t), b = at(x0, x1, row[1], t), c = at(x0, x1, row[2], t),
-            d = at(x0, x1, row[3], t);
-  const Vec q = vf ? c - b : b - a, r = vf ? d - b : d - c, p = vf ? a - b : c - a;
-  Vec n = cross(q, r);
+  const Vec3 a = at(x0, x1, row[0], t), b = at(x0, x1, row[1], t), c = at(x0, x1, row[2], t),
+             d = at(x0, x1, row[3], t);
+  const Vec3 q = vf ? c - b : b - a, r = vf ? d - b : d - c, p = vf ? a - b : c - a;
+  Vec3 n = cross(q, r);
   const double nn = dot(n, n);
   double* w = out.weights + 4 * i;
-  Vec point = a;
+  Vec3 point = a;
   if (vf) {
     const double v1 = nn > 0 ? dot(cross(p, r), n) / nn : 0,
                  v2 = nn > 0 ? dot(cross(q, p), n) / nn : 0;
@@ -56,7 +56,7 @@ void describe(const double* x0, const double* x1, const std::int32_t* row, doubl
     point = a + s * q;
   }
   const double length = std::sqrt(nn);
-  n = length > 0 ? (1 / length) * n : Vec{0, 0, 0};
+  n = length > 0 ? (1 / length) * n : Vec3{0, 0, 0};
   const double pt[] = {point.x, point.y, point.z}, nl[] = {n.x, n.y, n.z};
   std::copy(pt, pt + 3, out.point + 3 * i);
   std::copy(nl, nl + 3, out.normal + 3 * i);
@@ -254,7 +254,7 @@ void one_by_one(const double* x0, const double* x1, const std::int32_t* rows, in
 
 Query query_of(const Group& g, int lane) {
   const auto vector = [&](int f) {
-    return Vec{g.value[f][lane], g.value[f + 1][lane], g.value[f + 2][lane]};
+    return Vec3{g.value[f][lane], g.value[f + 1][lane], g.value[f + 2][lane]};
   };
   Query k{};
   for (int e = 0; e < 2; ++e) {

@@ -84,8 +84,6 @@ void pair_portable(const LeafLanes& a, const LeafLanes& b, int axes, int times, 
 }
 
 #if defined(__x86_64__)
-#define TAUGUARD_AVX2 __attribute__((target("avx2")))
-
 TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const float* b,
                                             int times) {
   const __m256 below = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
@@ -143,8 +141,6 @@ TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, i
                               out.lanes_of[row]));
   }
 }
-
-#define TAUGUARD_AVX512 __attribute__((target("avx512f")))
 
 // Of 16 volumes on one axis.
 template <int times>
@@ -229,9 +225,8 @@ constexpr OverlapKernels portable{node_portable, pair_portable};
 const OverlapKernels* overlap_kernels(const char* name) {
   if (std::strcmp(name, "portable") == 0) return &portable;
 #if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (std::strcmp(name, "avx2") == 0 && __builtin_cpu_supports("avx2")) return &avx2;
-  if (std::strcmp(name, "avx512") == 0 && __builtin_cpu_supports("avx512f")) return &avx512;
+  if (std::strcmp(name, "avx2") == 0 && geometry::has_avx2()) return &avx2;
+  if (std::strcmp(name, "avx512") == 0 && geometry::has_avx512()) return &avx512;
 #endif
   return nullptr;
 }

@@ -3,9 +3,11 @@
 
 #include <cstdint>
 
-#include "lanes.hpp"
+#include "tauguard/geometry/lanes.hpp"
 
 namespace tauguard::cloth {
+
+using geometry::count_of;
 
 inline constexpr int lanes = 16;
 using Mask = std::uint32_t;  // a bit per lane

@@ -5,29 +5,31 @@
 #include <cmath>
 #include <cstdint>
 
+#include "tauguard/geometry/rounding.hpp"
+#include "tauguard/geometry/vec3.hpp"
+
 namespace tauguard::cloth {
 
-inline constexpr double u = 0x1p-53;
+using geometry::cross;
+using geometry::dot;
+using geometry::largest;
+using geometry::mix;
+using geometry::unit_roundoff;
+using geometry::Vec3;
+using geometry::operator+;
+using geometry::operator-;
+using geometry::operator*;
 
-struct Vec {
-  double x, y, z;
-};
-inline Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Vec operator*(double s, Vec a) { return {s * a.x, s * a.y, s * a.z}; }
-inline double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vec cross(Vec a, Vec b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+// Position i of an array (n, 3).
+inline Vec3 position(const double* x, std::int32_t i) {
+  return geometry::load(x + 3 * std::ptrdiff_t(i));
 }
-inline double size(Vec a) { return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}); }
-inline Vec load(const double* x, std::int32_t i) { return {x[3 * i], x[3 * i + 1], x[3 * i + 2]}; }
-inline Vec mix(Vec a, Vec b, double t) { return a + t * (b - a); }
 
 // Differences of positions at both ends: the cubic is p . (q x r); `gap` holds those that a
 // separating direction must see on one side. `big` is the largest magnitude among them.
 struct Query {
-  Vec p[2], q[2], r[2];
-  Vec gap[2][4];
+  Vec3 p[2], q[2], r[2];
+  Vec3 gap[2][4];
   int gaps;
   double big, distance;
   // Of a Bernstein coefficient, with M = big^3: each of up to three triple products of 6 terms
@@ -45,7 +47,8 @@ Query make(const double* x0, const double* x1, const std::int32_t* row, double d
   k.big = 0;
   for (int e = 0; e < 2; ++e) {
     const double* x = e ? x1 : x0;
-    const Vec a = load(x, row[0]), b = load(x, row[1]), c = load(x, row[2]), d = load(x, row[3]);
+    const Vec3 a = position(x, row[0]), b = position(x, row[1]), c = position(x, row[2]),
+               d = position(x, row[3]);
     if (vf) {
       k.p[e] = a - b;
       k.q[e] = c - b;
@@ -62,8 +65,8 @@ Query make(const double* x0, const double* x1, const std::int32_t* row, double d
       k.gap[e][2] = c - b;
       k.gap[e][3] = d - b;
     }
-    for (int i = 0; i < k.gaps; ++i) k.big = std::max(k.big, size(k.gap[e][i]));
-    k.big = std::max({k.big, size(k.q[e]), size(k.r[e])});
+    for (int i = 0; i < k.gaps; ++i) k.big = std::max(k.big, largest(k.gap[e][i]));
+    k.big = std::max({k.big, largest(k.q[e]), largest(k.r[e])});
   }
   // By a power of two to about 1, so that no product over- or underflows.
   if (k.big > 0x1p-20 && k.big < 0x1p20) return k;
@@ -83,8 +86,8 @@ struct Cubic {
   double b[4];
 };
 inline Cubic cubic(const Query& k) {
-  const Vec c00 = cross(k.q[0], k.r[0]), c11 = cross(k.q[1], k.r[1]);
-  const Vec mixed = cross(k.q[0], k.r[1]) + cross(k.q[1], k.r[0]);
+  const Vec3 c00 = cross(k.q[0], k.r[0]), c11 = cross(k.q[1], k.r[1]);
+  const Vec3 mixed = cross(k.q[0], k.r[1]) + cross(k.q[1], k.r[0]);
   return {{dot(k.p[0], c00), (dot(k.p[1], c00) + dot(k.p[0], mixed)) / 3,
            (dot(k.p[0], c11) + dot(k.p[1], mixed)) / 3, dot(k.p[1], c11)}};
 }

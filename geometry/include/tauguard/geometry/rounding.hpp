@@ -6,6 +6,9 @@
 
 namespace tauguard::geometry {
 
+// The largest relative error of one rounding of a double to nearest.
+inline constexpr double unit_roundoff = 0x1p-53;
+
 class RoundToNearest {
  public:
   RoundToNearest() : saved_(std::fegetround()) {

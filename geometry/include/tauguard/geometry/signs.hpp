@@ -4,10 +4,9 @@
 #include <cmath>
 
 #include "tauguard/geometry/dyadic.hpp"
+#include "tauguard/geometry/rounding.hpp"
 
 namespace tauguard::geometry {
-
-inline constexpr double unit_roundoff = 0x1p-53;
 
 inline int sign_of(double x) { return (x > 0) - (x < 0); }
 

@@ -1,6 +1,7 @@
 // Plain 3-vectors and 3x3 matrices in row-major order.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 namespace tauguard::geometry {
@@ -19,6 +20,10 @@ inline Vec3 cross(Vec3 a, Vec3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline double norm(Vec3 a) { return std::sqrt(dot(a, a)); }
+// The largest magnitude of its components.
+inline double largest(Vec3 a) { return std::max({std::fabs(a.x), std::fabs(a.y), std::fabs(a.z)}); }
+// From a (t = 0) to b (t = 1).
+inline Vec3 mix(Vec3 a, Vec3 b, double t) { return a + t * (b - a); }
 
 struct Mat3 {
   double m[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};

@@ -1,0 +1,96 @@
+// Several numbers side by side, by the compiler's vector types. One source is compiled for the
+// baseline and, by target attributes, for wider units; which runs is chosen when the program does.
+// No contraction and no reassociation: every variant gives the same bits.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+// A function of a kernel must be inlined into the one that carries the target attribute.
+#define TAUGUARD_INLINE inline __attribute__((always_inline))
+
+#if defined(__x86_64__)
+#define TAUGUARD_AVX2 __attribute__((target("avx2")))
+#define TAUGUARD_AVX512 __attribute__((target("avx512f")))
+#endif
+
+// Compiles a function for the baseline and for AVX2; the loader picks.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__)
+#define TAUGUARD_CLONES __attribute__((target_clones("avx2", "default")))
+#else
+#define TAUGUARD_CLONES
+#endif
+
+namespace tauguard::geometry {
+
+// Does this processor run functions of TAUGUARD_AVX2, of TAUGUARD_AVX512?
+inline bool has_avx2() {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  return __builtin_cpu_supports("avx2");
+#else
+  return false;
+#endif
+}
+inline bool has_avx512() {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  return __builtin_cpu_supports("avx512f");
+#else
+  return false;
+#endif
+}
+
+using Double4 = double __attribute__((vector_size(32)));
+using Mask4 = std::int64_t __attribute__((vector_size(32)));  // -1 where true
+using Float4 = float __attribute__((vector_size(16)));
+using Float8 = float __attribute__((vector_size(32)));
+using Mask8 = std::int32_t __attribute__((vector_size(32)));  // -1 where true
+
+TAUGUARD_INLINE Double4 splat(double x) { return Double4{x, x, x, x}; }
+TAUGUARD_INLINE Double4 load4(const double* from) {
+  Double4 x;
+  std::memcpy(&x, from, sizeof x);
+  return x;
+}
+TAUGUARD_INLINE Float8 load8(const float* from) {
+  Float8 x;
+  std::memcpy(&x, from, sizeof x);
+  return x;
+}
+TAUGUARD_INLINE void store4(double* to, Double4 x) { std::memcpy(to, &x, sizeof x); }
+TAUGUARD_INLINE Double4 abs(Double4 x) { return (Double4)((Mask4)x & INT64_MAX); }
+TAUGUARD_INLINE Double4 max(Double4 x, Double4 y) { return x > y ? x : y; }
+TAUGUARD_INLINE Double4 min(Double4 x, Double4 y) { return x < y ? x : y; }
+TAUGUARD_INLINE Float8 abs(Float8 x) { return (Float8)((Mask8)x & INT32_MAX); }
+TAUGUARD_INLINE Float8 max(Float8 x, Float8 y) { return x > y ? x : y; }
+TAUGUARD_INLINE Float8 min(Float8 x, Float8 y) { return x < y ? x : y; }
+
+// A bit a lane.
+TAUGUARD_INLINE unsigned bits(Mask4 c) {
+  const Mask4 x = c & Mask4{1, 2, 4, 8};
+  return unsigned(x[0] | x[1] | x[2] | x[3]);
+}
+
+// How many bits of a mask of 16 (the builtin is a call where the processor's own instruction may be
+// missing).
+TAUGUARD_INLINE unsigned count_of(unsigned x) {
+  x -= x >> 1 & 0x5555;
+  x = (x & 0x3333) + (x >> 2 & 0x3333);
+  return (((x + (x >> 4)) & 0x0f0f) * 0x0101) >> 8 & 0x1f;
+}
+
+// Four 3-vectors.
+struct Vec3x4 {
+  Double4 x, y, z;
+};
+TAUGUARD_INLINE Vec3x4 operator+(Vec3x4 a, Vec3x4 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+TAUGUARD_INLINE Vec3x4 operator-(Vec3x4 a, Vec3x4 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+TAUGUARD_INLINE Vec3x4 operator*(Double4 s, Vec3x4 a) { return {s * a.x, s * a.y, s * a.z}; }
+TAUGUARD_INLINE Double4 dot(Vec3x4 a, Vec3x4 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+TAUGUARD_INLINE Vec3x4 cross(Vec3x4 a, Vec3x4 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+TAUGUARD_INLINE Double4 largest(Vec3x4 a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); }
+
+}  // namespace tauguard::geometry
