@@ -1,6 +1,6 @@
-"""Speed against error: one file a study, one table and one figure each.
+"""Speed against error: a room for each family of studies, one table and one figure each.
 
-A study is a module ``tauguard.benchmarks.<name>`` with two functions::
+A study is a module of ``tauguard.benchmarks`` with two functions::
 
     def run(quick: bool, seed: int) -> list[dict[str, object]]   # flat rows
     def draw(rows: list[dict[str, object]], figure: matplotlib.figure.Figure) -> None
@@ -9,18 +9,63 @@ and, where the rows are too many to print, ``shown(rows) -> rows``: what is prin
 ``NOTES: dict[str, str]`` say above each table (by the rows' ``study``) what the columns mean.
 """
 
-#: Every study and its one-line description, in the order of ``tauguard bench list``.
-STUDIES: dict[str, str] = {
-    "simulation": "what each part of a scene costs, and what the time step costs in accuracy",
-    "impact": "blows against body regions beside the two-mass model: error against cost",
-    "detection_conformal": "false alarms per hour: what calibration promises, and what is counted",
-    "detection_online": "observer and SVR a sample: microseconds, and fewer support vectors",
-    "environments": "what an environment costs beside its physics, many at once, and reactions",
-    "rigid": "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
-    "contacts": "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",
-    "guard": "fast things against thin ones: fixed steps, MuJoCo's modes, guarded steps",
-    "cloth": "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
-    "diagnosis": "after the alarm: link, force, point and kind of event against the truth",
-    "real_arm": "logs of a real UR10e: residuals, false alarms, smallest contacts, beside a peer",
-    "detection": "the dissertation's experiment: detectors, speeds, operating points, false alarms",
+from typing import NamedTuple
+
+
+class Study(NamedTuple):
+    """Where a study is and what it answers."""
+
+    module: str
+    line: str
+
+
+#: Every study: its module and its one-line description, in the order of ``tauguard bench list``.
+STUDIES: dict[str, Study] = {
+    "simulation": Study(
+        "simulation.study",
+        "what each part of a scene costs, and what the time step costs in accuracy",
+    ),
+    "impact": Study(
+        "simulation.impact",
+        "blows against body regions beside the two-mass model: error against cost",
+    ),
+    "detection_conformal": Study(
+        "detection.conformal",
+        "false alarms per hour: what calibration promises, and what is counted",
+    ),
+    "detection_online": Study(
+        "detection.online", "observer and SVR a sample: microseconds, and fewer support vectors"
+    ),
+    "environments": Study(
+        "simulation.environments",
+        "what an environment costs beside its physics, many at once, and reactions",
+    ),
+    "rigid": Study(
+        "rigid.study",
+        "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
+    ),
+    "contacts": Study(
+        "contacts.study",
+        "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",
+    ),
+    "guard": Study(
+        "contacts.guard",
+        "fast things against thin ones: fixed steps, MuJoCo's modes, guarded steps",
+    ),
+    "cloth": Study(
+        "cloth.study",
+        "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
+    ),
+    "diagnosis": Study(
+        "detection.diagnosis",
+        "after the alarm: link, force, point and kind of event against the truth",
+    ),
+    "real_arm": Study(
+        "real_arm.study",
+        "logs of a real UR10e: residuals, false alarms, smallest contacts, beside a peer",
+    ),
+    "detection": Study(
+        "detection.study",
+        "the dissertation's experiment: detectors, speeds, operating points, false alarms",
+    ),
 }

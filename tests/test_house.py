@@ -10,6 +10,18 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
+PRODUCT = [
+    "geometry",
+    "traces",
+    "models",
+    "cloth",
+    "rigid",
+    "detectors",
+    "contacts",
+    "envs",
+    "datasets",
+    "replay",
+]
 ALLOWED = {
     "geometry": set(),
     "traces": set(),
@@ -21,7 +33,11 @@ ALLOWED = {
     "envs": {"models", "contacts", "detectors", "traces"},
     "datasets": {"envs", "contacts", "traces", "models", "detectors"},
     "replay": {"traces", "models"},
+    "report": set(),
+    "benchmarks": set(PRODUCT) | {"report"},
+    "cli": set(PRODUCT) | {"report", "benchmarks"},
 }
+FOLDERS = {room: ROOT / ("src/tauguard/cli" if room == "cli" else room) for room in ALLOWED}
 
 
 def rooms_imported(path: Path) -> set[str]:
@@ -41,10 +57,15 @@ def rooms_imported(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("room", sorted(ALLOWED))
 def test_imports_point_one_way(room):
-    rooms = ALLOWED.keys() | {"benchmarks", "cli"}
-    for path in (ROOT / room).rglob("*.py"):
-        backward = (rooms_imported(path) & rooms) - ALLOWED[room] - {room}
+    for path in FOLDERS[room].rglob("*.py"):
+        backward = (rooms_imported(path) & ALLOWED.keys()) - ALLOWED[room] - {room}
         assert not backward, f"{path.relative_to(ROOT)} imports {sorted(backward)}"
+
+
+def test_every_study_of_the_command_line_is_reached_through_its_one_command():
+    for path in FOLDERS["cli"].glob("*.py"):
+        if path.stem != "bench":
+            assert "benchmarks" not in rooms_imported(path), path.name
 
 
 @pytest.mark.parametrize("room", sorted(ALLOWED))
@@ -58,7 +79,7 @@ def test_includes_point_one_way(room):
             )
 
 
-@pytest.mark.parametrize("room", ["geometry", "cloth", "rigid", "traces"])
+@pytest.mark.parametrize("room", ["geometry", "cloth", "rigid", "traces", "report"])
 def test_light_rooms_leave_heavy_libraries_unloaded(room):
     code = (
         f"import sys, tauguard.{room}; "

@@ -25,10 +25,11 @@ def command(
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
     """
-    from tauguard.benchmarks import STUDIES, report
+    from tauguard.benchmarks import STUDIES
+    from tauguard.benchmarks.run import run_study
 
     if name == "list":
-        for study, line in STUDIES.items():
-            print(f"  {study}  {line}")
+        for name, study in STUDIES.items():
+            print(f"  {name}  {study.line}")
         return
-    report.run_study(name, quick=quick, seed=seed, json_path=json, figure_path=figure)
+    run_study(name, quick=quick, seed=seed, json_path=json, figure_path=figure)

@@ -47,11 +47,11 @@ def command(
         scale: what fixes the scale of the torques.
         json: write the figures here as JSON.
     """
-    from tauguard.benchmarks.report import write_json
     from tauguard.cli.real_logs import doubts, loaded, read_logs, robot_numbers, start
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import left_out
     from tauguard.detectors.calibration.identification import identify
+    from tauguard.report import write_json
 
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
@@ -92,7 +92,7 @@ def summary(names: list[str], found: Identified, held: list[Any], target: Path) 
 
 def report(result: dict[str, Any], found: Identified) -> None:
     """The figures for a reader."""
-    from tauguard.benchmarks.text_table import table
+    from tauguard.report import table
 
     print(f"scale of the torques: from {SOURCES[result['scale']]}")
     held = "preset" if result["scale"] == "preset" else "given"

@@ -33,12 +33,12 @@ def command(
     started = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
 
-    from tauguard.benchmarks.report import write_json
     from tauguard.cli.fitting import trained
     from tauguard.cli.summary import draw, text
     from tauguard.datasets import demo_plan, simulate_all
     from tauguard.detectors import figures, judge
     from tauguard.envs import simulate
+    from tauguard.report import write_json
 
     plan = demo_plan(seed)
     training = list(simulate_all(plan.train, workers, "simulate training"))

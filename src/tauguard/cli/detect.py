@@ -80,8 +80,8 @@ def command(
         out: folder for events.json, detect.mcap and detect.rrd.
         json: write the figures here as JSON.
     """
-    from tauguard.benchmarks.report import write_json
     from tauguard.cli.real_logs import read_matched, robot_numbers
+    from tauguard.report import write_json
 
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
@@ -231,8 +231,8 @@ def what(event: dict[str, Any]) -> str:
 
 def leave(out: Path, trace: Trace, found: Watch, result: dict[str, Any], robot: Path) -> None:
     """Write events, MCAP and recording into the folder ``out``."""
-    from tauguard.benchmarks.report import write_json
     from tauguard.replay import write_rrd
+    from tauguard.report import write_json
     from tauguard.traces import write_mcap
 
     out.mkdir(parents=True, exist_ok=True)

@@ -25,11 +25,11 @@ def command(
         json: write the figures here.
         figure: draw them here (PNG).
     """
-    from tauguard.benchmarks.report import machine, versions, write_json
     from tauguard.cli.folder import labelled
     from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.detectors import figures, judge, load_model
     from tauguard.detectors.methods.free_motion_file import is_free_motion
+    from tauguard.report import machine, versions, write_json
 
     if is_free_motion(model):
         raise ValueError(f"{model}: a real arm's detector (train --free); use `tauguard detect`")

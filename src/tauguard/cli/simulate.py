@@ -41,9 +41,9 @@ def command(
         workers: processes (default: all processors).
         json: write what was simulated here as JSON.
     """
-    from tauguard.benchmarks.report import write_json
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
     from tauguard.models import Mismatch
+    from tauguard.report import write_json
 
     if episodes < 1:
         raise ValueError(f"--episodes {episodes}: expected 1 or more")

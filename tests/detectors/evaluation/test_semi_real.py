@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tauguard.benchmarks.real_arm_pushes import Tried, push_rows
+from tauguard.benchmarks.real_arm.pushes import Tried, push_rows
 from tauguard.detectors.evaluation.semi_real import Push, add_torque, push_torque
 from tauguard.models import pin_model
 from tests.detectors.synthetic_arm import GAIN, XML, nominal, record

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tauguard.benchmarks import real_arm
+from tauguard.benchmarks.real_arm import study as real_arm
 from tauguard.detectors import ArmModel
 from tauguard.detectors.evaluation.semi_real import Added, add_contact, moments, smallest_found
 from tauguard.detectors.methods.free_motion import (

@@ -1,0 +1,1 @@
+"""The study of deformable collision detection beside ipctk."""

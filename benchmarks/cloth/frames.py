@@ -1,0 +1,194 @@
+"""Whole frames: every method beside ipctk's broad and narrow phases, hits and misses with it.
+
+Everything here runs in one thread, and times are the processor's: other programs do not count.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import process_time
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.benchmarks.cloth.peer import load_ipctk
+from tauguard.benchmarks.cloth.scaling import Step, bound, scaled, scenes, step_at
+from tauguard.benchmarks.harness import measure
+from tauguard.cloth import Groups, MeshCCD
+from tauguard.cloth.scenes import load_recording
+from tauguard.report import Row
+
+#: Method and volume: what each was published with, then all on the same candidates.
+ENTRIES = [
+    ("ab2pf", "moving_k_dop14"),
+    ("iccd", "k_dop18"),
+    ("dnf", "k_dop18"),
+    ("scd", "k_dop18"),
+    ("vcd", "k_dop18"),
+    ("naive", "k_dop18"),
+    ("ab2pf", "k_dop18"),
+    ("iccd", "moving_k_dop14"),
+    ("vcd", "moving_k_dop14"),
+]
+
+
+class Frame(NamedTuple):
+    """One step of a mesh to be timed."""
+
+    name: str
+    faces: NDArray[np.int32]
+    groups: Groups | None
+    step: Step
+
+
+def frames(triangles: int, seed: int, data: Path | None) -> list[Frame]:
+    """A late step of every generated scene, and the real cloth-ball step where the data is."""
+    found = [Frame(s.name, s.faces, s.groups, step_at(s, 0.85)) for s in scenes(triangles, seed)]
+    folder = None if data is None else data / "ccd" / "cloth-ball" / "frames"
+    if folder is not None and folder.is_dir():
+        recording = load_recording(folder)
+        found.append(Frame("cloth-ball", recording.faces, None, next(recording.steps())))
+    return found
+
+
+def methods(frame: Frame, repeats: int) -> list[Row]:
+    """Every method on one frame, with what it misses and adds against ab2pf.
+
+    ab2pf misses nothing; on cloth-ball its hits are exactly the listed ones, on the generated
+    scenes they are an upper bound, so that "missed" there may hold a false hit of ab2pf's.
+    """
+    truth = MeshCCD(frame.faces, groups=frame.groups).find(*frame.step)
+    meshes = {
+        (method, volume): MeshCCD(frame.faces, method, groups=frame.groups, volume=volume)
+        for method, volume in ENTRIES
+    }
+    spent = measure(
+        {" ".join(key): bound(ccd.find, *frame.step) for key, ccd in meshes.items()},
+        repeats,
+        process_time,
+    )
+    ours = spent[" ".join(ENTRIES[0])]["median"]
+    rows: list[Row] = []
+    for (method, volume), ccd in meshes.items():
+        answer = ccd.find(*frame.step)
+        vf, ee = compare(truth.vf, answer.vf), compare(truth.ee, answer.ee)
+        time_ms = scaled(spent[f"{method} {volume}"], 1e3)
+        rows.append(
+            {
+                "study": "frame",
+                "scene": frame.name,
+                "triangles": len(frame.faces),
+                "method": method,
+                "volume": volume,
+                "frame_ms": time_ms,
+                "times_ab2pf": time_ms["median"] / (1e3 * ours),
+                "candidates": answer.stats.vf["candidates"] + answer.stats.ee["candidates"],
+                "ab2pf_hits": len(truth.vf) + len(truth.ee),
+                "missed": vf[0] + ee[0],
+                "added": vf[1] + ee[1],
+            }
+        )
+    return rows
+
+
+def means(rows: list[Row]) -> list[Row]:
+    """How many times the first entry's time each method takes, averaged over the scenes."""
+    found: list[Row] = []
+    for method, volume in ENTRIES:
+        ratios = [
+            row["times_ab2pf"]
+            for row in rows
+            if row["study"] == "frame" and (row["method"], row["volume"]) == (method, volume)
+        ]
+        found.append(
+            {
+                "study": "frame mean",
+                "method": method,
+                "volume": volume,
+                "scenes": len(ratios),
+                "times_ab2pf_mean": float(np.mean(ratios)),
+                "times_ab2pf_least": min(ratios),
+                "times_ab2pf_most": max(ratios),
+            }
+        )
+    return found
+
+
+def peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row]:
+    """ipctk's LBVH and narrow phases on the same frame and one thread, all collisions.
+
+    The narrow phase is timed in its own C++ loop over up to ``limit`` candidates drawn from those
+    that the truth calls clear (a hit would shorten the step for what follows), and its time per
+    query is taken times the number of candidates; hits cost it more than that. Both sides test
+    everything against everything (no groups), so that they have the same work.
+    """
+    ipctk = load_ipctk()
+    if ipctk is None:
+        return [{"study": "frame peer", "scene": frame.name, "peer": "ipctk is not installed"}]
+    ccd = MeshCCD(frame.faces)
+    answer = ccd.find(*frame.step)
+    x_t0, x_t1 = (np.asfortranarray(x) for x in frame.step)
+    mesh = ipctk.CollisionMesh(x_t0, ccd.edges, frame.faces)
+    found = ipctk.Candidates()
+    spent = measure(
+        {
+            "ours": bound(ccd.find, *frame.step),
+            "LBVH": lambda: found.build(mesh, x_t0, x_t1, 0.0, ipctk.LBVH()),
+        },
+        repeats,
+        process_time,
+    )
+    n_vf, n_ee = len(found.fv_candidates), len(found.ee_candidates)
+    rows: list[Row] = []
+    narrow = {
+        "AdditiveCCD": (ipctk.AdditiveCCD(), limit),
+        "TightInclusionCCD": (ipctk.TightInclusionCCD(conservative_rescaling=1.0), tight_limit),
+    }
+    for name, (method, most) in narrow.items():
+        seconds = {}
+        for kind, clear in _clear(ipctk, found, answer, most).items():
+            part = ipctk.Candidates()
+            setattr(part, f"{kind}_candidates", clear)
+            start = process_time()
+            part.compute_collision_free_stepsize(mesh, x_t0, x_t1, 0.0, method)
+            seconds[kind] = (process_time() - start) / max(1, len(clear))
+        total = spent["LBVH"]["median"] + n_vf * seconds["fv"] + n_ee * seconds["ee"]
+        rows.append(
+            {
+                "study": "frame peer",
+                "scene": frame.name,
+                "peer": f"ipctk LBVH + {name}",
+                "peer_candidates": n_vf + n_ee,
+                "broad_ms": scaled(spent["LBVH"], 1e3),
+                "vf_ns": 1e9 * seconds["fv"],
+                "ee_ns": 1e9 * seconds["ee"],
+                "peer_ms": 1e3 * total,
+                "ab2pf_ms": scaled(spent["ours"], 1e3),
+                "speedup": total / spent["ours"]["median"],
+            }
+        )
+    return rows
+
+
+def _clear(ipctk: Any, found: Any, answer: Any, most: int) -> dict[str, list[Any]]:
+    """Up to ``most`` candidates of each kind, evenly over the list, without the true hits."""
+    hits = {tuple(pair) for pair in answer.vf.tolist()}
+    fv = found.fv_candidates
+    clear_fv = [c for c in fv[:: 1 + len(fv) // most] if (c.vertex_id, c.face_id) not in hits]
+    hits = {tuple(pair) for pair in answer.ee.tolist()}
+    ee = found.ee_candidates
+    clear_ee = [
+        c
+        for c in ee[:: 1 + len(ee) // most]
+        if (min(c.edge0_id, c.edge1_id), max(c.edge0_id, c.edge1_id)) not in hits
+    ]
+    return {"fv": clear_fv, "ee": clear_ee}
+
+
+def compare(truth: NDArray[np.int32], found: NDArray[np.int32]) -> tuple[int, int]:
+    """Misses and false hits of sorted pairs."""
+    weights = np.array([1 << 32, 1])
+    a, b = truth.astype(np.int64) @ weights, found.astype(np.int64) @ weights
+    common = len(np.intersect1d(a, b, assume_unique=True))
+    return len(truth) - common, len(found) - common

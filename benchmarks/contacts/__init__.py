@@ -1,0 +1,1 @@
+"""The studies of contact checkers and of guarded steps beside MuJoCo."""

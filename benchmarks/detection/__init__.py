@@ -1,0 +1,1 @@
+"""The studies of detectors: alarms, thresholds, online use, and what follows an alarm."""

@@ -1,0 +1,97 @@
+"""The detectors of one arm: its training set, their training, the motion for their thresholds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauguard.benchmarks.detection.pool import Conditions, free_pool
+from tauguard.benchmarks.detection.thresholds import Pieces, free_pieces
+from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
+from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
+from tauguard.detectors.detector import Detector
+from tauguard.detectors.features.front_end import FrontEnd, shared_front_ends
+from tauguard.detectors.registry import make_detector
+from tauguard.envs import simulate
+from tauguard.models import SceneSpec, compose, cura6_drive, pin_model
+from tauguard.traces import Trace
+
+#: Percent of the maximum speed in the training slices.
+TRAINING_SPEEDS = (10.0, 30.0, 60.0, 20.0, 45.0)
+#: The current-predicting network, whose specificity sets everybody's first two thresholds.
+NETWORK = "current-network"
+#: Streams of seeds: training, thresholds, judged motions.
+TRAIN, CALIBRATE, TEST = 11, 12, 13
+
+
+def stream(seed: int, *key: int) -> int:
+    """A seed of its own for every purpose, so that judged motions are never trained on."""
+    return int(np.random.SeedSequence([seed, *key]).generate_state(1)[0])
+
+
+@dataclass(frozen=True)
+class Training:
+    """How much one arm's detectors are trained with."""
+
+    slices: int = 15  #: with collisions, through the dissertation's payloads
+    collisions: int = 5  #: a slice
+    free: int = 20  #: collision-free slices
+    free_seconds: float = 40.0  #: of each
+
+    def traces(self, seed: int, arm: int, conditions: Conditions | None = None) -> list[Trace]:
+        """The slices of one arm."""
+        under = conditions or Conditions()
+        own, mismatch = stream(seed, TRAIN, arm), under.arm(arm)
+        payloads = TRAINING_PAYLOADS
+        struck = struck_episodes(
+            own, self.slices, self.collisions, TRAINING_SPEEDS, payloads, mismatch
+        )
+        free = free_episodes(
+            own, self.free, self.free_seconds, TRAINING_SPEEDS, payloads[::2], mismatch
+        )
+        return [simulate(under.applied(episode)) for episode in [*struck, *free]]
+
+
+def nominal() -> ArmModel:
+    """What is believed of every arm before training: nominal numbers, friction of weight 0.
+
+    The gear's ripple frequencies are known from its data sheet, their heights and phases are not.
+    """
+    scene, drive = compose(SceneSpec()), cura6_drive()
+    cycles = drive.ripple.cycles if drive.ripple is not None else np.empty(0)
+    columns = FrictionModel(cycles=np.outer(drive.gear, cycles))
+    robot = RobotNumbers.from_pin(pin_model(scene.arm_xml))
+    friction = replace(columns, weights=np.zeros((robot.joints, columns.columns)))
+    return ArmModel(robot, drive.gain, friction)
+
+
+def training_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Detectors that are trained together: those with one front end, then the rest in two parts."""
+    together = tuple(n for n in names if getattr(make_detector(n), "front", None) == FrontEnd())
+    rest = [n for n in names if n not in together]
+    return [group for group in (together, tuple(rest[::2]), tuple(rest[1::2])) if group]
+
+
+def train(seed: int, arm: int, names: Sequence[str], training: Training) -> dict[str, Detector]:
+    """The detectors of one arm, trained on its slices."""
+    traces = training.traces(seed, arm)
+    robot = nominal()
+    detectors: dict[str, Detector] = {name: make_detector(name) for name in names}
+    fronts = shared_front_ends(detectors.values())
+    for detector in detectors.values():
+        detector.fit(traces, robot)
+    for front in fronts:
+        front.forget()
+    return detectors
+
+
+def calibration_pieces(
+    seed: int, arm: int, detectors: dict[str, Detector], speed: float, hours: float
+) -> dict[str, Pieces]:
+    """What detectors say of the arm's collision-free motion with the training payloads."""
+    under = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
+    pool = free_pool(stream(seed, CALIBRATE), speed, (arm,), hours, under)
+    found = [free_pieces(detectors, simulate(episode)) for _, episode in pool]
+    return {name: Pieces.joined([f[name] for f in found]) for name in detectors}

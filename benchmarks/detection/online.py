@@ -1,0 +1,231 @@
+"""What one sample costs online: observer and SVR, the kernel beside scikit-learn, fewer vectors.
+
+The detector runs sample by sample through :meth:`CollisionDetector.step` on a motion with
+collisions that it was not trained on. scikit-learn's ``SVR.predict`` gets the same windows, one row
+a call; its kernel is precomputed and it is charged with the kernel row against the support vectors
+alone, in NumPy: less than its own callable kernels compute.
+"""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.report import Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tauguard.detectors import CollisionDetector
+    from tauguard.detectors.methods.svr_regressor import SrqSVR
+    from tauguard.traces import Trace
+
+Array = NDArray[np.float64]
+
+#: Shares of the support vectors that are kept.
+SHARES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75)
+#: A controller's period at 1 kHz, and what a sample may take of it at the median [us].
+PERIOD, GOAL = 1000.0, 100.0
+
+#: What the columns of each table mean.
+NOTES = {
+    "step": "wall time of one sample of the whole detector (observer, features, SVR), one thread "
+    "[us]; over_a_period: of its samples, those that took over 1 ms; difference_to_batch: of the "
+    "scores, largest.",
+    "kernel": "one window of the SVR alone: all support vectors, then ever fewer. The peer is "
+    "scikit-learn's predict with its kernel row by NumPy, less than its own callable kernels do. "
+    "error: of the output, beside all vectors. What fewer vectors cost in missed collisions is not "
+    "shown.",
+}
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is trained on and timed."""
+
+    slices: int  #: with collisions
+    free: int  #: collision-free
+    samples: int  #: timed
+    single: int  #: rows that scikit-learn predicts, one a call
+
+
+def trained(extent: Extent, seed: int) -> tuple[CollisionDetector, Trace]:
+    """A detector of a simulated arm, and a motion with collisions it has not seen."""
+    from tauguard.benchmarks.detection.fleet import TRAINING_SPEEDS, nominal
+    from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
+    from tauguard.detectors import CollisionDetector
+    from tauguard.envs import simulate
+    from tauguard.models import Mismatch
+
+    arm = Mismatch(seed=500 + seed)
+    payloads = TRAINING_PAYLOADS[:: max(1, 15 // extent.slices)]
+    planned = struck_episodes(3 * seed, extent.slices, 5, TRAINING_SPEEDS, payloads, arm)
+    planned += free_episodes(3 * seed + 1, extent.free, 30.0, TRAINING_SPEEDS, payloads, arm)
+    robot = nominal()
+    detector = CollisionDetector().fit(
+        [simulate(episode) for episode in planned],
+        robot.robot,
+        robot.drive_gain,
+        friction=robot.friction,
+    )
+    unseen = struck_episodes(3 * seed + 2, 1, 8, (40.0,), (1500.0,), arm)
+    return detector, simulate(unseen[0])
+
+
+def timed(calls: Callable[[int], object], count: int) -> Array:
+    """Microseconds of ``calls(k)`` for every k below ``count``."""
+    spent = np.empty(count, dtype=np.int64)
+    for k in range(count):
+        begin = time.perf_counter_ns()
+        calls(k)
+        spent[k] = time.perf_counter_ns() - begin
+    return spent / 1e3
+
+
+def spread(spent: Array) -> Row:
+    """Median with its quartiles [us]."""
+    low, median, high = (float(x) for x in np.percentile(spent, (25, 50, 75)))
+    return {"median": median, "low": low, "high": high}
+
+
+def step_row(detector: CollisionDetector, trace: Trace, samples: int) -> Row:
+    """``step``: one sample through observer, payload estimate, features, SVR and filter."""
+    batch = detector.detect(trace)
+    count = min(samples, len(trace.t))
+    scores = np.empty(count)
+
+    def step(k: int) -> None:
+        detector.step(trace.q[k], trace.qd[k], trace.current[k])
+
+    def kept(k: int) -> None:
+        step(k)
+        scores[k] = detector.score
+
+    for k in range(500):
+        step(k)
+    detector.reset()
+    spent = timed(step, count)
+    detector.reset()
+    timed(kept, count)
+    detector.reset()
+    grown = allocated(step, count // 4)
+    _, _, regressor = detector._fitted()
+    return {
+        "study": "step",
+        "support_vectors": len(regressor.support_vectors_),
+        "samples": count,
+        "us": spread(spent),
+        "us_p99": float(np.percentile(spent, 99)),
+        "us_max": float(spent.max()),
+        "over_a_period": int((spent > PERIOD).sum()),
+        "difference_to_batch": float(np.abs(scores - batch.score[:count]).max()),
+        "bytes_kept_a_call": grown,
+        "met": bool(np.median(spent) <= GOAL),
+    }
+
+
+def allocated(call: Callable[[int], object], count: int) -> float:
+    """Bytes that Python and NumPy hold more of after ``count`` calls, per call."""
+    for k in range(min(200, count)):
+        call(k)
+    tracemalloc.start()
+    try:
+        before, _ = tracemalloc.get_traced_memory()
+        for k in range(count):
+            call(k)
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    return (after - before) / count
+
+
+def windows_of(detector: CollisionDetector, trace: Trace) -> Array:
+    """The windows of every sample, shape (T, size)."""
+    _, features, _ = detector._fitted()
+    estimate = detector._estimate(trace)
+    signal = features.signal(estimate.left, trace.qd, estimate.acceleration)
+    return features.windows(signal, np.arange(len(trace.t)))
+
+
+def peer(regressor: SrqSVR) -> Callable[[Array], Array]:
+    """scikit-learn's own ``predict`` of the fitted SVR on one window, shape (1, size)."""
+    svr, vectors = regressor.svr_, regressor.support_vectors_
+    row = np.zeros((1, svr.shape_fit_[0]))
+    columns, scale = svr.support_, 1 / regressor.sigma**2
+
+    def predict(window: Array) -> Array:
+        gap = vectors - window
+        row[0, columns] = (1 + scale * np.einsum("ij,ij->i", gap, gap)) ** -2.0
+        value: Array = svr.predict(row)
+        return value
+
+    return predict
+
+
+def kernel_rows(regressor: SrqSVR, windows: Array, single: int, seed: int) -> list[Row]:
+    """``kernel``: the full sum beside scikit-learn, then reduced sets: time against error."""
+    rng = np.random.default_rng([seed, 9])
+    own = np.ascontiguousarray(windows[rng.integers(len(windows), size=single)])
+    value = np.empty(single)
+    slices = [own[k : k + 1] for k in range(single)]
+    theirs = peer(regressor)
+    full = regressor.predict(windows)
+    total = len(regressor.support_vectors_)
+    models = [regressor] + [regressor.reduced(max(1, round(s * total))) for s in SHARES]
+    rows = []
+    for model in models:
+        call = _one_window(model, slices)
+        timed(call, min(200, single))
+        ours = timed(call, single)
+        row: Row = {"study": "kernel", "support_vectors": len(model.support_vectors_)}
+        row |= {"us": spread(ours), "us_p99": float(np.percentile(ours, 99))}
+        again = timed(lambda k: value.__setitem__(k, theirs(slices[k])[0]), single)
+        row |= {"sklearn_us": spread(again), "speedup": float(np.median(again) / np.median(ours))}
+        row["difference_to_sklearn"] = float(np.abs(model.predict(own) - value).max())
+        error = np.abs(model.predict(windows) - full)
+        row |= {"error_rms": float(np.sqrt(np.mean(error**2))), "error_max": float(error.max())}
+        rows.append(row)
+    return sorted(rows, key=lambda r: -int(r["support_vectors"]))
+
+
+def _one_window(model: SrqSVR, slices: list[Array]) -> Callable[[int], object]:
+    """The kernel sum at the k-th window, one thread."""
+    kernel, out = model.kernel_sum(), np.empty(1)
+    return lambda k: kernel.rows(slices[k], out, 1)
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """Rows ``step`` (the whole detector) and ``kernel`` (full and reduced sets, scikit-learn)."""
+    extent = Extent(5, 5, 15_000, 1000) if quick else Extent(15, 20, 27_000, 5000)
+    detector, trace = trained(extent, seed)
+    _, _, regressor = detector._fitted()
+    found = [step_row(detector, trace, extent.samples)]
+    found += kernel_rows(regressor, windows_of(detector, trace), extent.single, seed)
+    return found
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Microseconds and error over the number of support vectors."""
+    own = [r for r in rows if r["study"] == "kernel"]
+    count = [r["support_vectors"] for r in own]
+    left, right = figure.subplots(1, 2)
+    left.plot(count, [r["us"]["median"] for r in own], "o-", label="kernel sum, one window")
+    left.plot(count, [r["us_p99"] for r in own], ":", color="C0", label="99th percentile")
+    peers = [r["sklearn_us"]["median"] for r in own]
+    left.axhline(peers[0], color="black", ls="--", label="scikit-learn's predict, all vectors")
+    left.set(xlabel="support vectors", ylabel="microseconds a sample", yscale="log")
+    left.set_title("Time")
+    fewer = [r for r in own if r["error_max"] > 0]
+    for key, label in (("error_rms", "root mean square"), ("error_max", "largest")):
+        right.plot([r["us"]["median"] for r in fewer], [r[key] for r in fewer], "o-", label=label)
+    right.set(xlabel="microseconds a sample", ylabel="error of the SVR's output", yscale="log")
+    right.set_title("Speed against error of reduced sets")
+    for axis in (left, right):
+        axis.legend()
+        axis.grid(alpha=0.3)

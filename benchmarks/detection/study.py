@@ -1,0 +1,220 @@
+"""The dissertation's experiment on simulated arms: detectors, speeds, operating points.
+
+Every arm differs from the nominal one within the measured magnitudes; its detectors are trained on
+its own 15 slices with the dissertation's payloads, get their thresholds from other motion of that
+arm, and are judged on motions with payloads that no slice had and nobody tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tauguard.benchmarks.detection import chart as detection_chart
+from tauguard.benchmarks.detection import rows as report
+from tauguard.benchmarks.detection import table as detection_table
+from tauguard.benchmarks.detection.fleet import (
+    NETWORK,
+    TEST,
+    Training,
+    calibration_pieces,
+    stream,
+    train,
+    training_groups,
+)
+from tauguard.benchmarks.detection.judge import Tallies, judge_free, judge_struck, merged
+from tauguard.benchmarks.detection.oracle import ORACLE, oracle
+from tauguard.benchmarks.detection.pool import (
+    FAINT,
+    FAINT_FORCES,
+    FORCES,
+    SPEEDS,
+    free_pool,
+    struck_pool,
+)
+from tauguard.benchmarks.detection.study import variations
+from tauguard.benchmarks.detection.thresholds import Fleet, Pieces, watched
+from tauguard.benchmarks.workers import Workers
+from tauguard.detectors.detector import Detector
+from tauguard.envs import simulate
+from tauguard.report import Row
+from tauguard.traces import STRATA
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_JUDGED = (
+    "sensitivity: of the collisions from 16 N m up (achieved peak of the external torque, joints 1 "
+    "to 4), "
+)
+#: What the columns of each table mean.
+NOTES = {
+    "speed": _JUDGED + "and specificity, of collision-free cases of 2 s; by percent of the largest "
+    "speed. threshold_a: the operating point [A]; threshold: of each arm's own, median [least, "
+    "most]. All arms and collisions are simulated.",
+    "hourly": _JUDGED + "all speeds, at thresholds that aim at 0.25 false alarms an hour; "
+    "alarms_per_hour: what came of it in so many hours. Delays from the touch [ms]. tau98: the "
+    "least torque above which 98 % are found [N m], by speed.",
+    "floor": "the same collisions by an oracle that is given the true external torque: no detector "
+    "that needs as much torque is sooner.",
+    "strata": "found of all, by torque [N m]; what is below 4 N m counts in no other rate.",
+    "dissertation": "TP, FN, FP, TN printed for a real arm beside ours for simulated ones: the "
+    "same experiment, not the same collisions. Sensitivities are of all from 4 N m up.",
+    "mcnemar": "exact test on the same collisions: found by the first detector only, by the other.",
+    "output": "Spearman's between a collision's torque and the highest output.",
+    "training_size": "at the third point, one speed and arm; few collisions, wide intervals.",
+    "conditions": "what training did not have, at the third point, one speed and arm; nothing is "
+    "learnt anew.",
+    "sigma": "the length of the SRQ kernel, at the third point, one speed and arm.",
+    "sample_rate": "a kilohertz beside the rate of the arm in the dissertation.",
+    "headline": "the best detector (one for all cells) and SVR-SRQ beside the dissertation's SVR. "
+    "met: both rates of the best reach 0.98, and both of SVR-SRQ's the dissertation's.",
+}
+
+Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
+Trained = Mapping[int, dict[str, Detector]]
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is simulated."""
+
+    arms: int  #: judged, each with its own detectors
+    detectors: tuple[str, ...]
+    training: Training
+    calibration_hours: float  #: collision-free, for the thresholds, of each arm
+    hours: float  #: collision-free, judged, all speeds and arms together
+    short: float  #: of them, those that all detectors judge; the rest only the thorough ones
+    per_stratum: int  #: judged collisions of a stratum at one speed
+    faint: int  #: the same below the judged strata
+    target: float = 0.25  #: false alarms per hour that the third threshold aims at
+    variations: bool = False  #: also training size, sigma, conditions, sample rate
+
+
+ALL = (
+    "srq-svr",
+    "srq-svr-plain",
+    "current-network",
+    "current-threshold",
+    "residual-thresholds",
+    "moving-thresholds",
+    "cusum",
+    "one-class",
+    "window-network",
+    "boosting",
+)
+#: Those whose need for collisions is compared.
+LEARNERS = ("srq-svr", "window-network", "boosting")
+#: Those that judge all of the collision-free motion.
+THOROUGH = ("srq-svr",)
+PARTS = ("training_size", "conditions", "sigma", "sample_rate")
+FULL = Size(3, ALL, Training(), 0.75, 10.0, 1.0, 13, 5, variations=True)
+QUICK = Size(
+    1,
+    ("srq-svr", "srq-svr-plain", "current-network", "residual-thresholds"),
+    Training(slices=10, free=8, free_seconds=25.0),
+    0.1,
+    0.1,
+    0.1,
+    2,
+    0,
+)
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """Rows of all studies; see :mod:`tauguard.benchmarks.detection.rows` for their fields."""
+    return study(QUICK if quick else FULL, seed)
+
+
+def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
+    """Train, judge, report; the result does not depend on the number of ``workers``."""
+    arms = [1000 * (seed + 1) + k for k in range(size.arms)]
+    with Workers(workers) as each:
+        trained = _trained(size, seed, arms, each)
+        fleets = _calibrated(size, seed, trained, each)
+        parts = [(part, arms[0], fleets[arms[0]], seed) for part in PARTS]
+        jobs = [(size, seed, speed, arm) for speed in SPEEDS for arm in (0, *arms)]
+        judged = each(_judge, [(job, fleets) for job in jobs])
+        more = each(_vary, parts if size.variations else [])  # whoever is done goes on with it
+        tallies = list(judged)
+        by_speed = {
+            speed: merged(t for (*_, own, _), t in zip(jobs, tallies, strict=True) if own == speed)
+            for speed in SPEEDS
+        }
+        rows = report.rows(by_speed, report.spread(list(fleets.values())))
+        rows += detection_table.headline(rows)
+        return rows + [row for found in more for row in found]
+
+
+def _trained(size: Size, seed: int, arms: Sequence[int], each: Each) -> Trained:
+    """Every arm's detectors, in the order of their names."""
+    groups = training_groups(size.detectors)
+    jobs = [(size, seed, arm, group) for arm in arms for group in groups]
+    found: dict[int, dict[str, Detector]] = {arm: {} for arm in arms}
+    for (_, _, arm, _), own in zip(jobs, each(_train, jobs), strict=True):
+        found[arm].update(own)
+    return {arm: {name: own[name] for name in size.detectors} for arm, own in found.items()}
+
+
+def _train(job: tuple[Size, int, int, tuple[str, ...]]) -> dict[str, Detector]:
+    size, seed, arm, group = job
+    return train(seed, arm, group, size.training)
+
+
+def _calibrated(size: Size, seed: int, trained: Trained, each: Each) -> dict[int, Fleet]:
+    """Every arm's detectors with levels and thresholds from that arm's own motion."""
+    hours = size.calibration_hours / len(SPEEDS)
+    jobs = [(seed, arm, own, speed, hours) for arm, own in trained.items() for speed in SPEEDS]
+    pieces: dict[int, dict[float, dict[str, Pieces]]] = {arm: {} for arm in trained}
+    for (_, arm, _, speed, _), found in zip(jobs, each(_calibrate, jobs), strict=True):
+        pieces[arm][speed] = found
+    network = NETWORK if NETWORK in size.detectors else None
+    return {arm: watched(own, pieces[arm], network, size.target) for arm, own in trained.items()}
+
+
+def _calibrate(job: tuple[int, int, dict[str, Detector], float, float]) -> dict[str, Pieces]:
+    return calibration_pieces(*job)
+
+
+def _vary(job: tuple[str, int, Fleet, int]) -> list[Row]:
+    part, arm, fleet, seed = job
+    extent = variations.Extent()
+    if part == "conditions":
+        return variations.conditions(fleet, arm, seed, extent)
+    bench = variations.Bench(seed, arm, extent)
+    if part == "training_size":
+        return variations.training_size(bench, LEARNERS)
+    return {"sigma": variations.sigmas, "sample_rate": variations.sample_rate}[part](bench)
+
+
+def _judge(job: tuple[tuple[Size, int, float, int], Mapping[int, Fleet]]) -> Tallies:
+    """One speed: an arm's free motion, or (arm 0) the collisions of all arms."""
+    (size, seed, speed, arm), fleets = job
+    test = stream(seed, TEST)
+    if arm:
+        share = 1 / len(SPEEDS) / size.arms
+        pool = free_pool(test, speed, (arm,), share * size.hours)
+        early = len(free_pool(test, speed, (arm,), share * size.short))
+        thorough = {name: own for name, own in fleets[arm].items() if name in THOROUGH}
+        return merged(
+            judge_free(fleets[arm] if k < early else thorough, simulate(episode))
+            for k, (_, episode) in enumerate(pool)
+        )
+    pools = [(STRATA, size.per_stratum, FORCES), (FAINT, size.faint, FAINT_FORCES)]
+    return merged(
+        judge_struck({**fleets[struck.arm], ORACLE: oracle()}, struck)
+        for k, (strata, count, forces) in enumerate(pools)
+        if count
+        for struck in struck_pool(test + k, speed, list(fleets), count, strata, forces)
+    )
+
+
+def shown(rows: list[Row]) -> list[Row]:
+    """See :func:`tauguard.benchmarks.detection_table.shown`."""
+    return detection_table.shown(rows)
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """See :func:`tauguard.benchmarks.detection_chart.draw`."""
+    detection_chart.draw(rows, figure)

@@ -1,0 +1,1 @@
+"""The study of logs of a real arm."""

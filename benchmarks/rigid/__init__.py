@@ -1,0 +1,1 @@
+"""The study of convex bodies and meshes beside coal."""

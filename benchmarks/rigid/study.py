@@ -1,0 +1,48 @@
+"""Rigid bodies: convex pairs (table 2.1), meshes (2.2), volumes (figure 1.1), motion, claims."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tauguard.benchmarks.rigid import claims as rigid_claims
+from tauguard.benchmarks.rigid import convex as rigid_convex
+from tauguard.benchmarks.rigid import impact as rigid_impact
+from tauguard.benchmarks.rigid import mesh as rigid_mesh
+from tauguard.benchmarks.rigid import volumes as rigid_volumes
+from tauguard.report import Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PARTS = (rigid_convex, rigid_mesh, rigid_volumes, rigid_impact)
+
+#: What the columns of each table mean; a table without a line has its file's docstring.
+NOTES = {
+    "table 2.1 static": "ns a pair in one pose, one thread. coal_net: without the loop and the "
+    "call; a_vs_b: b's time over a's; published: the printed ratio; wrong: of all pairs.",
+    "table 2.1 dynamic": "ns a pair that moves by a constant translation; a_vs_b: b's time over "
+    "a's.",
+    "hard cases": "false_hit and false_clear count wrong answers, exact_share is what was left to "
+    "exact arithmetic.",
+    "mesh build": "times_faster: coal's time over ours.",
+    "table 2.2 static": "first hit of two copies in random poses [us]; times_faster: coal's mean, "
+    "net of its call, over ours; disagree: answers that differ from coal's.",
+    "figure 1.1 volumes": "tightness: volume over the hull's; false_hits: of the pairs whose "
+    "hulls are apart, those that the volumes cannot tell apart.",
+    "claims": "the worst figure of each kind beside what was asked of it; a quick run denies no "
+    "claim of a time.",
+}
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """The rows of every part, and what was asked of them beside what they measured."""
+    rows = [row for part in PARTS for row in part.run(quick, seed)]
+    return rows + rigid_claims.claims(rows, quick)
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Table 2.1 above, the other parts below."""
+    grid = figure.add_gridspec(2, 3)
+    panels = [grid[0, :], *(grid[1, k] for k in range(3))]
+    for part, panel in zip(PARTS, panels, strict=True):
+        part.draw(rows, figure.add_subplot(panel))

@@ -1,0 +1,138 @@
+"""Rows as text tables that a terminal can show; what does not fit is left to the JSON form."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+#: Characters of a line.
+WIDTH = 140
+#: A column's heading is broken at its underscores into lines of about this length.
+HEADING = 9
+#: Text in a cell is broken into lines of this length.
+TEXT = 56
+
+#: A line of figures: a flat dictionary.
+Row = dict[str, Any]
+#: A column: the heading and then each row's cell, all as lines of text.
+Column = list[list[str]]
+
+
+def table(
+    rows: Sequence[Mapping[str, Any]],
+    width: int = WIDTH,
+    notes: Mapping[str, str] = MappingProxyType({}),
+) -> str:
+    """Rows as aligned columns; neighbours of one study with the same keys share a heading.
+
+    The study stands above, with what ``notes`` says of it. Where a line would be longer than
+    ``width``, headings and long texts are broken first, then intervals are left out, and then the
+    columns that do not fit follow below, each part with the first columns again.
+    """
+    blocks: list[str] = []
+    start = 0
+    while start < len(rows):
+        kind = _kind(rows[start])
+        stop = start
+        while stop < len(rows) and _kind(rows[stop]) == kind:
+            stop += 1
+        study, keys = kind
+        parts = _block(keys, rows[start:stop], width)
+        if study is not None:
+            title = f"{study}: {notes[study]}" if study in notes else str(study)
+            blocks.append("\n".join(textwrap.wrap(title, width)))
+        blocks += parts
+        start = stop
+    return "\n\n".join(blocks)
+
+
+def _kind(row: Mapping[str, Any]) -> tuple[Any, list[str]]:
+    return row.get("study"), [key for key in row if key != "study"]
+
+
+def cell(value: object, brief: bool = False) -> str:
+    """One value: three digits; a rate or a time as value [low, high], ``brief`` without these."""
+    if value is None:
+        return "-"
+    if isinstance(value, Mapping):
+        form = ".3f" if "value" in value else ".3g"
+        middle = value["value"] if "value" in value else value["median"]
+        if middle is None:
+            return "-"
+        if brief:
+            return f"{middle:.1e}" if 0 < middle < 5e-4 else f"{middle:{form}}"
+        if "median" in value and value["low"] == value["high"]:
+            return f"{middle:{form}}"  # of one repeat
+        return f"{middle:{form}} [{value['low']:{form}}, {value['high']:{form}}]"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, np.floating):
+        value = float(value)
+    if isinstance(value, float):
+        return f"{value:.3g}" if abs(value) < 1e5 else f"{value:.2e}"
+    return str(value)
+
+
+def _block(keys: list[str], rows: Sequence[Mapping[str, Any]], width: int) -> list[str]:
+    """One table, or several of them where there are too many columns."""
+    columns: list[Column] = []
+    for narrow, brief in ((False, False), (True, False), (True, True)):
+        columns = [_column(key, [row[key] for row in rows], narrow, brief) for key in keys]
+        if _length(columns) <= width:
+            return [_aligned(columns)]
+    labels: list[Column] = []
+    for key, column in zip(keys, columns, strict=True):
+        if not isinstance(rows[0][key], str) or _length([*labels, column]) > width / 2:
+            break
+        labels.append(column)
+    parts = [list(labels)]
+    for column in columns[len(labels) :]:
+        if _length([*parts[-1], column]) > width and len(parts[-1]) > len(labels):
+            parts.append(list(labels))
+        parts[-1].append(column)
+    return [_aligned(part) for part in parts]
+
+
+def _column(key: str, values: list[Any], narrow: bool, brief: bool) -> Column:
+    texts = [cell(value, brief) for value in values]
+    if not narrow:
+        return [[key], *([text] for text in texts)]
+    wrapped = [textwrap.wrap(text, TEXT) or [""] for text in texts]
+    room = max(HEADING, *(len(line) for lines in wrapped for line in lines))
+    return [_broken(key, room), *wrapped]
+
+
+def _broken(key: str, room: int) -> list[str]:
+    """A heading in lines that end at a space or an underscore, but not within a unit's brackets."""
+    lines = [""]
+    for word in re.split(r"(?<=[_ ])(?![^\[]*\])", key):
+        if lines[-1] and len(lines[-1]) + len(word.rstrip("_ ")) > room:
+            lines.append("")
+        lines[-1] += word
+    return [line.rstrip() for line in lines]
+
+
+def _wide(column: Column) -> int:
+    return max(len(line) for lines in column for line in lines)
+
+
+def _length(columns: list[Column]) -> int:
+    return sum(_wide(column) + 2 for column in columns) - 2
+
+
+def _aligned(columns: list[Column]) -> str:
+    widths = [_wide(column) for column in columns]
+    lines: list[str] = []
+    for cells in zip(*columns, strict=True):
+        for i in range(max(len(own) for own in cells)):
+            texts = [own[i] if i < len(own) else "" for own in cells]
+            padded = (text.ljust(room) for text, room in zip(texts, widths, strict=True))
+            lines.append("  ".join(padded).rstrip())
+        if cells[0] is columns[0][0]:
+            lines.append("  ".join("-" * room for room in widths))
+    return "\n".join(lines)
