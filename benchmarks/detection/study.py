@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from tauguard.benchmarks.detection import chart as detection_chart
 from tauguard.benchmarks.detection import rows as report
 from tauguard.benchmarks.detection import table as detection_table
+from tauguard.benchmarks.detection import variations
 from tauguard.benchmarks.detection.fleet import (
     NETWORK,
     TEST,
@@ -33,7 +34,6 @@ from tauguard.benchmarks.detection.pool import (
     free_pool,
     struck_pool,
 )
-from tauguard.benchmarks.detection.study import variations
 from tauguard.benchmarks.detection.thresholds import Fleet, Pieces, watched
 from tauguard.benchmarks.workers import Workers
 from tauguard.detectors.detector import Detector

@@ -4,7 +4,7 @@ import mujoco
 import pytest
 from matplotlib.figure import Figure
 
-from tauguard.benchmarks.contacts.study import guard
+from tauguard.benchmarks.contacts import guard
 from tauguard.contacts.scenes import ball_cloth, sphere_plate
 
 

@@ -4,7 +4,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.contacts.study import study
+from tauguard.benchmarks.contacts import study
 
 matplotlib.use("Agg")
 

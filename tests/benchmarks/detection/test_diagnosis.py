@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tauguard.benchmarks.detection import diagnosis
 from tauguard.benchmarks.detection.diagnosis import Judged
 from tauguard.benchmarks.detection.diagnosis_pool import contact_kind, first_alarm
 from tauguard.benchmarks.detection.fleet import Training
-from tauguard.benchmarks.detection.study import diagnosis
 from tauguard.detectors import Diagnosis
 from tauguard.detectors.diagnosis.classification import Signs
 from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors

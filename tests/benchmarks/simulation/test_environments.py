@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tauguard.benchmarks import STUDIES
-from tauguard.benchmarks.simulation.study import environments
+from tauguard.benchmarks.simulation import environments
 from tauguard.report import table
 
 KNOWN = {"contact": None, "observer": "observer"}

@@ -1,6 +1,6 @@
 """The force study: a blow by the default contact is within 2 % of paper, and parameters matter."""
 
-from tauguard.benchmarks.simulation.study import impact
+from tauguard.benchmarks.simulation import impact
 
 
 def test_limp_arm_follows_its_reflected_mass():
