@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.envs import _env
+from tauguard.envs import _plant
 from tauguard.envs.actions import Entry, action_scale, action_table, observation_table
-from tauguard.envs.loop import drive_numbers, function_address
+from tauguard.envs.plant import make_plant
 from tauguard.envs.sensing import Sensing, make_detector
 from tauguard.envs.settings import CONTROLS
 from tauguard.envs.watching import Watching
-from tauguard.envs.world import World
+from tauguard.envs.world import RegionInfo, World
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ FIGURES = (
     DIVERGED,
     SPEED,
 ) = range(len(FIGURES))
-assert len(FIGURES) == _env.FIGURES
+assert len(FIGURES) == _plant.FIGURES
 #: What replaces an action, by its native code: nothing, velocities, no power, no power and brakes.
 FREE, VELOCITY, LIMP, BRAKE = range(4)
 
@@ -70,10 +70,10 @@ class Cell:
         self.alarm = np.zeros(rows, dtype=np.bool_)
         self.target = np.zeros((rows, world.arms, 3))
         self.q, self.qd, self.current, self.tau = (np.zeros((rows, steps, n)) for _ in range(4))
-        self.contact = np.zeros((rows, steps, _env.CONTACT_WIDTH))
+        self.contact = np.zeros((rows, steps, _plant.CONTACT_WIDTH))
         self.region = np.zeros((rows, steps, len(world.regions), 3))
         self.datas = [mujoco.MjData(world.scene.model) for _ in range(rows)]
-        self.plants = [self._plant(i) for i in range(rows)]
+        self.plants = [self._make_plant(i) for i in range(rows)]
         self.sensing: list[Sensing] | None = None
         self.attach(world.settings.detector)
         names = world.settings.checkers
@@ -121,7 +121,7 @@ class Cell:
             for i in np.flatnonzero(mask):
                 self._watched(int(i), actions[i])
         else:
-            _env.step_all(self.plants, actions, mask, threads)
+            _plant.step_all(self.plants, actions, mask, threads)
         if self.sensing is not None:
             for i in np.flatnonzero(mask):
                 self._sense(int(i), rngs[i])
@@ -149,70 +149,80 @@ class Cell:
         self.contacts[i] = watching.counts
         plant.finish()
 
-    def _plant(self, i: int) -> _env.Plant:
-        world, model, data = self.world, self.world.scene.model, self.datas[i]
-        scale = action_scale(world)
-        fields = ("qpos", "qvel", "qfrc_applied", "sensordata", "site_xpos")
-        addresses = {name: getattr(data, name).ctypes.data for name in fields}
-        addresses |= {n: getattr(data, n).ctypes.data for n in ("xpos", "xaxis", "xmat", "xanchor")}
-        addresses |= {name: function_address(name) for name in ("mj_step", "mj_kinematics")}
-        addresses |= {"model": model._address, "data": data._address}
-        rows = {"observation", "figure", "tau_ext", "target"}
-        addresses |= {name: getattr(self, name)[i].ctypes.data for name in rows}
-        each = ("q", "qd", "current", "tau", "contact", "region")
-        addresses |= {f"row_{name}": getattr(self, name)[i].ctypes.data for name in each}
-        constant = world.scene.drive.electrical_time_constant
-        dt = float(model.opt.timestep)
-        numbers = {
-            "mass": world.nominal_mass,
-            "com": world.nominal_com.ravel(),
-            "gravity": model.opt.gravity,
-            "times": [dt, float(np.exp(-dt / constant)) if constant else 0.0],
-            "scale": scale[1],
-            "centre": scale[0],
-            "max_speed": world.max_speed,
-            "torque_limit": world.torque_limit,
-            "low": [entry.low for entry in self.observations],
-            "high": [entry.high for entry in self.observations],
-            "regions": [
-                x for r in world.regions for x in (r.quasi_static, r.transient, r.span, r.speed)
-            ],
-        }
-        plain = {key: [float(x) for x in value] for key, value in numbers.items()}
-        return _env.Plant(addresses, _layout(world), plain, _drive(world))
+    def _make_plant(self, i: int) -> _plant.Plant:
+        world, data = self.world, self.datas[i]
+        plant = make_plant(world.scene, world.nominal, world.gains, data)
+        rows = _plant.Rows(
+            observation=self.observation[i],
+            figure=self.figure[i],
+            tau_ext=self.tau_ext[i],
+            target=self.target[i],
+            q=self.q[i],
+            qd=self.qd[i],
+            current=self.current[i],
+            tau=self.tau[i],
+            contact=self.contact[i],
+            region=self.region[i],
+        )
+        around = _surroundings(world, self.observations)
+        plant.surround(around, _controls(world), rows, substeps=world.settings.substeps)
+        return plant
 
 
-def _layout(world: World) -> dict[str, list[int]]:
+def _controls(world: World) -> _plant.Controls:
+    settings = world.settings
+    centre, scale = action_scale(world)
+    return _plant.Controls(
+        mode=CONTROLS.index(settings.control),
+        period=float(world.scene.model.opt.timestep) * settings.substeps,
+        scale=scale.tolist(),
+        centre=centre.tolist(),
+        max_speed=world.max_speed.tolist(),
+        torque_limit=world.torque_limit.tolist(),
+    )
+
+
+def _surroundings(world: World, observations: list[Entry]) -> _plant.Surroundings:
     model, scene = world.scene.model, world.scene
     each = len(scene.joint_names) // world.arms
-    joints = world.ids()
-    regions: list[int] = []
-    for r in world.regions:
-        sensor = -1
-        if scene.spec.labels:
-            sensor = int(model.sensor_adr[model.sensor(f"contact_{r.name}").id])
-        at = (model.jnt_qposadr[r.joint], model.jnt_dofadr[r.joint]) if r.joint >= 0 else (-1, -1)
-        regions += [r.body, r.joint, int(at[0]), int(at[1]), sensor]
-    begin = int(model.sensor_adr[model.sensor("contact_link1").id]) if scene.spec.labels else -1
-    sizes = [model.nq, model.nv, world.settings.substeps, begin]
-    return {
-        "joint": [int(j) for j in joints],
-        "body": [int(b) for b in scene.link_bodies],
-        "first": [i // each * each for i in range(len(joints))],
-        "slide": [int(model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE) for j in joints],
-        "qpos_adr": [int(a) for a in scene.qpos_adr],
-        "dof_adr": [int(a) for a in scene.dof_adr],
-        "tool_site": [tool[0] for tool in world.tools],
-        "tool_body": [tool[1] for tool in world.tools],
-        "tool_first": [tool[2] for tool in world.tools],
-        "sizes": [*sizes, CONTROLS.index(world.settings.control)],
-        "regions": regions,
-    }
-
-
-def _drive(world: World) -> list[dict[str, list[float]]]:
-    """What the native joints are made of; the servo divides by the nominal gain."""
-    return [
-        {key: value if isinstance(value, list) else [float(value)] for key, value in joint.items()}
-        for joint in drive_numbers(world.scene.drive, world.nominal, world.gains)
+    links = [
+        _plant.Link(
+            joint=int(joint),
+            body=int(scene.link_bodies[i]),
+            first=i // each * each,
+            slide=bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE),
+            mass=float(world.nominal_mass[i]),
+            com=world.nominal_com[i].tolist(),
+        )
+        for i, joint in enumerate(world.ids())
     ]
+    labels = scene.spec.labels
+    return _plant.Surroundings(
+        links=links,
+        gravity=model.opt.gravity.tolist(),
+        tools=[_plant.Tool(site=site, body=body, first=first) for site, body, first in world.tools],
+        regions=[_region(world, region) for region in world.regions],
+        sensor_begin=_sensor(model, "contact_link1") if labels else -1,
+        low=[entry.low for entry in observations],
+        high=[entry.high for entry in observations],
+    )
+
+
+def _region(world: World, region: RegionInfo) -> _plant.Region:
+    model, joint = world.scene.model, region.joint
+    return _plant.Region(
+        body=region.body,
+        joint=joint,
+        qpos=int(model.jnt_qposadr[joint]) if joint >= 0 else -1,
+        dof=int(model.jnt_dofadr[joint]) if joint >= 0 else -1,
+        sensor=_sensor(model, f"contact_{region.name}") if world.scene.spec.labels else -1,
+        quasi_static=region.quasi_static,
+        transient=region.transient,
+        span=region.span,
+        speed=region.speed,
+    )
+
+
+def _sensor(model: mujoco.MjModel, name: str) -> int:
+    """Address of a sensor's numbers."""
+    return int(model.sensor_adr[model.sensor(name).id])

@@ -2,52 +2,24 @@
 
 from __future__ import annotations
 
-import ctypes
-import functools
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.envs import _loop
+from tauguard.envs import _plant
+from tauguard.envs.plant import Gains, make_plant
 from tauguard.models import Drive, Scene
 
 Array = NDArray[np.float64]
 
 #: Numbers per link in a scene's contact sensors: found, force (3), torque (3), position (3).
-SENSOR_WIDTH = 10
+SENSOR_WIDTH = _plant.SENSOR_WIDTH
 
 
 class SimulationDiverged(RuntimeError):
     """The simulated arm left every sensible range; the message says when."""
-
-
-@dataclass(frozen=True)
-class Gains:
-    """Stiffness and damping of the position control, joint by joint."""
-
-    kp: Array  #: [N m/rad], shape (n,)
-    kd: Array  #: [N m s/rad], shape (n,)
-
-    @classmethod
-    def for_scene(cls, scene: Scene, bandwidth: float = 30.0) -> Gains:
-        """Critically damped gains for the arm's inertia in its first pose.
-
-        Args:
-            scene: the composed scene.
-            bandwidth: natural frequency of every joint's loop [rad/s].
-        """
-        data = mujoco.MjData(scene.model)
-        if scene.model.nkey:
-            mujoco.mj_resetDataKeyframe(scene.model, data, 0)
-        mujoco.mj_forward(scene.model, data)
-        mass = np.zeros((scene.model.nv, scene.model.nv))
-        mujoco.mj_fullM(scene.model, data, mass)
-        inertia = np.diag(mass)[scene.dof_adr]
-        return cls(bandwidth**2 * inertia, 2 * bandwidth * inertia)
 
 
 @dataclass(frozen=True)
@@ -59,51 +31,6 @@ class Recording:
     current: Array  #: true motor currents, held over the step [A], shape (T, n)
     contact: Array  #: contact sensors [found, N, N m, m], shape (T, links, SENSOR_WIDTH)
     poses: Array  #: obstacle positions and quaternions (wxyz), shape (T, obstacles, 7)
-
-
-@functools.cache
-def _library() -> ctypes.CDLL:
-    """The MuJoCo library that the Python binding has loaded."""
-    folder = Path(mujoco.__file__).parent
-    names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib")]
-    if not names:
-        raise OSError(f"no MuJoCo library beside its Python binding in {folder.name}")
-    return ctypes.CDLL(str(names[0]))
-
-
-def function_address(name: str) -> int:
-    """Address of one of its functions."""
-    address = ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value
-    assert address is not None
-    return address
-
-
-def drive_numbers(drive: Drive, nominal: Drive, gains: Gains) -> list[dict[str, Any]]:
-    """What the native joints are made of: the simulated drive, the servo's gains and beliefs."""
-    friction, ripple = drive.friction, drive.ripple
-    warm = 0.0 if friction is None else friction.temperature - friction.reference_temperature
-    level = 0.0 if friction is None else 1 + friction.coulomb_per_kelvin * warm
-    thick = 0.0 if friction is None else 1 + friction.viscous_per_kelvin * warm
-    return [
-        {
-            "gain": drive.gain[i],
-            "nominal_gain": nominal.gain[i],
-            "limit": drive.current_limit[i],
-            "gear": drive.gear[i],
-            "coulomb": 0.0 if friction is None else friction.coulomb[i] * level,
-            "breakaway": 0.0 if friction is None else friction.static[i] * level,
-            "stribeck_velocity": 1.0 if friction is None else friction.stribeck_velocity[i],
-            "viscous": 0.0 if friction is None else friction.viscous[i] * thick,
-            "bristle_stiffness": 0.0 if friction is None else friction.bristle_stiffness[i],
-            "load": 0.0 if friction is None else friction.load[i],
-            "kp": gains.kp[i],
-            "kd": gains.kd[i],
-            "cycles": [] if ripple is None else [float(c) for c in ripple.cycles],
-            "amplitude": [] if ripple is None else [float(a) for a in ripple.amplitude[i]],
-            "phase": [] if ripple is None else [float(p) for p in ripple.phase[i]],
-        }
-        for i in range(len(drive.gain))
-    ]
 
 
 class SimulationLoop:
@@ -121,32 +48,9 @@ class SimulationLoop:
         self.model = scene.model
         self.data = mujoco.MjData(scene.model)
         self.gains = gains or Gains.for_scene(scene)
-        self._nominal = nominal
         self._obstacles = [scene.model.body(name).id for name in scene.obstacle_names]
         self._sensors = self._sensor_range()
-        data, drive = self.data, scene.drive
-        dt = scene.model.opt.timestep
-        constant = drive.electrical_time_constant
-        self._loop = _loop.Loop(
-            step=function_address("mj_step"),
-            model=scene.model._address,
-            data=data._address,
-            dt=dt,
-            decay=float(np.exp(-dt / constant)) if constant else 0.0,
-            qpos=data.qpos.ctypes.data,
-            qvel=data.qvel.ctypes.data,
-            qfrc_applied=data.qfrc_applied.ctypes.data,
-            xfrc_applied=data.xfrc_applied.ctypes.data,
-            xpos=data.xpos.ctypes.data,
-            xquat=data.xquat.ctypes.data,
-            sensordata=data.sensordata.ctypes.data,
-            qpos_adr=[int(i) for i in scene.qpos_adr],
-            dof_adr=[int(i) for i in scene.dof_adr],
-            obstacle_bodies=self._obstacles,
-            sensor_begin=self._sensors[0],
-            sensor_count=self._sensors[1],
-        )
-        self._configure(drive)
+        self._plant = make_plant(scene, nominal, self.gains, self.data)
 
     def _sensor_range(self) -> tuple[int, int]:
         model = self.model
@@ -158,15 +62,11 @@ class SimulationLoop:
         links = sum("contact_link" in model.sensor(i).name for i in range(model.nsensor))
         return int(model.sensor_adr[first]), links * SENSOR_WIDTH
 
-    def _configure(self, drive: Drive) -> None:
-        for i, numbers in enumerate(drive_numbers(drive, self._nominal, self.gains)):
-            self._loop.set_joint(i, **numbers)
-
     def reset(self, q: Array) -> None:
         """Start at rest at ``q`` [rad], shape (n,), with no current and relaxed bristles."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self.scene.qpos_adr] = q
-        self._loop.set_state(np.zeros(2 * self._loop.joints))
+        self._plant.relax()
         mujoco.mj_forward(self.model, self.data)
 
     def save(self) -> tuple[Array, Array]:
@@ -174,14 +74,12 @@ class SimulationLoop:
         kind = mujoco.mjtState.mjSTATE_INTEGRATION
         state = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, self.data, state, kind)
-        drive = np.empty(2 * self._loop.joints)
-        self._loop.get_state(drive)
-        return state, drive
+        return state, np.array(self._plant.state())
 
     def restore(self, saved: tuple[Array, Array]) -> None:
         """Go back to what :meth:`save` gave."""
         mujoco.mj_setState(self.model, self.data, saved[0], mujoco.mjtState.mjSTATE_INTEGRATION)
-        self._loop.set_state(saved[1])
+        self._plant.restore(saved[1].tolist())
 
     def run(
         self,
@@ -213,17 +111,22 @@ class SimulationLoop:
             contact=np.zeros((rows, links, SENSOR_WIDTH)),
             poses=np.empty((rows, len(self._obstacles), 7)),
         )
-        sound = self._loop.run(
+        track = _plant.Track(
+            q=out.q,
+            qd=out.qd,
+            current=out.current,
+            sensors=out.contact.reshape(rows, links * SENSOR_WIDTH),
+            poses=out.poses,
+            bodies=self._obstacles,
+            sensor_begin=self._sensors[0],
+        )
+        sound = self._plant.follow(
             np.ascontiguousarray(q_des),
             np.ascontiguousarray(qd_des),
             np.ascontiguousarray(tau_ff),
             np.zeros((0, 6)) if wrench is None else np.ascontiguousarray(wrench),
-            wrench_body,
-            out.q,
-            out.qd,
-            out.current,
-            out.contact.reshape(rows, links * SENSOR_WIDTH),
-            out.poses.reshape(rows, 7 * len(self._obstacles)),
+            0 if wrench is None else wrench_body,
+            track,
         )
         if sound < rows:
             raise SimulationDiverged(

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.envs.loop import Gains
+from tauguard.envs.plant import Gains
 from tauguard.envs.settings import Settings
 from tauguard.envs.two_arms_scene import add_second_arm
 from tauguard.models import (

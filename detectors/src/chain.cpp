@@ -72,8 +72,9 @@ Projection project(const Joint& joint, const Link& link) {
 
 Inertial unit(int parameter) {
   Inertial one;
-  double* slots[kInertial] = {&one.mass, &one.moment.x, &one.moment.y, &one.moment.z, &one.xx,
-                              &one.xy,   &one.yy,       &one.xz,       &one.yz,       &one.zz};
+  double* slots[inertial_numbers] = {&one.mass, &one.moment.x, &one.moment.y, &one.moment.z,
+                                     &one.xx,   &one.xy,       &one.yy,       &one.xz,
+                                     &one.yz,   &one.zz};
   *slots[parameter] = 1.0;
   return one;
 }
@@ -143,10 +144,11 @@ void Chain::link_regressor_again(int body, int count, double* p, double* beta,
 void Chain::regressor(const double* q, const double* qd, double* p, double* beta,
                       Workspace& work) const {
   velocities(q, qd, work);
-  const std::size_t stride = static_cast<std::size_t>(kInertial) * joints.size();
+  const std::size_t stride = static_cast<std::size_t>(inertial_numbers) * joints.size();
   for (int body = 0; body < size(); ++body)
-    for (int c = 0; c < kInertial; ++c)
-      column(body, c, p + kInertial * body + c, beta + kInertial * body + c, stride, work);
+    for (int c = 0; c < inertial_numbers; ++c)
+      column(body, c, p + inertial_numbers * body + c, beta + inertial_numbers * body + c, stride,
+             work);
 }
 
 void Chain::rnea(const double* q, const double* qd, const double* qdd, double* tau,

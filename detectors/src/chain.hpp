@@ -23,7 +23,7 @@ namespace tauguard::detectors {
 using geometry::Mat3;
 using geometry::Vec3;
 
-constexpr int kInertial = 10;  // m, m c (3), Ixx Ixy Iyy Ixz Iyz Izz about the link's origin
+constexpr int inertial_numbers = 10;  // m, m c (3), Ixx Ixy Iyy Ixz Iyz Izz about the link's origin
 
 struct Inertial {
   double mass = 0;

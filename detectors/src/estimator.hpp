@@ -28,9 +28,9 @@
 
 namespace tauguard::detectors {
 
-constexpr int kPayload = 4;                 // mass and first moment
-constexpr int kPerJoint = 3;                // offset, viscous, Coulomb
-constexpr double kAccelerationRate = 30.0;  // [1/s]
+constexpr int payload_numbers = 4;          // mass and first moment
+constexpr int per_joint = 3;                // offset, viscous, Coulomb
+constexpr double acceleration_rate = 30.0;  // [1/s]
 
 struct EstimatorSettings {
   std::vector<double> drive_gain;   // N m/A, n
@@ -52,7 +52,7 @@ class Estimator {
         basis_(std::move(basis)),
         set_(std::move(settings)),
         n_(chain_.joints.size()),
-        m_(kPayload + kPerJoint * n_),
+        m_(payload_numbers + per_joint * n_),
         work_(n_),
         memory_(n_ * basis_.memory()),
         column_(basis_.columns()),
@@ -65,8 +65,8 @@ class Estimator {
          {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_, &decay_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
-      v->resize(kPayload * n_);
-    for (auto* v : {&own_now_, &own_before_, &own_}) v->resize(kPerJoint * n_);
+      v->resize(payload_numbers * n_);
+    for (auto* v : {&own_now_, &own_before_, &own_}) v->resize(per_joint * n_);
     adapts_ = false;
     for (const double d : set_.deviation) adapts_ = adapts_ || d > 0;
   }
@@ -82,14 +82,14 @@ class Estimator {
   }
 
   // One sample: residual r of the observer, what is left of it after the unknowns' share, in
-  // `left`, and an acceleration (velocity differentiated at the rate kAccelerationRate).
+  // `left`, and an acceleration (velocity differentiated at the rate acceleration_rate).
   void step(const double* q, const double* qd, const double* current, double dt, double* residual,
             double* left, double* acceleration) {
     if (!started_) begin(q, qd);
     if (fusion_.active()) qd = started_ ? fusion_.step(q, qd, dt) : fusion_.last();
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
     if (adapts_)
-      chain_.link_regressor_again(static_cast<int>(n_) - 1, kPayload, load_p_.data(),
+      chain_.link_regressor_again(static_cast<int>(n_) - 1, payload_numbers, load_p_.data(),
                                   load_beta_.data(), work_);
     drive(q, qd, current);
     if (started_) filter(dt);
@@ -97,7 +97,7 @@ class Estimator {
     for (std::size_t j = 0; j < n_; ++j) {
       residual[j] = left[j] = residual_[j];
       if (started_) smooth_[j] += smooth_decay_ * (qd[j] - smooth_[j]);
-      acceleration[j] = kAccelerationRate * (qd[j] - smooth_[j]);
+      acceleration[j] = acceleration_rate * (qd[j] - smooth_[j]);
     }
     if (adapts_) {
       for (std::size_t j = 0; j < n_; ++j) left[j] = (left[j] - expected(j)) * certainty(j);
@@ -126,14 +126,14 @@ class Estimator {
       const double load = basis_.modelled ? carried(j) : tau;
       basis_.evaluate(j, q[j], qd[j], tau, load, &memory_[j * basis_.memory()], column_.data());
       const double* w = &set_.weights[j * columns];
-      const double viscous = w[FrictionBasis::kViscous] * column_[FrictionBasis::kViscous];
-      double coulomb = 0.0, other = w[FrictionBasis::kOffset];
-      for (std::size_t c = FrictionBasis::kFirst; c < smooth; ++c) coulomb += w[c] * column_[c];
+      const double viscous = w[FrictionBasis::viscous_at] * column_[FrictionBasis::viscous_at];
+      double coulomb = 0.0, other = w[FrictionBasis::offset_at];
+      for (std::size_t c = FrictionBasis::first_at; c < smooth; ++c) coulomb += w[c] * column_[c];
       for (std::size_t c = smooth; c < columns; ++c) other += w[c] * column_[c];
       tau_[j] = tau - (viscous + coulomb + other);
-      own_now_[kPerJoint * j] = 1.0;
-      own_now_[kPerJoint * j + 1] = viscous;
-      own_now_[kPerJoint * j + 2] = coulomb;
+      own_now_[per_joint * j] = 1.0;
+      own_now_[per_joint * j + 1] = viscous;
+      own_now_[per_joint * j + 2] = coulomb;
     }
   }
 
@@ -142,24 +142,25 @@ class Estimator {
   double carried(std::size_t j) const {
     double sum = beta_[j];
     if (adapts_)
-      for (int a = 0; a < kPayload; ++a) sum -= load_beta_[kPayload * j + a] * theta_[a];
+      for (int a = 0; a < payload_numbers; ++a)
+        sum -= load_beta_[payload_numbers * j + a] * theta_[a];
     return sum;
   }
 
   void filter(double dt) {
     if (dt != decay_dt_) {
       for (std::size_t j = 0; j < n_; ++j) decay_[j] = observer_decay(set_.gain[j], dt);
-      smooth_decay_ = observer_decay(kAccelerationRate, dt);
+      smooth_decay_ = observer_decay(acceleration_rate, dt);
       decay_dt_ = dt;
     }
     for (std::size_t j = 0; j < n_; ++j) {
       residual_[j] = observer_step(residual_[j], decay_[j], dt, p_[j], p_before_[j], beta_[j],
                                    beta_before_[j], tau_before_[j]);
       if (!adapts_) continue;
-      for (std::size_t a = j * kPayload; a < (j + 1) * kPayload; ++a)
+      for (std::size_t a = j * payload_numbers; a < (j + 1) * payload_numbers; ++a)
         load_[a] = observer_step(load_[a], decay_[j], dt, load_p_[a], load_p_before_[a],
                                  load_beta_[a], load_beta_before_[a], 0.0);
-      for (std::size_t a = j * kPerJoint; a < (j + 1) * kPerJoint; ++a)
+      for (std::size_t a = j * per_joint; a < (j + 1) * per_joint; ++a)
         own_[a] += decay_[j] * (-own_before_[a] - own_[a]);
     }
   }
@@ -175,19 +176,19 @@ class Estimator {
 
   double expected(std::size_t j) const {
     double sum = 0.0;
-    for (int a = 0; a < kPayload; ++a) sum += load_[kPayload * j + a] * theta_[a];
-    for (int a = 0; a < kPerJoint; ++a)
-      sum += own_[kPerJoint * j + a] * theta_[kPayload + kPerJoint * j + a];
+    for (int a = 0; a < payload_numbers; ++a) sum += load_[payload_numbers * j + a] * theta_[a];
+    for (int a = 0; a < per_joint; ++a)
+      sum += own_[per_joint * j + a] * theta_[payload_numbers + per_joint * j + a];
     return sum;
   }
 
   double certainty(std::size_t j) const {
     if (!(set_.doubt > 0)) return 1.0;
-    const double* h = &load_[kPayload * j];
+    const double* h = &load_[payload_numbers * j];
     const double noise = set_.noise[j] * set_.noise[j];
     double payload = 0.0;
-    for (int a = 0; a < kPayload; ++a)
-      for (int b = 0; b < kPayload; ++b) payload += h[a] * covariance_[a * m_ + b] * h[b];
+    for (int a = 0; a < payload_numbers; ++a)
+      for (int b = 0; b < payload_numbers; ++b) payload += h[a] * covariance_[a * m_ + b] * h[b];
     return payload > 0 ? std::sqrt(noise / (noise + set_.doubt * payload)) : 1.0;
   }
 
@@ -204,15 +205,15 @@ class Estimator {
   }
 
   void update(std::size_t j) {
-    const std::size_t first = kPayload + kPerJoint * j;
+    const std::size_t first = payload_numbers + per_joint * j;
     std::fill(row_.begin(), row_.end(), 0.0);
-    for (int a = 0; a < kPayload; ++a) row_[a] = load_[kPayload * j + a];
-    for (int a = 0; a < kPerJoint; ++a) row_[first + a] = own_[kPerJoint * j + a];
+    for (int a = 0; a < payload_numbers; ++a) row_[a] = load_[payload_numbers * j + a];
+    for (int a = 0; a < per_joint; ++a) row_[first + a] = own_[per_joint * j + a];
     double variance = set_.noise[j] * set_.noise[j];
     for (std::size_t b = 0; b < m_; ++b) {
       double sum = 0.0;
-      for (int a = 0; a < kPayload; ++a) sum += covariance_[b * m_ + a] * row_[a];
-      for (int a = 0; a < kPerJoint; ++a) sum += covariance_[b * m_ + first + a] * row_[first + a];
+      for (int a = 0; a < payload_numbers; ++a) sum += covariance_[b * m_ + a] * row_[a];
+      for (int a = 0; a < per_joint; ++a) sum += covariance_[b * m_ + first + a] * row_[first + a];
       gathered_[b] = sum;
     }
     for (std::size_t b = 0; b < m_; ++b) variance += row_[b] * gathered_[b];

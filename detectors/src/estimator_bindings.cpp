@@ -93,12 +93,12 @@ void bind_estimator(nb::module_& m) {
               const Numbers& drive_gain, const Numbers& gain, const Numbers& weights,
               const Numbers& deviation, const Numbers& persistence, const Numbers& noise,
               double clip, int every, double doubt, const Numbers& fusion) {
-             const std::size_t n = chain.joints.size(), unknown = kPayload + kPerJoint * n;
+             const std::size_t n = chain.joints.size(), unknown = payload_numbers + per_joint * n;
              require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
                          weights.size() == n * basis.columns() && deviation.size() == unknown &&
                          persistence.size() == unknown &&
                          basis.cycles.size() == n * basis.ripples &&
-                         (fusion.empty() || fusion.size() == n * VelocityFusion::kGains),
+                         (fusion.empty() || fusion.size() == n * VelocityFusion::gain_numbers),
                      "Estimator: array lengths differ");
              new (self) Estimator(chain, basis,
                                   {drive_gain, gain, weights, deviation, persistence, noise, clip,

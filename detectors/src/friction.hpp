@@ -35,12 +35,12 @@ class FrictionBasis {
   std::size_t ripples = 0;
   double play = 0.0;  // [rad]
 
-  static constexpr std::size_t kOffset = 0, kViscous = 1, kFirst = 2;
+  static constexpr std::size_t offset_at = 0, viscous_at = 1, first_at = 2;
 
   std::size_t columns() const { return smooth() + 2 * ripples + (saturation ? 1 : 0); }
-  // Columns [kFirst, smooth()) are Coulomb friction in its forms.
+  // Columns [first_at, smooth()) are Coulomb friction in its forms.
   std::size_t smooth() const {
-    return kFirst + bristles.size() + stops.size() + stribeck.size() + slopes.size() + 1 +
+    return first_at + bristles.size() + stops.size() + stribeck.size() + slopes.size() + 1 +
            loaded.size();
   }
 

@@ -26,7 +26,7 @@ using geometry::ThreadPool;
 
 // Four lanes at once; the compiler makes one or two machine vectors of it.
 typedef double Four __attribute__((vector_size(32)));
-constexpr std::size_t kFours = 4, kLanes = 4 * kFours;
+constexpr std::size_t fours = 4, lanes = 4 * fours;
 
 inline Four load(const double* p) {
   Four v;
@@ -34,28 +34,28 @@ inline Four load(const double* p) {
   return v;
 }
 
-// sum_i coef_i / (1 + |x - z_i|^2 inv)^2 over `blocks` blocks of kLanes vectors of d numbers, lane
+// sum_i coef_i / (1 + |x - z_i|^2 inv)^2 over `blocks` blocks of lanes vectors of d numbers, lane
 // last.
 TAUGUARD_WIDE double weighted_sum(const double* x, const double* vectors, const double* coef,
                                   std::size_t blocks, std::size_t d, double inv) {
-  Four sum[kFours] = {};
+  Four sum[fours] = {};
   for (std::size_t b = 0; b < blocks; ++b) {
-    Four square[kFours] = {};
-    const double* z = vectors + b * d * kLanes;
-    for (std::size_t k = 0; k < d; ++k, z += kLanes) {
+    Four square[fours] = {};
+    const double* z = vectors + b * d * lanes;
+    for (std::size_t k = 0; k < d; ++k, z += lanes) {
       const Four at = {x[k], x[k], x[k], x[k]};
-      for (std::size_t f = 0; f < kFours; ++f) {
+      for (std::size_t f = 0; f < fours; ++f) {
         const Four gap = at - load(z + 4 * f);
         square[f] += gap * gap;
       }
     }
-    for (std::size_t f = 0; f < kFours; ++f) {
+    for (std::size_t f = 0; f < fours; ++f) {
       const Four one = 1.0 / (1.0 + square[f] * inv);
-      sum[f] += load(coef + b * kLanes + 4 * f) * (one * one);
+      sum[f] += load(coef + b * lanes + 4 * f) * (one * one);
     }
   }
   double total = 0.0;
-  for (std::size_t f = 0; f < kFours; ++f)
+  for (std::size_t f = 0; f < fours; ++f)
     for (std::size_t l = 0; l < 4; ++l) total += sum[f][l];
   return total;
 }
@@ -66,17 +66,17 @@ class KernelSum {
  public:
   KernelSum(In2 vectors, In1 coef, double intercept, double sigma)
       : d_(vectors.shape(1)),
-        blocks_((vectors.shape(0) + kLanes - 1) / kLanes),
+        blocks_((vectors.shape(0) + lanes - 1) / lanes),
         intercept_(intercept) {
     require(coef.shape(0) == vectors.shape(0), "KernelSum: one coefficient a vector");
     require(sigma > 0, "KernelSum: sigma must be above 0");
     inv_ = 1.0 / (sigma * sigma);
-    vectors_.assign(blocks_ * d_ * kLanes, 0.0);
-    coef_.assign(blocks_ * kLanes, 0.0);
+    vectors_.assign(blocks_ * d_ * lanes, 0.0);
+    coef_.assign(blocks_ * lanes, 0.0);
     for (std::size_t i = 0; i < vectors.shape(0); ++i) {
       coef_[i] = coef.data()[i];
       for (std::size_t k = 0; k < d_; ++k)
-        vectors_[((i / kLanes) * d_ + k) * kLanes + i % kLanes] = vectors.data()[i * d_ + k];
+        vectors_[((i / lanes) * d_ + k) * lanes + i % lanes] = vectors.data()[i * d_ + k];
     }
   }
 

@@ -18,7 +18,7 @@ using namespace tauguard::detectors;
 using tauguard::geometry::load;
 using tauguard::geometry::ThreadPool;
 
-constexpr std::size_t kGrain = 512;  // samples a chunk
+constexpr std::size_t grain = 512;  // samples a chunk
 
 namespace {
 
@@ -49,7 +49,7 @@ Chain make_chain(Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 a
   const bool fits = prismatic.shape(0) == n && rotation.shape(0) == n && rotation.shape(1) == 3 &&
                     rotation.shape(2) == 3 && translation.shape(0) == n &&
                     translation.shape(1) == 3 && axis.shape(0) == n && axis.shape(1) == 3 &&
-                    inertial.shape(0) == n && inertial.shape(1) == kInertial &&
+                    inertial.shape(0) == n && inertial.shape(1) == inertial_numbers &&
                     armature.shape(0) == n && gravity.shape(0) == 3;
   if (!fits) throw std::invalid_argument("Chain: array lengths differ");
   Chain chain;
@@ -64,7 +64,7 @@ Chain make_chain(Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 a
     joint.axis = load(axis.data() + 3 * i);
     joint.offset = load(translation.data() + 3 * i);
     fill_rotation(joint, rotation.data() + 9 * i);
-    const double* b = inertial.data() + kInertial * i;
+    const double* b = inertial.data() + inertial_numbers * i;
     joint.inertial = {b[0], load(b + 1), b[4], b[5], b[6], b[7], b[8], b[9]};
     joint.armature = armature.data()[i];
   }
@@ -74,7 +74,7 @@ Chain make_chain(Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 a
 template <class Row>
 void each_row(std::size_t rows, int joints, int threads, const Row& row) {
   nb::gil_scoped_release release;
-  ThreadPool::shared().parallel_for(rows, threads, kGrain, [&](auto begin, auto end, auto) {
+  ThreadPool::shared().parallel_for(rows, threads, grain, [&](auto begin, auto end, auto) {
     Workspace work(joints);
     for (auto t = begin; t < end; ++t) row(t, work);
   });
@@ -158,7 +158,7 @@ void bind_chain(nb::module_& m) {
       .def(
           "regressor",
           [](const Chain& chain, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
-            const std::size_t n = chain.joints.size(), c = kInertial * n;
+            const std::size_t n = chain.joints.size(), c = inertial_numbers * n;
             same_rows(chain, q, qd);
             require(p.shape(0) == q.shape(0) && p.shape(1) == n && p.shape(2) == c &&
                         beta.shape(0) == q.shape(0) && beta.shape(1) == n && beta.shape(2) == c,
@@ -174,7 +174,7 @@ void bind_chain(nb::module_& m) {
           [](const Chain& chain, int link, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
             const std::size_t n = chain.joints.size(), c = p.shape(2);
             same_rows(chain, q, qd);
-            require(link >= 0 && link < chain.size() && c <= kInertial &&
+            require(link >= 0 && link < chain.size() && c <= inertial_numbers &&
                         p.shape(0) == q.shape(0) && p.shape(1) == n &&
                         beta.shape(0) == q.shape(0) && beta.shape(1) == n && beta.shape(2) == c,
                     "link_regressor: arrays differ in shape");

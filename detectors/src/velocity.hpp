@@ -10,7 +10,7 @@ namespace tauguard::detectors {
 
 class VelocityFusion {
  public:
-  static constexpr std::size_t kGains =
+  static constexpr std::size_t gain_numbers =
       6;  // a joint: of position, velocity, acceleration by each innovation
 
   VelocityFusion() = default;
@@ -31,7 +31,7 @@ class VelocityFusion {
   const double* step(const double* q, const double* qd, double dt) {
     for (std::size_t j = 0; j < velocity_.size(); ++j) {
       double* x = &state_[3 * j];
-      const double* g = &gains_[kGains * j];
+      const double* g = &gains_[gain_numbers * j];
       x[0] += dt * (x[1] + 0.5 * dt * x[2]);
       x[1] += dt * x[2];
       const double place = q[j] - x[0], speed = qd[j] - x[1];

@@ -1,4 +1,5 @@
-// From an action in [-1, 1] to what every drive is told until the next one.
+// What every drive is told: from an action in [-1, 1] until the next one, or from a table of
+// references, row by row.
 #pragma once
 
 #include <algorithm>
@@ -6,12 +7,12 @@
 #include <cstddef>
 #include <vector>
 
-#include "chain.hpp"
 #include "drive.hpp"
+#include "kinematics.hpp"
 
 namespace tauguard::envs {
 
-enum class Mode { current = 0, torque = 1, velocity = 2, position = 3, cartesian = 4 };
+enum class Mode { current = 0, torque = 1, velocity = 2, position = 3, cartesian = 4, table = 5 };
 // What a reaction puts in the action's place: follow velocities, no power, no power and brakes on.
 enum class Override { none = 0, velocity = 1, limp = 2, brake = 3 };
 
@@ -22,13 +23,19 @@ constexpr double brake_damping = 3.0;
 // Damping of the Cartesian mode's least squares; it bounds the step near a singular pose.
 constexpr double cartesian_damping = 0.02;
 
+// References of a run, row-major (rows x joints): position [rad], velocity [rad/s], torque [N m].
+struct Table {
+  const double *q = nullptr, *qd = nullptr, *feed = nullptr;
+  std::size_t width = 0;  // joints
+};
+
 struct Command {
   std::vector<double> origin, speed, feed;  // reference [rad], its velocity [rad/s], torque [N m]
   bool servo = false, powered = true, brake = false;
 };
 
 struct Controls {
-  Mode mode = Mode::velocity;
+  Mode mode = Mode::table;
   double period = 0.01;              // of control [s]
   std::vector<double> scale;         // of the action, one an entry
   std::vector<double> centre;        // of the position mode [rad]
@@ -37,11 +44,20 @@ struct Controls {
   Override override = Override::none;
   std::vector<double> override_speed;  // [rad/s]
   Command command;
+  Table table;
 
-  // Maps the action at the state (q, the chain's kinematics, the tools) to the command.
-  void take(const Chain& chain, const std::vector<Joint>& joints, const std::vector<Vec3>& tools,
-            const std::vector<int>& tool_first, const double* q, const double* action) {
-    const std::size_t n = chain.size();
+  // No override, the reference where the arm is.
+  void reset(const std::vector<double>& q) {
+    override = Override::none;
+    command.origin = q;
+    command.speed.assign(q.size(), 0.0);
+    command.feed.assign(q.size(), 0.0);
+  }
+
+  // Maps the action at the state (q, the arms' kinematics) to the command.
+  void take(const Kinematics& arms, const std::vector<Joint>& joints,
+            const std::vector<Tool>& tools, const double* q, const double* action) {
+    const std::size_t n = arms.size();
     std::vector<double>& v = command.speed;
     std::fill(v.begin(), v.end(), 0.0);
     command.servo = true;
@@ -54,7 +70,7 @@ struct Controls {
       follow(joints, q);
       return;
     }
-    chain.hold(command.feed.data());
+    arms.hold(command.feed.data());
     if (override != Override::none) {
       command.powered = override == Override::velocity;
       command.servo = command.powered;
@@ -69,29 +85,36 @@ struct Controls {
       for (std::size_t i = 0; i < n; ++i)
         v[i] = (centre[i] + bounded(action[i]) * scale[i] - command.origin[i]) / period;
     } else {
-      cartesian(chain, tools, tool_first, action);
+      cartesian(arms, tools, action);
     }
     for (std::size_t i = 0; i < n; ++i)
       v[i] = std::min(std::max(v[i], -max_speed[i]), max_speed[i]);
     follow(joints, q);
   }
 
-  // The current [A] that joint i is told in substep k, and the brake's torque [N m] into `held`.
-  double current(const Joint& j, std::size_t i, double elapsed, double q, double qd, double& held) {
-    held = 0.0;
-    if (command.brake) {
-      const double stiffness = brake_stiffness * j.kp, slip = torque_limit[i] / stiffness;
-      command.origin[i] = std::min(std::max(command.origin[i], q - slip), q + slip);
-      const double torque = stiffness * (command.origin[i] - q) - brake_damping * j.kd * qd;
-      held = std::min(std::max(torque, -torque_limit[i]), torque_limit[i]);
+  // The motor torque [N m] wanted of joint i in physics step `row` of the action or table,
+  // `elapsed` after its beginning.
+  double wanted(const Joint& j, std::size_t i, std::size_t row, double elapsed, double q,
+                double qd) const {
+    if (mode == Mode::table) {
+      const std::size_t at = row * table.width + i;
+      return table.feed[at] + j.kp * (table.q[at] - q) + j.kd * (table.qd[at] - qd);
     }
     if (!command.powered) return 0.0;
     double torque = command.feed[i];
     if (command.servo)
       torque += j.kp * (command.origin[i] + command.speed[i] * elapsed - q) +
                 j.kd * (command.speed[i] - qd);
-    const double amperes = torque / j.nominal_gain;
-    return std::min(std::max(amperes, -j.current_limit), j.current_limit);
+    return torque;
+  }
+
+  // The torque [N m] of joint i's brake.
+  double brake(const Joint& j, std::size_t i, double q, double qd) {
+    if (!command.brake) return 0.0;
+    const double stiffness = brake_stiffness * j.kp, slip = torque_limit[i] / stiffness;
+    command.origin[i] = std::min(std::max(command.origin[i], q - slip), q + slip);
+    const double torque = stiffness * (command.origin[i] - q) - brake_damping * j.kd * qd;
+    return std::min(std::max(torque, -torque_limit[i]), torque_limit[i]);
   }
 
   void advance() {
@@ -103,15 +126,14 @@ struct Controls {
  private:
   static double bounded(double a) { return std::min(std::max(a, -1.0), 1.0); }
 
-  void cartesian(const Chain& chain, const std::vector<Vec3>& tools,
-                 const std::vector<int>& tool_first, const double* action) {
+  void cartesian(const Kinematics& arms, const std::vector<Tool>& tools, const double* action) {
     for (std::size_t a = 0; a < tools.size(); ++a) {
-      const std::size_t begin = static_cast<std::size_t>(tool_first[a]);
+      const std::size_t begin = static_cast<std::size_t>(tools[a].first);
       const std::size_t end =
-          a + 1 < tools.size() ? static_cast<std::size_t>(tool_first[a + 1]) : chain.size();
+          a + 1 < tools.size() ? static_cast<std::size_t>(tools[a + 1].first) : arms.size();
       double dx[6];
       for (int r = 0; r < 6; ++r) dx[r] = bounded(action[6 * a + r]) * scale[6 * a + r];
-      chain.resolve(begin, end, tools[a], dx, cartesian_damping, command.speed.data());
+      arms.resolve(begin, end, arms.tool(tools[a]), dx, cartesian_damping, command.speed.data());
       double factor = 1.0;  // one factor for all joints keeps the direction of the motion
       for (std::size_t i = begin; i < end; ++i)
         factor =

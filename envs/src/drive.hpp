@@ -1,5 +1,4 @@
-// One joint's drive over one step: current, ripple and friction, as documented in
-// tauguard.models.Drive.
+// The drives over one step: current, friction and ripple, as documented in tauguard.models.Drive.
 #pragma once
 
 #include <algorithm>
@@ -8,9 +7,10 @@
 
 namespace tauguard::envs {
 
-// What one joint's drive is made of. A stiffness of 0 leaves friction out, an empty ripple the
-// ripple.
+// One joint: where it is in MuJoCo's arrays, its drive and its servo. A bristle stiffness of 0
+// leaves friction out, an empty ripple the ripple.
 struct Joint {
+  int qpos = -1, dof = -1;     // addresses in qpos and qvel
   double gain = 1.0;           // N m/A, as simulated
   double nominal_gain = 1.0;   // N m/A, as the controller believes
   double current_limit = 0.0;  // A
@@ -47,11 +47,35 @@ inline double friction(const Joint& j, JointState& s, double v, double tau, doub
   return j.bristle_stiffness * s.bristle + j.viscous * v;
 }
 
+// Torque ripple at position q [N m].
 inline double ripple(const Joint& j, double q) {
   double sum = 0.0;
   for (std::size_t h = 0; h < j.cycles.size(); ++h)
     sum += j.amplitude[h] * std::sin(j.cycles[h] * j.gear * q + j.phase[h]);
   return j.gain * sum;
 }
+
+// All drives of a scene and their state.
+struct DriveTrain {
+  std::vector<Joint> joints;
+  std::vector<JointState> states;
+  double dt = 1e-3;    // of a physics step [s]
+  double decay = 0.0;  // of the current's error over a step; 0: no lag
+
+  std::size_t size() const { return joints.size(); }
+  void relax() { states.assign(joints.size(), JointState{}); }
+
+  // The torque [N m] that joint i's drive leaves at the joint for a wanted motor torque; the
+  // current is limited and lags.
+  double apply(std::size_t i, double wanted, double q, double qd) {
+    const Joint& j = joints[i];
+    JointState& s = states[i];
+    const double command =
+        std::min(std::max(wanted / j.nominal_gain, -j.current_limit), j.current_limit);
+    s.current = command + (s.current - command) * decay;
+    const double tau = j.gain * s.current;
+    return tau - friction(j, s, qd, tau, dt) + ripple(j, q);
+  }
+};
 
 }  // namespace tauguard::envs

@@ -1,17 +1,19 @@
-// One environment's physics: an action in, control steps of several mj_step each, an observation
-// row and a row of figures out. MuJoCo is reached by addresses alone, as in loop.cpp.
+// The plant: one scene's physics with its drives, under one of several control modes. Environments
+// step it by actions, a simulation lets it follow a table of references; the physics step is the
+// same for both.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <limits>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
-#include "chain.hpp"
 #include "control.hpp"
 #include "drive.hpp"
+#include "kinematics.hpp"
+#include "physics.hpp"
 #include "regions.hpp"
 
 namespace tauguard::envs {
@@ -33,89 +35,99 @@ enum Figure {
   figures
 };
 
-struct Addresses {
-  void (*step)(const void*, void*) = nullptr;
-  void (*kinematics)(const void*, void*) = nullptr;
-  const void* model = nullptr;
-  void* data = nullptr;
-  double *qpos = nullptr, *qvel = nullptr, *qfrc = nullptr;
-  const double *sensors = nullptr, *site_xpos = nullptr, *xpos = nullptr, *xaxis = nullptr;
+// What surrounds the drives: the arms' links and tools, body regions, contact sensors.
+struct Surroundings {
+  Kinematics arms;
+  std::vector<Tool> tools;
+  std::vector<Region> regions;
+  std::vector<double> low, high;  // of the observation
+  int sensor_begin = -1;          // of the links' contact sensors; -1: none
 };
 
-// Where results go: rows of arrays that Python owns.
+// Where an environment's results go: rows of arrays that Python owns.
 struct Rows {
-  double *observation = nullptr, *figure = nullptr, *tau_ext = nullptr, *target = nullptr;
-  double *q = nullptr, *qd = nullptr, *current = nullptr, *tau = nullptr;  // substeps x joints
-  double *contact = nullptr, *region = nullptr;  // substeps x contact_width, substeps x regions x 3
+  Held observation, figure, tau_ext, target;
+  Held q, qd, current, tau;  // physics steps x joints
+  Held contact, region;      // physics steps x contact_width, physics steps x regions x 3
+};
+
+// Where a run along a table of references is written to: row k belongs to the state before step k.
+struct Track {
+  Held q, qd, current;  // rows x joints
+  Held sensors, poses;  // rows x numbers of the links' sensors, rows x bodies x 7
+  std::vector<int> bodies;
+  int sensor_begin = 0;
+  // Force [N] and torque about the centre of mass [N m] on a body, rows x 6; body 0: none.
+  const double* wrench = nullptr;
+  int wrench_body = 0;
 };
 
 class Plant {
  public:
-  Addresses at;
-  Rows rows;
-  Chain chain;
-  Controls controls;
-  std::vector<Joint> joints;
-  std::vector<JointState> states;
-  std::vector<int> qpos, dof;                         // addresses of the arm's joints
-  std::vector<int> tool_site, tool_body, tool_first;  // a tool an arm; site -1: the body's origin
-  std::vector<Region> regions;
-  std::vector<double> low, high;  // of the observation
-  int sensor_begin = -1;          // of the links' contact sensors; -1: none
-  int nq = 0, nv = 0;
-  double dt = 1e-3, decay = 0.0;
-  int substeps = 10;
+  Plant(Physics physics, DriveTrain drives)
+      : physics_(std::move(physics)), drives_(std::move(drives)) {
+    controls.override_speed.assign(drives_.size(), 0.0);
+    q_.assign(drives_.size(), 0.0);
+    drives_.relax();
+  }
+  Plant(const Plant&) = delete;  // its kinematics point into its physics
+  Plant& operator=(const Plant&) = delete;
 
-  // After the data was reset and forwarded: nothing has touched yet, the reference is where the arm
-  // is.
-  void reset() {
-    std::fill(states.begin(), states.end(), JointState{});
+  Controls controls;
+  int substeps = 1;
+
+  // Makes it an environment's: where results go and what surrounds the arm.
+  void surround(Surroundings around, Rows rows) {
+    around_ = std::move(around);
+    around_.arms.physics = &physics_;
+    rows_ = std::move(rows);
+  }
+
+  std::size_t joints() const { return drives_.size(); }
+
+  // After the data was reset: no current, bristles relaxed, nothing has touched yet.
+  void relax() {
+    drives_.relax();
     contact_ = Contact{};
-    for (Region& r : regions) r.touching = 0;
+    for (Region& r : around_.regions) r.touching = 0;
     count_ = 0;
     sound_ = true;
-    std::fill(rows.tau_ext, rows.tau_ext + joints.size(), 0.0);
-    q_.assign(joints.size(), 0.0);
-    for (std::size_t i = 0; i < joints.size(); ++i) q_[i] = at.qpos[qpos[i]];
-    controls.override = Override::none;
-    controls.command.origin = q_;
-    controls.command.speed.assign(joints.size(), 0.0);
-    controls.command.feed.assign(joints.size(), 0.0);
+  }
+
+  // The same for an environment, after the data was forwarded too: the reference is where the arm
+  // is.
+  void reset() {
+    relax();
+    std::fill_n(rows_.tau_ext.data(), joints(), 0.0);
+    for (std::size_t i = 0; i < joints(); ++i) q_[i] = physics_.qpos()[drives_.joints[i].qpos];
+    controls.reset(q_);
     finish();
   }
 
   void begin(const double* action) {
     contact_.begin_step();
     row_ = 0;
-    for (std::size_t i = 0; i < joints.size(); ++i) q_[i] = at.qpos[qpos[i]];
-    controls.take(chain, joints, tools(), tool_first, q_.data(), action);
-    for (const Region& r : regions) turn_back(r);
+    for (std::size_t i = 0; i < joints(); ++i) q_[i] = physics_.qpos()[drives_.joints[i].qpos];
+    controls.take(around_.arms, drives_.joints, around_.tools, q_.data(), action);
+    for (const Region& r : around_.regions) turn_back(r);
   }
 
-  // Up to `steps` physics steps; fewer where the simulation diverges.
+  // Up to `steps` physics steps of the action; fewer where the simulation diverges.
   void run(int steps) {
-    const std::size_t n = joints.size();
+    const std::size_t n = joints();
     for (int k = 0; k < steps && sound_; ++k, ++row_) {
-      const double elapsed = row_ * dt;
-      double *q = rows.q + row_ * n, *qd = rows.qd + row_ * n, *current = rows.current + row_ * n;
-      for (std::size_t i = 0; i < n; ++i) {
-        q[i] = at.qpos[qpos[i]];
-        qd[i] = at.qvel[dof[i]];
-        current[i] = drive(i, elapsed, q[i], qd[i]);
-      }
-      at.step(at.model, at.data);
-      sound_ = finite();
+      advance(rows_.q.data() + row_ * n, rows_.qd.data() + row_ * n,
+              rows_.current.data() + row_ * n);
       if (sound_) label();
-      double* place = rows.region + 3 * row_ * regions.size();
-      for (const Region& r : regions)
-        place = std::copy(at.xpos + 3 * r.body, at.xpos + 3 * r.body + 3, place);
-      ++count_;
+      double* place = rows_.region.data() + 3 * row_ * around_.regions.size();
+      for (const Region& r : around_.regions)
+        place = std::copy_n(physics_.position(r.body), 3, place);
     }
   }
 
   void finish() {
     if (sound_) {
-      at.kinematics(at.model, at.data);
+      physics_.kinematics();
       controls.advance();
       observe();
     }
@@ -134,90 +146,148 @@ class Plant {
     report();
   }
 
- private:
-  // Beyond this speed [rad/s, m/s] a run counts as diverged; a cobot's joints stay below 10.
-  static constexpr double velocity_bound = 1e3;
-  Contact contact_;
-  std::vector<double> q_;
-  std::int64_t count_ = 0;
-  int row_ = 0;
-  bool sound_ = true;
-
-  double drive(std::size_t i, double elapsed, double q, double qd) {
-    const Joint& j = joints[i];
-    JointState& s = states[i];
-    double held = 0.0;
-    const double command = controls.current(j, i, elapsed, q, qd, held);
-    s.current = command + (s.current - command) * decay;
-    const double tau = j.gain * s.current;
-    at.qfrc[dof[i]] = tau - friction(j, s, qd, tau, dt) + ripple(j, q) + held;
-    return s.current;
+  // Follows `rows` rows of references; returns how many steps were sound, all unless it diverged.
+  std::size_t follow(const Table& table, std::size_t rows, const Track& track) {
+    const std::size_t n = joints();
+    const Mode before = std::exchange(controls.mode, Mode::table);
+    controls.table = table;
+    double* pushed = track.wrench_body > 0 ? physics_.wrench(track.wrench_body) : nullptr;
+    std::size_t done = 0;
+    for (row_ = 0; done < rows && sound_; ++row_) {
+      if (pushed) std::copy_n(track.wrench + 6 * row_, 6, pushed);
+      advance(track.q.data() + row_ * n, track.qd.data() + row_ * n,
+              track.current.data() + row_ * n);
+      if (!sound_) break;
+      record(track);
+      ++done;
+    }
+    if (pushed) std::fill_n(pushed, 6, 0.0);
+    controls.mode = before;
+    return done;
   }
 
-  bool finite() const {
-    for (int i = 0; i < nq; ++i)
-      if (!std::isfinite(at.qpos[i])) return false;
-    for (int i = 0; i < nv; ++i)
-      if (!(std::fabs(at.qvel[i]) < velocity_bound)) return false;
+  // Everything that the plant remembers beside MuJoCo's data, as numbers; of one length.
+  std::vector<double> state() {
+    std::vector<double> out;
+    visit([&](auto& value) { out.push_back(static_cast<double>(value)); });
+    return out;
+  }
+
+  // Goes back to what state() gave; false where it is of another length.
+  bool restore(const std::vector<double>& saved) {
+    if (saved.size() != state().size()) return false;
+    std::size_t at = 0;
+    visit([&](auto& value) { value = static_cast<std::decay_t<decltype(value)>>(saved[at++]); });
     return true;
   }
 
+ private:
+  Physics physics_;
+  DriveTrain drives_;
+  Surroundings around_;
+  Rows rows_;
+  Contact contact_;
+  std::vector<double> q_;
+  std::int64_t count_ = 0;  // physics steps since the reset
+  std::size_t row_ = 0;     // of the action or table
+  bool sound_ = true;
+
+  template <class Visitor>
+  void visit(Visitor&& each) {
+    for (JointState& s : drives_.states) each(s.current), each(s.bristle);
+    for (Region& r : around_.regions) each(r.touching);
+    Contact& c = contact_;
+    each(c.force), each(c.cost), each(c.ratio), each(c.region_force), each(c.link), each(c.region);
+    each(c.onset), each(c.onset_time), each(c.last);
+    each(count_), each(sound_), each(controls.override);
+    Command& command = controls.command;
+    each(command.servo), each(command.powered), each(command.brake);
+    for (auto* row : {&command.origin, &command.speed, &command.feed, &controls.override_speed}) {
+      row->resize(joints(), 0.0);
+      for (double& value : *row) each(value);
+    }
+  }
+
+  // One physics step: the state before it into a row, the drives' torques, mj_step.
+  void advance(double* q, double* qd, double* current) {
+    const double elapsed = static_cast<double>(row_) * drives_.dt;
+    for (std::size_t i = 0; i < joints(); ++i) {
+      const Joint& j = drives_.joints[i];
+      q[i] = physics_.qpos()[j.qpos];
+      qd[i] = physics_.qvel()[j.dof];
+      const double held = controls.brake(j, i, q[i], qd[i]);
+      const double wanted = controls.wanted(j, i, row_, elapsed, q[i], qd[i]);
+      physics_.applied()[j.dof] = drives_.apply(i, wanted, q[i], qd[i]) + held;
+      current[i] = drives_.states[i].current;
+    }
+    physics_.step();
+    sound_ = physics_.sound();
+    ++count_;
+  }
+
+  // Sensors and poses are those of the state before the step: mj_step evaluates them there.
+  void record(const Track& track) const {
+    const std::size_t width = track.sensors.shape(1);
+    if (width)
+      std::copy_n(physics_.sensors() + track.sensor_begin, width,
+                  track.sensors.data() + row_ * width);
+    double* pose = track.poses.data() + row_ * track.bodies.size() * 7;
+    for (int body : track.bodies) {
+      pose = std::copy_n(physics_.position(body), 3, pose);
+      pose = std::copy_n(physics_.quaternion(body), 4, pose);
+    }
+  }
+
   void label() {
-    if (sensor_begin < 0) return;
-    const std::size_t n = joints.size(), k = static_cast<std::size_t>(row_);
-    read_links(chain, at.sensors + sensor_begin, static_cast<double>(count_) * dt, contact_,
-               rows.tau + k * n, rows.contact + k * contact_width);
-    std::copy(rows.tau + k * n, rows.tau + (k + 1) * n, rows.tau_ext);
-    read_regions(regions, at.sensors, dt, contact_);
+    if (around_.sensor_begin < 0) return;
+    const std::size_t n = joints();
+    double* tau = rows_.tau.data() + row_ * n;
+    read_links(around_.arms, physics_.sensors() + around_.sensor_begin,
+               static_cast<double>(count_ - 1) * drives_.dt, contact_, tau,
+               rows_.contact.data() + row_ * contact_width);
+    std::copy_n(tau, n, rows_.tau_ext.data());
+    read_regions(around_.regions, physics_.sensors(), drives_.dt, contact_);
   }
 
   // A region that has left its span comes back at its own speed: a hand that goes to and fro.
   void turn_back(const Region& r) {
     if (r.joint < 0 || r.speed == 0) return;
-    const double at_now = at.qpos[r.qpos];
-    if (std::fabs(at_now) > r.span) at.qvel[r.dof] = at_now > 0 ? -r.speed : r.speed;
-  }
-
-  std::vector<Vec3> tools() const {
-    std::vector<Vec3> out;
-    for (std::size_t a = 0; a < tool_body.size(); ++a)
-      out.push_back(tool_site[a] >= 0 ? load(at.site_xpos + 3 * tool_site[a])
-                                      : load(at.xpos + 3 * tool_body[a]));
-    return out;
+    const double at_now = physics_.qpos()[r.qpos];
+    if (std::fabs(at_now) > r.span) physics_.qvel()[r.dof] = at_now > 0 ? -r.speed : r.speed;
   }
 
   // q, qd, torque; a tool's position and the way to its target; a region's position and velocity.
   void observe() {
-    double* out = rows.observation;
+    double* out = rows_.observation.data();
     const auto put = [&](Vec3 v) {
       *out++ = v.x;
       *out++ = v.y;
       *out++ = v.z;
     };
-    for (int i : qpos) *out++ = at.qpos[i];
-    for (int i : dof) *out++ = at.qvel[i];
-    for (std::size_t i = 0; i < joints.size(); ++i)
-      *out++ = joints[i].nominal_gain * states[i].current;
-    const std::vector<Vec3> at_tools = tools();
+    for (const Joint& j : drives_.joints) *out++ = physics_.qpos()[j.qpos];
+    for (const Joint& j : drives_.joints) *out++ = physics_.qvel()[j.dof];
+    for (std::size_t i = 0; i < joints(); ++i)
+      *out++ = drives_.joints[i].nominal_gain * drives_.states[i].current;
     double away = 0.0;
-    for (Vec3 tool : at_tools) put(tool);
-    for (std::size_t a = 0; a < at_tools.size(); ++a) {
-      const Vec3 way = load(rows.target + 3 * a) - at_tools[a];
+    for (const Tool& tool : around_.tools) put(around_.arms.tool(tool));
+    for (std::size_t a = 0; a < around_.tools.size(); ++a) {
+      const Vec3 way = load(rows_.target.data() + 3 * a) - around_.arms.tool(around_.tools[a]);
       away = std::max(away, norm(way));
       put(way);
     }
-    for (const Region& r : regions) {
-      put(load(at.xpos + 3 * r.body));
-      put(r.joint >= 0 ? at.qvel[r.dof] * load(at.xaxis + 3 * r.joint) : Vec3{});
+    for (const Region& r : around_.regions) {
+      put(load(physics_.position(r.body)));
+      put(r.joint >= 0 ? physics_.qvel()[r.dof] * load(physics_.axis(r.joint)) : Vec3{});
     }
-    for (std::size_t k = 0; k < low.size(); ++k)
-      rows.observation[k] = std::min(std::max(rows.observation[k], low[k]), high[k]);
-    rows.figure[distance] = away;
+    double* seen = rows_.observation.data();
+    for (std::size_t k = 0; k < around_.low.size(); ++k)
+      seen[k] = std::min(std::max(seen[k], around_.low[k]), around_.high[k]);
+    rows_.figure.data()[distance] = away;
   }
 
   void report() {
-    double* f = rows.figure;
-    f[time_now] = static_cast<double>(count_) * dt;
+    double* f = rows_.figure.data();
+    f[time_now] = static_cast<double>(count_) * drives_.dt;
     f[force] = contact_.force;
     f[cost] = contact_.cost;
     f[ratio] = contact_.ratio;
@@ -228,8 +298,9 @@ class Plant {
     f[region] = contact_.region;
     f[diverged] = sound_ ? 0.0 : 1.0;
     double fastest = 0.0;
-    for (std::size_t i = 0; i < joints.size(); ++i)
-      fastest = std::max(fastest, std::fabs(at.qvel[dof[i]]) / controls.max_speed[i]);
+    for (std::size_t i = 0; i < joints(); ++i)
+      fastest = std::max(fastest,
+                         std::fabs(physics_.qvel()[drives_.joints[i].dof]) / controls.max_speed[i]);
     f[speed_ratio] = std::isfinite(fastest) ? fastest : 0.0;
   }
 };

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "chain.hpp"
+#include "kinematics.hpp"
 
 namespace tauguard::envs {
 
@@ -47,20 +47,20 @@ constexpr int sensor_width = 10;        // found, force (3), torque (3), positio
 constexpr int contact_width = 8;
 
 // Reads the links' contact sensors at time t; tau receives tau_ext, row what touched.
-inline void read_links(const Chain& chain, const double* sensor, double t, Contact& c, double* tau,
-                       double* row) {
-  std::fill(tau, tau + chain.size(), 0.0);
+inline void read_links(const Kinematics& arms, const double* sensor, double t, Contact& c,
+                       double* tau, double* row) {
+  std::fill(tau, tau + arms.size(), 0.0);
   std::fill(row, row + contact_width, 0.0);
   std::fill(row + 2, row + 5, std::numeric_limits<double>::quiet_NaN());
   double strongest = 0;
   Vec3 net;
-  for (std::size_t link = 0; link < chain.size(); ++link) {
+  for (std::size_t link = 0; link < arms.size(); ++link) {
     const double* s = sensor + sensor_width * link;
     if (s[0] == 0) continue;
     const Vec3 force = -1.0 * load(s + 1), torque = -1.0 * load(s + 4);
     const double size = norm(force);
     if (size == 0) continue;
-    chain.push(link, load(s + 7), force, torque, tau);
+    arms.push(link, load(s + 7), force, torque, tau);
     net = net + force;
     if (size > strongest) {
       strongest = size;

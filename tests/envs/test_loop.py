@@ -1,12 +1,15 @@
 """The compiled loop against the same loop written plainly in Python."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
 
-from tauguard.envs import SimulationDiverged, SimulationLoop, random_motion
+from tauguard.envs import Gains, SimulationDiverged, SimulationLoop, random_motion
+from tauguard.envs.plant import make_plant
 from tauguard.envs.simulate import workspace
 from tauguard.models import SceneSpec, compose, cura6_drive
 
@@ -98,9 +101,7 @@ def test_a_joint_held_below_breakaway_stays(scene):
     level = scene.model.opt.gravity.copy()
     try:
         scene.model.opt.gravity[:] = 0
-        loop = SimulationLoop(scene, cura6_drive())
-        loop.gains = replace(loop.gains, kp=loop.gains.kp * 0, kd=loop.gains.kd * 0)
-        loop._configure(scene.drive)
+        loop = SimulationLoop(scene, cura6_drive(), Gains(np.zeros(6), np.zeros(6)))
         start = np.array(workspace(scene).low)
         loop.reset(start)
         push = np.tile(0.5 * friction.coulomb, (1000, 1))
@@ -118,3 +119,20 @@ def test_divergence_is_named(scene, motion):
     loop.data.qvel[:] = 1e5
     with pytest.raises(SimulationDiverged, match="smaller timestep"):
         loop.run(motion.q, motion.qd, np.zeros_like(motion.q))
+
+
+def test_the_plant_keeps_what_it_steps(scene, motion):
+    """Data and rows live as long as the plant that writes to them."""
+    data = mujoco.MjData(scene.model)
+    gone = weakref.ref(data)
+    plant = make_plant(scene, cura6_drive(), Gains.for_scene(scene), data)
+    del data
+    gc.collect()
+    assert gone() is not None
+    assert len(plant.state()) == len(plant.state())
+    plant.restore(plant.state())
+    with pytest.raises(ValueError, match="another scene"):
+        plant.restore([0.0])
+    del plant
+    gc.collect()
+    assert gone() is None

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "physics.hpp"
 #include "tauguard/geometry/vec3.hpp"
 
 namespace tauguard::envs {
@@ -15,30 +16,44 @@ namespace tauguard::envs {
 using geometry::load;
 using geometry::Vec3;
 
-// Joint i moves link i; the joints of one arm are consecutive, base to tip.
-struct Chain {
-  std::vector<int> joint, body;  // MuJoCo ids
-  std::vector<int> first;        // index of the first joint of the same arm
-  std::vector<int> slide;        // 1: prismatic
-  std::vector<double> mass;      // nominal, of the links [kg]
-  std::vector<double> com;       // nominal, in the link's frame [m], three a link
-  Vec3 gravity;                  // [m/s^2]
-  const double *xpos = nullptr, *xmat = nullptr, *xanchor = nullptr, *xaxis = nullptr;
+// The tool of an arm: a site, or where it is -1 the origin of a body; first: the arm's first joint.
+struct Tool {
+  int site = -1, body = -1, first = 0;
+};
 
-  std::size_t size() const { return joint.size(); }
-  Vec3 axis(std::size_t i) const { return load(xaxis + 3 * joint[i]); }
-  Vec3 anchor(std::size_t i) const { return load(xanchor + 3 * joint[i]); }
+// Joint i moves link i; the joints of one arm are consecutive, base to tip.
+struct Link {
+  int joint = -1, body = -1;  // MuJoCo ids
+  int first = 0;              // index of the first joint of the same arm
+  bool slide = false;         // prismatic
+  double mass = 0;            // nominal [kg]
+  Vec3 com;                   // nominal, in the link's frame [m]
+};
+
+struct Kinematics {
+  const Physics* physics = nullptr;
+  std::vector<Link> links;
+  Vec3 gravity;  // [m/s^2]
+
+  std::size_t size() const { return links.size(); }
+  Vec3 axis(std::size_t i) const { return load(physics->axis(links[i].joint)); }
+  Vec3 anchor(std::size_t i) const { return load(physics->anchor(links[i].joint)); }
   // How far the point p of a link beyond joint i moves per unit of joint i.
   Vec3 lever(std::size_t i, Vec3 p) const {
-    return slide[i] ? axis(i) : cross(axis(i), p - anchor(i));
+    return links[i].slide ? axis(i) : cross(axis(i), p - anchor(i));
   }
 
+  Vec3 tool(const Tool& t) const {
+    return load(t.site >= 0 ? physics->site_position(t.site) : physics->position(t.body));
+  }
+
+  // Centre of mass of nominal link i.
   Vec3 centre(std::size_t i) const {
-    const double* m = xmat + 9 * body[i];
-    const double* c = com.data() + 3 * i;
-    return load(xpos + 3 * body[i]) + Vec3{m[0] * c[0] + m[1] * c[1] + m[2] * c[2],
-                                           m[3] * c[0] + m[4] * c[1] + m[5] * c[2],
-                                           m[6] * c[0] + m[7] * c[1] + m[8] * c[2]};
+    const double* m = physics->rotation(links[i].body);
+    const Vec3 c = links[i].com;
+    return load(physics->position(links[i].body)) + Vec3{m[0] * c.x + m[1] * c.y + m[2] * c.z,
+                                                         m[3] * c.x + m[4] * c.y + m[5] * c.z,
+                                                         m[6] * c.x + m[7] * c.y + m[8] * c.z};
   }
 
   // Torques that hold the nominal links against gravity [N m], one a joint.
@@ -46,15 +61,15 @@ struct Chain {
     std::fill(tau, tau + size(), 0.0);
     for (std::size_t link = 0; link < size(); ++link) {
       const Vec3 c = centre(link);
-      for (std::size_t i = static_cast<std::size_t>(first[link]); i <= link; ++i)
-        tau[i] -= mass[link] * dot(lever(i, c), gravity);
+      for (std::size_t i = begin(link); i <= link; ++i)
+        tau[i] -= links[link].mass * dot(lever(i, c), gravity);
     }
   }
 
   // Adds J^T of a wrench on a link: force at p and torque, world frame.
   void push(std::size_t link, Vec3 p, Vec3 force, Vec3 torque, double* tau) const {
-    for (std::size_t i = static_cast<std::size_t>(first[link]); i <= link; ++i)
-      tau[i] += dot(lever(i, p), force) + (slide[i] ? 0.0 : dot(axis(i), torque));
+    for (std::size_t i = begin(link); i <= link; ++i)
+      tau[i] += dot(lever(i, p), force) + (links[i].slide ? 0.0 : dot(axis(i), torque));
   }
 
   // Joint step dq of joints [begin, end) that moves the tool point by dx (3 m, 3 rad about world
@@ -64,7 +79,7 @@ struct Chain {
     std::array<double, 36> a{};
     std::vector<std::array<double, 6>> columns;
     for (std::size_t i = begin; i < end; ++i) {
-      const Vec3 v = lever(i, tool), w = slide[i] ? Vec3{} : axis(i);
+      const Vec3 v = lever(i, tool), w = links[i].slide ? Vec3{} : axis(i);
       columns.push_back({v.x, v.y, v.z, w.x, w.y, w.z});
       for (int r = 0; r < 6; ++r)
         for (int c = 0; c < 6; ++c) a[6 * r + c] += columns.back()[r] * columns.back()[c];
@@ -81,6 +96,8 @@ struct Chain {
   }
 
  private:
+  std::size_t begin(std::size_t link) const { return static_cast<std::size_t>(links[link].first); }
+
   // Cholesky; the matrix is positive definite because of its damping.
   static void solve(std::array<double, 36>& a, std::array<double, 6>& y) {
     for (int c = 0; c < 6; ++c) {

@@ -1,0 +1,254 @@
+// Python's view of the plant. A plant's result depends on nothing but its own state and action, so
+// it is the same for any number of threads.
+#include "plant.hpp"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/vector.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "tauguard/geometry/rounding.hpp"
+#include "tauguard/geometry/thread_pool.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace tauguard::envs;
+
+namespace {
+
+using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Numbers = std::vector<double>;
+
+void check(const double* action, std::size_t n, std::size_t env) {
+  for (std::size_t i = 0; i < n; ++i)
+    if (!std::isfinite(action[i]))
+      throw nb::value_error(("action: not finite at entry " + std::to_string(i) +
+                             " of environment " + std::to_string(env) +
+                             "; expected numbers from -1 to 1")
+                                .c_str());
+}
+
+void check_action(const Plant& p, Vector action) {
+  if (action.shape(0) != p.controls.scale.size()) throw nb::value_error("action: wrong length");
+  check(action.data(), action.shape(0), 0);
+}
+
+void step_one(Plant& p, Vector action) {
+  check_action(p, action);
+  nb::gil_scoped_release release;
+  const tauguard::geometry::RoundToNearest guard;
+  p.step(action.data());
+}
+
+// Steps every plant whose mask is not 0 with its row of the actions.
+void step_all(const std::vector<Plant*>& plants, Matrix actions,
+              nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu> mask,
+              int threads) {
+  const std::size_t n = plants.size(), width = actions.shape(1);
+  if (actions.shape(0) != n || mask.shape(0) != n)
+    throw nb::value_error("actions, mask: a row a plant");
+  for (std::size_t i = 0; i < n; ++i) {
+    if (plants[i]->controls.scale.size() != width) throw nb::value_error("actions: wrong width");
+    if (mask.data()[i]) check(actions.data() + i * width, width, i);
+  }
+  nb::gil_scoped_release release;
+  const tauguard::geometry::RoundToNearest guard;
+  tauguard::geometry::ThreadPool::shared().parallel_for(
+      n, threads, 1, [&](std::size_t begin, std::size_t end, std::size_t) {
+        for (std::size_t i = begin; i < end; ++i)
+          if (mask.data()[i]) plants[i]->step(actions.data() + i * width);
+      });
+}
+
+std::size_t follow(Plant& p, Matrix q_des, Matrix qd_des, Matrix tau_ff, Matrix wrench,
+                   int wrench_body, Track& track) {
+  const std::size_t rows = q_des.shape(0);
+  for (const Matrix& m : {q_des, qd_des, tau_ff})
+    if (m.shape(0) != rows || m.shape(1) != p.joints())
+      throw nb::value_error("q_des, qd_des, tau_ff: expected one shape (rows, joints)");
+  if (wrench_body > 0 && (wrench.shape(0) != rows || wrench.shape(1) != 6))
+    throw nb::value_error("wrench: expected (rows, 6)");
+  if (track.q.size() < rows * p.joints()) throw nb::value_error("track: too short");
+  track.wrench = wrench.data();
+  track.wrench_body = wrench_body;
+  nb::gil_scoped_release release;
+  const tauguard::geometry::RoundToNearest guard;
+  return p.follow({q_des.data(), qd_des.data(), tau_ff.data(), p.joints()}, rows, track);
+}
+
+void bind_joint(nb::module_& m) {
+  nb::class_<Joint>(m, "Joint")
+      .def(
+          "__init__",
+          [](Joint* self, int qpos, int dof, double gain, double nominal_gain, double current_limit,
+             double gear, double coulomb, double breakaway, double stribeck_velocity,
+             double viscous, double bristle_stiffness, double load, double kp, double kd,
+             Numbers cycles, Numbers amplitude, Numbers phase) {
+            new (self) Joint{qpos,
+                             dof,
+                             gain,
+                             nominal_gain,
+                             current_limit,
+                             gear,
+                             coulomb,
+                             breakaway,
+                             stribeck_velocity,
+                             viscous,
+                             bristle_stiffness,
+                             load,
+                             kp,
+                             kd,
+                             std::move(cycles),
+                             std::move(amplitude),
+                             std::move(phase)};
+          },
+          nb::kw_only(), "qpos"_a, "dof"_a, "gain"_a, "nominal_gain"_a, "current_limit"_a, "gear"_a,
+          "coulomb"_a, "breakaway"_a, "stribeck_velocity"_a, "viscous"_a, "bristle_stiffness"_a,
+          "load"_a, "kp"_a, "kd"_a, "cycles"_a, "amplitude"_a, "phase"_a);
+}
+
+void bind_surroundings(nb::module_& m) {
+  nb::class_<Link>(m, "Link").def(
+      "__init__",
+      [](Link* self, int joint, int body, int first, bool slide, double mass, Numbers com) {
+        if (com.size() != 3) throw nb::value_error("com: expected three numbers");
+        new (self) Link{joint, body, first, slide, mass, Vec3{com[0], com[1], com[2]}};
+      },
+      nb::kw_only(), "joint"_a, "body"_a, "first"_a, "slide"_a, "mass"_a, "com"_a);
+  nb::class_<Tool>(m, "Tool").def(
+      "__init__",
+      [](Tool* self, int site, int body, int first) { new (self) Tool{site, body, first}; },
+      nb::kw_only(), "site"_a, "body"_a, "first"_a);
+  nb::class_<Region>(m, "Region")
+      .def(
+          "__init__",
+          [](Region* self, int body, int joint, int qpos, int dof, int sensor, double quasi_static,
+             double transient, double span, double speed) {
+            new (self)
+                Region{body, joint, qpos, dof, sensor, quasi_static, transient, span, speed, 0.0};
+          },
+          nb::kw_only(), "body"_a, "joint"_a, "qpos"_a, "dof"_a, "sensor"_a, "quasi_static"_a,
+          "transient"_a, "span"_a, "speed"_a);
+  nb::class_<Surroundings>(m, "Surroundings")
+      .def(
+          "__init__",
+          [](Surroundings* self, std::vector<Link> links, Numbers gravity, std::vector<Tool> tools,
+             std::vector<Region> regions, int sensor_begin, Numbers low, Numbers high) {
+            if (gravity.size() != 3) throw nb::value_error("gravity: expected three numbers");
+            new (self) Surroundings{
+                Kinematics{nullptr, std::move(links), Vec3{gravity[0], gravity[1], gravity[2]}},
+                std::move(tools),
+                std::move(regions),
+                std::move(low),
+                std::move(high),
+                sensor_begin};
+          },
+          nb::kw_only(), "links"_a, "gravity"_a, "tools"_a, "regions"_a, "sensor_begin"_a, "low"_a,
+          "high"_a);
+}
+
+void bind_outputs(nb::module_& m) {
+  nb::class_<Rows>(m, "Rows").def(
+      "__init__",
+      [](Rows* self, Held observation, Held figure, Held tau_ext, Held target, Held q, Held qd,
+         Held current, Held tau, Held contact, Held region) {
+        new (self) Rows{observation, figure, tau_ext, target, q, qd, current, tau, contact, region};
+      },
+      nb::kw_only(), "observation"_a, "figure"_a, "tau_ext"_a, "target"_a, "q"_a, "qd"_a,
+      "current"_a, "tau"_a, "contact"_a, "region"_a);
+  nb::class_<Track>(m, "Track")
+      .def(
+          "__init__",
+          [](Track* self, Held q, Held qd, Held current, Held sensors, Held poses,
+             std::vector<int> bodies, int sensor_begin) {
+            new (self) Track{q, qd, current, sensors, poses, std::move(bodies), sensor_begin};
+          },
+          nb::kw_only(), "q"_a, "qd"_a, "current"_a, "sensors"_a, "poses"_a, "bodies"_a,
+          "sensor_begin"_a);
+  nb::class_<Controls>(m, "Controls")
+      .def(
+          "__init__",
+          [](Controls* self, int mode, double period, Numbers scale, Numbers centre,
+             Numbers max_speed, Numbers torque_limit) {
+            new (self) Controls();
+            self->mode = static_cast<Mode>(mode);
+            self->period = period;
+            self->scale = std::move(scale);
+            self->centre = std::move(centre);
+            self->override_speed.assign(max_speed.size(), 0.0);
+            self->max_speed = std::move(max_speed);
+            self->torque_limit = std::move(torque_limit);
+          },
+          nb::kw_only(), "mode"_a, "period"_a, "scale"_a, "centre"_a, "max_speed"_a,
+          "torque_limit"_a);
+}
+
+void bind_plant(nb::module_& m) {
+  nb::class_<Physics>(m, "Physics")
+      .def(nb::init<nb::object, nb::object, std::uintptr_t, std::uintptr_t>(), "model"_a, "data"_a,
+           nb::kw_only(), "step"_a, "kinematics"_a);
+  nb::class_<Plant>(m, "Plant")
+      .def(
+          "__init__",
+          [](Plant* self, const Physics& physics, std::vector<Joint> joints, double dt,
+             double decay) {
+            new (self) Plant(physics, DriveTrain{std::move(joints), {}, dt, decay});
+          },
+          "physics"_a, "joints"_a, nb::kw_only(), "dt"_a, "decay"_a)
+      .def(
+          "surround",
+          [](Plant& p, const Surroundings& around, const Controls& controls, const Rows& rows,
+             int substeps) {
+            p.controls = controls;
+            p.substeps = substeps;
+            p.surround(around, rows);
+          },
+          "around"_a, "controls"_a, "rows"_a, nb::kw_only(), "substeps"_a)
+      .def("reset", &Plant::reset)
+      .def("relax", &Plant::relax)
+      .def("step", &step_one, "action"_a)
+      .def(
+          "begin",
+          [](Plant& p, Vector action) {
+            check_action(p, action);
+            p.begin(action.data());
+          },
+          "action"_a)
+      .def("run", &Plant::run, "steps"_a, nb::call_guard<nb::gil_scoped_release>())
+      .def("finish", &Plant::finish)
+      .def("refresh", &Plant::refresh)
+      .def(
+          "override",
+          [](Plant& p, int kind, Vector speed) {
+            if (speed.shape(0) != p.joints()) throw nb::value_error("speed: one number a joint");
+            p.controls.override = static_cast<Override>(kind);
+            p.controls.override_speed.assign(speed.data(), speed.data() + speed.shape(0));
+          },
+          "kind"_a, "speed"_a)
+      .def("follow", &follow, "q_des"_a, "qd_des"_a, "tau_ff"_a, "wrench"_a, "wrench_body"_a,
+           "track"_a)
+      .def("state", &Plant::state)
+      .def(
+          "restore",
+          [](Plant& p, const Numbers& saved) {
+            if (!p.restore(saved)) throw nb::value_error("state: of another scene");
+          },
+          "state"_a);
+}
+
+}  // namespace
+
+NB_MODULE(_plant, m) {
+  bind_joint(m);
+  bind_surroundings(m);
+  bind_outputs(m);
+  bind_plant(m);
+  m.def("step_all", &step_all, "plants"_a, "actions"_a, "mask"_a, "threads"_a);
+  m.attr("CONTACT_WIDTH") = contact_width;
+  m.attr("SENSOR_WIDTH") = sensor_width;
+  m.attr("FIGURES") = static_cast<int>(figures);
+}
