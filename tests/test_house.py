@@ -28,7 +28,7 @@ ALLOWED = {
     "models": set(),
     "cloth": {"geometry"},
     "rigid": {"geometry"},
-    "detectors": {"traces", "models"},
+    "detectors": {"traces", "models", "report"},
     "contacts": {"cloth", "rigid", "models", "traces"},
     "envs": {"models", "contacts", "detectors", "traces"},
     "datasets": {"envs", "contacts", "traces", "models", "detectors"},

@@ -9,30 +9,13 @@ import numpy as np
 from scipy import stats
 
 from tauguard.detectors.evaluation.events import Matching
+from tauguard.report import rate as wilson
 from tauguard.traces.severity import STRATA, stratum
 
 #: The headline is over collisions from here up [N m].
 HEADLINE = 16.0
 
 Rate = dict[str, Any]
-
-
-def wilson(successes: int, trials: int) -> Rate:
-    """A proportion with its Wilson 95 % interval; ``None`` for each where there is no trial."""
-    if not 0 <= successes <= trials:
-        raise ValueError(f"{successes} of {trials}: expected 0 <= successes <= trials")
-    if trials == 0:
-        return {"value": None, "low": None, "high": None, "n": 0}
-    z = float(stats.norm.ppf(0.975))
-    share = successes / trials
-    centre = (share + z * z / (2 * trials)) / (1 + z * z / trials)
-    half = (
-        z / (1 + z * z / trials) * np.sqrt(share * (1 - share) / trials + z * z / (4 * trials**2))
-    )
-    # The exact bounds at the ends; rounding would leave 1e-17 there.
-    low = 0.0 if successes == 0 else float(centre - half)
-    high = 1.0 if successes == trials else float(centre + half)
-    return {"value": share, "low": low, "high": high, "n": trials}
 
 
 def poisson_rate(count: int, hours: float) -> Rate:

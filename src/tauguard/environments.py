@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from gymnasium.envs.registration import register, registry
-
 #: Name -> module and class prefix, and how many actions an episode has.
 ENVIRONMENTS = {
     "tauguard/Reach-v0": ("reach", "Reach", 1000),
@@ -14,7 +12,11 @@ ENVIRONMENTS = {
 
 
 def register_environments() -> None:
-    """Put them into Gymnasium's registry, once."""
+    """Put them into Gymnasium's registry, once; without Gymnasium there is none to put them in."""
+    try:
+        from gymnasium.envs.registration import register, registry
+    except ModuleNotFoundError:
+        return
     for name, (module, prefix, steps) in ENVIRONMENTS.items():
         if name not in registry:
             register(

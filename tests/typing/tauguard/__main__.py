@@ -1,5 +1,0 @@
-"""``python -m tauguard``: the command line."""
-
-from tauguard.cli import main
-
-main()
