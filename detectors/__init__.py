@@ -16,7 +16,7 @@ from tauguard.detectors.dynamics.robot import (
 from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.estimation.observer import MomentumObserver, observe
 from tauguard.detectors.evaluation.events import Matching, find_alarms, judge, match
-from tauguard.detectors.evaluation.metrics import figures, poisson_rate, wilson
+from tauguard.detectors.evaluation.metrics import figures, poisson_rate
 from tauguard.detectors.methods.pipeline import CollisionDetector, DetectorSettings
 from tauguard.detectors.methods.svr_regressor import SrqSVR, srq_kernel
 from tauguard.detectors.ranking_file import load_model, save_model
@@ -30,6 +30,7 @@ from tauguard.detectors.thresholds.conformal import (
 )
 from tauguard.detectors.thresholds.quiet import QuietDetector, QuietThresholds
 from tauguard.detectors.thresholds.thresholded import Thresholded
+from tauguard.report import rate as wilson
 
 __all__ = [
     "DETECTORS",

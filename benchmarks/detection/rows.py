@@ -11,8 +11,9 @@ from scipy import stats
 from tauguard.benchmarks.detection.judge import Outcome, Tallies, Tally
 from tauguard.benchmarks.detection.oracle import LEVELS, ORACLE, at_level
 from tauguard.benchmarks.detection.thresholds import AMPERES, HOURLY, POINTS, Fleet
-from tauguard.detectors.evaluation.metrics import HEADLINE, poisson_rate, wilson
+from tauguard.detectors.evaluation.metrics import HEADLINE, poisson_rate
 from tauguard.report import Row
+from tauguard.report import rate as wilson
 from tauguard.traces import stratum
 
 #: The dissertation's confusion matrices (TP, FN, FP, TN; 65 collisions) by speed [%]:

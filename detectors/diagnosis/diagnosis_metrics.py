@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.detectors.diagnosis.diagnosis import Diagnosis
 from tauguard.detectors.evaluation.events import detection_window
-from tauguard.detectors.evaluation.metrics import wilson
+from tauguard.report import rate as wilson
 from tauguard.traces.trace import Collision, Trace
 
 Array = NDArray[np.float64]
