@@ -42,6 +42,7 @@ class Aim:
         """For the scene's collision geometry (group 3) and the motion's references."""
         self._scene, self._motion = scene, motion
         self._data = mujoco.MjData(scene.model)
+        self._ahead = mujoco.MjData(scene.model)
         self._groups = np.array([0, 0, 0, 1, 0, 0], dtype=np.uint8)
 
     def find(self, plan: CollisionPlan, rng: np.random.Generator, last: int) -> Target | None:
@@ -109,7 +110,9 @@ class Aim:
         """Whether the surface goes on for a little way only: it presses and does not sweep."""
         stride = max(1, round(CLAMP_STRIDE / float(self._motion.t[1])))
         stop = row + round((plan.duration + CLAMP_HOLD) / float(self._motion.t[1]))
-        path = body_points(self._scene, self._motion.q[row:stop:stride], body, point)
+        path = body_points(
+            self._scene, self._motion.q[row:stop:stride], body, point, self._ahead
+        )
         ahead = float((-(path - point) @ push).max())
         return CLAMP_TRAVEL[0] <= ahead <= CLAMP_TRAVEL[1]
 
@@ -185,12 +188,20 @@ def clamp_centre(target: Target, path: Array, depth: float, radius: float) -> Ar
     return target.point - (ahead - depth + radius) * target.direction
 
 
-def body_points(scene: Scene, q: Array, body: int, point: Array | None = None) -> Array:
+def body_points(
+    scene: Scene,
+    q: Array,
+    body: int,
+    point: Array | None = None,
+    data: mujoco.MjData | None = None,
+) -> Array:
     """World path of a body-fixed point along joint positions (T, n), shape (T, 3) [m].
 
-    ``point`` is given in the world at ``q[0]``; the default is the body's centre of mass.
+    ``point`` is given in the world at ``q[0]``; the default is the body's centre of mass. ``data``
+    is scratch space: where many short paths are asked for, making it costs more than they do.
     """
-    model, data = scene.model, mujoco.MjData(scene.model)
+    model = scene.model
+    data = mujoco.MjData(model) if data is None else data
     path, local = np.empty((len(q), 3)), None
     for row, position in enumerate(q):
         data.qpos[scene.qpos_adr] = position
