@@ -1,28 +1,44 @@
-"""Generation of labelled episodes, and loaders of real logs."""
+"""Labelled datasets: described, generated, inspected and read; and loaders of real logs."""
 
-from tauguard.datasets.columns import PRESETS, ColumnMap
-from tauguard.datasets.demo import SPEEDS, DemoPlan, demo_plan
-from tauguard.datasets.generate import simulate_all, write_dataset
-from tauguard.datasets.logs import Log, read_log
-from tauguard.datasets.plans import (
-    TRAINING_PAYLOADS,
-    collision_plans,
-    free_episodes,
-    struck_episodes,
-)
+from typing import TYPE_CHECKING
+
+from tauguard.lazy import on_demand
+
+if TYPE_CHECKING:
+    from tauguard.datasets.build import build
+    from tauguard.datasets.columns import PRESETS, ColumnMap
+    from tauguard.datasets.configuration import Configuration, Split
+    from tauguard.datasets.configuration import load as load_configuration
+    from tauguard.datasets.demo import SPEEDS, DemoPlan, demo_plan
+    from tauguard.datasets.generate import simulate_all, write_dataset
+    from tauguard.datasets.logs import Log, read_log
+    from tauguard.datasets.plans import (
+        TRAINING_PAYLOADS,
+        collision_plans,
+        free_episodes,
+        struck_episodes,
+    )
+    from tauguard.datasets.reader import read
 
 __all__ = [
     "PRESETS",
     "SPEEDS",
     "TRAINING_PAYLOADS",
     "ColumnMap",
+    "Configuration",
     "DemoPlan",
     "Log",
+    "Split",
+    "build",
     "collision_plans",
     "demo_plan",
     "free_episodes",
+    "load_configuration",
+    "read",
     "read_log",
     "simulate_all",
     "struck_episodes",
     "write_dataset",
 ]
+
+__getattr__ = on_demand(__name__)

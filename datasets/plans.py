@@ -27,26 +27,30 @@ def collision_plans(
     count: int,
     begin: float = BEGIN,
     strata: Sequence[tuple[float, float]] = STRATA,
+    kinds: Sequence[str] = KIND_CYCLE,
+    links: Sequence[int] = (2, 3, 4, 5, 6),
 ) -> tuple[CollisionPlan, ...]:
-    """``count`` collisions of all kinds on links 2-6, one a slot, spread over the strata.
+    """``count`` collisions, one a slot, spread over kinds, links and strata.
 
     Args:
         rng: shuffles which kind meets which link and stratum.
         count: how many.
         begin: start of the first slot [s].
         strata: severities to go through in turn [N m].
+        kinds: to go through in turn.
+        links: to go through in turn, 1-based.
     """
-    kinds = rng.permutation([KIND_CYCLE[i % len(KIND_CYCLE)] for i in range(count)])
-    links = rng.permutation([2 + i % 5 for i in range(count)])
+    kind_of = rng.permutation([kinds[i % len(kinds)] for i in range(count)])
+    link_of = rng.permutation([links[i % len(links)] for i in range(count)])
     levels = rng.permutation([i % len(strata) for i in range(count)])
     plans = []
     for i in range(count):
-        kind = str(kinds[i])
+        kind = str(kind_of[i])
         plans.append(
             CollisionPlan(
                 kind=kind,
                 time=begin + SLOT * i + OFFSET + float(rng.uniform(0, 0.2)),
-                link=int(links[i]),
+                link=int(link_of[i]),
                 severity=strata[int(levels[i])],
                 duration=float(
                     rng.uniform(0.4, 0.8) if kind == "clamp" else rng.uniform(0.03, 0.2)

@@ -110,9 +110,7 @@ class Aim:
         """Whether the surface goes on for a little way only: it presses and does not sweep."""
         stride = max(1, round(CLAMP_STRIDE / float(self._motion.t[1])))
         stop = row + round((plan.duration + CLAMP_HOLD) / float(self._motion.t[1]))
-        path = body_points(
-            self._scene, self._motion.q[row:stop:stride], body, point, self._ahead
-        )
+        path = body_points(self._scene, self._motion.q[row:stop:stride], body, point, self._ahead)
         ahead = float((-(path - point) @ push).max())
         return CLAMP_TRAVEL[0] <= ahead <= CLAMP_TRAVEL[1]
 

@@ -54,7 +54,7 @@ def workspace(scene: Scene) -> Workspace:
     return Workspace(
         low=np.maximum(home - spread, limits[:, 0]),
         high=np.minimum(home + spread, limits[:, 1]),
-        max_speed=np.array(cura6.MAX_SPEED),
+        max_speed=np.array(cura6.max_speed(scene.spec.arm)),
         max_acceleration=np.array(cura6.MAX_ACCELERATION),
         allowed=allowed,
     )
@@ -67,6 +67,7 @@ def scene_for(episode: Episode) -> Scene:
     scene = compose(
         SceneSpec(
             timestep=episode.timestep,
+            arm=episode.arm,
             mismatch=episode.mismatch,
             payload=carries,
             striker=Striker() if "strike" in kinds else None,
@@ -103,7 +104,7 @@ class Simulation:
         self._checkers = [_known(c) for c in checkers]
         self.episode = episode
         self.scene = scene_for(episode)
-        self.nominal = nominal or cura6_drive()
+        self.nominal = nominal or cura6_drive(episode.arm)
         streams = np.random.SeedSequence(episode.seed).spawn(3)
         motion_rng, aim_rng, self._sensor_rng = map(np.random.default_rng, streams)
         self.motion = random_motion(

@@ -15,7 +15,7 @@ from tauguard.models.mjcf import compiled
 Array = NDArray[np.float64]
 
 #: Arms that need no file.
-NAMED = ("cura6",)
+NAMED = cura6.NAMES
 #: Collision bits: what the arm has and what obstacles have, so that the arm never meets itself.
 ARM_BITS, OBSTACLE_BITS = 1, 2
 #: Radius of the capsule that stands for a link without collision geometry [m].
@@ -74,7 +74,7 @@ def load_arm(source: str) -> Arm:
         FileNotFoundError: no such name or file.
     """
     if source in NAMED:
-        spec = mujoco.MjSpec.from_string(cura6.arm_xml())
+        spec = mujoco.MjSpec.from_string(cura6.arm_xml(source))
         limits = spec.compile().jnt_actfrcrange[:, 1].copy()
         links = tuple(f"link{i}" for i in range(1, len(cura6.JOINTS) + 1))
         return Arm(spec, links, cura6.JOINTS, limits, np.array(cura6.HOME))

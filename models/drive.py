@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.models import cura6
 from tauguard.models.checks import above_zero, not_negative, shaped
 
 Array = NDArray[np.float64]
@@ -174,8 +175,8 @@ class Drive:
         return np.abs(self.gain) * self.current_limit
 
 
-def cura6_drive() -> Drive:
-    """The CURA6-like arm's nominal drives.
+def cura6_drive(name: str = "cura6") -> Drive:
+    """The nominal drives of the CURA6-like arm, or of one of its other sizes.
 
     Magnitudes: gains and friction as identified on a UR10e (Mamedov et al. 2020), current noise as
     measured on one at standstill, quanta 4.5 and 2.24 mA and ripple of 2, 5, 10, 20 cycles with
@@ -183,6 +184,8 @@ def cura6_drive() -> Drive:
     """
     coulomb = np.array([12.5, 13.3, 5.0, 2.0, 2.7, 2.3])
     gain = np.array([10.0, 10.7, 8.5, 9.0, 9.5, 10.1])
+    scale = cura6.SIZES[name].drive if name in cura6.SIZES else 1.0
+    coulomb, gain = scale * coulomb, scale * gain
     size = np.array([1.0, 1.0, 0.7, 0.25, 0.25, 0.25])
     return Drive(
         gain=gain,
@@ -193,9 +196,9 @@ def cura6_drive() -> Drive:
             coulomb=coulomb,
             static=1.12 * coulomb,
             stribeck_velocity=np.full(6, 0.03),
-            viscous=np.array([21.3, 20.2, 10.4, 3.6, 2.5, 3.0]),
+            viscous=scale * np.array([21.3, 20.2, 10.4, 3.6, 2.5, 3.0]),
             bristle_stiffness=coulomb / 1.5e-3,
-            load=np.array([0.0010, 0.0018, 0.0022, 0.002, 0.002, 0.002]),
+            load=np.array([0.0010, 0.0018, 0.0022, 0.002, 0.002, 0.002]) / scale,
         ),
         ripple=Ripple(
             cycles=np.array([2.0, 5.0, 10.0, 20.0]),

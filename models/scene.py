@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.models.arm import Arm, load_arm
+from tauguard.models.arm import NAMED, Arm, load_arm
 from tauguard.models.checks import rigid_pose
 from tauguard.models.cloth import Cloth, add_cloth
 from tauguard.models.drive import Drive, cura6_drive
@@ -195,7 +195,8 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
 def _drive(spec: SceneSpec, arm: Arm) -> Drive:
     drive = spec.drive
     if drive is None:
-        drive = cura6_drive() if spec.arm == "cura6" else Drive.ideal(arm.torque_limit)
+        known = spec.arm in NAMED
+        drive = cura6_drive(spec.arm) if known else Drive.ideal(arm.torque_limit)
     if len(drive.gain) != len(arm.joints):
         raise ValueError(
             f"drive: of {len(drive.gain)} joints, but the arm has {len(arm.joints)}: "

@@ -1,12 +1,43 @@
-"""The CURA6-like arm: six revolute joints, the class of a 10 kg cobot."""
+"""The CURA6-like arm: six revolute joints, the class of a 10 kg cobot; and its other sizes."""
 
+from functools import cache
 from importlib.resources import files
 
-from tauguard.models.cura6.design import FLANGE, HOME, JOINTS, MAX_ACCELERATION, MAX_SPEED
+from tauguard.models.cura6.design import (
+    FLANGE,
+    HOME,
+    JOINTS,
+    MAX_ACCELERATION,
+    MAX_SPEED,
+    mjcf,
+)
+from tauguard.models.cura6.sizes import SIZES, flange, links
 
-__all__ = ["FLANGE", "HOME", "JOINTS", "MAX_ACCELERATION", "MAX_SPEED", "arm_xml"]
+__all__ = [
+    "FLANGE",
+    "HOME",
+    "JOINTS",
+    "MAX_ACCELERATION",
+    "MAX_SPEED",
+    "NAMES",
+    "SIZES",
+    "arm_xml",
+    "max_speed",
+]
+
+#: The arm and its other sizes, by name.
+NAMES = ("cura6", *SIZES)
 
 
-def arm_xml() -> str:
-    """MJCF text of the arm alone, self-contained."""
+@cache
+def arm_xml(name: str = "cura6") -> str:
+    """MJCF text of the arm alone, self-contained; ``name`` is one of :data:`NAMES`."""
+    if name in SIZES:
+        return mjcf(links(SIZES[name]), flange(SIZES[name]), name)
     return files(__name__).joinpath("cura6.xml").read_text()
+
+
+def max_speed(name: str = "cura6") -> tuple[float, ...]:
+    """Largest joint speeds of planned motions [rad/s]."""
+    factor = SIZES[name].speed if name in SIZES else 1.0
+    return tuple(factor * speed for speed in MAX_SPEED)

@@ -6,6 +6,7 @@ README.md beside this file gives the source of each.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -179,14 +180,18 @@ def dome(cap: Part) -> Part:
     return Part((x0, y0, z0), (x1, y1, z1), 0.985 * cap.radius, HOUSING, "ellipsoid")
 
 
-def mjcf() -> str:
-    """The arm's MJCF text."""
-    lines = [_HEAD]
+def mjcf(
+    links: Sequence[Link] = LINKS,
+    flange: tuple[float, float, float] = FLANGE,
+    name: str = "cura6",
+) -> str:
+    """The MJCF text of an arm with these links, by default the arm's own."""
+    lines = [_HEAD.replace('"cura6"', f'"{name}"')]
     indent = "    "
     lines += [f'{indent}<body name="base">']
     lines += [f"{indent}  {_geom(part, 'visual')}" for part in _BASE]
     lines += [f"{indent}  {_geom(Part((0, 0, 0.03), (0, 0, 0.08), 0.092), 'collision')}"]
-    for i, link in enumerate(LINKS, start=1):
+    for i, link in enumerate(links, start=1):
         indent += "  "
         mass, centre, inertia = inertial(link)
         full = [inertia[0, 0], inertia[1, 1], inertia[2, 2]]
@@ -203,9 +208,9 @@ def mjcf() -> str:
         lines += [f"{indent}  {_geom(part, 'visual')}" for part in shown]
         lines += [f"{indent}  {_geom(part, 'collision')}" for part in link.collides]
     lines += [
-        f'{indent}  <site name="flange" pos="{_numbers(FLANGE)}" quat="0.707107 -0.707107 0 0"/>'
+        f'{indent}  <site name="flange" pos="{_numbers(flange)}" quat="0.707107 -0.707107 0 0"/>'
     ]
-    lines += [f"{' ' * (4 + 2 * depth)}</body>" for depth in range(len(LINKS), -1, -1)]
+    lines += [f"{' ' * (4 + 2 * depth)}</body>" for depth in range(len(links), -1, -1)]
     lines += ["  </worldbody>", "  <keyframe>"]
     lines += [f'    <key name="home" qpos="{_numbers(HOME)}"/>', "  </keyframe>", "</mujoco>", ""]
     return "\n".join(lines)

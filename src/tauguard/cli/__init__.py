@@ -16,6 +16,8 @@ COMMANDS = {
     "demo": "simulate, strike, train, detect, and leave a recording to look at",
     "calibrate": "friction, inertia and drive gains of a real arm from collision-free logs",
     "detect": "look for collisions in the log of a real arm",
+    "generate": "a labelled dataset from its description, on all cores or a Ray cluster",
+    "inspect": "what a generated dataset holds, and whether it is whole",
     "simulate": "labelled episodes of the arm at work, as many as asked",
     "train": "a detector from labelled recordings",
     "evaluate": "a detector's figures on labelled recordings",

@@ -1,0 +1,91 @@
+"""Generation of a dataset: shard by shard, on processes or a Ray cluster, resumed at will."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tqdm import tqdm
+
+from tauguard.datasets.code_identity import code
+from tauguard.datasets.configuration import Configuration
+from tauguard.datasets.dataset_folder import claimed, write_description
+from tauguard.datasets.shard import Done, ShardTask, make_shard
+from tauguard.datasets.workers import in_processes, terminable
+from tauguard.traces.whole_file import remove_parts
+
+
+@dataclass
+class Built:
+    """What a run did."""
+
+    made: int = 0  #: shards
+    kept: int = 0  #: shards that were whole already
+    episodes: int = 0  #: in all shards
+    seconds: float = 0.0  #: simulated in this run [s]
+
+
+def build(
+    configuration: Configuration,
+    folder: Path,
+    workers: int | None = None,
+    ray: str | None = None,
+) -> Built:
+    """Write the dataset, or what is missing of it; the bytes do not depend on who computes them.
+
+    Args:
+        configuration: what it holds.
+        folder: made if it does not exist; if it does, it is empty or holds this dataset.
+        workers: processes (default: the processors there are); 1 stays in this process.
+        ray: address of a Ray cluster to work on instead ("local" starts one here).
+
+    Raises:
+        ValueError: the folder holds something else; nothing in it is changed.
+        OSError: it cannot be written, somebody else is writing it, or a worker died.
+    """
+    count = workers or os.cpu_count() or 1
+    done = Built()
+    with terminable(), claimed(folder, configuration):
+        todo = tasks(configuration, folder)
+        if ray is None:
+            results: Iterator[Done] = in_processes(make_shard, todo, count)
+        else:
+            from tauguard.datasets.cluster import on_cluster
+
+            results = on_cluster(make_shard, todo, ray)
+        try:
+            with _progress(configuration) as bar:
+                for one in results:
+                    _count(done, one, bar)
+            write_description(folder, configuration)
+        finally:
+            if isinstance(results, Generator):
+                results.close()  # no worker is left that could still be writing
+            remove_parts(folder)
+    return done
+
+
+def tasks(configuration: Configuration, folder: Path) -> Iterator[ShardTask]:
+    """Every shard's task, split by split."""
+    text, code_hash = configuration.to_json(), code()
+    for split in configuration.splits:
+        for number in range(math.ceil(split.episodes / configuration.episodes_per_shard)):
+            yield ShardTask(str(folder.resolve()), text, split.name, number, code_hash)
+
+
+def _progress(configuration: Configuration) -> tqdm[None]:
+    total = sum(split.episodes for split in configuration.splits)
+    return tqdm(total=total, desc="generate", unit="episode", disable=None, leave=False)
+
+
+def _count(done: Built, one: Done, bar: tqdm[None]) -> None:
+    done.episodes += one.episodes
+    if one.kept:
+        done.kept += 1
+    else:
+        done.made += 1
+        done.seconds += one.seconds
+    bar.update(one.episodes)

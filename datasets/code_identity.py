@@ -1,0 +1,81 @@
+"""Which code computes a dataset: versions, sources, and the bits that it computes here."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.metadata
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+
+import numpy as np
+
+#: What an episode's bytes depend on, beside native code, which :func:`computed_bits` tries.
+_ROOMS = ("models", "envs")
+_FILES = {
+    "traces": ("trace.py", "severity.py"),
+    "datasets": (
+        "configuration.py",
+        "configuration_checks.py",
+        "plans.py",
+        "schedule.py",
+        "shard.py",
+        "columns_of_shards.py",
+    ),
+}
+_LIBRARIES = ("mujoco", "numpy", "pin", "pyarrow")
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Of tauguard and of the libraries whose change may change the bytes."""
+    return {name: importlib.metadata.version(name) for name in ("tauguard", *_LIBRARIES)}
+
+
+@functools.cache
+def sources() -> str:
+    """SHA-256 over the source text that decides what an episode is."""
+    digest = hashlib.sha256()
+    for room in _ROOMS:
+        _add_tree(digest, files(f"tauguard.{room}"), room)
+    for room, names in _FILES.items():
+        for name in names:
+            _add(digest, f"{room}/{name}", files(f"tauguard.{room}").joinpath(name))
+    return digest.hexdigest()
+
+
+@functools.cache
+def computed_bits() -> str:
+    """SHA-256 of a short episode as this machine computes it: other processors may round apart."""
+    from tauguard.detectors import RobotNumbers, observe
+    from tauguard.envs import Episode, Simulation
+    from tauguard.models import Mismatch, pin_model
+
+    episode = Episode(seed=1, seconds=0.5, speed=60, payload_g=1000, mismatch=Mismatch(seed=1))
+    simulation = Simulation(episode)
+    trace = simulation.run()
+    robot = RobotNumbers.from_pin(pin_model(simulation.scene.arm_xml))
+    tau = trace.current * simulation.nominal.gain
+    residual = observe(robot, trace.t, trace.q, trace.qd, tau, 50.0, threads=1)
+    parts = (trace.q, trace.qd, trace.current, residual)
+    return hashlib.sha256(b"".join(np.ascontiguousarray(p).tobytes() for p in parts)).hexdigest()
+
+
+@functools.cache
+def code() -> str:
+    """One hash of it all."""
+    text = "\n".join([*(f"{k} {v}" for k, v in versions().items()), sources(), computed_bits()])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _add_tree(digest: hashlib._Hash, folder: Traversable, name: str) -> None:
+    for entry in sorted(folder.iterdir(), key=lambda e: e.name):
+        if entry.is_dir() and entry.name not in ("__pycache__", "src", "dm"):
+            _add_tree(digest, entry, f"{name}/{entry.name}")
+        elif entry.name.endswith((".py", ".xml")):
+            _add(digest, f"{name}/{entry.name}", entry)
+
+
+def _add(digest: hashlib._Hash, name: str, entry: Traversable) -> None:
+    text = entry.read_bytes()
+    digest.update(f"{name} {len(text)}\n".encode() + text)

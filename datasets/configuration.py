@@ -1,0 +1,202 @@
+"""What a dataset holds, described in TOML: checked whole before anything is simulated."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from tauguard.datasets.configuration_checks import (
+    KEYS,
+    checked_table,
+    closest,
+    refuse,
+)
+
+#: The configurations that ship, by name.
+NAMED = ("tauguard-collisions-v1", "cura6-twin")
+
+
+@dataclass(frozen=True)
+class Split:
+    """A part of a dataset that is used for one purpose; every episode belongs to one split."""
+
+    name: str
+    episodes: int  #: how many there are
+    quick_episodes: int  #: the first of them that ``--quick`` makes
+    seconds: float  #: length of an episode [s]
+    arms: tuple[str, ...]  #: designs, gone through in turn like everything that is listed below
+    individuals: tuple[int, ...]  #: seeds of how an arm differs from its design; -1: not at all
+    speeds: tuple[float, ...]  #: percent of the largest joint speeds
+    payloads_g: tuple[float, ...]  #: carried and not told to the observer [g]
+    struck: float  #: share of the episodes that hold collisions
+    collisions: int  #: planned in each of those
+    kinds: tuple[str, ...]  #: of collisions; a kind that is listed twice comes twice as often
+    links: tuple[int, ...]  #: that are struck, 1-based
+    severities: tuple[tuple[float, float], ...]  #: wanted peak |tau_ext| of joints 1-4 [N m]
+    temperature: tuple[float, float]  #: of the gears, drawn between these [degC]
+    picks: float  #: share of collision-free episodes in which a payload is taken up half-way
+    unseen: tuple[str, ...]  #: what the first split shares nothing of: "arm", "individual", ...
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A whole dataset; :func:`load` makes one."""
+
+    name: str
+    seed: int  #: of everything that is drawn
+    rate: int  #: rows a second [Hz]; the physics runs at 1000
+    episodes_per_shard: int
+    residual: bool  #: whether the momentum observer's estimate of tau_ext is stored
+    mismatch: tuple[tuple[str, float], ...]  #: half-widths, see :class:`tauguard.models.Mismatch`
+    splits: tuple[Split, ...]
+
+    def to_json(self) -> str:
+        """As JSON text with sorted keys: equal configurations give equal text."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Configuration:
+        """What :meth:`to_json` wrote."""
+        values = json.loads(text)
+        splits = tuple(Split(**{k: _frozen(v) for k, v in s.items()}) for s in values["splits"])
+        rest = {k: _frozen(v) for k, v in values.items() if k != "splits"}
+        return cls(**rest, splits=splits)
+
+    @property
+    def sha256(self) -> str:
+        """Of the JSON text."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()
+
+    def quick(self) -> Configuration:
+        """The first episodes of every split, with the same bytes as in the whole dataset."""
+        return replace(
+            self, splits=tuple(replace(s, episodes=s.quick_episodes) for s in self.splits)
+        )
+
+    @functools.cached_property
+    def identity(self) -> str:
+        """The same for the whole dataset and for its quick part, which share their episodes."""
+        return self.quick().sha256
+
+    @property
+    def hours(self) -> float:
+        """Simulated time of all episodes [h]."""
+        return sum(s.episodes * s.seconds for s in self.splits) / 3600
+
+
+def load(source: str | Path) -> Configuration:
+    """The configuration in a TOML file, or the one that ships under that name.
+
+    Raises:
+        ValueError: not TOML, an unknown key, a value out of its range, or splits that share what
+            they must not; the message names key, value and what would work.
+        OSError: no such file.
+    """
+    path = Path(source)
+    if str(source) in NAMED:
+        text, where = files("tauguard.datasets").joinpath(f"named/{source}.toml").read_text(), ""
+    elif path.is_file():
+        try:
+            text, where = path.read_text(encoding="utf-8"), f"{path}: "
+        except UnicodeDecodeError:
+            raise ValueError(f"{path}: not a text file; expected TOML") from None
+    else:
+        raise FileNotFoundError(
+            f"configuration {str(source)!r}: no such file{closest(str(source), NAMED)}; names that "
+            f"ship: {', '.join(NAMED)}"
+        )
+    try:
+        return parse(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{where}not TOML ({error})") from None
+    except ValueError as error:
+        raise ValueError(f"{where}{error}") from None
+
+
+def parse(values: Mapping[str, Any]) -> Configuration:
+    """The configuration of parsed TOML; errors as for :func:`load`."""
+    top = checked_table("", {k: v for k, v in values.items() if k not in TABLES}, KEYS["top"])
+    if not re.fullmatch(r"[a-z0-9][a-z0-9._-]{0,63}", top["name"]):
+        refuse("name", top["name"], "small letters, digits, dots and dashes, at most 64")
+    widths = checked_table("mismatch", _table(values, "mismatch"), KEYS["mismatch"])
+    common = dict(_table(values, "episodes"))
+    checked_table("episodes", common, KEYS["split"], partial=True)
+    tables = values.get("splits")
+    if not (isinstance(tables, list) and tables and all(isinstance(t, dict) for t in tables)):
+        refuse("splits", tables, "one [[splits]] table or more")
+    splits = []
+    for number, own in enumerate(tables):
+        where = f"splits[{number}]"
+        merged = checked_table(where, {**common, **own}, KEYS["split"])
+        splits.append(_split(where, merged))
+    _check_splits(splits)
+    return Configuration(**top, mismatch=tuple(sorted(widths.items())), splits=tuple(splits))
+
+
+TABLES = ("mismatch", "episodes", "splits")
+#: A collision's slot and the time before the first and after the last one [s].
+SLOT, MARGIN = 3.0, 3.5
+
+
+def _split(where: str, values: dict[str, Any]) -> Split:
+    quick = values["quick_episodes"]
+    if quick is None:
+        values["quick_episodes"] = max(1, round(0.02 * values["episodes"]))
+    elif quick > values["episodes"]:
+        refuse(f"{where}.quick_episodes", quick, f"at most the split's {values['episodes']}")
+    room = int((values["seconds"] - MARGIN) / SLOT)
+    if values["collisions"] is None:
+        values["collisions"] = max(room, 0)
+    if values["struck"] > 0 and not 1 <= values["collisions"] <= room:
+        refuse(
+            f"{where}.collisions",
+            values["collisions"],
+            f"1 to {room}, as many as {values['seconds']:g} s have room for "
+            f"({SLOT:g} s each after {MARGIN:g} s)",
+        )
+    return Split(**values)
+
+
+def _check_splits(splits: list[Split]) -> None:
+    """Names that differ, and nothing shared that a split says is unseen in the first."""
+    names = [split.name for split in splits]
+    if len(set(names)) < len(names):
+        refuse("splits", names, "a name of its own for every split")
+    first = splits[0]
+    for number, split in enumerate(splits):
+        where = f"splits[{number}].unseen"
+        if number == 0 and split.unseen:
+            refuse(where, split.unseen, "nothing: the first split is what the others are held to")
+        for what in split.unseen:
+            shared = values_of(first, what) & values_of(split, what)
+            if shared:
+                raise ValueError(
+                    f"{where}: {split.name} shares {what} {sorted(shared)[0]!r} with {first.name}; "
+                    f"expected no {what} of {first.name}"
+                )
+
+
+def values_of(split: Split, what: str) -> set[Any]:
+    """The planned values of one of "arm", "individual", "payload" and "speed"."""
+    if what == "individual":
+        return {(arm, number) for arm in split.arms for number in split.individuals}
+    return set({"arm": split.arms, "payload": split.payloads_g, "speed": split.speeds}[what])
+
+
+def _table(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = values.get(name, {})
+    if not isinstance(table, dict):
+        refuse(name, table, f"a table [{name}]")
+    return dict(table)
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value

@@ -1,0 +1,221 @@
+"""The keys of a dataset's configuration: type, range, default, and errors that name them."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NoReturn
+
+from tauguard.models import Mismatch, cura6
+from tauguard.traces import KINDS, STRATA
+
+REQUIRED = object()
+Read = Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a key takes."""
+
+    read: Read  #: the value as it is stored; ``ValueError`` where it is out of range
+    expected: str  #: what would work, for messages and documentation
+    default: Any = REQUIRED
+
+
+def refuse(key: str, value: Any, expected: str) -> NoReturn:
+    """``ValueError`` with key, value and what would work."""
+    shown = repr(value)
+    shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
+    raise ValueError(f"{key} = {shown}: expected {expected}")
+
+
+def closest(word: str, known: Iterable[str]) -> str:
+    """A hint at the known word that is most like ``word``."""
+    near = difflib.get_close_matches(word, list(known), n=1)
+    return f" (did you mean {near[0]}?)" if near else ""
+
+
+def checked_table(
+    where: str, values: Mapping[str, Any], keys: Mapping[str, Key], partial: bool = False
+) -> dict[str, Any]:
+    """All keys of a table, read and checked; defaults where they are missing.
+
+    Args:
+        where: the table's name.
+        values: what the file has.
+        keys: those that there are.
+        partial: required keys may be missing.
+
+    Raises:
+        ValueError: an unknown or missing key, or a value out of range.
+    """
+    dot = f"{where}." if where else ""
+    for name in values:
+        if name not in keys:
+            raise ValueError(
+                f"{dot}{name}: unknown key{closest(name, keys)}; expected one of {', '.join(keys)}"
+            )
+    found = {}
+    for name, key in keys.items():
+        if name in values:
+            try:
+                found[name] = key.read(values[name])
+            except (ValueError, TypeError):
+                refuse(f"{dot}{name}", values[name], key.expected)
+        elif key.default is not REQUIRED:
+            found[name] = key.default
+        elif not partial:
+            raise ValueError(f"{dot}{name}: missing; expected {key.expected}")
+    return found
+
+
+def number(low: float, high: float, above: bool = False) -> Read:
+    """A finite number in [low, high], or (low, high] with ``above``."""
+
+    def read(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise TypeError
+        good = low <= value <= high and not (above and value == low)
+        if not (math.isfinite(value) and good):
+            raise ValueError
+        return float(value)
+
+    return read
+
+
+def whole(low: int, high: int) -> Read:
+    """A whole number in [low, high]."""
+
+    def read(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise TypeError
+        if not low <= value <= high:
+            raise ValueError
+        return value
+
+    return read
+
+
+def several(read: Read, least: int = 1, distinct: bool = False) -> Read:
+    """A list of values."""
+
+    def read_all(value: Any) -> tuple[Any, ...]:
+        if not isinstance(value, list | tuple):
+            raise TypeError
+        items = tuple(read(item) for item in value)
+        if len(items) < least or (distinct and len(set(items)) < len(items)):
+            raise ValueError
+        return items
+
+    return read_all
+
+
+def one_of(*words: str) -> Read:
+    """One of ``words``."""
+
+    def read(value: Any) -> str:
+        if value not in words or not isinstance(value, str):
+            raise ValueError
+        return value
+
+    return read
+
+
+def span(low: float, high: float, equal: bool) -> Read:
+    """Two numbers in order, both in [low, high]."""
+    inner = number(low, high)
+
+    def read(value: Any) -> tuple[float, float]:
+        a, b = (inner(v) for v in value)
+        if not (a < b or (equal and a == b)):
+            raise ValueError
+        return a, b
+
+    return read
+
+
+def text(value: Any) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise TypeError
+    return value
+
+
+def split_name(value: Any) -> str:
+    """A name that can be part of a file's name."""
+    if not isinstance(value, str) or not value.replace("-", "").replace("_", "").isalnum():
+        raise ValueError
+    if not value.isascii() or len(value) > 40 or value.startswith(("-", "_")):
+        raise ValueError
+    return value
+
+
+def flag(value: Any) -> bool:
+    """True or false."""
+    if not isinstance(value, bool):
+        raise TypeError
+    return value
+
+
+def rows_a_second(value: Any) -> int:
+    """A rate at which every row is a step of the physics."""
+    rate = int(whole(1, 1000)(value))
+    if 1000 % rate:
+        raise ValueError
+    return rate
+
+
+_LARGEST = {f.name: 0.09 if f.name == "com" else 0.5 for f in fields(Mismatch) if f.name != "seed"}
+_DEFAULT = Mismatch(seed=0)
+SPLIT = {
+    "name": Key(split_name, "letters, digits, - and _, at most 40"),
+    "episodes": Key(whole(1, 10_000_000), "a whole number, 1 to 10,000,000"),
+    "quick_episodes": Key(
+        lambda v: None if v is None else whole(1, 10_000_000)(v), "a whole number from 1", None
+    ),
+    "seconds": Key(number(1, 600), "seconds, 1 to 600", 60.0),
+    "arms": Key(
+        several(one_of(*cura6.NAMES), distinct=True), f"a list of {', '.join(cura6.NAMES)}"
+    ),
+    "individuals": Key(
+        several(whole(-1, 2**31), distinct=True), "a list of different seeds, -1 for no mismatch"
+    ),
+    "speeds": Key(several(number(0, 100, above=True)), "a list of percentages above 0 to 100"),
+    "payloads_g": Key(several(number(0, 20_000)), "a list of grams, 0 to 20,000", (0.0,)),
+    "struck": Key(number(0, 1), "a share, 0 to 1", 0.5),
+    "collisions": Key(
+        lambda v: None if v is None else whole(1, 200)(v), "a whole number, 1 to 200", None
+    ),
+    "kinds": Key(
+        several(one_of(*KINDS)),
+        f"a list of {', '.join(KINDS)}",
+        ("strike", "pulse", "strike", "clamp"),
+    ),
+    "links": Key(several(whole(1, len(cura6.JOINTS))), "a list of links, 1 to 6", (2, 3, 4, 5, 6)),
+    "severities": Key(
+        several(span(0.1, 500, equal=False)), "a list of [low, high] in N m, 0.1 to 500", STRATA
+    ),
+    "temperature": Key(span(-10, 80, equal=True), "[low, high] in degC, -10 to 80", (25.0, 45.0)),
+    "picks": Key(number(0, 1), "a share, 0 to 1", 0.0),
+    "unseen": Key(
+        several(one_of("arm", "individual", "payload", "speed"), least=0, distinct=True),
+        "a list of arm, individual, payload, speed",
+        (),
+    ),
+}
+KEYS: dict[str, dict[str, Key]] = {
+    "top": {
+        "name": Key(text, "the dataset's name"),
+        "seed": Key(whole(0, 2**62), "a whole number, 0 to 2^62"),
+        "rate": Key(rows_a_second, "rows a second that divide 1000", 1000),
+        "episodes_per_shard": Key(whole(1, 1000), "a whole number, 1 to 1000", 10),
+        "residual": Key(flag, "true or false", False),
+    },
+    "mismatch": {
+        name: Key(number(0, largest), f"a half-width, 0 to {largest}", getattr(_DEFAULT, name))
+        for name, largest in _LARGEST.items()
+    },
+    "split": SPLIT,
+}

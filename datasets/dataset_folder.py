@@ -1,0 +1,188 @@
+"""A dataset's folder: what says which dataset it is, and who may write there."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from tauguard.datasets.code_identity import code, computed_bits, versions
+from tauguard.datasets.configuration import Configuration
+from tauguard.datasets.schedule import stated_balance
+from tauguard.datasets.shard import fault, manifest_path, read_lines
+from tauguard.models import cura6
+from tauguard.traces.whole_file import PART, remove_parts, write_whole
+
+#: Of the folder's layout; a reader refuses newer ones.
+FORMAT = 1
+HEAD = "dataset.json"
+
+
+def read_head(folder: Path) -> dict[str, Any]:
+    """What ``dataset.json`` says.
+
+    Raises:
+        ValueError: no dataset, a damaged one, or one of a newer version (its number is named).
+        FileNotFoundError: no such folder.
+    """
+    path = folder / HEAD
+    if not folder.is_dir():
+        raise FileNotFoundError(f"{folder}: no such folder; `tauguard generate` makes datasets")
+    if not path.is_file():
+        raise ValueError(f"{folder}: no {HEAD} in it; `tauguard generate` makes datasets")
+    try:
+        head = json.loads(path.read_text(encoding="utf-8"))
+        version = head["format"]
+        if isinstance(version, int) and version > FORMAT:
+            raise ValueError(
+                f"{folder}: a dataset of format {version}; this tauguard reads up to {FORMAT}: "
+                "install a newer one"
+            )
+        Configuration.from_json(json.dumps(head["configuration"]))
+    except (KeyError, TypeError, AttributeError, json.JSONDecodeError, UnicodeDecodeError):
+        raise ValueError(
+            f"{path}: damaged; `tauguard generate` with the same configuration into another "
+            "folder makes the same bytes"
+        ) from None
+    return dict(head)
+
+
+def configuration_in(folder: Path) -> Configuration:
+    """The configuration of the dataset in ``folder``; errors as for :func:`read_head`."""
+    return Configuration.from_json(json.dumps(read_head(folder)["configuration"]))
+
+
+def shard_count(configuration: Configuration, split: str) -> int:
+    """How many shards a split has."""
+    episodes = next(s.episodes for s in configuration.splits if s.name == split)
+    return math.ceil(episodes / configuration.episodes_per_shard)
+
+
+def shards(configuration: Configuration) -> Iterator[tuple[str, int]]:
+    """Split and number of every shard, in order."""
+    for split in configuration.splits:
+        for number in range(shard_count(configuration, split.name)):
+            yield split.name, number
+
+
+def lines(folder: Path, splits: tuple[str, ...] | None = None) -> Iterator[dict[str, Any]]:
+    """The lines of the manifest that there are, split by split, a shard at a time.
+
+    Raises:
+        ValueError: a damaged file of the manifest.
+    """
+    for split, number in shards(configuration_in(folder)):
+        path = folder / manifest_path(split, number)
+        if (splits is None or split in splits) and path.is_file():
+            yield from read_lines(path)
+
+
+def faults(folder: Path) -> Iterator[tuple[str, int, str | None]]:
+    """Every shard, and what is wrong with it (None: nothing); reads every byte."""
+    for split, number in shards(configuration_in(folder)):
+        yield split, number, fault(folder, split, number)
+
+
+@contextlib.contextmanager
+def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
+    """``folder`` holds this dataset (begun, if it was empty), and nobody else writes there.
+
+    Raises:
+        ValueError: it holds something else.
+        OSError: somebody else is writing there, or it cannot be made.
+    """
+    made = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with _locked(folder):
+            head = head_of(configuration)
+            if (folder / HEAD).is_file():
+                _check_same(folder, head)
+            elif any(not _is_part(entry) for entry in folder.iterdir()):
+                raise ValueError(
+                    f"{folder}: not empty, and no dataset; name a new or an empty folder"
+                )
+            remove_parts(folder)
+            _begin(folder, head)
+            yield
+    finally:
+        if made:
+            with contextlib.suppress(OSError):
+                folder.rmdir()  # only if nothing came of it
+
+
+def head_of(configuration: Configuration) -> dict[str, Any]:
+    """The content of ``dataset.json``."""
+    return {
+        "format": FORMAT,
+        "name": configuration.name,
+        "configuration_sha256": configuration.sha256,
+        "code": {"sha256": code(), "computed_bits": computed_bits(), **versions()},
+        "hours": configuration.hours,
+        "shards": {s.name: shard_count(configuration, s.name) for s in configuration.splits},
+        "planned": stated_balance(configuration),
+        "configuration": json.loads(configuration.to_json()),
+    }
+
+
+def _begin(folder: Path, head: dict[str, Any]) -> None:
+    for name in ("data", "manifest", "arms"):
+        (folder / name).mkdir(exist_ok=True)
+    for arm in sorted({arm for s in head["configuration"]["splits"] for arm in s["arms"]}):
+        _write_once(folder / "arms" / f"{arm}.xml", cura6.arm_xml(arm))
+    _write_once(folder / HEAD, json.dumps(head, indent=1, sort_keys=True) + "\n")
+
+
+def _write_once(path: Path, text: str) -> None:
+    if not path.is_file() or path.read_bytes() != text.encode():
+        write_whole(path, text)
+
+
+def _check_same(folder: Path, head: dict[str, Any]) -> None:
+    there = read_head(folder)
+    if there["configuration_sha256"] != head["configuration_sha256"]:
+        raise ValueError(
+            f"{folder}: holds another dataset ({there['name']}, configuration "
+            f"{there['configuration_sha256'][:12]}, not {head['configuration_sha256'][:12]}); "
+            "name another folder"
+        )
+    if there["code"] != head["code"]:
+        differ = [k for k in head["code"] if there["code"].get(k) != head["code"][k]]
+        named = [f"{k} {there['code'].get(k)}" for k in differ if k in versions()]
+        why = ", ".join(named) or "other sources, or a machine that rounds otherwise"
+        raise ValueError(
+            f"{folder}: was begun with {why}: new shards would not have the same bytes; "
+            "name another folder"
+        )
+
+
+def _is_part(entry: Path) -> bool:
+    return entry.name.startswith(".") and entry.name.endswith(PART)
+
+
+@contextlib.contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """One writer at a time; the lock ends with the process, however it ends."""
+    try:
+        import fcntl
+    except ImportError:  # no such locks on this system
+        yield
+        return
+    import os
+
+    handle: IO[bytes] | int = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise OSError(f"{folder}: another process is generating into it") from None
+        yield
+    finally:
+        os.close(handle)  # type: ignore[arg-type]
+
+
+def write_description(folder: Path, configuration: Configuration) -> None:
+    """The card and what else is derived from the manifest, once every shard is there."""

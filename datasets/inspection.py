@@ -1,0 +1,228 @@
+"""What is in a dataset, in numbers: counts, balance, outcomes, leakage, and damage."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tauguard.datasets.columns_of_shards import collision_line, stored
+from tauguard.datasets.configuration import Configuration
+from tauguard.datasets.dataset_folder import configuration_in, faults, lines, read_head, shards
+from tauguard.datasets.reader import episodes_of
+from tauguard.datasets.schedule import Balance, Planned
+from tauguard.datasets.shard import PHYSICS_RATE, data_path, manifest_path, simulated
+from tauguard.envs import Episode
+from tauguard.traces import Trace, stratum
+
+#: Of collisions, what is counted from the labels.
+ACHIEVED = ("kind", "link", "severity")
+#: A class is off balance where it misses what was planned by this share, and this many collisions.
+SLACK, SLACK_COUNT = 0.25, 10
+
+
+@dataclass
+class SplitSummary:
+    """What one split holds."""
+
+    episodes: int = 0
+    hours: float = 0.0
+    rows: int = 0
+    megabytes: float = 0.0
+    planned_collisions: int = 0
+    collisions: int = 0
+    planned: dict[str, Counter[str]] = field(default_factory=dict)
+    achieved: dict[str, Counter[str]] = field(default_factory=dict)
+    outcomes: Counter[str] = field(default_factory=Counter)
+    seeds: set[int] = field(default_factory=set)
+    values: dict[str, set[Any]] = field(default_factory=dict)
+
+
+def summarised(folder: Path) -> dict[str, SplitSummary]:
+    """What the manifest says, split by split; planned classes are those of the episodes there.
+
+    Raises:
+        ValueError: no dataset, one of a newer version, or a damaged manifest.
+    """
+    found = {split.name: SplitSummary() for split in configuration_in(folder).splits}
+    last = ""
+    for line in lines(folder):
+        one = found[line["split"]]
+        _add(one, line)
+        if line["shard"] != last:
+            one.megabytes += line["bytes"] / 1e6
+            last = line["shard"]
+    return found
+
+
+def _add(one: SplitSummary, line: dict[str, Any]) -> None:
+    one.episodes += 1
+    one.rows += line["rows"]
+    one.hours += line["seconds"] / 3600
+    one.planned_collisions += line["planned_collisions"]
+    one.collisions += len(line["collisions"])
+    one.seeds.add(line["seed"])
+    one.outcomes[_outcome(line["outcome"])] += 1
+    for name, value in (
+        ("arm", line["arm"]),
+        ("individual", (line["arm"], line["individual"])),
+        ("payload", line["payload_g"]),
+        ("speed", line["speed"]),
+    ):
+        one.values.setdefault(name, set()).add(value)
+    _count(one.planned, _planned_of(line))
+    _count(
+        one.achieved,
+        {
+            "kind": Counter(c["kind"] for c in line["collisions"]),
+            "link": Counter(str(c["link"]) for c in line["collisions"]),
+            "severity": Counter(stratum(c["peak_tau"]) for c in line["collisions"]),
+        },
+    )
+
+
+def _outcome(text: str) -> str:
+    if text == "as planned":
+        return text
+    return "failed" if text.startswith("failed") else "other collisions than planned"
+
+
+def _planned_of(line: dict[str, Any]) -> dict[str, Counter[str]]:
+    plans = line["episode"]["collisions"]
+    middle = [(p["severity"][0] * p["severity"][1]) ** 0.5 for p in plans if p["severity"]]
+    return {
+        "arm": Counter([line["arm"]]),
+        "speed": Counter([f"{line['speed']:g}"]),
+        "payload_g": Counter([f"{line['payload_g']:g}"]),
+        "kind": Counter(p["kind"] for p in plans),
+        "link": Counter(str(p["link"]) for p in plans),
+        "severity": Counter(stratum(m) for m in middle),
+    }
+
+
+def _count(into: dict[str, Counter[str]], what: dict[str, Counter[str]]) -> None:
+    for name, counts in what.items():
+        into.setdefault(name, Counter()).update(counts)
+
+
+def leaks(configuration: Configuration, found: dict[str, SplitSummary]) -> list[str]:
+    """What splits share that they must not: motion seeds, and what a split calls unseen."""
+    told = []
+    names = list(found)
+    for i, a in enumerate(names):
+        for b in names[i + 1 :]:
+            if shared := found[a].seeds & found[b].seeds:
+                told.append(f"{a} and {b} share {len(shared)} motion seeds")
+    first = configuration.splits[0]
+    for split in configuration.splits[1:]:
+        for what in split.unseen:
+            of_first = found[first.name].values.get(what, set())
+            if shared := of_first & found[split.name].values.get(what, set()):
+                told.append(f"{split.name} shares {what} {sorted(shared)} with {first.name}")
+    return told
+
+
+def missing(folder: Path) -> list[str]:
+    """Shards that are not there yet."""
+    return [
+        data_path(split, number)
+        for split, number in shards(configuration_in(folder))
+        if not (folder / manifest_path(split, number)).is_file()
+    ]
+
+
+def verified(folder: Path) -> list[tuple[str, str]]:
+    """Damaged or missing shards and what is wrong with each; reads every byte."""
+    return [
+        (data_path(split, number), wrong)
+        for split, number, wrong in faults(folder)
+        if wrong is not None
+    ]
+
+
+def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
+    """Classes of which there is not what was stated: planned otherwise, or achieved by far."""
+    told = []
+    for name, classes in stated.items():
+        if {k: v for k, v in classes.items() if v} != dict(one.planned.get(name, {})):
+            told.append(f"{name}: planned other than stated")
+    for name in ACHIEVED:
+        for value, wanted in stated[name].items():
+            there = one.achieved.get(name, Counter())[value]
+            if abs(there - wanted) > max(SLACK * wanted, SLACK_COUNT):
+                told.append(f"{name} {value}: {there} of {wanted} planned")
+    return told
+
+
+def report(folder: Path) -> dict[str, Any]:
+    """All of it as plain values."""
+    head = read_head(folder)
+    configuration = configuration_in(folder)
+    found = summarised(folder)
+    absent = missing(folder)
+    return {
+        "name": head["name"],
+        "format": head["format"],
+        "configuration_sha256": head["configuration_sha256"],
+        "code": head["code"],
+        "rate": configuration.rate,
+        "missing": absent,
+        "stated": head["planned"],
+        "leaks": leaks(configuration, found),
+        "splits": {
+            name: {
+                "episodes": one.episodes,
+                "hours": one.hours,
+                "rows": one.rows,
+                "megabytes": one.megabytes,
+                "planned_collisions": one.planned_collisions,
+                "collisions": one.collisions,
+                "outcomes": dict(one.outcomes),
+                "planned": {k: dict(v) for k, v in one.planned.items()},
+                "achieved": {k: dict(v) for k, v in one.achieved.items()},
+                "off_balance": [] if absent else off_balance(head["planned"][name], one),
+            }
+            for name, one in found.items()
+        },
+    }
+
+
+def line_of(folder: Path, name: str) -> dict[str, Any]:
+    """The manifest's line of an episode, ``split/number``.
+
+    Raises:
+        ValueError: no such episode.
+    """
+    for line in lines(folder):
+        if f"{line['split']}/{line['number']}" == name:
+            return line
+    raise ValueError(f"{folder}: no episode {name!r}; expected split/number, such as train/0")
+
+
+def same_again(folder: Path, line: dict[str, Any]) -> tuple[Trace | None, bool]:
+    """The episode simulated from its line alone, and whether its samples are those stored."""
+    episode = Episode.from_json(json.dumps(line["episode"]))
+    one = Planned(line["split"], line["number"], line["arm"], line["individual"], episode)
+    configuration = configuration_in(folder)
+    if not line["rows"]:
+        return None, True
+    trace, _ = simulated(one, with_residual=False)
+    kept = next(iter(episodes_of(folder, [line])))
+    fresh = stored(trace, PHYSICS_RATE // configuration.rate)
+    same = all(
+        np.array_equal(getattr(fresh, name), getattr(kept, name), equal_nan=True)
+        for name in ("t", "q", "qd", "current", "q_des", "qd_des", "qdd_des")
+    )
+    truths = (_given(fresh.truth), _given(kept.truth))
+    same &= np.array_equal(truths[0].tau_ext, truths[1].tau_ext)
+    same &= [collision_line(c) for c in truths[0].collisions] == line["collisions"]
+    return trace, bool(same)
+
+
+def _given(value: Any) -> Any:
+    assert value is not None
+    return value

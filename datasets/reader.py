@@ -1,0 +1,123 @@
+"""Traces from wherever they are: a generated dataset, a folder of recordings, a log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+
+from tauguard.datasets.columns_of_shards import RESIDUAL, trace_of
+from tauguard.datasets.dataset_folder import HEAD, configuration_in, shards
+from tauguard.datasets.logs import read_log
+from tauguard.datasets.shard import data_path, manifest_path, read_lines
+from tauguard.traces import Trace
+
+#: Files that :func:`read` takes for recordings.
+ENDINGS = (".mcap", ".csv", ".parquet")
+
+
+def is_dataset(path: Path) -> bool:
+    """Whether ``path`` is a folder that ``tauguard generate`` made."""
+    return (path / HEAD).is_file()
+
+
+def read(
+    path: str | Path,
+    splits: Sequence[str] | None = None,
+    arm: str | None = None,
+) -> Iterator[Trace]:
+    """The traces of a dataset, of a folder of recordings or of one recording, one at a time.
+
+    Args:
+        path: a folder that ``tauguard generate`` made; a folder of MCAP or CSV files; one of those.
+        splits: of a dataset, which of its splits (default: all).
+        arm: of a dataset, only this arm's episodes.
+
+    Yields:
+        Traces; those of a dataset have their truth and the nominal arm (``arm.xml``) with them.
+
+    Raises:
+        ValueError: nothing there to read, a damaged shard (it is named), an unknown split or arm, a
+            dataset of a newer version.
+        OSError: no such file or folder.
+    """
+    path = Path(path)
+    if is_dataset(path):
+        yield from _of_dataset(path, splits, arm)
+        return
+    if splits or arm:
+        raise ValueError(f"{path}: no dataset (no {HEAD}), so it has no splits and no named arms")
+    if not path.exists():
+        raise FileNotFoundError(f"{path}: no such file or folder")
+    files = sorted(f for f in path.iterdir() if f.suffix in ENDINGS) if path.is_dir() else [path]
+    if not files:
+        raise ValueError(f"{path}: no dataset and no recordings ({', '.join(ENDINGS)}) in it")
+    for file in files:
+        yield read_log(file).trace
+
+
+def splits_of(folder: Path, wanted: Sequence[str] | None) -> tuple[str, ...]:
+    """The wanted splits of a dataset, all by default; ``ValueError`` for one it does not have."""
+    there = [split.name for split in configuration_in(folder).splits]
+    for name in wanted or ():
+        if name not in there:
+            raise ValueError(f"{folder}: no split {name!r}; it has {', '.join(there)}")
+    return tuple(wanted or there)
+
+
+def arms_of(folder: Path, splits: Sequence[str] | None = None) -> tuple[str, ...]:
+    """The arms of a dataset's splits, by name."""
+    chosen = splits_of(folder, splits)
+    return tuple(
+        sorted({a for s in configuration_in(folder).splits if s.name in chosen for a in s.arms})
+    )
+
+
+def read_residuals(folder: Path, line: dict[str, Any]) -> Any:
+    """The stored residuals of one episode [N m], shape (T, n)."""
+    import numpy as np
+
+    names = [f"{RESIDUAL}_{i}" for i in range(1, len(line["joints"]) + 1)]
+    rows = pq.ParquetFile(folder / line["shard"]).read_row_group(line["row_group"], names)
+    return np.stack([column.to_numpy() for column in rows.columns], axis=1).astype(np.float64)
+
+
+def _of_dataset(folder: Path, splits: Sequence[str] | None, arm: str | None) -> Iterator[Trace]:
+    chosen = splits_of(folder, splits)
+    if arm is not None and arm not in arms_of(folder, chosen):
+        raise ValueError(
+            f"{folder}: no arm {arm!r} in {', '.join(chosen)}; "
+            f"there are {', '.join(arms_of(folder, chosen))}"
+        )
+    for split, number in shards(configuration_in(folder)):
+        if split not in chosen:
+            continue
+        listed = folder / manifest_path(split, number)
+        if not listed.is_file():
+            raise ValueError(
+                f"{folder}: {data_path(split, number)} is missing; the same `tauguard generate` "
+                "that began the dataset completes it"
+            )
+        wanted = [x for x in read_lines(listed) if x["rows"] and arm in (None, x["arm"])]
+        yield from episodes_of(folder, wanted)
+
+
+def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trace]:
+    """The traces of some lines of one shard."""
+    if not wanted:
+        return
+    path = folder / wanted[0]["shard"]
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            for line in wanted:
+                arm_xml = (folder / "arms" / f"{line['arm']}.xml").read_text()
+                yield trace_of(file.read_row_group(line["row_group"]), line, {"arm.xml": arm_xml})
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, KeyError) as error:
+        raise ValueError(
+            f"{path}: damaged ({' '.join(str(error).split())[:120]}); the same `tauguard generate` "
+            "that made the dataset makes this shard again"
+        ) from None

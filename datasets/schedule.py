@@ -1,0 +1,166 @@
+"""The episodes of a configuration, each a pure function of the configuration and its number.
+
+A value that is gone through in turn (arm, individual, speed, payload, struck or not; kind, link and
+severity of a collision) comes from a deck that is shuffled anew every round, each by itself, so
+that any stretch of a split is balanced to within one round and no two values go together.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import zlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, TypeVar
+
+import numpy as np
+
+from tauguard.datasets.configuration import Configuration, Split
+from tauguard.datasets.plans import collision_plans
+from tauguard.envs import CollisionPlan, Episode, PayloadPick
+from tauguard.models import Mismatch
+from tauguard.traces import stratum
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One episode of a dataset."""
+
+    split: str
+    number: int  #: within the split, from 0
+    arm: str
+    individual: int  #: seed of its mismatch, -1 for none
+    episode: Episode
+
+    @property
+    def name(self) -> str:
+        """``split/number``."""
+        return f"{self.split}/{self.number}"
+
+    def key(self, configuration: Configuration, code: str) -> str:
+        """What the episode's bytes depend on, hashed: configuration, number and code."""
+        text = "\n".join((configuration.identity, self.name, self.episode.config_hash, code))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def planned(configuration: Configuration, split: Split, number: int) -> Planned:
+    """Episode ``number`` of a split.
+
+    Raises:
+        IndexError: the split has no such episode.
+    """
+    if not 0 <= number < split.episodes:
+        raise IndexError(f"{split.name}: no episode {number}; it has {split.episodes}")
+    seed = [configuration.seed, zlib.crc32(split.name.encode())]
+    rng = np.random.default_rng([*seed, 0, number])
+    arm = dealt(split.arms, [*seed, 1], number)
+    individual = dealt(split.individuals, [*seed, 2], number)
+    payload = dealt(split.payloads_g, [*seed, 4], number)
+    struck = dealt(_share(split.struck), [*seed, 5], number)
+    picked = not struck and payload > 0 and dealt(_share(split.picks), [*seed, 6], number)
+    picks = (PayloadPick(split.seconds / 2, payload),) if picked else ()
+    widths = dict(configuration.mismatch)
+    episode = Episode(
+        seed=int(rng.integers(2**62)),
+        seconds=split.seconds,
+        speed=dealt(split.speeds, [*seed, 3], number),
+        payload_g=0.0 if picked else payload,
+        collisions=_collisions(split, seed, number, rng) if struck else (),
+        picks=picks,
+        mismatch=None if individual < 0 else Mismatch(seed=individual, **widths),
+        temperature=float(rng.uniform(*split.temperature)),
+        arm=arm,
+    )
+    return Planned(split.name, number, arm, individual, episode)
+
+
+def all_planned(configuration: Configuration) -> Iterator[Planned]:
+    """Every episode, split by split."""
+    for split in configuration.splits:
+        for number in range(split.episodes):
+            yield planned(configuration, split, number)
+
+
+def dealt(values: Sequence[T], seed: list[int], number: int) -> T:
+    """The ``number``-th card of a deck of ``values`` that is shuffled anew every round."""
+    round_, place = divmod(number, len(values))
+    order = np.random.default_rng([*seed, round_]).permutation(len(values))
+    return values[int(order[place])]
+
+
+def _share(share: float) -> tuple[bool, ...]:
+    """A deck with that share of True, of at most 20 cards."""
+    part = Fraction(share).limit_denominator(20)
+    yes, no = part.numerator, part.denominator - part.numerator
+    return (True,) * yes + (False,) * no
+
+
+def _collisions(
+    split: Split, seed: list[int], number: int, rng: np.random.Generator
+) -> tuple[CollisionPlan, ...]:
+    """The collisions of a struck episode; their classes are dealt on from the one before."""
+    before = _dealt_counts(_share(split.struck), [*seed, 5], number)[True]
+    cards = range(before * split.collisions, (before + 1) * split.collisions)
+    return collision_plans(
+        rng,
+        split.collisions,
+        strata=[dealt(split.severities, [*seed, 9], card) for card in cards],
+        kinds=[dealt(split.kinds, [*seed, 7], card) for card in cards],
+        links=[dealt(split.links, [*seed, 8], card) for card in cards],
+    )
+
+
+#: Classes whose balance is stated beforehand: episodes by three, collisions by the other three.
+CLASSES = ("arm", "speed", "payload_g", "kind", "link", "severity")
+Balance = dict[str, dict[str, int]]
+
+
+def stated_balance(configuration: Configuration) -> dict[str, Balance]:
+    """What will be planned in every split, counted by class, without drawing every episode."""
+    return {split.name: _stated(configuration, split) for split in configuration.splits}
+
+
+def _stated(configuration: Configuration, split: Split) -> Balance:
+    seed = [configuration.seed, zlib.crc32(split.name.encode())]
+    count = split.episodes
+    struck = _dealt_counts(_share(split.struck), [*seed, 5], count)[True]
+    found: dict[str, Counter[Any]] = {
+        "arm": _dealt_counts(split.arms, [*seed, 1], count),
+        "speed": _dealt_counts([f"{v:g}" for v in split.speeds], [*seed, 3], count),
+        "payload_g": _dealt_counts([f"{v:g}" for v in split.payloads_g], [*seed, 4], count),
+    }
+    levels = [_level(low, high) for low, high in split.severities]
+    links = [str(link) for link in split.links]
+    for name, values, card in (
+        ("kind", split.kinds, 7),
+        ("link", links, 8),
+        ("severity", levels, 9),
+    ):
+        found[name] = _dealt_counts(values, [*seed, card], struck * split.collisions)
+    return {name: dict(sorted(c.items(), key=_order)) for name, c in found.items()}
+
+
+def _dealt_counts(values: Sequence[T], seed: list[int], count: int) -> Counter[T]:
+    """How often each value is dealt to the first ``count`` episodes."""
+    rounds, rest = divmod(count, len(values))
+    found: Counter[T] = Counter()
+    for value in values:
+        found[value] += rounds
+    found.update(dealt(values, seed, rounds * len(values) + i) for i in range(rest))
+    return found
+
+
+def _level(low: float, high: float) -> str:
+    return stratum(math.sqrt(low * high))
+
+
+def _order(item: tuple[str, int]) -> tuple[float, str]:
+    try:
+        return float(item[0].split("-")[0]), item[0]
+    except ValueError:
+        return 0.0, item[0]

@@ -1,0 +1,258 @@
+"""One shard: a few episodes of one split, simulated and written; the work of one task."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from tauguard.datasets.code_identity import code
+from tauguard.datasets.columns_of_shards import (
+    RESIDUAL,
+    collision_line,
+    rounded,
+    schema,
+    stored,
+    table,
+)
+from tauguard.datasets.configuration import Configuration, Split
+from tauguard.datasets.schedule import Planned, planned
+from tauguard.detectors import RobotNumbers, observe
+from tauguard.envs import Simulation, SimulationDiverged
+from tauguard.models import Drive, cura6, pin_model
+from tauguard.traces import Trace
+from tauguard.traces.whole_file import whole_file, write_whole
+
+Array = NDArray[np.float64]
+
+#: Rate of the momentum observer [1/s], and slope of the nominal friction at standstill [rad/s].
+OBSERVER_GAIN, STANDSTILL = 50.0, 0.05
+#: Of the physics [Hz].
+PHYSICS_RATE = 1000
+#: zstd's level; the levels above cost much time for a few percent.
+ZSTD_LEVEL = 3
+
+
+@dataclass(frozen=True)
+class ShardTask:
+    """What a worker is sent."""
+
+    folder: str  #: of the dataset
+    configuration: str  #: as JSON
+    split: str
+    number: int  #: of the shard within the split
+    code: str  #: which code must compute it
+
+
+@dataclass(frozen=True)
+class Done:
+    """What became of a shard."""
+
+    split: str
+    number: int
+    episodes: int
+    seconds: float  #: simulated [s]
+    kept: bool  #: it was there already, whole
+
+
+def data_path(split: str, number: int) -> str:
+    """Where a shard's samples are, in the dataset's folder."""
+    return f"data/{split}-{number:06d}.parquet"
+
+
+def manifest_path(split: str, number: int) -> str:
+    """Where a shard's episodes are listed, a JSON line each; written when its samples are there."""
+    return f"manifest/{split}-{number:06d}.jsonl"
+
+
+def numbers_in(configuration: Configuration, split: Split, shard: int) -> range:
+    """The episodes of a shard."""
+    first = shard * configuration.episodes_per_shard
+    return range(first, min(first + configuration.episodes_per_shard, split.episodes))
+
+
+def make_shard(task: ShardTask) -> Done:
+    """Simulate and write a shard, unless it is there and whole.
+
+    Raises:
+        ValueError: this machine or this installation computes other bytes than the dataset's.
+        OSError: it cannot be written.
+    """
+    if code() != task.code:
+        raise ValueError(
+            "a worker has other code, or computes other bits, than the command that sent it work: "
+            "install the same versions on all machines, and use one kind of processor"
+        )
+    configuration = Configuration.from_json(task.configuration)
+    split = next(s for s in configuration.splits if s.name == task.split)
+    numbers = numbers_in(configuration, split, task.number)
+    folder = Path(task.folder)
+    kept = fault(folder, task.split, task.number) is None
+    if not kept:
+        _write(folder, task, configuration, [planned(configuration, split, n) for n in numbers])
+    return Done(task.split, task.number, len(numbers), len(numbers) * split.seconds, kept)
+
+
+def fault(folder: Path, split: str, number: int) -> str | None:
+    """What is wrong with a shard: None if it is whole, byte for byte."""
+    data, listed = folder / data_path(split, number), folder / manifest_path(split, number)
+    if not listed.is_file():
+        return "missing" if not data.exists() else "not listed in the manifest"
+    try:
+        lines = read_lines(listed)
+    except ValueError as error:
+        return f"its manifest is damaged ({error})"
+    if not data.is_file():
+        return "its samples are missing"
+    if digest(data) != lines[0]["sha256"]:
+        return f"damaged: {data.stat().st_size} bytes, not those that were written"
+    return None
+
+
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """The lines of one file of the manifest.
+
+    Raises:
+        ValueError: it is not what was written.
+    """
+    try:
+        *lines, last = path.read_text(encoding="utf-8").splitlines()
+        check = hashlib.sha256("".join(f"{line}\n" for line in lines).encode()).hexdigest()
+        if json.loads(last) != {"sha256_of_lines": check}:
+            raise ValueError("its checksum differs")
+        found = [json.loads(line) for line in lines]
+    except (ValueError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path.name}: {error}") from None
+    if not found:
+        raise ValueError(f"{path.name}: no lines")
+    return found
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _write(
+    folder: Path, task: ShardTask, configuration: Configuration, episodes: list[Planned]
+) -> None:
+    data = folder / data_path(task.split, task.number)
+    with whole_file(data) as stream:
+        lines = _write_episodes(stream, configuration, episodes, task.code)
+    common = {
+        "shard": data_path(task.split, task.number),
+        "bytes": data.stat().st_size,
+        "sha256": digest(data),
+    }
+    text = "".join(json.dumps({**line, **common}, sort_keys=True) + "\n" for line in lines)
+    check = {"sha256_of_lines": hashlib.sha256(text.encode()).hexdigest()}
+    write_whole(folder / manifest_path(task.split, task.number), text + json.dumps(check) + "\n")
+
+
+def _write_episodes(
+    stream: BinaryIO, configuration: Configuration, episodes: list[Planned], code_hash: str
+) -> list[dict[str, Any]]:
+    """Write the samples, a row group an episode; returns the episodes' lines."""
+    like = schema(len(cura6.JOINTS), configuration.residual)
+    floats = [field.name for field in like if pa.types.is_floating(field.type)]
+    others = [field.name for field in like if field.name not in floats]
+    lines, groups = [], 0
+    with pq.ParquetWriter(
+        stream,
+        like,
+        compression="zstd",
+        compression_level=ZSTD_LEVEL,
+        use_dictionary=others,
+        use_byte_stream_split=floats,
+        write_page_checksum=True,
+    ) as writer:
+        for one, trace, residual, outcome in _simulated(configuration, episodes):
+            line = _line(one, trace, outcome)
+            line["key"] = one.key(configuration, code_hash)
+            line["row_group"] = groups if line["rows"] else None
+            if trace is not None:
+                writer.write_table(table(trace, one.number, residual, like), len(trace.t))
+                groups += 1
+            lines.append(line)
+        text = json.dumps({"format": 1, "episodes": lines}, sort_keys=True)
+        writer.add_key_value_metadata({"tauguard": text})
+    return lines
+
+
+def _simulated(
+    configuration: Configuration, episodes: list[Planned]
+) -> Iterator[tuple[Planned, Trace | None, Array | None, str]]:
+    every = PHYSICS_RATE // configuration.rate
+    for one in episodes:
+        try:
+            trace, residual = simulated(one, configuration.residual)
+        except (SimulationDiverged, ValueError) as error:
+            yield one, None, None, f"failed: {' '.join(str(error).split())}"
+            continue
+        happened, wanted = len(_given(trace.truth).collisions), len(one.episode.collisions)
+        outcome = "as planned"
+        if happened != wanted:
+            outcome = f"{happened} of {wanted} planned collisions happened"
+        rows = None if residual is None else rounded(RESIDUAL, residual[::every])
+        yield one, stored(trace, every), rows, outcome
+
+
+def simulated(one: Planned, with_residual: bool) -> tuple[Trace, Array | None]:
+    """An episode at the rate of the physics, with the observer's residual (T, n) if wanted."""
+    simulation = Simulation(one.episode)
+    trace = simulation.run()
+    if not with_residual:
+        return trace, None
+    robot = RobotNumbers.from_pin(pin_model(simulation.scene.arm_xml))
+    return trace, residual_of(trace, robot, simulation.nominal)
+
+
+def residual_of(trace: Trace, robot: RobotNumbers, drive: Drive) -> Array:
+    """The momentum observer's estimate of tau_ext [N m], (T, n), with the nominal numbers."""
+    tau = drive.gain * trace.current
+    if drive.friction is not None:
+        tau = tau - drive.friction.coulomb * np.tanh(trace.qd / STANDSTILL)
+        tau = tau - drive.friction.viscous * trace.qd
+    return observe(robot, trace.t, trace.q, trace.qd, tau, OBSERVER_GAIN, threads=1)
+
+
+def _line(one: Planned, trace: Trace | None, outcome: str) -> dict[str, Any]:
+    episode = one.episode
+    collisions = () if trace is None else _given(trace.truth).collisions
+    return {
+        "split": one.split,
+        "number": one.number,
+        "arm": one.arm,
+        "individual": one.individual,
+        "seed": episode.seed,
+        "speed": episode.speed,
+        "payload_g": max([episode.payload_g, *(pick.payload_g for pick in episode.picks)]),
+        "temperature": episode.temperature,
+        "seconds": episode.seconds,
+        "rows": 0 if trace is None else len(trace.t),
+        "joints": list(cura6.JOINTS),
+        "outcome": outcome,
+        "planned_collisions": len(episode.collisions),
+        "collisions": [collision_line(c) for c in collisions],
+        "config_sha256": episode.config_hash,
+        "model_sha256": None if trace is None else trace.meta["model_sha256"],
+        "episode": _plain(asdict(episode)),
+    }
+
+
+def _plain(values: Mapping[str, Any]) -> Any:
+    return json.loads(json.dumps(values))
+
+
+def _given(value: Any) -> Any:
+    assert value is not None
+    return value

@@ -1,0 +1,158 @@
+"""Processes that do tasks: none outlives the command, and none that dies goes unnoticed."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from types import FrameType
+from typing import Any, TypeVar
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+class WorkerDied(OSError):
+    """A worker process ended before its task was done; the message says how."""
+
+
+class Terminated(KeyboardInterrupt):
+    """The command was asked to end (SIGTERM)."""
+
+
+@contextlib.contextmanager
+def terminable() -> Iterator[None]:
+    """In this block SIGTERM raises :class:`Terminated`, so that what must be tidied up is."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def in_processes(
+    work: Callable[[Task], Result], tasks: Iterable[Task], workers: int
+) -> Iterator[Result]:
+    """The results of ``work`` in the order in which they are ready.
+
+    Args:
+        work: a function of a module (it is sent to the workers by its name).
+        tasks: taken one by one, when a worker is free.
+        workers: processes; 1 stays in this process.
+
+    Raises:
+        WorkerDied: a worker was killed.
+        Exception: what ``work`` raised. Whatever is raised here, no worker is left running.
+    """
+    if workers == 1:
+        yield from map(work, tasks)
+        return
+    waiting = iter(tasks)
+    crew: dict[Connection, BaseProcess] = {}
+    with contextlib.ExitStack() as stack:
+        stack.callback(_end, crew)
+        for _ in range(workers):
+            task = next(waiting, None)
+            if task is None:
+                break
+            pipe, process = _hire(work)
+            crew[pipe] = process
+            pipe.send(task)
+        busy = set(crew)
+        ready: deque[Any] = deque()
+        while busy:
+            ready.extend(wait(list(busy)))
+            while ready:
+                pipe = ready.popleft()
+                result = _receive(pipe, crew[pipe])
+                task = next(waiting, None)
+                if task is None:
+                    busy.discard(pipe)
+                else:
+                    pipe.send(task)
+                yield result
+
+
+def _hire(work: Callable[[Any], Any]) -> tuple[Connection, BaseProcess]:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs, work), daemon=True)
+    with _ctrl_c_blocked():  # inherited: Ctrl-C reaches this process alone, which ends the others
+        process.start()
+    theirs.close()
+    return ours, process
+
+
+@contextlib.contextmanager
+def _ctrl_c_blocked() -> Iterator[None]:
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
+    """Do tasks until the pipe is closed."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    while True:
+        try:
+            task = pipe.recv()
+        except EOFError:
+            return
+        try:
+            answer: tuple[Any, BaseException | None, str] = (work(task), None, "")
+        except Exception as error:
+            answer = (None, error, traceback.format_exc())
+        try:
+            pipe.send(answer)
+        except OSError:
+            return
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed stops at once: another run may be at work soon."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)
+
+
+def _receive(pipe: Connection, process: BaseProcess) -> Any:
+    try:
+        result, error, told = pipe.recv()
+    except (EOFError, ConnectionError):
+        process.join(5)
+        code = process.exitcode or 0
+        how = f"signal {-code}" if code < 0 else f"exit code {code}"
+        raise WorkerDied(f"a worker process died ({how})") from None
+    if error is not None:
+        if not isinstance(error, ValueError | OSError):
+            error.add_note(told)
+        raise error
+    return result
+
+
+def _end(crew: dict[Connection, BaseProcess]) -> None:
+    for process in crew.values():
+        process.kill()
+    for pipe, process in crew.items():
+        process.join(5)
+        pipe.close()

@@ -1,0 +1,62 @@
+"""``tauguard generate``: a labelled dataset from its description."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+def command(
+    config: Annotated[str, tyro.conf.Positional],
+    out: Path,
+    workers: int | None = None,
+    ray: str | None = None,
+    quick: bool = False,
+) -> None:
+    """Simulate a described dataset and write it as Parquet with a manifest.
+
+    The same command continues where a run stopped, however it stopped, and repairs damaged shards;
+    the bytes are the same for any number of workers.
+
+    Args:
+        config: a TOML file, or a name that ships: tauguard-collisions-v1, cura6-twin.
+        out: folder of the dataset: a new or empty one, or one that holds a part of this dataset.
+        workers: processes (default: all processors).
+        ray: address of a Ray cluster to work on instead; "local" starts one on this machine.
+        quick: only the first episodes of every split, as many as the configuration says.
+    """
+    import time
+
+    from tauguard.datasets.build import build
+    from tauguard.datasets.configuration import load
+    from tauguard.datasets.workers import Terminated
+
+    if workers is not None and workers < 1:
+        raise ValueError(f"--workers {workers}: expected 1 or more")
+    if ray is not None and workers is not None:
+        raise ValueError("--workers is for this machine and --ray for a cluster: give one of them")
+    configuration = load(config)
+    if quick:
+        configuration = configuration.quick()
+    began = time.perf_counter()
+    try:
+        done = build(configuration, out, workers, ray)
+    except KeyboardInterrupt as stop:
+        number = signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT
+        import sys
+
+        print(
+            f"tauguard generate: stopped; the same command continues {out}",
+            file=sys.stderr,
+        )
+        raise SystemExit(128 + number) from None
+    wall = time.perf_counter() - began
+    print(
+        f"{out}: {configuration.name}, {configuration.hours:.4g} h in {done.episodes} episodes; "
+        f"{done.made} shards made, {done.kept} kept"
+    )
+    if done.seconds:
+        print(f"{done.seconds / 3600:.3g} h simulated in {wall:.0f} s: {done.seconds / wall:.0f} x")

@@ -1,0 +1,133 @@
+"""``tauguard inspect``: what a dataset holds, and whether it is whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def command(
+    folder: Annotated[Path, tyro.conf.Positional],
+    verify: bool = False,
+    json: Path | None = None,
+    figure: Path | None = None,
+    episode: str | None = None,
+    mcap: Path | None = None,
+) -> None:
+    """Show what a generated dataset holds; with --verify read every byte of it.
+
+    Exit code 1: --verify found damaged or missing shards, or splits share what they must not. The
+    command that generated the dataset makes such shards again, and only those.
+
+    Args:
+        folder: of the dataset.
+        verify: compare every shard with its checksum in the manifest.
+        json: write the figures here.
+        figure: draw the figures here (PNG).
+        episode: simulate this episode again, split/number, from its line of the manifest, and check
+            that it has the same bytes.
+        mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
+            turns that into an .rrd.
+    """
+    from tauguard.benchmarks.report import write_json
+    from tauguard.datasets import inspection
+
+    if mcap is not None and episode is None:
+        raise ValueError("--mcap goes with --episode: say which one")
+    if episode is not None:
+        again(folder, episode, mcap)
+        return
+    report = inspection.report(folder)
+    report["damaged"] = dict(inspection.verified(folder)) if verify else None
+    print(page(report))
+    if figure is not None:
+        from tauguard.cli.inspection_figure import draw
+
+        draw(figure, folder, report)
+    if json is not None:
+        write_json(json, report)
+    if report["damaged"] or (verify and report["leaks"]):
+        raise SystemExit(1)
+
+
+def page(report: Mapping[str, Any]) -> str:
+    """The report as text."""
+    code = report["code"]
+    lines = [
+        f"{report['name']}, {report['rate']} rows a second, "
+        f"configuration {report['configuration_sha256'][:12]}",
+        f"made by tauguard {code['tauguard']}, MuJoCo {code['mujoco']}",
+        "",
+        f"{'split':<14} {'episodes':>8} {'hours':>8} {'MB':>9} {'MB/h':>6} "
+        f"{'collisions':>10} {'planned':>8}  outcomes",
+    ]
+    for name, one in report["splits"].items():
+        rate = one["megabytes"] / one["hours"] if one["hours"] else 0.0
+        outcomes = ", ".join(f"{n} {what}" for what, n in sorted(one["outcomes"].items()))
+        lines.append(
+            f"{name:<14} {one['episodes']:>8} {one['hours']:>8.3g} {one['megabytes']:>9.1f} "
+            f"{rate:>6.0f} {one['collisions']:>10} {one['planned_collisions']:>8}  {outcomes}"
+        )
+    for name, one in report["splits"].items():
+        if one["collisions"]:
+            lines += ["", *classes(name, one)]
+        lines += [f"  off balance: {what}" for what in one["off_balance"]]
+    return "\n".join([*lines, "", *verdict(report)])
+
+
+def classes(name: str, one: Mapping[str, Any]) -> list[str]:
+    """Collisions of a split by class, as achieved and as planned."""
+    lines = [f"{name}: collisions there (planned)"]
+    for what in ("kind", "link", "severity"):
+        there, wanted = one["achieved"].get(what, {}), one["planned"].get(what, {})
+        both = sorted(there.keys() | wanted.keys(), key=order)
+        cells = "  ".join(f"{v} {there.get(v, 0)} ({wanted.get(v, 0)})" for v in both)
+        lines.append(f"  {what:<9} {cells}")
+    return lines
+
+
+def order(value: str) -> tuple[float, str]:
+    """Numbers and ranges by size, words by letters."""
+    head = value.split("-")[0]
+    return (float(head), value) if head.replace(".", "").isdigit() else (0.0, value)
+
+
+def verdict(report: Mapping[str, Any]) -> list[str]:
+    """What is missing, shared or damaged."""
+    lines = []
+    gone, damaged = report["missing"], report["damaged"]
+    if gone:
+        lines.append(f"not complete: {len(gone)} shards missing, first: {gone[0]}")
+    for leak in report["leaks"]:
+        lines.append(f"LEAK: {leak}")
+    if not report["leaks"]:
+        lines.append("splits share no motion, and nothing that they call unseen")
+    if damaged is None:
+        lines.append("shards not checked (--verify reads every byte)")
+    elif damaged:
+        lines += [f"DAMAGED: {name}: {wrong}" for name, wrong in damaged.items()]
+        lines.append("`tauguard generate` with the same configuration makes these again")
+    else:
+        lines.append("every shard is whole, byte for byte")
+    return lines
+
+
+def again(folder: Path, name: str, mcap: Path | None) -> None:
+    """Simulate one episode again and compare it with what is stored."""
+    from tauguard.datasets.inspection import line_of, same_again
+    from tauguard.traces import write_mcap
+
+    line = line_of(folder, name)
+    trace, same = same_again(folder, line)
+    print(f"{name}: {line['outcome']}; {line['rows']} rows, key {line['key'][:12]}")
+    print("simulated again: the same bytes" if same else "simulated again: OTHER bytes")
+    if mcap is not None and trace is not None:
+        write_mcap(mcap, trace)
+        print(f"{mcap}: the episode with its scene; `tauguard replay` shows it")
+    if not same:
+        raise SystemExit(1)

@@ -1,0 +1,119 @@
+"""A page of charts of what a dataset holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLOURS = {"strike": "#d95f02", "clamp": "#7570b3", "pulse": "#1b9e77"}
+
+
+def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
+    """Classes as planned and as achieved, severity by kind, and one collision of the dataset."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    from tauguard.datasets.dataset_folder import lines
+
+    every = list(lines(folder))
+    figure, axes = plt.subplots(2, 2, figsize=(13, 8.5), layout="constrained")
+    _classes(axes[0, 0], report)
+    _severity(axes[0, 1], every)
+    _speeds(axes[1, 0], every)
+    _collision(axes[1, 1], folder, every)
+    splits = ", ".join(f"{k} {v['hours']:.3g} h" for k, v in report["splits"].items())
+    figure.suptitle(f"{report['name']}: {splits}")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _classes(axes: Axes, report: Mapping[str, Any]) -> None:
+    labels, there, wanted = [], [], []
+    for what in ("kind", "link", "severity"):
+        planned: dict[str, int] = {}
+        achieved: dict[str, int] = {}
+        for one in report["splits"].values():
+            for into, counts in ((planned, one["planned"]), (achieved, one["achieved"])):
+                for value, count in counts.get(what, {}).items():
+                    into[value] = into.get(value, 0) + count
+        for value in sorted(planned.keys() | achieved.keys(), key=_order):
+            labels.append({"link": f"link {value}", "severity": f"{value} N m"}.get(what, value))
+            there.append(achieved.get(value, 0))
+            wanted.append(planned.get(value, 0))
+    rows = np.arange(len(labels))
+    axes.barh(rows, there, color="#2a788e", label="there")
+    axes.plot(wanted, rows, "|", color="black", markersize=14, markeredgewidth=2, label="planned")
+    axes.set_yticks(rows, labels)
+    axes.invert_yaxis()
+    axes.set(xlabel="collisions", title="Classes, as planned and as they came out")
+    axes.legend(loc="lower right")
+
+
+def _order(value: str) -> tuple[float, str]:
+    head = value.split("-")[0]
+    return (float(head), value) if head.replace(".", "").isdigit() else (0.0, value)
+
+
+def _severity(axes: Axes, every: list[dict[str, Any]]) -> None:
+    for kind, colour in COLOURS.items():
+        found = [c for line in every for c in line["collisions"] if c["kind"] == kind]
+        if found:
+            force = [float(np.linalg.norm(c["force"])) for c in found]
+            axes.scatter(
+                force, [c["peak_tau"] for c in found], s=12, alpha=0.6, color=colour, label=kind
+            )
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="peak contact force [N]",
+        ylabel="peak |tau_ext|, joints 1-4 [N m]",
+        title="Force and severity of the collisions",
+    )
+    axes.grid(alpha=0.3)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend()
+
+
+def _speeds(axes: Axes, every: list[dict[str, Any]]) -> None:
+    speeds = sorted({line["speed"] for line in every})
+    loads = sorted({line["payload_g"] for line in every})
+    grid = np.zeros((len(loads), len(speeds)))
+    for line in every:
+        grid[loads.index(line["payload_g"]), speeds.index(line["speed"])] += line["seconds"] / 3600
+    image = axes.imshow(grid, cmap="YlGnBu", aspect="auto", vmin=0)
+    axes.set_xticks(range(len(speeds)), [f"{v:g}" for v in speeds])
+    axes.set_yticks(range(len(loads)), [f"{v:g}" for v in loads])
+    axes.set(xlabel="speed [% of maximum]", ylabel="payload [g]", title="Hours")
+    axes.figure.colorbar(image, ax=axes, label="h")
+
+
+def _collision(axes: Axes, folder: Path, every: list[dict[str, Any]]) -> None:
+    from tauguard.datasets.reader import episodes_of
+
+    line = next((x for x in every if x["rows"] and x["collisions"]), None)
+    if line is None:
+        axes.set_axis_off()
+        return
+    trace = next(iter(episodes_of(folder, [line])))
+    first = max(line["collisions"], key=lambda c: float(c["peak_tau"]))
+    near = (trace.t > first["onset"] - 0.15) & (trace.t < first["end"] + 0.25)
+    assert trace.truth is not None
+    torque = trace.truth.tau_ext[near]
+    for joint in range(torque.shape[1]):
+        axes.plot(trace.t[near], torque[:, joint], label=f"joint {joint + 1}")
+    axes.axvspan(first["onset"], first["end"], color="#d95f02", alpha=0.15)
+    axes.set(
+        xlabel="time [s]",
+        ylabel="tau_ext [N m]",
+        title=f"{line['split']}/{line['number']}: {first['kind']} on link {first['link']}",
+    )
+    axes.grid(alpha=0.3)
+    axes.legend(ncols=2, fontsize=8)

@@ -1,0 +1,204 @@
+"""Datasets on disk: the same bytes whoever computes them, and nothing half-written."""
+
+import errno
+import json
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from tauguard.datasets import inspection
+from tauguard.datasets.build import build
+from tauguard.datasets.configuration import load
+from tauguard.datasets.dataset_folder import HEAD, lines, read_head
+from tauguard.datasets.reader import read
+from tauguard.datasets.shard import simulated
+from tauguard.datasets.workers import WorkerDied, in_processes
+from tauguard.traces.whole_file import whole_file
+
+from .conftest import contents
+
+
+def generate(*arguments, **options):
+    command = [sys.executable, "-c", "from tauguard.cli import main; main()", "generate"]
+    return subprocess.Popen(
+        [*command, *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        **options,
+    )
+
+
+def wait_for(condition, seconds=240):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.005)
+
+
+def test_every_episode_is_there_once_with_its_labels(tiny, tiny_toml):
+    every = list(lines(tiny))
+    assert [(x["split"], x["number"]) for x in every] == [
+        ("train", 0), ("train", 1), ("train", 2), ("test", 0), ("test", 1)
+    ]  # fmt: skip
+    assert inspection.verified(tiny) == []
+    report = inspection.report(tiny)
+    assert report["leaks"] == report["missing"] == []
+    table = pq.read_table(tiny / "data" / "train-000000.parquet")
+    assert table.num_rows == 2 * 3300
+    struck = np.flatnonzero(table["collision"].to_numpy() >= 0)
+    pushed = np.flatnonzero(table["contact_force"].to_numpy() > 0)
+    assert set(pushed) <= set(struck)
+
+
+def test_what_is_read_is_what_was_simulated(tiny, tiny_toml):
+    line = next(x for x in lines(tiny) if x["collisions"])
+    _, same = inspection.same_again(tiny, line)
+    assert same
+    trace = next(t for t in read(tiny) if t.meta["key"] == line["key"])
+    configuration = load(tiny_toml)
+    split = next(s for s in configuration.splits if s.name == line["split"])
+    from tauguard.datasets.schedule import planned
+
+    whole, _ = simulated(planned(configuration, split, line["number"]), with_residual=False)
+    np.testing.assert_allclose(trace.current, whole.current[::2], atol=4e-5)
+    np.testing.assert_allclose(trace.q, whole.q[::2], atol=3e-7)
+    np.testing.assert_allclose(trace.truth.tau_ext, whole.truth.tau_ext[::2], rtol=1e-6, atol=1e-9)
+    for a, b in zip(trace.truth.collisions, whole.truth.collisions, strict=True):
+        assert (a.kind, a.onset, a.end, a.link, a.peak_tau) == (
+            b.kind, b.onset, b.end, b.link, b.peak_tau
+        )  # fmt: skip
+
+
+def test_two_workers_and_a_killed_run_give_the_same_bytes(tiny, tiny_toml, tmp_path):
+    folder = tmp_path / "killed"
+    process = generate(tiny_toml, "--out", folder, "--workers", 2)
+    wait_for(lambda: list(folder.glob("data/*.parquet")) or process.poll() is not None)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    build(load(tiny_toml), folder, workers=2)
+    assert contents(folder) == contents(tiny)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_run_ends_at_once_with_one_line(tiny_toml, tmp_path, number):
+    folder = tmp_path / "stopped"
+    process = generate(tiny_toml, "--out", folder, "--workers", 2)
+    wait_for(lambda: (folder / HEAD).exists())
+    began = time.monotonic()
+    os.kill(process.pid, number)
+    out, err = process.communicate(timeout=60)
+    assert time.monotonic() - began < 5
+    assert process.returncode == 128 + number, err
+    assert err.count("\n") == 1, err
+    assert "the same command continues" in err
+    assert out == ""
+    assert not list(folder.rglob(".*"))
+
+
+def test_a_dead_worker_is_noticed():
+    with pytest.raises(WorkerDied, match="exit code 3"):
+        list(in_processes(os._exit, [3, 3], 2))
+
+
+def test_results_of_workers_are_complete_and_errors_come_through():
+    squares = [float(n * n) for n in range(9)]
+    assert sorted(in_processes(math.sqrt, squares, 2)) == list(range(9))
+    with pytest.raises(ValueError, match="math domain error|nonnegative"):
+        list(in_processes(math.sqrt, [1.0, -1.0, 4.0], 2))
+
+
+def test_a_damaged_shard_is_found_named_and_made_again_alone(tiny, tiny_toml, tmp_path):
+    folder = tmp_path / "damaged"
+    shutil.copytree(tiny, folder)
+    victim = folder / "data" / "train-000001.parquet"
+    data = bytearray(victim.read_bytes())
+    data[len(data) // 2] ^= 1
+    victim.write_bytes(data)
+    others = {p: p.stat().st_mtime_ns for p in folder.rglob("*.parquet") if p != victim}
+    ((name, wrong),) = inspection.verified(folder)
+    assert name == "data/train-000001.parquet"
+    assert "damaged" in wrong
+    with pytest.raises(ValueError, match=r"train-000001\.parquet: damaged"):
+        list(read(folder))
+    done = build(load(tiny_toml), folder, workers=1)
+    assert (done.made, done.kept) == (1, 2)
+    assert contents(folder) == contents(tiny)
+    assert others == {p: p.stat().st_mtime_ns for p in others}
+
+
+@pytest.mark.parametrize("damage", ["cut", "gone", "manifest cut", "manifest gone"])
+def test_any_damage_is_mended(tiny, tiny_toml, tmp_path, damage):
+    folder = tmp_path / "damaged"
+    shutil.copytree(tiny, folder)
+    name = "manifest/test-000000.jsonl" if "manifest" in damage else "data/test-000000.parquet"
+    victim = folder / name
+    if "gone" in damage:
+        victim.unlink()
+    else:
+        victim.write_bytes(victim.read_bytes()[: victim.stat().st_size // 2])
+    assert [name for name, _ in inspection.verified(folder)] == ["data/test-000000.parquet"]
+    build(load(tiny_toml), folder, workers=1)
+    assert contents(folder) == contents(tiny)
+
+
+def test_a_folder_of_something_else_is_left_as_it_is(tiny, tiny_toml, tmp_path):
+    before = contents(tiny)
+    with pytest.raises(ValueError, match="holds another dataset"):
+        build(load(tiny_toml).quick(), tiny, workers=1)
+    assert contents(tiny) == before
+    (tmp_path / "holiday.jpg").write_bytes(b"1")
+    with pytest.raises(ValueError, match="not empty, and no dataset"):
+        build(load(tiny_toml), tmp_path, workers=1)
+    assert contents(tmp_path) == {"holiday.jpg": b"1"}
+
+
+def test_a_newer_format_is_refused_with_its_number(tiny, tiny_toml, tmp_path):
+    folder = tmp_path / "newer"
+    shutil.copytree(tiny, folder)
+    head = json.loads((folder / HEAD).read_text())
+    (folder / HEAD).write_text(json.dumps({**head, "format": 99}))
+    before = contents(folder)
+    for attempt in (read_head, lambda f: list(read(f)), lambda f: build(load(tiny_toml), f)):
+        with pytest.raises(ValueError, match="format 99; this tauguard reads up to 1"):
+            attempt(folder)
+    assert contents(folder) == before
+
+
+def test_the_quick_part_is_the_beginning_of_the_whole(tiny, tiny_toml, tmp_path):
+    build(load(tiny_toml).quick(), tmp_path / "quick", workers=1)
+    name = "data/train-000000.parquet"
+    assert contents(tmp_path / "quick")[name] == contents(tiny)[name]
+
+
+def test_a_full_disk_leaves_no_part_and_the_old_file(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"old")
+
+    def fill():
+        with whole_file(path) as stream:
+            stream.write(b"new")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(OSError, match=r"No space left on device: '.*/a'"):
+        fill()
+    assert contents(tmp_path) == {"a": b"old"}
+
+
+def test_two_runs_do_not_write_one_folder(tiny, tiny_toml):
+    process = generate(tiny_toml, "--out", tiny, "--workers", 1)
+    from tauguard.datasets.dataset_folder import claimed
+
+    with claimed(tiny, load(tiny_toml)):
+        _, err = process.communicate(timeout=240)
+    assert process.returncode == 2
+    assert "another process is generating" in err
