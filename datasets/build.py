@@ -10,9 +10,10 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from tauguard.datasets.card import write_cards
 from tauguard.datasets.code_identity import code
 from tauguard.datasets.configuration import Configuration
-from tauguard.datasets.dataset_folder import claimed, write_description
+from tauguard.datasets.dataset_folder import claimed
 from tauguard.datasets.shard import Done, ShardTask, make_shard
 from tauguard.datasets.workers import in_processes, terminable
 from tauguard.traces.whole_file import remove_parts
@@ -60,7 +61,7 @@ def build(
             with _progress(configuration) as bar:
                 for one in results:
                     _count(done, one, bar)
-            write_description(folder, configuration)
+            write_cards(folder)
         finally:
             if isinstance(results, Generator):
                 results.close()  # no worker is left that could still be writing

@@ -182,7 +182,3 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)  # type: ignore[arg-type]
-
-
-def write_description(folder: Path, configuration: Configuration) -> None:
-    """The card and what else is derived from the manifest, once every shard is there."""

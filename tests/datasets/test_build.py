@@ -113,7 +113,7 @@ def test_a_dead_worker_is_noticed():
 def test_results_of_workers_are_complete_and_errors_come_through():
     squares = [float(n * n) for n in range(9)]
     assert sorted(in_processes(math.sqrt, squares, 2)) == list(range(9))
-    with pytest.raises(ValueError, match="math domain error|nonnegative"):
+    with pytest.raises(ValueError, match=r"math domain error|nonnegative"):
         list(in_processes(math.sqrt, [1.0, -1.0, 4.0], 2))
 
 

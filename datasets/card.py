@@ -1,0 +1,240 @@
+"""What others need to find and use a dataset: a Hugging Face card and Croissant metadata.
+
+Both are derived from ``dataset.json`` and the manifest alone, so that the same dataset has the same
+card.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from tauguard.datasets.columns_of_shards import JOINT_SIGNALS, MEANING, RESIDUAL, schema
+from tauguard.datasets.configuration import Configuration
+from tauguard.datasets.dataset_folder import configuration_in, lines, read_head
+from tauguard.datasets.inspection import SplitSummary, summarised
+from tauguard.models import cura6
+from tauguard.traces.whole_file import write_whole
+
+CARD, CROISSANT = "README.md", "croissant.json"
+LICENSE, LICENSE_URL = "apache-2.0", "https://www.apache.org/licenses/LICENSE-2.0"
+
+
+def write_cards(folder: Path) -> None:
+    """Write both into the dataset's folder, where their content is not there already."""
+    configuration = configuration_in(folder)
+    summary = summarised(folder)
+    _write(folder / CARD, card(configuration, read_head(folder), summary))
+    _write(folder / CROISSANT, croissant(folder, configuration, summary))
+
+
+def _write(path: Path, text: str) -> None:
+    if not path.is_file() or path.read_bytes() != text.encode():
+        write_whole(path, text)
+
+
+def describe(configuration: Configuration) -> str:
+    """The dataset in a sentence."""
+    arms = sorted({arm for split in configuration.splits for arm in split.arms})
+    return (
+        f"{configuration.hours:.4g} hours of simulated robot arms at work ({', '.join(arms)}), "
+        f"{configuration.rate} samples a second, with the exact onset, link, point, force and "
+        "joint torque of every collision"
+    )
+
+
+def card(
+    configuration: Configuration, head: dict[str, Any], summary: dict[str, SplitSummary]
+) -> str:
+    """The text of ``README.md``, with the header that the Hugging Face hub reads."""
+    files = "".join(
+        f"  - split: {name.replace('-', '_')}\n    path: data/{name}-*.parquet\n"
+        for name in summary
+    )
+    rows = sum(one.rows for one in summary.values())
+    code = head["code"]
+    return f"""---
+license: {LICENSE}
+pretty_name: {configuration.name}
+tags:
+- robotics
+- collision-detection
+- time-series
+- simulation
+- tauguard
+size_categories:
+- {_size(rows)}
+configs:
+- config_name: default
+  data_files:
+{files}---
+
+# {configuration.name}
+
+{describe(configuration)}. The arms, their drives, sensors and collisions are simulated; no real arm
+was recorded.
+
+| split | episodes | hours | rows | MB | collisions |
+|---|---|---|---|---|---|
+{_split_rows(summary)}
+
+An episode is a run of one arm. Splits share no motion; `unseen` in `dataset.json` says what else a
+split does not share with the first one.
+
+## Files
+
+* `data/SPLIT-NNNNNN.parquet`: a row a sample, an episode a row group.
+* `manifest/SPLIT-NNNNNN.jsonl`: a line an episode (arm, speed, payload, seed, collisions, outcome,
+  everything needed to simulate it again); the last line is a checksum of the others.
+* `arms/NAME.xml`: the nominal arm, what an observer may believe; the simulated ones differ from it.
+* `dataset.json`: the whole configuration, versions, what was planned.
+
+## Columns
+
+{_column_rows(configuration)}
+
+Joint signals have one column a joint, `q_1` to `q_{len(cura6.JOINTS)}`.
+
+## Labels
+
+A collision begins at the first sample (of the physics, at 1 kHz) with a contact force above 0 N and
+ends at the last one; contacts less than 0.5 s apart are one. Its kind, link, point, force and peak
+torque are in the manifest, and `collision` says which rows belong to which. Episodes in which other
+collisions happened than were planned are kept; their `outcome` says so.
+
+## How it was made
+
+By tauguard {code["tauguard"]} on MuJoCo {code["mujoco"]}, from the configuration with the SHA-256
+`{head["configuration_sha256"]}`. The same configuration and versions give the same bytes.
+"""
+
+
+def _split_rows(summary: dict[str, SplitSummary]) -> str:
+    return "\n".join(
+        f"| {name} | {one.episodes} | {one.hours:.4g} | {one.rows} | {one.megabytes:.1f} | "
+        f"{one.collisions} |"
+        for name, one in summary.items()
+    )
+
+
+def _column_rows(configuration: Configuration) -> str:
+    names = {k: v for k, v in MEANING.items() if k != RESIDUAL or configuration.residual}
+    rows = ["| column | meaning |", "|---|---|"]
+    return "\n".join([*rows, *(f"| `{k}` | {v} |" for k, v in names.items())])
+
+
+def _size(rows: int) -> str:
+    steps = (("n<1K", 1e3), ("1K<n<10K", 1e4), ("10K<n<100K", 1e5), ("100K<n<1M", 1e6))
+    steps += (("1M<n<10M", 1e7), ("10M<n<100M", 1e8), ("100M<n<1B", 1e9))
+    return next((name for name, limit in steps if rows < limit), "1B<n<10B")
+
+
+def croissant(folder: Path, configuration: Configuration, summary: dict[str, SplitSummary]) -> str:
+    """Croissant 1.0 metadata as JSON text: every shard with its SHA-256, every column."""
+    shards: dict[str, tuple[str, int, str]] = {}
+    for line in lines(folder):
+        shards.setdefault(line["shard"], (line["sha256"], line["bytes"], line["split"]))
+    distribution: list[dict[str, Any]] = [
+        {
+            "@type": "cr:FileObject",
+            "@id": path,
+            "name": path.split("/")[-1],
+            "contentUrl": path,
+            "contentSize": f"{size} B",
+            "encodingFormat": "application/x-parquet",
+            "sha256": digest,
+        }
+        for path, (digest, size, _) in shards.items()
+    ]
+    records = [
+        _records(split, [p for p, (_, _, s) in shards.items() if s == split], configuration)
+        for split in summary
+        if any(s == split for _, _, s in shards.values())
+    ]
+    content = {
+        "@context": CONTEXT,
+        "@type": "sc:Dataset",
+        "conformsTo": "http://mlcommons.org/croissant/1.0",
+        "name": configuration.name,
+        "description": f"{describe(configuration)}.",
+        "license": LICENSE_URL,
+        "version": "1.0.0",
+        "citeAs": f"{configuration.name}, configuration {configuration.sha256}",
+        "distribution": [*distribution, *(r[0] for r in records)],
+        "recordSet": [r[1] for r in records],
+    }
+    return json.dumps(content, indent=1) + "\n"
+
+
+def _records(
+    split: str, paths: list[str], configuration: Configuration
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The set of a split's files, and what a row of them holds."""
+    files = {
+        "@type": "cr:FileSet",
+        "@id": f"{split}-files",
+        "name": f"{split}-files",
+        "containedIn": [{"@id": path} for path in paths],
+        "encodingFormat": "application/x-parquet",
+        "includes": f"data/{split}-*.parquet",
+    }
+    fields = []
+    for field in schema(len(cura6.JOINTS), configuration.residual):
+        signal = field.name.rpartition("_")[0]
+        meaning = MEANING.get(field.name)
+        if meaning is None and signal in (*JOINT_SIGNALS, RESIDUAL):
+            meaning = f"{MEANING[signal]}, joint {field.name.rpartition('_')[2]}"
+        kind = "sc:Float" if str(field.type) in ("float", "double") else "sc:Integer"
+        fields.append(
+            {
+                "@type": "cr:Field",
+                "@id": f"{split}/{field.name}",
+                "name": field.name,
+                "description": meaning or f"see {field.name[:-1]}x",
+                "dataType": kind,
+                "source": {
+                    "fileSet": {"@id": f"{split}-files"},
+                    "extract": {"column": field.name},
+                },
+            }
+        )
+    return files, {"@type": "cr:RecordSet", "@id": split, "name": split, "field": fields}
+
+
+CONTEXT = {
+    "@language": "en",
+    "@vocab": "https://schema.org/",
+    "sc": "https://schema.org/",
+    "cr": "http://mlcommons.org/croissant/",
+    "rai": "http://mlcommons.org/croissant/RAI/",
+    "dct": "http://purl.org/dc/terms/",
+    "citeAs": "cr:citeAs",
+    "column": "cr:column",
+    "conformsTo": "dct:conformsTo",
+    "data": {"@id": "cr:data", "@type": "@json"},
+    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    "examples": {"@id": "cr:examples", "@type": "@json"},
+    "extract": "cr:extract",
+    "field": "cr:field",
+    "fileProperty": "cr:fileProperty",
+    "fileObject": "cr:fileObject",
+    "fileSet": "cr:fileSet",
+    "format": "cr:format",
+    "includes": "cr:includes",
+    "isLiveDataset": "cr:isLiveDataset",
+    "jsonPath": "cr:jsonPath",
+    "key": "cr:key",
+    "md5": "cr:md5",
+    "parentField": "cr:parentField",
+    "path": "cr:path",
+    "recordSet": "cr:recordSet",
+    "references": "cr:references",
+    "regex": "cr:regex",
+    "repeated": "cr:repeated",
+    "replace": "cr:replace",
+    "separator": "cr:separator",
+    "source": "cr:source",
+    "subField": "cr:subField",
+    "transform": "cr:transform",
+}
