@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from tauguard.lazy import on_demand
 
 if TYPE_CHECKING:
-    from tauguard.datasets.build import build
     from tauguard.datasets.columns import PRESETS, ColumnMap
     from tauguard.datasets.configuration import Configuration, Split
     from tauguard.datasets.configuration import load as load_configuration
     from tauguard.datasets.demo import SPEEDS, DemoPlan, demo_plan
     from tauguard.datasets.generate import simulate_all, write_dataset
+    from tauguard.datasets.generation import generate_dataset
     from tauguard.datasets.logs import Log, read_log
     from tauguard.datasets.plans import (
         TRAINING_PAYLOADS,
@@ -29,10 +29,10 @@ __all__ = [
     "DemoPlan",
     "Log",
     "Split",
-    "build",
     "collision_plans",
     "demo_plan",
     "free_episodes",
+    "generate_dataset",
     "load_configuration",
     "read",
     "read_log",

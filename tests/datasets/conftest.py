@@ -4,8 +4,8 @@ import textwrap
 
 import pytest
 
-from tauguard.datasets.build import build
 from tauguard.datasets.configuration import load
+from tauguard.datasets.generation import generate_dataset
 
 TINY = """
     name = "tiny"
@@ -42,7 +42,7 @@ def tiny_toml(tmp_path_factory):
 @pytest.fixture(scope="session")
 def tiny(tiny_toml, tmp_path_factory):
     folder = tmp_path_factory.mktemp("datasets") / "tiny"
-    build(load(tiny_toml), folder, workers=1)
+    generate_dataset(load(tiny_toml), folder, workers=1)
     return folder
 
 

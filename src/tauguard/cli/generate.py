@@ -30,8 +30,8 @@ def command(
     """
     import time
 
-    from tauguard.datasets.build import build
     from tauguard.datasets.configuration import load
+    from tauguard.datasets.generation import generate_dataset
     from tauguard.datasets.workers import Terminated
 
     if workers is not None and workers < 1:
@@ -43,7 +43,7 @@ def command(
         configuration = configuration.quick()
     began = time.perf_counter()
     try:
-        done = build(configuration, out, workers, ray)
+        done = generate_dataset(configuration, out, workers, ray)
     except KeyboardInterrupt as stop:
         number = signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT
         import sys

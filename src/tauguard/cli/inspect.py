@@ -34,7 +34,7 @@ def command(
         mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
             turns that into an .rrd.
     """
-    from tauguard.benchmarks.report import write_json
+    from tauguard.report import write_json
     from tauguard.datasets import inspection
 
     if mcap is not None and episode is None:

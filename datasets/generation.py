@@ -29,7 +29,7 @@ class Built:
     seconds: float = 0.0  #: simulated in this run [s]
 
 
-def build(
+def generate_dataset(
     configuration: Configuration,
     folder: Path,
     workers: int | None = None,

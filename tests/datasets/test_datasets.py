@@ -15,9 +15,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from tauguard.datasets import inspection
-from tauguard.datasets.build import build
 from tauguard.datasets.configuration import load
 from tauguard.datasets.dataset_folder import HEAD, lines, read_head
+from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import read
 from tauguard.datasets.shard import simulated
 from tauguard.datasets.workers import WorkerDied, in_processes
@@ -85,7 +85,7 @@ def test_two_workers_and_a_killed_run_give_the_same_bytes(tiny, tiny_toml, tmp_p
     wait_for(lambda: list(folder.glob("data/*.parquet")) or process.poll() is not None)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    build(load(tiny_toml), folder, workers=2)
+    generate_dataset(load(tiny_toml), folder, workers=2)
     assert contents(folder) == contents(tiny)
 
 
@@ -130,7 +130,7 @@ def test_a_damaged_shard_is_found_named_and_made_again_alone(tiny, tiny_toml, tm
     assert "damaged" in wrong
     with pytest.raises(ValueError, match=r"train-000001\.parquet: damaged"):
         list(read(folder))
-    done = build(load(tiny_toml), folder, workers=1)
+    done = generate_dataset(load(tiny_toml), folder, workers=1)
     assert (done.made, done.kept) == (1, 2)
     assert contents(folder) == contents(tiny)
     assert others == {p: p.stat().st_mtime_ns for p in others}
@@ -147,18 +147,18 @@ def test_any_damage_is_mended(tiny, tiny_toml, tmp_path, damage):
     else:
         victim.write_bytes(victim.read_bytes()[: victim.stat().st_size // 2])
     assert [name for name, _ in inspection.verified(folder)] == ["data/test-000000.parquet"]
-    build(load(tiny_toml), folder, workers=1)
+    generate_dataset(load(tiny_toml), folder, workers=1)
     assert contents(folder) == contents(tiny)
 
 
 def test_a_folder_of_something_else_is_left_as_it_is(tiny, tiny_toml, tmp_path):
     before = contents(tiny)
     with pytest.raises(ValueError, match="holds another dataset"):
-        build(load(tiny_toml).quick(), tiny, workers=1)
+        generate_dataset(load(tiny_toml).quick(), tiny, workers=1)
     assert contents(tiny) == before
     (tmp_path / "holiday.jpg").write_bytes(b"1")
     with pytest.raises(ValueError, match="not empty, and no dataset"):
-        build(load(tiny_toml), tmp_path, workers=1)
+        generate_dataset(load(tiny_toml), tmp_path, workers=1)
     assert contents(tmp_path) == {"holiday.jpg": b"1"}
 
 
@@ -168,14 +168,18 @@ def test_a_newer_format_is_refused_with_its_number(tiny, tiny_toml, tmp_path):
     head = json.loads((folder / HEAD).read_text())
     (folder / HEAD).write_text(json.dumps({**head, "format": 99}))
     before = contents(folder)
-    for attempt in (read_head, lambda f: list(read(f)), lambda f: build(load(tiny_toml), f)):
+    for attempt in (
+        read_head,
+        lambda f: list(read(f)),
+        lambda f: generate_dataset(load(tiny_toml), f),
+    ):
         with pytest.raises(ValueError, match="format 99; this tauguard reads up to 1"):
             attempt(folder)
     assert contents(folder) == before
 
 
 def test_the_quick_part_is_the_beginning_of_the_whole(tiny, tiny_toml, tmp_path):
-    build(load(tiny_toml).quick(), tmp_path / "quick", workers=1)
+    generate_dataset(load(tiny_toml).quick(), tmp_path / "quick", workers=1)
     name = "data/train-000000.parquet"
     assert contents(tmp_path / "quick")[name] == contents(tiny)[name]
 
