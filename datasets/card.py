@@ -125,9 +125,10 @@ def _column_rows(configuration: Configuration) -> str:
 
 
 def _size(rows: int) -> str:
-    steps = (("n<1K", 1e3), ("1K<n<10K", 1e4), ("10K<n<100K", 1e5), ("100K<n<1M", 1e6))
-    steps += (("1M<n<10M", 1e7), ("10M<n<100M", 1e8), ("100M<n<1B", 1e9))
-    return next((name for name, limit in steps if rows < limit), "1B<n<10B")
+    """The hub's class of this many rows."""
+    names = "1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B", "1T"
+    power = next((i for i in range(len(names)) if rows < 10 ** (i + 3)), len(names) - 1)
+    return f"{names[power - 1]}<n<{names[power]}" if power else "n<1K"
 
 
 def croissant(folder: Path, configuration: Configuration, summary: dict[str, SplitSummary]) -> str:

@@ -34,8 +34,8 @@ def command(
         mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
             turns that into an .rrd.
     """
-    from tauguard.report import write_json
     from tauguard.datasets import inspection
+    from tauguard.report import write_json
 
     if mcap is not None and episode is None:
         raise ValueError("--mcap goes with --episode: say which one")
