@@ -20,6 +20,7 @@ class Mesh:
         x_t1: NDArray[np.float64],
         min_distance: float,
         fresh: bool,
+        limit: int,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], dict[str, Any]]: ...
     def find(
         self,
@@ -28,6 +29,7 @@ class Mesh:
         method: int,
         min_distance: float,
         fresh: bool,
+        limit: int,
     ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]: ...
     def update_topology(
         self, faces: NDArray[np.int32], ids: NDArray[np.int32], meets: NDArray[np.uint8]

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tauguard.geometry import indices
+from tauguard.geometry import Rebuilt, frozen, frozen_indices
 
 
 @dataclass(frozen=True, eq=False)
-class Groups:
-    """A group for every vertex and a table of the groups that meet.
+class Groups(Rebuilt):
+    """A group for every vertex and a table of the groups that meet; own copies, read-only.
 
     Attributes:
         ids: Shape (V,), the group of every vertex, 0 to G - 1. All vertices of a face belong to
@@ -35,12 +35,12 @@ class Groups:
     meets: NDArray[np.bool_]
 
     def __init__(self, ids: ArrayLike, meets: ArrayLike) -> None:
-        """Check and convert both arrays."""
-        table = _table(meets)
+        """Check and copy both arrays."""
+        table = frozen(_table(meets))
         if (table != table.T).any():
             a, b = np.argwhere(table != table.T)[0]
             raise ValueError(f"meets: [{a}, {b}] is {table[a, b]} but [{b}, {a}] is {table[b, a]}")
-        object.__setattr__(self, "ids", indices("ids", ids, (None,), len(table)))
+        object.__setattr__(self, "ids", frozen_indices("ids", ids, (None,), len(table)))
         object.__setattr__(self, "meets", table)
 
     def check_faces(self, faces: NDArray[np.int32]) -> None:

@@ -20,7 +20,7 @@ from tauguard.cloth import _mesh
 from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
 from tauguard.cloth.impacts import Impacts, checked_distance, method_number
-from tauguard.geometry import finite, indices
+from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 
 #: Bounding volumes by name: k, and whether they move with the step or sweep it.
 VOLUMES: dict[str, tuple[int, bool]] = {
@@ -28,6 +28,9 @@ VOLUMES: dict[str, tuple[int, bool]] = {
     for prefix in ("", "moving_")
     for k in (6, 14, 16, 18, 26)
 } | {"aabb": (6, False), "moving_aabb": (6, True)}
+
+#: What ``find`` and ``candidates`` allow of either kind unless told otherwise.
+MOST_COLLISIONS, MOST_CANDIDATES = 4_000_000, 50_000_000
 
 _NO_GROUPS = (np.zeros(0, dtype=np.int32), np.zeros((0, 0), dtype=np.uint8))
 
@@ -44,18 +47,24 @@ class MeshCCD:
         volume: One of :data:`VOLUMES`. Any of them finds the same collisions; they differ in cost.
 
     Attributes:
-        faces: Rows of vertices, as given; ``Frame.vf`` counts them. Shape (F, 3).
-        edges: Their edges, each once, smaller vertex first; ``Frame.ee`` counts them. Shape (E, 2).
+        faces: Rows of vertices, an own copy, read-only; ``Frame.vf`` counts them. Shape (F, 3).
+        edges: Their edges, each once, smaller vertex first, read-only; ``Frame.ee`` counts them.
+            Shape (E, 2).
         groups: As given.
+        method, threads, volume: As given, ``threads`` with 0 as the number of processors.
         broad_stats: Counts and seconds of the last :meth:`candidates`; empty before.
 
     The hierarchy is built in the first frame and kept; a call is one step of a motion in which
-    every vertex moves linearly. Calls from several Python threads on one object wait for each
-    other.
+    every vertex moves linearly. It works on copies of what it is given. Calls from several Python
+    threads on one object wait for each other; Ctrl-C ends a call, and the object can be used again.
+    So can its copy in a forked process, unless another thread was in a call when it was forked:
+    that raises a ``RuntimeError``. Attributes cannot be assigned; :meth:`update_topology` changes
+    faces and groups.
 
     Raises:
         ValueError: a face repeats a vertex, an index is negative, a face mixes groups, ``groups``
-            is no :class:`Groups`, ``threads`` no int >= 0, or there is no such method or volume.
+            is no :class:`Groups`, ``threads`` no int from 0 to 1024, or there is no such method or
+            volume.
     """
 
     def __init__(
@@ -70,20 +79,50 @@ class MeshCCD:
         method_number(method)  # raises where there is none
         if not isinstance(volume, str) or volume not in VOLUMES:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
-        _check_threads(threads)
         k, moving = VOLUMES[volume]
-        self.method = method
-        self.threads = int(threads)
-        self.volume = volume
-        self.groups = groups
-        self.faces = _checked_faces(faces, groups)
+        self._method, self._volume, self._threads = method, volume, thread_count(threads)
+        faces = _checked_faces(faces, groups)
+        self._mesh = _mesh.Mesh(faces, *_group_arrays(groups), k, moving, self._threads)
+        self._topology = _Topology(faces, frozen(self._mesh.edges()), groups)
         self.broad_stats: dict[str, Any] = {}
-        self._vertices: int | None = None
-        self._mesh = _mesh.Mesh(self.faces, *_group_arrays(groups), k, moving, self.threads)
-        self.edges: NDArray[np.int32] = self._mesh.edges()
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """Rows of vertices, shape (F, 3)."""
+        return self._topology.faces
+
+    @property
+    def edges(self) -> NDArray[np.int32]:
+        """Rows of vertices, shape (E, 2)."""
+        return self._topology.edges
+
+    @property
+    def groups(self) -> Groups | None:
+        """Which parts meet."""
+        return self._topology.groups
+
+    @property
+    def method(self) -> str:
+        """How the narrow phase decides."""
+        return self._method
+
+    @property
+    def threads(self) -> int:
+        """At least 1."""
+        return self._threads
+
+    @property
+    def volume(self) -> str:
+        """One of :data:`VOLUMES`."""
+        return self._volume
 
     def find(
-        self, x_t0: ArrayLike, x_t1: ArrayLike, min_distance: float = 0.0, fresh: bool = False
+        self,
+        x_t0: ArrayLike,
+        x_t1: ArrayLike,
+        min_distance: float = 0.0,
+        fresh: bool = False,
+        limit: int = MOST_COLLISIONS,
     ) -> Frame:
         """Every collision of one step.
 
@@ -93,6 +132,8 @@ class MeshCCD:
             min_distance: Pairs that come this close count, in the unit of the positions:
                 conservative there, exact at 0 (with an exact method).
             fresh: Descend from the root instead of the last frame's front. The answer is the same.
+            limit: Most collisions of either kind (some 300 bytes each), and an eighth of the pairs
+                of leaves that may be held (16 bytes each).
 
         Raises:
             ValueError: as :meth:`candidates`.
@@ -103,6 +144,7 @@ class MeshCCD:
             method_number(self.method),
             checked_distance(min_distance, self.method),
             _checked_flag(fresh),
+            _checked_limit(limit),
         )
         answer = Frame(
             vf["pairs"],
@@ -117,7 +159,12 @@ class MeshCCD:
         return answer
 
     def candidates(
-        self, x_t0: ArrayLike, x_t1: ArrayLike, min_distance: float = 0.0, fresh: bool = False
+        self,
+        x_t0: ArrayLike,
+        x_t1: ArrayLike,
+        min_distance: float = 0.0,
+        fresh: bool = False,
+        limit: int = MOST_CANDIDATES,
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Pairs that the broad phase leaves: volumes overlap, no vertex is shared, groups meet.
 
@@ -126,6 +173,7 @@ class MeshCCD:
             x_t1: Positions at its end. Shape (V, 3).
             min_distance: Pairs that come this close count, in the unit of the positions.
             fresh: Descend from the root instead of the last frame's front. The answer is the same.
+            limit: Most candidates of either kind (some 30 bytes each).
 
         Returns:
             Rows (vertex, face), shape (M, 2), and rows of two edges (smaller first), shape (K, 2),
@@ -134,12 +182,13 @@ class MeshCCD:
         Raises:
             ValueError: positions that are not finite or not (V, 3), of different sizes at both
                 ends, of a size that the faces or earlier frames do not have; a distance that is
-                negative or no number; ``fresh`` that is no bool.
+                negative or no number; ``fresh`` that is no bool; more than ``limit``.
         """
         vf, ee, self.broad_stats = self._mesh.candidates(
             *self._checked_step(x_t0, x_t1),
             checked_distance(min_distance, self.method),
             _checked_flag(fresh),
+            _checked_limit(limit),
         )
         return vf, ee
 
@@ -165,8 +214,7 @@ class MeshCCD:
         groups = self.groups if groups is None else groups
         checked = _checked_faces(faces, groups)
         change = self._mesh.update_topology(checked, *_group_arrays(groups))
-        self.faces, self.groups, self._vertices = checked, groups, None
-        self.edges = self._mesh.edges()
+        self._topology = _Topology(checked, frozen(change.pop("edge_rows")), groups)
         return change
 
     def _checked_step(
@@ -174,35 +222,50 @@ class MeshCCD:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         start = finite("x_t0", x_t0, (None, 3))
         end = finite("x_t1", x_t1, (None, 3))
-        if len(start) != len(end):
-            raise ValueError(f"x_t1: {len(end)} vertices, but x_t0 has {len(start)}")
-        if self._vertices is not None and len(start) != self._vertices:
-            raise ValueError(
-                f"x_t0: {len(start)} vertices, but the frames before had {self._vertices}; "
-                "update_topology comes first where the mesh changes"
-            )
-        if self.groups is not None and len(start) != len(self.groups.ids):
-            raise ValueError(f"x_t0: {len(start)} vertices, but groups has {len(self.groups.ids)}")
-        if self.faces.size and int(self.faces.max()) >= len(start):
-            row = int(np.argmax((self.faces >= len(start)).any(axis=1)))
-            raise ValueError(
-                f"faces: row {row} is {self.faces[row].tolist()}, "
-                f"but x_t0 has {len(start)} vertices"
-            )
-        self._vertices = len(start)
+        self._topology.check(len(start), len(end))
         return start, end
 
 
-def _check_threads(threads: int) -> None:
-    number = isinstance(threads, int | np.integer) and not isinstance(threads, bool)
-    if not number or not 0 <= threads <= np.iinfo(np.int32).max:
-        raise ValueError(f"threads: {threads!r:.40}, expected an int >= 0 (0: all processors)")
+class _Topology:
+    """Faces, edges and groups that belong together, and how many vertices a frame has."""
+
+    def __init__(
+        self, faces: NDArray[np.int32], edges: NDArray[np.int32], groups: Groups | None
+    ) -> None:
+        self.faces, self.edges, self.groups = faces, edges, groups
+        self._rows = int(faces.max()) + 1 if faces.size else 0
+        self._vertices: int | None = None
+
+    def check(self, start: int, end: int) -> None:
+        """Raise a ``ValueError`` for numbers of vertices that do not fit."""
+        if start != end:
+            raise ValueError(f"x_t1: {end} vertices, but x_t0 has {start}")
+        if self._vertices is not None and start != self._vertices:
+            raise ValueError(
+                f"x_t0: {start} vertices, but the frames before had {self._vertices}; "
+                "update_topology comes first where the mesh changes"
+            )
+        if self.groups is not None and start != len(self.groups.ids):
+            raise ValueError(f"x_t0: {start} vertices, but groups has {len(self.groups.ids)}")
+        if start < self._rows:
+            row = int(np.argmax((self.faces >= start).any(axis=1)))
+            raise ValueError(
+                f"faces: row {row} is {self.faces[row].tolist()}, but x_t0 has {start} vertices"
+            )
+        self._vertices = start
 
 
 def _checked_flag(fresh: bool) -> bool:
     if not isinstance(fresh, bool | np.bool_):
         raise ValueError(f"fresh: {fresh!r:.40}, expected True or False")
     return bool(fresh)
+
+
+def _checked_limit(limit: int) -> int:
+    number = isinstance(limit, int | np.integer) and not isinstance(limit, bool)
+    if not number or not 0 <= limit <= 2**40:
+        raise ValueError(f"limit: {limit!r:.40}, expected an int from 0 to {2**40}")
+    return int(limit)
 
 
 def _impacts(found: dict[str, Any]) -> Impacts:
@@ -223,7 +286,7 @@ def _checked_faces(faces: ArrayLike, groups: Groups | None) -> NDArray[np.int32]
     array = np.asarray(faces)
     if array.size == 0:
         array = np.zeros((0, 3), dtype=np.int32)
-    checked = indices("faces", array, (None, 3), np.iinfo(np.int32).max)
+    checked = frozen_indices("faces", array, (None, 3), np.iinfo(np.int32).max)
     a, b, c = checked.T
     repeats = (a == b) | (b == c) | (c == a)
     if repeats.any():

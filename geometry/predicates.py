@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import _geometry
 from tauguard.geometry.arrays import finite
+from tauguard.geometry.threads import thread_count
 
 
 def orient3d(points: ArrayLike, threads: int = 1) -> NDArray[np.int8]:
@@ -20,11 +21,11 @@ def orient3d(points: ArrayLike, threads: int = 1) -> NDArray[np.int8]:
         Shape (N,), each -1, 0 or 1, never wrong.
 
     Raises:
-        ValueError: wrong shape, or an entry that is not finite.
+        ValueError: wrong shape, an entry that is not finite, or ``threads`` no int from 0 to 1024.
     """
     array = finite("points", points, (None, 4, 3))
     out = np.empty(len(array), dtype=np.int8)
-    _geometry.orient3d(array, out, threads)
+    _geometry.orient3d(array, out, thread_count(threads))
     return out
 
 
@@ -32,5 +33,5 @@ def orient2d(points: ArrayLike, threads: int = 1) -> NDArray[np.int8]:
     """Sign of ``(b - a) x (c - a)`` for rows ``a, b, c``, shape (N, 3, 2); see :func:`orient3d`."""
     array = finite("points", points, (None, 3, 2))
     out = np.empty(len(array), dtype=np.int8)
-    _geometry.orient2d(array, out, threads)
+    _geometry.orient2d(array, out, thread_count(threads))
     return out

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "ends.hpp"
 #include "k_dop.hpp"
 #include "tauguard/geometry/lanes.hpp"
 
@@ -15,31 +16,32 @@ using namespace geometry;  // lanes.hpp
 
 inline constexpr int ahead = 8;  // queries between asking for positions and using them
 
-TAUGUARD_INLINE void prefetch(const double* x0, const double* x1, const std::int32_t* row) {
+template <bool packed>
+TAUGUARD_INLINE void prefetch(const Ends& x, const std::int32_t* row) {
   for (int v = 0; v < 4; ++v) {
-    __builtin_prefetch(x0 + 3 * std::ptrdiff_t(row[v]));
-    __builtin_prefetch(x1 + 3 * std::ptrdiff_t(row[v]));
+    __builtin_prefetch(x.t0 + (packed ? Ends::line : x.stride) * std::ptrdiff_t(row[v]));
+    if (!packed) __builtin_prefetch(x.t1 + x.stride * std::ptrdiff_t(row[v]));
   }
 }
 
-TAUGUARD_INLINE Double4 point(const double* x, std::int32_t v) {
-  const double* p = x + 3 * std::ptrdiff_t(v);
+template <bool packed>
+TAUGUARD_INLINE Double4 point(const Ends& x, bool end, std::int32_t v) {
+  const double* p = (end ? x.t1 : x.t0) + (packed ? Ends::line : x.stride) * std::ptrdiff_t(v);
+  if (packed) return load4(p);
   return Double4{p[0], p[1], p[2], p[2]};
 }
 
 // The queries of n that are not: their numbers go to `left`. rows: (n, 4) vertices.
 template <bool vf>
-TAUGUARD_INLINE int not_apart(const double* x0, const double* x1, const std::int32_t* rows, int n,
-                              std::int32_t* left) {
+TAUGUARD_INLINE int not_apart(const Ends& x, const std::int32_t* rows, int n, std::int32_t* left) {
   int count = 0;
   for (int i = 0; i < n; ++i) {
-    prefetch(x0, x1, rows + 4 * std::min(i + ahead, n - 1));
+    prefetch<false>(x, rows + 4 * std::min(i + ahead, n - 1));
     const std::int32_t* row = rows + 4 * i;
     Mask4 above{-1, -1, -1, -1}, below = above;
     for (int e = 0; e < 2; ++e) {
-      const double* x = e ? x1 : x0;
-      const Double4 a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]),
-                    d = point(x, row[3]);
+      const Double4 a = point<false>(x, e, row[0]), b = point<false>(x, e, row[1]),
+                    c = point<false>(x, e, row[2]), d = point<false>(x, e, row[3]);
       above &= (vf ? a : min(a, b)) > (vf ? max(max(b, c), d) : max(c, d));
       below &= (vf ? a : max(a, b)) < (vf ? min(min(b, c), d) : min(c, d));
     }

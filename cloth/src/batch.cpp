@@ -70,10 +70,10 @@ TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, G
 struct Differences {
   Double4 p, q, r;
 };
-template <bool vf>
-TAUGUARD_INLINE Differences differences(const double* x, const std::int32_t* row) {
-  const Double4 a = point(x, row[0]), b = point(x, row[1]), c = point(x, row[2]),
-                d = point(x, row[3]);
+template <bool vf, bool packed>
+TAUGUARD_INLINE Differences differences(const Ends& x, bool end, const std::int32_t* row) {
+  const Double4 a = point<packed>(x, end, row[0]), b = point<packed>(x, end, row[1]),
+                c = point<packed>(x, end, row[2]), d = point<packed>(x, end, row[3]);
   if (vf) return {a - b, c - b, d - b};
   return {c - a, b - a, d - c};
 }
@@ -87,17 +87,17 @@ TAUGUARD_INLINE Vec3x4 transposed(Double4 a, Double4 b, Double4 c, Double4 d) {
           __builtin_shufflevector(ab, cd, 2, 3, 6, 7)};
 }
 
-template <bool vf>
-TAUGUARD_INLINE void gather(const double* x0, const double* x1, const std::int32_t* rows, int n,
-                            Group* groups) {
+template <bool vf, bool packed>
+TAUGUARD_INLINE void gather(const Ends& x, const std::int32_t* rows, int n, Group* groups) {
   for (int first = 0; first < n; first += width, ++groups) {
     const auto row = [&](int i) { return rows + 4 * std::min(first + i, n - 1); };
-    for (int i = 0; i < width; ++i) prefetch(x0, x1, row(i + ahead));
+    for (int i = 0; i < width; ++i) prefetch<packed>(x, row(i + ahead));
     Vec3x4 p[2], q[2], r[2];
     for (int e = 0; e < 2; ++e) {
-      const double* x = e ? x1 : x0;
-      const Differences a = differences<vf>(x, row(0)), b = differences<vf>(x, row(1)),
-                        c = differences<vf>(x, row(2)), d = differences<vf>(x, row(3));
+      const Differences a = differences<vf, packed>(x, e, row(0)),
+                        b = differences<vf, packed>(x, e, row(1)),
+                        c = differences<vf, packed>(x, e, row(2)),
+                        d = differences<vf, packed>(x, e, row(3));
       p[e] = transposed(a.p, b.p, c.p, d.p);
       q[e] = transposed(a.q, b.q, c.q, d.q);
       r[e] = transposed(a.r, b.r, c.r, d.r);
@@ -231,19 +231,25 @@ TAUGUARD_INLINE void at_roots(const Group* groups, const Piece* pieces, int n, O
   }
 }
 
+template <bool packed>
+TAUGUARD_INLINE void gather(bool vf, const Ends& x, const std::int32_t* rows, int n,
+                            Group* groups) {
+  vf ? gather<true, packed>(x, rows, n, groups) : gather<false, packed>(x, rows, n, groups);
+}
+
 #define TAUGUARD_VARIANT(name, attributes)                                                         \
-  attributes void gather_##name(bool vf, const double* x0, const double* x1,                       \
-                                const std::int32_t* rows, int n, Group* groups) {                  \
-    vf ? gather<true>(x0, x1, rows, n, groups) : gather<false>(x0, x1, rows, n, groups);           \
+  attributes void gather_##name(bool vf, const Ends& x, const std::int32_t* rows, int n,           \
+                                Group* groups) {                                                   \
+    x.in_lines() ? gather<true>(vf, x, rows, n, groups) : gather<false>(vf, x, rows, n, groups);   \
   }                                                                                                \
   attributes void at_roots_##name(bool vf, const Group* groups, const Piece* pieces, int n,        \
                                   Outcome* outcome, double* toi) {                                 \
     vf ? at_roots<true>(groups, pieces, n, outcome, toi)                                           \
        : at_roots<false>(groups, pieces, n, outcome, toi);                                         \
   }                                                                                                \
-  attributes int not_apart_##name(bool vf, const double* x0, const double* x1,                     \
-                                  const std::int32_t* rows, int n, std::int32_t* left) {           \
-    return vf ? not_apart<true>(x0, x1, rows, n, left) : not_apart<false>(x0, x1, rows, n, left);  \
+  attributes int not_apart_##name(bool vf, const Ends& x, const std::int32_t* rows, int n,         \
+                                  std::int32_t* left) {                                            \
+    return vf ? not_apart<true>(x, rows, n, left) : not_apart<false>(x, rows, n, left);            \
   }                                                                                                \
   attributes int not_apart_on_seven_##name(bool vf, const float* points, const std::int32_t* rows, \
                                            int n, std::int32_t* left) {                            \

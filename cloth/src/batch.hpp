@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "ends.hpp"
+
 #include "tauguard/geometry/lanes.hpp"
 
 namespace tauguard::cloth {
@@ -38,15 +40,13 @@ struct BatchKernels {
   // The queries of n that no axis (x, y or z) keeps apart, on the same side at both ends of the
   // step and so in between: their numbers go to `left`. Comparisons of coordinates only, and so
   // exact.
-  int (*not_apart)(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n,
-                   std::int32_t* left);
+  int (*not_apart)(bool vf, const Ends& x, const std::int32_t* rows, int n, std::int32_t* left);
   // The same by seven axes (apart.hpp), beyond rounding; points: of those positions.
   int (*not_apart_on_seven)(bool vf, const float* points, const std::int32_t* rows, int n,
                             std::int32_t* left);
   // (n + width - 1) / width groups of n queries; the last is filled up with copies of the last
   // query.
-  void (*gather)(bool vf, const double* x0, const double* x1, const std::int32_t* rows, int n,
-                 Group* groups);
+  void (*gather)(bool vf, const Ends& x, const std::int32_t* rows, int n, Group* groups);
   // Per piece: is there contact at its root, and from when on can that be (at most 2^-32 before
   // it).
   void (*at_roots)(bool vf, const Group* groups, const Piece* pieces, int n, Outcome* outcome,

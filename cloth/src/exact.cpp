@@ -39,18 +39,18 @@ struct Hull {
 };
 
 // The motion of vertex a as seen from vertex b.
-Vector motion(const double* x0, const double* x1, std::int32_t a, std::int32_t b) {
+Vector motion(const Ends& x, std::int32_t a, std::int32_t b) {
   Vector m;
   for (int k = 0; k < 3; ++k) {
-    const Dyadic start = Dyadic(x0[3 * a + k]) - Dyadic(x0[3 * b + k]);
-    const Dyadic end = Dyadic(x1[3 * a + k]) - Dyadic(x1[3 * b + k]);
+    const Dyadic start = Dyadic(x.at(false, a)[k]) - Dyadic(x.at(false, b)[k]);
+    const Dyadic end = Dyadic(x.at(true, a)[k]) - Dyadic(x.at(true, b)[k]);
     m[k] = trimmed({start, end - start});
   }
   return m;
 }
 
-Hull hull_of(bool vf, const double* x0, const double* x1, const std::int32_t* row) {
-  const auto g = [&](int i, int j) { return motion(x0, x1, row[i], row[j]); };
+Hull hull_of(bool vf, const Ends& x, const std::int32_t* row) {
+  const auto g = [&](int i, int j) { return motion(x, row[i], row[j]); };
   if (vf) return {{g(0, 1), g(0, 2), g(0, 3)}, 3, {}};
   return {{g(2, 0), g(3, 0), g(3, 1), g(2, 1)}, 4, {}};
 }
@@ -109,8 +109,8 @@ std::vector<Root> candidate_times(const Hull& hull) {
 
 }  // namespace
 
-double exact_contact(bool vf, const double* x_t0, const double* x_t1, const std::int32_t* row) {
-  const Hull hull = hull_of(vf, x_t0, x_t1, row);
+double exact_contact(bool vf, const Ends& x, const std::int32_t* row) {
+  const Hull hull = hull_of(vf, x, row);
   for (const auto& t : candidate_times(hull))
     if (contains_origin(hull, t)) return t.floor();
   return std::numeric_limits<double>::infinity();

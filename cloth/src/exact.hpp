@@ -4,10 +4,12 @@
 
 #include <cstdint>
 
+#include "ends.hpp"
+
 namespace tauguard::cloth {
 
 // Infinity without a hit, else the first time of contact, rounded down (by 2^-52 of it or 2^-60).
-// row: 4 indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge.
-double exact_contact(bool vf, const double* x_t0, const double* x_t1, const std::int32_t* row);
+// row: 4 vertices: vertex and face, or edge and edge.
+double exact_contact(bool vf, const Ends& x, const std::int32_t* row);
 
 }  // namespace tauguard::cloth

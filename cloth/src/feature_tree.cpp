@@ -7,6 +7,7 @@
 
 #include "tauguard/geometry/aabb.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
+#include "vertex_table.hpp"
 
 namespace tauguard::cloth {
 namespace {
@@ -44,21 +45,21 @@ void split(std::vector<std::int32_t>& order, std::size_t begin, std::size_t left
                    before);
 }
 
-std::vector<Centroid> centroids(const Features& features, const double* x, const Groups& groups) {
+std::vector<Centroid> centroids(const Features& features, const Ends& x, const Groups& groups) {
   std::vector<Centroid> at(features.size());
   const double share = 1.0 / features.arity;
   for (std::size_t i = 0; i < at.size(); ++i) {
     const std::int32_t* v = features.of(i);
     at[i] = {{0, 0, 0}, groups.any() ? groups.of_vertex[v[0]] : 0};
     for (int j = 0; j < features.arity; ++j)
-      for (int k = 0; k < 3; ++k) at[i].x[k] += share * x[3 * std::size_t(v[j]) + k];
+      for (int k = 0; k < 3; ++k) at[i].x[k] += share * x.at(false, v[j])[k];
   }
   return at;
 }
 
 }  // namespace
 
-void FeatureTree::build(const Features& features, const double* x, const Groups& groups,
+void FeatureTree::build(const Features& features, const Ends& x, const Groups& groups,
                         int threads) {
   arity_ = features.arity;
   leaves_ =
@@ -299,24 +300,25 @@ bool FeatureTree::update(const Features& features, const std::vector<std::int32_
   for (std::int32_t i = leaves_ - 1; i >= 1; --i) free_[i] = free_[2 * i] + free_[2 * i + 1];
 
   // A leaf that touches each vertex, for new features to settle near.
-  std::vector<std::int32_t> leaf_at;
-  if (!missing.empty()) {
-    leaf_at.assign(
-        std::size_t(*std::max_element(features.vertices.begin(), features.vertices.end())) + 1, -1);
-    for (std::size_t i = 0; i < vertices_.size(); ++i)
-      if (vertices_[i] >= 0)
-        leaf_at[vertices_[i]] = static_cast<std::int32_t>(i / (lanes * arity_));
-  }
+  const auto used =
+      used_vertices(missing.empty() ? std::vector<std::int32_t>() : features.vertices);
+  const VertexTable table(used);
+  std::vector<std::int32_t> leaf_at(used.size(), -1);
+  for (std::size_t i = 0; i < vertices_.size() && !used.empty(); ++i)
+    if (vertices_[i] >= 0)
+      leaf_at[table.place(vertices_[i])] = static_cast<std::int32_t>(i / (lanes * arity_));
   std::int32_t near = 0;
   for (const auto id : missing) {
-    for (int j = 0; j < arity_; ++j)
-      if (leaf_at[features.of(id)[j]] >= 0) near = leaf_at[features.of(id)[j]];
+    for (int j = 0; j < arity_; ++j) {
+      const std::int32_t there = leaf_at[table.place(features.of(id)[j])];
+      if (there >= 0) near = there;
+    }
     const std::int32_t leaf = free_leaf_near(near);
     if (leaf < 0) return false;
     const int lane = __builtin_ctz(~occupied_[leaf]);
     put(leaf, lane, id, features);
     for (std::int32_t i = (leaves_ + leaf) / 2; i >= 1; i /= 2) --free_[i];
-    for (int j = 0; j < arity_; ++j) leaf_at[features.of(id)[j]] = leaf;
+    for (int j = 0; j < arity_; ++j) leaf_at[table.place(features.of(id)[j])] = leaf;
   }
   fill_groups(features, groups);
   return true;

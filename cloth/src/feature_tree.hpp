@@ -34,9 +34,9 @@ struct Groups {
 
 class FeatureTree {
  public:
-  // Places every feature by the centroid of its vertices in x (n, 3). Groups are split before space
-  // is.
-  void build(const Features& features, const double* x, const Groups& groups, int threads);
+  // Places every feature by the centroid of its vertices at the start of the step. Groups are split
+  // before space is.
+  void build(const Features& features, const Ends& x, const Groups& groups, int threads);
   // Bounds of every leaf and node for this step.
   void refit(const Projection& points, int threads);
   // The features are now `features`; old feature i is new_id[i], or gone (-1). New ones go near

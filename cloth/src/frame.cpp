@@ -1,9 +1,12 @@
 #include "frame.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 
 #include "tauguard/geometry/rounding.hpp"
+#include "tauguard/geometry/scratch.hpp"
+#include "too_many.hpp"
 
 namespace tauguard::cloth {
 namespace {
@@ -88,17 +91,20 @@ Collisions sorted(const std::vector<Part>& parts) {
 
 }  // namespace
 
-Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const double* x_t0, const double* x_t1,
-                           Method method, double min_distance) {
+Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, double min_distance,
+                           std::size_t limit) {
   std::vector<Part> parts(ccd.chunks(kind));
+  std::atomic<std::size_t> found{0};
   const auto start = std::chrono::steady_clock::now();
   ccd.for_each_block(kind, [&](const CandidateBlock& block, std::size_t chunk) {
     const geometry::RoundToNearest guard;  // of this thread
-    static thread_local Answers answers;
+    geometry::Scratch<Answers> scratch;
+    Answers& answers = *scratch;
     Part& part = parts[chunk];
+    const std::size_t before = part.rows.size();
     const auto begin = std::chrono::steady_clock::now();
     const auto solve = kind == MeshCcd::Kind::vf ? solve_vf : solve_ee;
-    solve(x_t0, x_t1, block.rows.data(), block.size, method, min_distance, answers.hit.data(),
+    solve(ccd.ends(), block.rows.data(), block.size, method, min_distance, answers.hit.data(),
           {answers.toi.data(), answers.point.data(), answers.normal.data(), answers.weights.data()},
           part.stats, {!ccd.volume().moving});  // what moves has been seen from x, y and z
     for (std::size_t i = 0; i < block.size; ++i) {
@@ -110,6 +116,7 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const double* x_t0,
       std::copy_n(&answers.normal[3 * i], 3, row.normal);
       std::copy_n(&answers.weights[4 * i], 4, row.weights);
     }
+    if ((found += part.rows.size() - before) > limit) throw TooMany("collisions of a kind", limit);
     part.narrow_s += seconds(begin, std::chrono::steady_clock::now());
   });
   Collisions all = sorted(parts);

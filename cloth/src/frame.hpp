@@ -19,8 +19,8 @@ struct Collisions {
   std::size_t size() const { return toi.size(); }
 };
 
-// After ccd.prepare with the same positions.
-Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const double* x_t0, const double* x_t1,
-                           Method method, double min_distance);
+// After ccd.prepare. Throws TooMany where there are more than `limit`.
+Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, double min_distance,
+                           std::size_t limit);
 
 }  // namespace tauguard::cloth

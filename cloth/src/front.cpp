@@ -1,6 +1,9 @@
 #include "front.hpp"
 
-#include "tauguard/geometry/thread_pool.hpp"
+#include <atomic>
+
+#include "tauguard/geometry/interrupt.hpp"
+#include "too_many.hpp"
 
 namespace tauguard::cloth {
 namespace {
@@ -11,14 +14,23 @@ constexpr int first_depth = 5;  // the cut to start from: all pairs at this dept
 
 int depth(std::int32_t node) { return 31 - __builtin_clz(static_cast<unsigned>(node)); }
 
+// Entries of the new cut so far, of all chunks.
+struct Total {
+  std::size_t limit;
+  std::atomic<std::size_t> entries{0};
+  void add(std::size_t more) {
+    if ((entries += more) > limit) throw TooMany("pairs of leaves (8 times limit)", limit);
+  }
+};
+
 // One chunk's walk: reads a run of the old cut, writes its part of the new one.
 class Walk {
  public:
-  Walk(const FeatureTree& a, const FeatureTree& b)
-      : a_(a), b_(b), self_(&a == &b), test_(node_test(a.slots(), a.times())) {}
+  Walk(const FeatureTree& a, const FeatureTree& b, Total& total)
+      : a_(a), b_(b), self_(&a == &b), test_(node_test(a.slots(), a.times())), total_(total) {}
 
   bool overlap(NodePair p) {
-    ++tests;
+    if (++tests % pause == 0) look_up();
     return a_.may_meet(p.a, b_, p.b) && test_(a_.node(p.a), b_.node(p.b));
   }
 
@@ -83,10 +95,19 @@ class Walk {
     }
   }
 
+  // Ctrl-C, and the size that all walks together have reached.
+  void look_up() {
+    geometry::poll_interrupt();
+    total_.add(cut.size() - counted_);
+    counted_ = cut.size();
+  }
+
   std::vector<NodePair> cut, leaf_pairs;
   std::size_t tests = 0;
 
  private:
+  static constexpr std::size_t pause = 1024;  // tests between two looks
+
   static bool same(const NodePair* x, const NodePair* y, int n) {
     for (int i = 0; i < n; ++i)
       if (x[i].a != y[i].a || x[i].b != y[i].b) return false;
@@ -96,6 +117,8 @@ class Walk {
   const FeatureTree &a_, &b_;
   bool self_;
   NodeTest test_;
+  Total& total_;
+  std::size_t counted_ = 0;
 };
 
 void append(std::vector<NodePair>& to, const std::vector<NodePair>& from) {
@@ -104,13 +127,14 @@ void append(std::vector<NodePair>& to, const std::vector<NodePair>& from) {
 
 }  // namespace
 
-const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTree& b,
-                                           int threads) {
+const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTree& b, int threads,
+                                           std::size_t limit) {
+  Total total{limit};
   const std::size_t step = cut_.empty() ? root_grain : kept_grain;
   if (cut_.empty()) {
     // Split every entry, without looking at the volumes, until it is `first_depth` deep or two
     // leaves.
-    const Walk walk(a, b);
+    const Walk walk(a, b, total);
     cut_.push_back({1, 1});
     for (int level = 0; level < first_depth; ++level) {
       std::vector<NodePair> next;
@@ -126,10 +150,10 @@ const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTr
       cut_.swap(next);
     }
   }
-  std::vector<Walk> walks((cut_.size() + step - 1) / step, Walk(a, b));
-  geometry::ThreadPool::shared().parallel_for(
-      cut_.size(), threads, step,
-      [&](auto begin, auto end, auto c) { walks[c].move(cut_.data() + begin, cut_.data() + end); });
+  std::vector<Walk> walks((cut_.size() + step - 1) / step, Walk(a, b, total));
+  geometry::interruptible_for(cut_.size(), threads, step, [&](auto begin, auto end, auto c) {
+    walks[c].move(cut_.data() + begin, cut_.data() + end);
+  });
   cut_.clear();
   leaf_pairs_.clear();
   tests_ = 0;

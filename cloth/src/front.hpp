@@ -25,7 +25,9 @@ class Front {
   void reset() { cut_.clear(); }
   // Moves the front to where the trees now stand and returns the pairs of leaf numbers that
   // overlap. For a tree with itself pass the same tree twice: each unordered pair is visited once.
-  const std::vector<NodePair>& update(const FeatureTree& a, const FeatureTree& b, int threads);
+  // Throws TooMany where the cut outgrows `limit`; reset comes next then.
+  const std::vector<NodePair>& update(const FeatureTree& a, const FeatureTree& b, int threads,
+                                      std::size_t limit);
 
   std::size_t size() const { return cut_.size(); }
   std::size_t tests() const { return tests_; }  // of node pairs in the last update

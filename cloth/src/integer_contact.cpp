@@ -36,12 +36,11 @@ struct Binary {
 
 // Coordinates k of four vertices at both ends, [vertex][end], in units of a power of two (each axis
 // its own, which changes neither contact nor its time); false where they do not fit.
-bool on_axis(const double* x0, const double* x1, const std::int32_t* row, int k,
-             FixedInt<2> (*out)[2]) {
+bool on_axis(const Ends& x, const std::int32_t* row, int k, FixedInt<2> (*out)[2]) {
   int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
   for (int v = 0; v < 4; ++v)
-    for (const double* x : {x0, x1}) {
-      const Binary b(x[3 * std::ptrdiff_t(row[v]) + k]);
+    for (int e = 0; e < 2; ++e) {
+      const Binary b(x.at(e, row[v])[k]);
       if (b.mantissa == 0) continue;
       least = std::min(least, b.exponent);
       most = std::max(most, b.exponent + b.bits());
@@ -49,7 +48,7 @@ bool on_axis(const double* x0, const double* x1, const std::int32_t* row, int k,
   if (least < most && most - least > coordinate_bits) return false;
   for (int v = 0; v < 4; ++v)
     for (int e = 0; e < 2; ++e) {
-      const Binary b((e ? x1 : x0)[3 * std::ptrdiff_t(row[v]) + k]);
+      const Binary b(x.at(e, row[v])[k]);
       out[v][e] = FixedInt<2>(b.mantissa).shifted(b.mantissa ? b.exponent - least : 0);
     }
   return true;
@@ -164,10 +163,10 @@ class Hull {
 
 }  // namespace
 
-double integer_contact(bool vf, const double* x_t0, const double* x_t1, const std::int32_t* row) {
+double integer_contact(bool vf, const Ends& ends, const std::int32_t* row) {
   FixedInt<2> x[3][4][2];
   for (int k = 0; k < 3; ++k)
-    if (!on_axis(x_t0, x_t1, row, k, x[k])) return std::numeric_limits<double>::quiet_NaN();
+    if (!on_axis(ends, row, k, x[k])) return std::numeric_limits<double>::quiet_NaN();
   return Hull(vf, x).first_contact();
 }
 

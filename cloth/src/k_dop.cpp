@@ -24,14 +24,14 @@ constexpr std::int8_t corner_axes[7][3] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {
                                            {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
 constexpr std::size_t grain = 4096;
 
-Aabb bounds(const double* x_t0, const double* x_t1, std::size_t n, int threads) {
+Aabb bounds(const Ends& x, std::size_t n, int threads) {
   Aabb all;
   std::mutex mutex;
   ThreadPool::shared().parallel_for(n, threads, grain, [&](auto begin, auto end, auto) {
     Aabb part;
     for (auto i = begin; i < end; ++i) {
-      part.add(x_t0 + 3 * i);
-      part.add(x_t1 + 3 * i);
+      part.add(x.at(false, static_cast<std::int32_t>(i)));
+      part.add(x.at(true, static_cast<std::int32_t>(i)));
     }
     const std::lock_guard<std::mutex> lock(
         mutex);  // minima and maxima: any order gives the same box
@@ -62,8 +62,8 @@ const std::int8_t (*axes_of(int k))[3] {
   }
 }
 
-void Projection::set(const double* x_t0, const double* x_t1, std::size_t n, VolumeKind kind,
-                     double min_distance, int threads) {
+void Projection::set(const Ends& x, std::size_t n, VolumeKind kind, double min_distance,
+                     int threads) {
   kind_ = kind;
   const int axes = kind.axes();
   const auto* axis = axes_of(kind.k);
@@ -71,7 +71,7 @@ void Projection::set(const double* x_t0, const double* x_t1, std::size_t n, Volu
   values_.resize(2 * slots * n);
   std::fill(pad_, pad_ + most_slots, 0.0f);
   double largest = 0;
-  const Aabb raw = bounds(x_t0, x_t1, n, threads);
+  const Aabb raw = bounds(x, n, threads);
   for (int k = 0; k < 3 && n > 0; ++k) largest = std::max({largest, -raw.lo[k], raw.hi[k]});
   const double first = shrink(largest);
   double centre[3] = {0, 0, 0}, extent = 0;
@@ -94,9 +94,10 @@ void Projection::set(const double* x_t0, const double* x_t1, std::size_t n, Volu
   ThreadPool::shared().parallel_for(n, threads, grain, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i) {
       float* out = values_.data() + 2 * slots * i;
-      for (const double* x : {x_t0 + 3 * i, x_t1 + 3 * i}) {
+      for (const bool end : {false, true}) {
+        const double* p = x.at(end, static_cast<std::int32_t>(i));
         double z[3];
-        for (int k = 0; k < 3; ++k) z[k] = (x[k] * first - centre[k]) * second;
+        for (int k = 0; k < 3; ++k) z[k] = (p[k] * first - centre[k]) * second;
         for (int a = 0; a < 3; ++a) *out++ = static_cast<float>(z[a]);
         for (int a = 3; a < axes; ++a) {
           const auto& s = axis[a];

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "ends.hpp"
+
 namespace tauguard::cloth {
 
 // The largest number of axes, rounded up to a vector.
@@ -39,9 +41,8 @@ const std::int8_t (*axes_of(int k))[3];
 // errors: 2^-22 + m 2^-20 > 2^-24 + 2^-24 (1 + 2^-22 + m (1 + 2^-20)).
 class Projection {
  public:
-  // x_t0, x_t1: (n, 3), finite.
-  void set(const double* x_t0, const double* x_t1, std::size_t n, VolumeKind kind,
-           double min_distance, int threads);
+  // Of n vertices, finite.
+  void set(const Ends& x, std::size_t n, VolumeKind kind, double min_distance, int threads);
 
   VolumeKind kind() const { return kind_; }
   // [end of the step][axis slot]

@@ -4,16 +4,22 @@
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
+#include <atomic>
 #include <mutex>
 
 #include "apart.hpp"
 #include "batch.hpp"
 #include "frame.hpp"
 #include "mesh_ccd.hpp"
+#include "tauguard/geometry/call_lock.hpp"
+#include "tauguard/geometry/interrupt_binding.hpp"
 #include "tauguard/geometry/rounding.hpp"
+#include "too_many.hpp"
 
 namespace nb = nanobind;
 using namespace tauguard::cloth;
+using tauguard::geometry::CallLock;
+using tauguard::geometry::LongCall;
 
 namespace {
 
@@ -47,17 +53,25 @@ std::uint64_t key_of(const std::int32_t* pair) {
   return std::uint64_t(std::uint32_t(pair[0])) << 32 | std::uint32_t(pair[1]);
 }
 
-// One step at a time, whatever Python threads do.
+// One step at a time, whatever Python threads, signals and forks do.
 struct Mesh {
   Mesh(Faces faces, Ids ids, Table meets, int k, bool moving, int threads)
       : ccd(list_of(faces), groups_of(ids, meets), VolumeKind{k, moving}, threads) {}
   MeshCcd ccd;
-  std::mutex mutex;
+  CallLock lock;
+};
+// A call on it: without the interpreter's lock, open to Ctrl-C.
+struct Call {
+  explicit Call(Mesh& mesh) : one(mesh.lock) {}
+  LongCall open;
+  std::lock_guard<CallLock> one;
 };
 
-std::vector<std::int32_t> sorted_candidates(MeshCcd& ccd, MeshCcd::Kind kind) {
+std::vector<std::int32_t> sorted_candidates(MeshCcd& ccd, MeshCcd::Kind kind, std::size_t limit) {
   std::vector<std::vector<std::uint64_t>> parts(ccd.chunks(kind));
+  std::atomic<std::size_t> found{0};
   ccd.for_each_block(kind, [&](const CandidateBlock& block, std::size_t chunk) {
+    if ((found += block.size) > limit) throw TooMany("candidates of a kind", limit);
     for (std::size_t i = 0; i < block.size; ++i)
       parts[chunk].push_back(key_of(&block.pairs[2 * i]));
   });
@@ -98,16 +112,16 @@ nb::dict stats_of(const BroadStats& s, std::size_t bytes) {
   return d;
 }
 
-nb::tuple candidates(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, bool fresh) {
+nb::tuple candidates(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, bool fresh,
+                     std::size_t limit) {
   std::vector<std::int32_t> vf, ee;
   BroadStats broad;
   std::size_t bytes = 0;
   {
-    const nb::gil_scoped_release release;
-    const std::lock_guard<std::mutex> lock(mesh.mutex);
-    mesh.ccd.prepare(x_t0.data(), x_t1.data(), x_t0.shape(0), min_distance, fresh);
-    vf = sorted_candidates(mesh.ccd, MeshCcd::Kind::vf);
-    ee = sorted_candidates(mesh.ccd, MeshCcd::Kind::ee);
+    const Call call(mesh);
+    mesh.ccd.prepare(x_t0.data(), x_t1.data(), x_t0.shape(0), min_distance, fresh, limit);
+    vf = sorted_candidates(mesh.ccd, MeshCcd::Kind::vf, limit);
+    ee = sorted_candidates(mesh.ccd, MeshCcd::Kind::ee, limit);
     broad = mesh.ccd.stats();
     bytes = mesh.ccd.bytes();
   }
@@ -144,17 +158,15 @@ nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
 }
 
 nb::tuple find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double min_distance,
-               bool fresh) {
+               bool fresh, std::size_t limit) {
   Collisions vf, ee;
   BroadStats broad;
   std::size_t bytes = 0;
-  const double *start = x_t0.data(), *end = x_t1.data();
   {
-    const nb::gil_scoped_release release;
-    const std::lock_guard<std::mutex> lock(mesh.mutex);
-    mesh.ccd.prepare(start, end, x_t0.shape(0), min_distance, fresh);
-    vf = find_collisions(mesh.ccd, MeshCcd::Kind::vf, start, end, Method(method), min_distance);
-    ee = find_collisions(mesh.ccd, MeshCcd::Kind::ee, start, end, Method(method), min_distance);
+    const Call call(mesh);
+    mesh.ccd.prepare(x_t0.data(), x_t1.data(), x_t0.shape(0), min_distance, fresh, limit);
+    vf = find_collisions(mesh.ccd, MeshCcd::Kind::vf, Method(method), min_distance, limit);
+    ee = find_collisions(mesh.ccd, MeshCcd::Kind::ee, Method(method), min_distance, limit);
     broad = mesh.ccd.stats();
     bytes = mesh.ccd.bytes();
   }
@@ -169,36 +181,44 @@ nb::tuple find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double mi
 
 nb::dict update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
   TopologyChange change;
+  std::vector<std::int32_t> edges;
   {
     auto list = list_of(faces);
     auto groups = groups_of(ids, meets);
-    const nb::gil_scoped_release release;
-    const std::lock_guard<std::mutex> lock(mesh.mutex);
+    const Call call(mesh);
     change = mesh.ccd.update_topology(std::move(list), std::move(groups));
+    edges = mesh.ccd.topology().edges.vertices;
   }
   nb::dict d;
   const char* kinds[] = {"vertices", "edges", "faces"};
   for (int i = 0; i < 3; ++i) d[kinds[i]] = nb::make_tuple(change.removed[i], change.added[i]);
   d["rebuilt"] = change.rebuilt;
+  const std::size_t n = edges.size() / 2;
+  d["edge_rows"] = array_of<Pairs>(std::move(edges), {n, 2});
   return d;
 }
 
 }  // namespace
 
 NB_MODULE(_mesh, m) {
+  tauguard::geometry::bind_interrupts();
   nb::class_<Mesh>(m, "Mesh")
       .def(nb::init<Faces, Ids, Table, int, bool, int>(), nb::arg("faces"), nb::arg("ids"),
            nb::arg("meets"), nb::arg("k"), nb::arg("moving"), nb::arg("threads"))
       .def("edges",
-           [](const Mesh& mesh) {
-             auto list = mesh.ccd.topology().edges.vertices;
+           [](Mesh& mesh) {
+             std::vector<std::int32_t> list;
+             {
+               const Call call(mesh);
+               list = mesh.ccd.topology().edges.vertices;
+             }
              const std::size_t n = list.size() / 2;
              return array_of<Pairs>(std::move(list), {n, 2});
            })
       .def("candidates", &candidates, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("min_distance"),
-           nb::arg("fresh"))
+           nb::arg("fresh"), nb::arg("limit"))
       .def("find", &find, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("method"),
-           nb::arg("min_distance"), nb::arg("fresh"))
+           nb::arg("min_distance"), nb::arg("fresh"), nb::arg("limit"))
       .def("update_topology", &update_topology, nb::arg("faces"), nb::arg("ids"), nb::arg("meets"));
   m.def("solve",
         [](bool vf, Positions x_t0, Positions x_t1,
@@ -211,20 +231,21 @@ NB_MODULE(_mesh, m) {
            nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig> weights) {
           Stats stats;
           {
-            const nb::gil_scoped_release release;
+            const LongCall call;
             const tauguard::geometry::RoundToNearest guard;
+            const Ends ends = Ends::of(x_t0.data(), x_t1.data());
             Projection points;
             AxisFilter axes;
             constexpr std::size_t pays =
                 4;  // queries a vertex: one costs 18 ns to project, a query saves 6
             if (Method(method) == Method::ab2pf && min_distance == 0 &&
                 rows.shape(0) >= pays * x_t0.shape(0)) {
-              points.set(x_t0.data(), x_t1.data(), x_t0.shape(0), seven_axes, 0, 1);
+              points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
               axes.points = &points;
             }
             (vf ? solve_vf : solve_ee)(
-                x_t0.data(), x_t1.data(), rows.data(), rows.shape(0), Method(method), min_distance,
-                hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
+                ends, rows.data(), rows.shape(0), Method(method), min_distance, hit.data(),
+                {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
           }
           nb::dict counts;
           add_counts(counts, stats);

@@ -1,9 +1,13 @@
 #include "mesh_ccd.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <mutex>
+#include <stdexcept>
 
-#include "tauguard/geometry/thread_pool.hpp"
+#include "tauguard/geometry/interrupt.hpp"
+#include "tauguard/geometry/scratch.hpp"
 
 namespace tauguard::cloth {
 namespace {
@@ -11,6 +15,8 @@ namespace {
 constexpr std::size_t chunk_pairs = 512;  // leaf pairs of a chunk
 // Trees are built anew where the leaves have spread this much wider than when they were built.
 constexpr double worn = 2;
+// Pairs of leaves that a step may hold for each collision that it may.
+constexpr std::size_t leaf_pairs = 8;
 
 // Asks for the volumes of a leaf, which lie anywhere in memory.
 void prefetch(const FeatureTree& tree, std::int32_t leaf) {
@@ -43,13 +49,40 @@ MeshCcd::MeshCcd(std::vector<std::int32_t> faces, Groups groups, VolumeKind volu
 }
 
 void MeshCcd::prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance,
-                      bool fresh) {
+                      bool fresh, std::size_t limit) {
   const geometry::RoundToNearest guard;
   stats_ = {};
-  Clock clock;
-  points_.set(x_t0, x_t1, n, volume_, min_distance, threads_);
-  stats_.project_s = clock.lap();
+  try {
+    copy(x_t0, x_t1, n);
+    place(min_distance);
+    descend(fresh, limit);
+  } catch (...) {
+    forget();  // trees and fronts may be half done
+    throw;
+  }
+}
 
+void MeshCcd::copy(const double* x_t0, const double* x_t1, std::size_t n) {
+  if (n < topology_.rows() || (groups_.any() && n < groups_.of_vertex.size()))
+    throw std::invalid_argument("x_t0: fewer vertices than the mesh has");
+  lines_.resize(std::max<std::size_t>(n, 1));
+  double wild = 0;  // NaN where an entry is not finite
+  for (std::size_t i = 0; i < n; ++i) {
+    double* line = lines_[i].value;
+    for (int k = 0; k < 3; ++k) {
+      line[k] = x_t0[3 * i + k];
+      line[4 + k] = x_t1[3 * i + k];
+      wild += 0 * line[k] + 0 * line[4 + k];
+    }
+  }
+  if (std::isnan(wild))
+    throw std::invalid_argument("x_t0, x_t1: changed during the call, an entry is not finite");
+}
+
+void MeshCcd::place(double min_distance) {
+  Clock clock;
+  points_.set(ends(), lines_.size(), volume_, min_distance, threads_);
+  stats_.project_s = clock.lap();
   FeatureTree* trees[] = {&vertices_, &edges_, &faces_};
   const Features* features[] = {&topology_.vertices, &topology_.edges, &topology_.faces};
   for (int i = 0; i < 3; ++i) {
@@ -59,7 +92,7 @@ void MeshCcd::prepare(const double* x_t0, const double* x_t1, std::size_t n, dou
     }
     // Spread is in units of the scene's extent, which also makes it comparable between steps.
     if (built_spread_[i] < 0 || trees[i]->spread() > worn * built_spread_[i]) {
-      trees[i]->build(*features[i], x_t0, groups_, threads_);
+      trees[i]->build(*features[i], ends(), groups_, threads_);
       ++stats_.builds;
       stats_.build_s += clock.lap();
       trees[i]->refit(points_, threads_);
@@ -69,12 +102,16 @@ void MeshCcd::prepare(const double* x_t0, const double* x_t1, std::size_t n, dou
       stats_.refit_s += clock.lap();
     }
   }
+}
+
+void MeshCcd::descend(bool fresh, std::size_t limit) {
+  Clock clock;
   if (fresh) {
     vf_front_.reset();
     ee_front_.reset();
   }
-  vf_pairs_ = &vf_front_.update(vertices_, faces_, threads_);
-  ee_pairs_ = &ee_front_.update(edges_, edges_, threads_);
+  vf_pairs_ = &vf_front_.update(vertices_, faces_, threads_, leaf_pairs * limit);
+  ee_pairs_ = &ee_front_.update(edges_, edges_, threads_, leaf_pairs * limit);
   stats_.vf.node_tests = vf_front_.tests();
   stats_.ee.node_tests = ee_front_.tests();
   stats_.vf.front = vf_front_.size();
@@ -82,6 +119,12 @@ void MeshCcd::prepare(const double* x_t0, const double* x_t1, std::size_t n, dou
   stats_.vf.leaf_pairs = vf_pairs_->size();
   stats_.ee.leaf_pairs = ee_pairs_->size();
   stats_.traverse_s = clock.lap();
+}
+
+void MeshCcd::forget() {
+  built_spread_ = {-1, -1, -1};
+  vf_front_.reset();
+  ee_front_.reset();
 }
 
 std::size_t MeshCcd::chunks(Kind kind) const {
@@ -95,9 +138,10 @@ void MeshCcd::for_each_block(Kind kind, const Take& take) {
   const FeatureTree &a = vf ? vertices_ : edges_, &b = vf ? faces_ : edges_;
   BroadCounts& counts = vf ? stats_.vf : stats_.ee;
   std::mutex mutex;
-  geometry::ThreadPool::shared().parallel_for(
+  geometry::interruptible_for(
       pairs.size(), threads_, chunk_pairs, [&](auto begin, auto end, auto chunk) {
-        static thread_local CandidateBlock block;
+        geometry::Scratch<CandidateBlock> scratch;
+        CandidateBlock& block = *scratch;
         block.size = block.adjacent = block.kept_apart = 0;
         std::uint64_t candidates = 0;
         for (auto i = begin; i < end; ++i) {
@@ -107,6 +151,7 @@ void MeshCcd::for_each_block(Kind kind, const Take& take) {
           }
           leaf_candidates(a, b, pairs[i], groups_, block);
           if (block.size >= CandidateBlock::full || (i + 1 == end && block.size > 0)) {
+            geometry::poll_interrupt();
             candidates += block.size;
             take(block, chunk);
             block.size = 0;
@@ -128,15 +173,20 @@ TopologyChange MeshCcd::update_topology(std::vector<std::int32_t> faces, Groups 
   FeatureTree* trees[] = {&vertices_, &edges_, &faces_};
   const Features* features[] = {&after.vertices, &after.edges, &after.faces};
   TopologyChange change;
-  for (int i = 0; i < 3; ++i) {
-    std::uint64_t kept = 0;
-    for (const auto id : match[i]) kept += id >= 0;
-    change.removed[i] = match[i].size() - kept;
-    change.added[i] = features[i]->size() - kept;
-    if (built_spread_[i] >= 0 && !trees[i]->update(*features[i], match[i], groups)) {
-      built_spread_[i] = -1;
-      ++change.rebuilt;
+  try {
+    for (int i = 0; i < 3; ++i) {
+      std::uint64_t kept = 0;
+      for (const auto id : match[i]) kept += id >= 0;
+      change.removed[i] = match[i].size() - kept;
+      change.added[i] = features[i]->size() - kept;
+      if (built_spread_[i] >= 0 && !trees[i]->update(*features[i], match[i], groups)) {
+        built_spread_[i] = -1;
+        ++change.rebuilt;
+      }
     }
+  } catch (...) {
+    forget();  // the mesh is as before, its trees are not
+    throw;
   }
   topology_ = std::move(after);
   groups_ = std::move(groups);
@@ -147,8 +197,9 @@ std::size_t MeshCcd::bytes() const {
   const std::size_t lists = topology_.vertices.vertices.capacity() +
                             topology_.edges.vertices.capacity() +
                             topology_.faces.vertices.capacity() + groups_.of_vertex.capacity();
-  return lists * sizeof(std::int32_t) + points_.bytes() + vertices_.bytes() + edges_.bytes() +
-         faces_.bytes() + vf_front_.bytes() + ee_front_.bytes();
+  return lists * sizeof(std::int32_t) + lines_.capacity() * sizeof(Line) + points_.bytes() +
+         vertices_.bytes() + edges_.bytes() + faces_.bytes() + vf_front_.bytes() +
+         ee_front_.bytes();
 }
 
 }  // namespace tauguard::cloth

@@ -42,10 +42,15 @@ class MeshCcd {
   int threads() const { return threads_; }
   VolumeKind volume() const { return volume_; }
 
-  // Trees, volumes and fronts for this step. fresh: descend from the root instead of the last
-  // front.
+  // Trees, volumes and fronts for this step, of a copy of the positions (n, 3): what the caller
+  // does to them meanwhile changes nothing. fresh: descend from the root instead of the last front.
+  // Throws std::invalid_argument where the features use more vertices or a position is not finite,
+  // TooMany where more than 8 `limit` pairs of leaves are held; the next call is none the worse for
+  // it.
   void prepare(const double* x_t0, const double* x_t1, std::size_t n, double min_distance,
-               bool fresh);
+               bool fresh, std::size_t limit);
+  // Of the last prepare.
+  Ends ends() const { return Ends::packed(lines_.data()->value); }
   // After prepare: hands the candidates of one kind to `take(block, chunk)`, from several threads;
   // a chunk is always the same candidates, taken in the same order, and comes in blocks of some
   // thousand.
@@ -59,8 +64,15 @@ class MeshCcd {
   std::size_t bytes() const;
 
  private:
-  void build(FeatureTree& tree, const Features& features, const double* x, double& built_spread);
+  struct alignas(64) Line {
+    double value[Ends::line];
+  };
+  void copy(const double* x_t0, const double* x_t1, std::size_t n);
+  void place(double min_distance);
+  void descend(bool fresh, std::size_t limit);
+  void forget();
 
+  std::vector<Line> lines_;
   Topology topology_;
   Groups groups_;
   VolumeKind volume_;

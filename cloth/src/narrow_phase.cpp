@@ -6,6 +6,7 @@
 #include "narrow_phase.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -15,6 +16,8 @@
 #include "integer_contact.hpp"
 #include "intervals.hpp"
 #include "query.hpp"
+#include "tauguard/geometry/interrupt.hpp"
+#include "tauguard/geometry/scratch.hpp"
 
 namespace tauguard::cloth {
 namespace {
@@ -24,16 +27,12 @@ constexpr int batch = 128,
                   512;  // queries at a time, after and before those apart on an axis are left out
 constexpr double never = std::numeric_limits<double>::infinity();
 
-Vec3 at(const double* x0, const double* x1, std::int32_t v, double t) {
-  return mix(position(x0, v), position(x1, v), t);
-}
+Vec3 at(const Ends& x, std::int32_t v, double t) { return mix(x(false, v), x(true, v), t); }
 
 // Where, along which normal and with which weights the two features meet at time t.
 template <bool vf>
-void describe(const double* x0, const double* x1, const std::int32_t* row, double t,
-              ImpactArrays out, std::size_t i) {
-  const Vec3 a = at(x0, x1, row[0], t), b = at(x0, x1, row[1], t), c = at(x0, x1, row[2], t),
-             d = at(x0, x1, row[3], t);
+void describe(const Ends& x, const std::int32_t* row, double t, ImpactArrays out, std::size_t i) {
+  const Vec3 a = at(x, row[0], t), b = at(x, row[1], t), c = at(x, row[2], t), d = at(x, row[3], t);
   const Vec3 q = vf ? c - b : b - a, r = vf ? d - b : d - c, p = vf ? a - b : c - a;
   Vec3 n = cross(q, r);
   const double nn = dot(n, n);
@@ -112,21 +111,21 @@ int split(const double* b, double error, std::int32_t query, Piece* pieces) {
 }
 
 template <bool vf>
-double exactly(const double* x0, const double* x1, const std::int32_t* row, Stats& stats) {
+double exactly(const Ends& x, const std::int32_t* row, Stats& stats) {
+  geometry::poll_interrupt();
   ++stats.exact;
-  const double t = integer_contact(vf, x0, x1, row);
+  const double t = integer_contact(vf, x, row);
   if (!std::isnan(t)) return t;
   ++stats.long_exact;
-  return exact_contact(vf, x0, x1, row);
+  return exact_contact(vf, x, row);
 }
 
 // The rest, one by one: by intervals, then exactly.
 template <bool vf>
-double resolve(const double* x0, const double* x1, const std::int32_t* row, double distance,
-               Stats& stats) {
+double resolve(const Ends& x, const std::int32_t* row, double distance, Stats& stats) {
   ++stats.resolved;
-  const double t = first_contact(make<vf>(x0, x1, row, distance), vf, stats);
-  return std::isnan(t) ? exactly<vf>(x0, x1, row, stats) : t;
+  const double t = first_contact(make<vf>(x, row, distance), vf, stats);
+  return std::isnan(t) ? exactly<vf>(x, row, stats) : t;
 }
 
 // A batch on its way through the stages.
@@ -177,12 +176,12 @@ int make_pieces(Batch& b, int n, Stats& stats) {
 
 // One batch: the time of contact of each query, or `never`.
 template <bool vf>
-void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, double* toi,
-           Stats& stats) {
-  static thread_local Batch b;
+void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& stats) {
+  geometry::Scratch<Batch> scratch;
+  Batch& b = *scratch;
   const BatchKernels& kernels = batch_kernels();
   b.count = b.left = 0;
-  kernels.gather(vf, x0, x1, rows, n, b.groups);
+  kernels.gather(vf, x, rows, n, b.groups);
   std::fill(toi, toi + n, never);
   const int single = make_pieces(b, n, stats);
   kernels.at_roots(vf, b.groups, b.pieces, b.count, b.outcome, b.at);
@@ -190,7 +189,7 @@ void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, 
     toi[b.pieces[i].query] = b.outcome[i] == Outcome::contact ? b.at[i] : never;
     stats.roots += b.outcome[i] == Outcome::clear;
     if (b.outcome[i] == Outcome::edge)
-      toi[b.pieces[i].query] = exactly<vf>(x0, x1, rows + 4 * b.pieces[i].query, stats);
+      toi[b.pieces[i].query] = exactly<vf>(x, rows + 4 * b.pieces[i].query, stats);
     if (b.outcome[i] == Outcome::unknown) b.open[b.left++] = b.pieces[i].query;
   }
   for (int i = single; i < b.count;) {
@@ -203,51 +202,51 @@ void ab2pf(const double* x0, const double* x1, const std::int32_t* rows, int n, 
     } else if (b.outcome[first] == Outcome::contact) {
       toi[query] = b.at[first];
     } else if (b.outcome[first] == Outcome::edge) {
-      toi[query] = exactly<vf>(x0, x1, rows + 4 * query, stats);
+      toi[query] = exactly<vf>(x, rows + 4 * query, stats);
     } else {
       b.open[b.left++] = query;
     }
     while (i < b.count && b.pieces[i].query == query) ++i;
   }
-  for (int i = 0; i < b.left; ++i)
-    toi[b.open[i]] = resolve<vf>(x0, x1, rows + 4 * b.open[i], 0, stats);
+  for (int i = 0; i < b.left; ++i) toi[b.open[i]] = resolve<vf>(x, rows + 4 * b.open[i], 0, stats);
 }
 
 // A block: what no axis keeps apart goes on in batches.
 template <bool vf>
-void in_batches(const double* x0, const double* x1, const std::int32_t* rows, int n,
-                AxisFilter axes, double* toi, Stats& stats) {
+void in_batches(const Ends& x, const std::int32_t* rows, int n, AxisFilter axes, double* toi,
+                Stats& stats) {
   if (!axes.look) {
     for (int first = 0; first < n; first += batch)
-      ab2pf<vf>(x0, x1, rows + 4 * first, std::min(batch, n - first), toi + first, stats);
+      ab2pf<vf>(x, rows + 4 * first, std::min(batch, n - first), toi + first, stats);
     return;
   }
   std::int32_t left[block], part[4 * batch];
   double found[batch];
   const int count = axes.points
                         ? batch_kernels().not_apart_on_seven(vf, axes.points->of(0), rows, n, left)
-                        : batch_kernels().not_apart(vf, x0, x1, rows, n, left);
+                        : batch_kernels().not_apart(vf, x, rows, n, left);
   stats.axes += n - count;
   std::fill(toi, toi + n, never);
   for (int first = 0; first < count; first += batch) {
     const int some = std::min(batch, count - first);
     for (int i = 0; i < some; ++i) std::copy_n(rows + 4 * left[first + i], 4, part + 4 * i);
-    ab2pf<vf>(x0, x1, part, some, found, stats);
+    ab2pf<vf>(x, part, some, found, stats);
     for (int i = 0; i < some; ++i) toi[left[first + i]] = found[i];
   }
 }
 
 template <bool vf>
-void one_by_one(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method,
-                double distance, double* toi, Stats& stats) {
+void one_by_one(const Ends& x, const std::int32_t* rows, int n, Method method, double distance,
+                double* toi, Stats& stats) {
   for (int i = 0; i < n; ++i) {
+    geometry::poll_interrupt();
     const std::int32_t* row = rows + 4 * i;
     if (method == Method::ab2pf) {
-      toi[i] = resolve<vf>(x0, x1, row, distance, stats);
+      toi[i] = resolve<vf>(x, row, distance, stats);
     } else {
       ++stats.exact;
       ++stats.long_exact;
-      toi[i] = exact_contact(vf, x0, x1, row);
+      toi[i] = exact_contact(vf, x, row);
     }
   }
 }
@@ -267,10 +266,11 @@ Query query_of(const Group& g, int lane) {
 
 // The comparators, on the same differences and cubics.
 template <bool vf>
-void compare(const double* x0, const double* x1, const std::int32_t* rows, int n, Method method,
-             double* toi, Stats& stats) {
-  static thread_local Group groups[block / width];
-  batch_kernels().gather(vf, x0, x1, rows, n, groups);
+void compare(const Ends& x, const std::int32_t* rows, int n, Method method, double* toi,
+             Stats& stats) {
+  geometry::Scratch<std::array<Group, block / width>> scratch;
+  Group* groups = scratch->data();
+  batch_kernels().gather(vf, x, rows, n, groups);
   for (int i = 0; i < n; ++i) {
     const Group& g = groups[i / width];
     const int lane = i % width;
@@ -287,38 +287,38 @@ void compare(const double* x0, const double* x1, const std::int32_t* rows, int n
 }
 
 template <bool vf>
-void solve(const double* x0, const double* x1, const std::int32_t* rows, std::size_t n,
-           Method method, double distance, std::uint8_t* hit, ImpactArrays out, Stats& stats,
-           AxisFilter axes) {
+void solve(const Ends& x, const std::int32_t* rows, std::size_t n, Method method, double distance,
+           std::uint8_t* hit, ImpactArrays out, Stats& stats, AxisFilter axes) {
   double toi[block];
   for (std::size_t first = 0; first < n; first += block) {
+    geometry::poll_interrupt();
     const int count = static_cast<int>(std::min<std::size_t>(block, n - first));
     const std::int32_t* part = rows + 4 * first;
     if (method == Method::ab2pf && distance == 0) {
-      in_batches<vf>(x0, x1, part, count, axes, toi, stats);
+      in_batches<vf>(x, part, count, axes, toi, stats);
     } else if (method == Method::ab2pf || method == Method::exact) {
-      one_by_one<vf>(x0, x1, part, count, method, distance, toi, stats);
+      one_by_one<vf>(x, part, count, method, distance, toi, stats);
     } else {
-      compare<vf>(x0, x1, part, count, method, toi, stats);
+      compare<vf>(x, part, count, method, toi, stats);
     }
     for (int i = 0; i < count; ++i) {
       hit[first + i] = toi[i] <= 1;
       if (!hit[first + i]) continue;
       out.toi[first + i] = toi[i];
-      describe<vf>(x0, x1, part + 4 * i, toi[i], out, first + i);
+      describe<vf>(x, part + 4 * i, toi[i], out, first + i);
     }
   }
 }
 }  // namespace
 
-void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n,
-              Method method, double min_distance, std::uint8_t* hit, ImpactArrays impacts,
-              Stats& stats, AxisFilter axes) {
-  solve<true>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, axes);
+void solve_vf(const Ends& x, const std::int32_t* rows, std::size_t n, Method method,
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats,
+              AxisFilter axes) {
+  solve<true>(x, rows, n, method, min_distance, hit, impacts, stats, axes);
 }
-void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n,
-              Method method, double min_distance, std::uint8_t* hit, ImpactArrays impacts,
-              Stats& stats, AxisFilter axes) {
-  solve<false>(x_t0, x_t1, rows, n, method, min_distance, hit, impacts, stats, axes);
+void solve_ee(const Ends& x, const std::int32_t* rows, std::size_t n, Method method,
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats,
+              AxisFilter axes) {
+  solve<false>(x, rows, n, method, min_distance, hit, impacts, stats, axes);
 }
 }  // namespace tauguard::cloth

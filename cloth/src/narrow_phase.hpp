@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ends.hpp"
 #include "k_dop.hpp"
 
 namespace tauguard::cloth {
@@ -46,13 +47,13 @@ struct AxisFilter {
   const Projection* points = nullptr;
 };
 
-// rows: (n, 4) indices into x_t0 and x_t1, (V, 3): vertex and face, or edge and edge. Callable from
+// rows: (n, 4) vertices: vertex and face, or edge and edge. Callable from
 // several threads. Needs round-to-nearest.
-void solve_vf(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n,
-              Method method, double min_distance, std::uint8_t* hit, ImpactArrays impacts,
-              Stats& stats, AxisFilter axes);
-void solve_ee(const double* x_t0, const double* x_t1, const std::int32_t* rows, std::size_t n,
-              Method method, double min_distance, std::uint8_t* hit, ImpactArrays impacts,
-              Stats& stats, AxisFilter axes);
+void solve_vf(const Ends& x, const std::int32_t* rows, std::size_t n, Method method,
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats,
+              AxisFilter axes);
+void solve_ee(const Ends& x, const std::int32_t* rows, std::size_t n, Method method,
+              double min_distance, std::uint8_t* hit, ImpactArrays impacts, Stats& stats,
+              AxisFilter axes);
 
 }  // namespace tauguard::cloth

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "ends.hpp"
 #include "tauguard/geometry/rounding.hpp"
 #include "tauguard/geometry/vec3.hpp"
 
@@ -19,11 +20,6 @@ using geometry::Vec3;
 using geometry::operator+;
 using geometry::operator-;
 using geometry::operator*;
-
-// Position i of an array (n, 3).
-inline Vec3 position(const double* x, std::int32_t i) {
-  return geometry::load(x + 3 * std::ptrdiff_t(i));
-}
 
 // Differences of positions at both ends: the cubic is p . (q x r); `gap` holds those that a
 // separating direction must see on one side. `big` is the largest magnitude among them.
@@ -40,15 +36,13 @@ struct Query {
 };
 
 template <bool vf>
-Query make(const double* x0, const double* x1, const std::int32_t* row, double distance) {
+Query make(const Ends& x, const std::int32_t* row, double distance) {
   Query k;
   k.distance = distance;
   k.gaps = vf ? 3 : 4;
   k.big = 0;
   for (int e = 0; e < 2; ++e) {
-    const double* x = e ? x1 : x0;
-    const Vec3 a = position(x, row[0]), b = position(x, row[1]), c = position(x, row[2]),
-               d = position(x, row[3]);
+    const Vec3 a = x(e, row[0]), b = x(e, row[1]), c = x(e, row[2]), d = x(e, row[3]);
     if (vf) {
       k.p[e] = a - b;
       k.q[e] = c - b;

@@ -4,6 +4,8 @@
 #include <array>
 #include <numeric>
 
+#include "vertex_table.hpp"
+
 namespace tauguard::cloth {
 namespace {
 
@@ -31,33 +33,33 @@ void merge(const Features& before, const std::vector<std::int32_t>& old_order,
 
 void Topology::set(std::vector<std::int32_t> face_vertices) {
   faces.vertices = std::move(face_vertices);
-  const auto& f = faces.vertices;
-  const std::size_t count = f.empty() ? 0 : std::size_t(*std::max_element(f.begin(), f.end())) + 1;
+  vertices.vertices = used_vertices(faces.vertices);
+  const VertexTable numbers(vertices.vertices);
+  const std::size_t count = vertices.size();
+  std::vector<std::int32_t> f(faces.vertices.size());  // by their place among the vertices in use
+  std::transform(faces.vertices.begin(), faces.vertices.end(), f.begin(),
+                 [&](std::int32_t v) { return numbers.place(v); });
   // Buckets by the smaller vertex, then each bucket by the larger.
   std::vector<std::size_t> begin(count + 1, 0);
-  std::vector<std::uint8_t> used(count, 0);
   const auto each_edge = [&](auto&& visit) {
     for (std::size_t i = 0; i < f.size(); i += 3)
       for (int k = 0; k < 3; ++k) visit(std::minmax(f[i + k], f[i + (k + 1) % 3]));
   };
-  for (const auto v : f) used[v] = 1;
   each_edge([&](auto e) { ++begin[e.first + 1]; });
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
   std::vector<std::int32_t> larger(f.size());
   auto next = begin;
   each_edge([&](auto e) { larger[next[e.first]++] = e.second; });
 
-  vertices.vertices.clear();
   edges.vertices.clear();
   edges.vertices.reserve(f.size() + 6);
   for (std::size_t v = 0; v < count; ++v) {
-    if (used[v]) vertices.vertices.push_back(static_cast<std::int32_t>(v));
     const auto first = larger.begin() + begin[v], last = larger.begin() + begin[v + 1];
     std::sort(first, last);
     const auto end = std::unique(first, last);
     for (auto e = first; e != end; ++e) {
-      edges.vertices.push_back(static_cast<std::int32_t>(v));
-      edges.vertices.push_back(*e);
+      edges.vertices.push_back(vertices.vertices[v]);
+      edges.vertices.push_back(vertices.vertices[*e]);
     }
   }
 }

@@ -11,6 +11,10 @@ namespace tauguard::cloth {
 
 struct Topology {
   Features vertices{1, {}}, edges{2, {}}, faces{3, {}};
+  // Positions must have at least so many rows.
+  std::size_t rows() const {
+    return vertices.vertices.empty() ? 0 : std::size_t(vertices.vertices.back()) + 1;
+  }
   // faces: rows of three different vertices. Edges: rows (smaller, larger) in lexicographic order.
   void set(std::vector<std::int32_t> face_vertices);
 };

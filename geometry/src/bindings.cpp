@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "tauguard/geometry/aabb.hpp"
+#include "tauguard/geometry/interrupt_binding.hpp"
 #include "tauguard/geometry/rounding.hpp"
 #include "tauguard/geometry/signs.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
@@ -18,26 +19,25 @@ using Points2 = nb::ndarray<const double, nb::shape<-1, 3, 2>, nb::c_contig, nb:
 using Signs = nb::ndarray<std::int8_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 
 NB_MODULE(_geometry, m) {
+  bind_interrupts();
   m.def("orient3d", [](Points3 points, Signs out, int threads) {
-    nb::gil_scoped_release release;
+    const LongCall call;
     const double* p = points.data();
     std::int8_t* s = out.data();
-    ThreadPool::shared().parallel_for(
-        points.shape(0), threads, 4096, [&](auto begin, auto end, auto) {
-          for (auto i = begin; i < end; ++i)
-            s[i] = static_cast<std::int8_t>(
-                orient3d(p + 12 * i, p + 12 * i + 3, p + 12 * i + 6, p + 12 * i + 9));
-        });
+    interruptible_for(points.shape(0), threads, 4096, [&](auto begin, auto end, auto) {
+      for (auto i = begin; i < end; ++i)
+        s[i] = static_cast<std::int8_t>(
+            orient3d(p + 12 * i, p + 12 * i + 3, p + 12 * i + 6, p + 12 * i + 9));
+    });
   });
   m.def("orient2d", [](Points2 points, Signs out, int threads) {
-    nb::gil_scoped_release release;
+    const LongCall call;
     const double* p = points.data();
     std::int8_t* s = out.data();
-    ThreadPool::shared().parallel_for(
-        points.shape(0), threads, 4096, [&](auto begin, auto end, auto) {
-          for (auto i = begin; i < end; ++i)
-            s[i] = static_cast<std::int8_t>(orient2d(p + 6 * i, p + 6 * i + 2, p + 6 * i + 4));
-        });
+    interruptible_for(points.shape(0), threads, 4096, [&](auto begin, auto end, auto) {
+      for (auto i = begin; i < end; ++i)
+        s[i] = static_cast<std::int8_t>(orient2d(p + 6 * i, p + 6 * i + 2, p + 6 * i + 4));
+    });
   });
   // For tests of the rounding guard: what a careless library leaves behind.
   m.def("set_rounding", [](int mode) {

@@ -1,6 +1,9 @@
 // A small persistent thread pool. Work is cut into chunks whose bounds depend on the problem alone,
 // never on the number of threads: a kernel that writes into slots indexed by item or by chunk gives
 // the same bits for any thread count.
+//
+// Threads do not survive a fork: the child gets a pool of its own at its first call, and neither
+// waits for the parent's threads, at its exit included.
 #pragma once
 
 #include <algorithm>
@@ -9,20 +12,29 @@
 #include <cstddef>
 #include <exception>
 #include <functional>
+#include <memory>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
+#include "tauguard/geometry/process.hpp"
 #include "tauguard/geometry/rounding.hpp"
 
 namespace tauguard::geometry {
 
 class ThreadPool {
  public:
-  // One pool per native module, grown to the largest number of threads asked for.
+  // One pool per native module and process, grown to the largest number of threads asked for. It is
+  // never destroyed: at exit its threads may be inside a call, or belong to the process forked
+  // from.
   static ThreadPool& shared() {
-    static ThreadPool pool;
-    return pool;
+    static std::atomic<ThreadPool*> kept{nullptr};
+    ThreadPool* pool = kept.load();
+    if (pool && pool->process_ == process_number()) return *pool;
+    auto fresh = std::make_unique<ThreadPool>();
+    if (kept.compare_exchange_strong(pool, fresh.get())) return *fresh.release();
+    return *pool;  // another thread was faster
   }
 
   // The default for `threads=0`: the processors there are.
@@ -38,11 +50,13 @@ class ThreadPool {
     const std::size_t chunks = (n + grain - 1) / grain;
     const RoundToNearest guard;
     const std::size_t wanted = std::min<std::size_t>(threads <= 0 ? hardware() : threads, chunks);
-    if (wanted <= 1) {
+    // A call from within a call, and one beside another thread's, does without helpers.
+    std::unique_lock<std::mutex> one_caller(caller_, std::defer_lock);
+    if (wanted <= 1 || inside_ || !one_caller.try_lock()) {
       for (std::size_t c = 0; c < chunks; ++c) body(c * grain, std::min(n, (c + 1) * grain), c);
       return;
     }
-    const std::lock_guard<std::mutex> one_caller(caller_);
+    const Inside inside;
     job_.body = &body;
     job_.n = n;
     job_.grain = grain;
@@ -51,9 +65,8 @@ class ThreadPool {
     job_.error = nullptr;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      while (workers_.size() + 1 < wanted)
-        workers_.emplace_back([this, i = workers_.size()] { serve(i); });
-      helpers_ = wanted - 1;
+      grow(wanted - 1);
+      helpers_ = std::min(workers_.size(), wanted - 1);
       busy_ = helpers_;
       ++generation_;
     }
@@ -75,6 +88,12 @@ class ThreadPool {
   }
 
  private:
+  static inline thread_local bool inside_ = false;
+  struct Inside {
+    Inside() { inside_ = true; }
+    ~Inside() { inside_ = false; }
+  };
+
   struct Job {
     const std::function<void(std::size_t, std::size_t, std::size_t)>* body = nullptr;
     std::size_t n = 0, grain = 1, chunks = 0;
@@ -82,6 +101,14 @@ class ThreadPool {
     std::exception_ptr error;
     std::mutex error_mutex;
   };
+
+  void grow(std::size_t helpers) {
+    try {
+      while (workers_.size() < helpers)
+        workers_.emplace_back([this, i = workers_.size()] { serve(i); });
+    } catch (const std::system_error&) {  // no more threads to be had: fewer do the work
+    }
+  }
 
   void work() {
     for (;;) {
@@ -99,6 +126,7 @@ class ThreadPool {
 
   void serve(std::size_t index) {
     const RoundToNearest guard;
+    const Inside inside;
     std::size_t seen = 0;
     for (;;) {
       {
@@ -121,6 +149,7 @@ class ThreadPool {
   Job job_;
   std::size_t helpers_ = 0, busy_ = 0, generation_ = 0;
   bool stop_ = false;
+  const long process_ = process_number();
 };
 
 }  // namespace tauguard::geometry

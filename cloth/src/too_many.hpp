@@ -1,0 +1,16 @@
+// An answer that outgrows what the caller allows.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace tauguard::cloth {
+
+struct TooMany : std::invalid_argument {
+  TooMany(const std::string& what, std::size_t limit)
+      : std::invalid_argument(
+            "limit: more than " + std::to_string(limit) + " " + what +
+            " in this step; a larger limit= allows them, at some 300 bytes each") {}
+};
+
+}  // namespace tauguard::cloth

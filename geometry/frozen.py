@@ -1,0 +1,49 @@
+"""Arrays that nobody can change: what a native kernel keeps must stay what was checked."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.geometry.arrays import finite, indices
+
+_T = TypeVar("_T", bound=np.generic)
+
+
+def frozen(array: NDArray[_T]) -> NDArray[_T]:
+    """A C-contiguous copy over immutable memory, which no flag makes writeable again."""
+    if array.size == 0:
+        return sealed(np.empty(array.shape, dtype=array.dtype))
+    return np.frombuffer(array.tobytes(), dtype=array.dtype).reshape(array.shape)
+
+
+def sealed(array: NDArray[_T]) -> NDArray[_T]:
+    """A read-only view of an array that only the caller holds; no copy."""
+    array.setflags(write=False)
+    return array[:]
+
+
+def frozen_finite(
+    name: str, value: ArrayLike, shape: tuple[int | None, ...]
+) -> NDArray[np.float64]:
+    """As :func:`finite`, of an own copy: what is checked is what is kept."""
+    return finite(name, frozen(finite(name, value, shape)), shape)
+
+
+def frozen_indices(
+    name: str, value: ArrayLike, shape: tuple[int | None, ...], upper: int
+) -> NDArray[np.int32]:
+    """As :func:`indices`, of an own copy: what is checked is what is kept."""
+    return indices(name, frozen(indices(name, value, shape, upper)), shape, upper)
+
+
+class Rebuilt:
+    """Mixin of frozen dataclasses: a copy or an unpickled value passes the constructor's checks."""
+
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        """The class and its arguments, in their order."""
+        given = tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
+        return type(self), given

@@ -1,0 +1,31 @@
+// Ctrl-C in the calls of a native module.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include "tauguard/geometry/interrupt.hpp"
+
+namespace tauguard::geometry {
+
+// Once in a module. An interrupted call raises what the signal's handler raised.
+inline void bind_interrupts() {
+  InterruptScope::ask = [] {
+    const nanobind::gil_scoped_acquire hold;
+    return PyErr_CheckSignals() != 0;
+  };
+  nanobind::register_exception_translator([](const std::exception_ptr& p, void*) {
+    try {
+      std::rethrow_exception(p);
+    } catch (const Interrupted&) {
+      if (!PyErr_Occurred()) PyErr_SetNone(PyExc_KeyboardInterrupt);
+    }
+  });
+}
+
+// Around a kernel: without the interpreter's lock, and open to Ctrl-C.
+class LongCall {
+  nanobind::gil_scoped_release release_;
+  InterruptScope scope_;
+};
+
+}  // namespace tauguard::geometry

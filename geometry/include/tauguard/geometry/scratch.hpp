@@ -1,0 +1,28 @@
+// Room that a thread keeps between calls. A call that begins while another of the same thread is
+// not over (a signal's handler that calls again) gets room of its own.
+#pragma once
+
+#include <memory>
+
+namespace tauguard::geometry {
+
+template <class T>
+class Scratch {
+ public:
+  Scratch() : own_(spare() ? std::move(spare()) : std::make_unique<T>()) {}
+  ~Scratch() { spare() = std::move(own_); }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+
+  T& operator*() { return *own_; }
+  T* operator->() { return own_.get(); }
+
+ private:
+  static std::unique_ptr<T>& spare() {
+    static thread_local std::unique_ptr<T> kept;
+    return kept;
+  }
+  std::unique_ptr<T> own_;
+};
+
+}  // namespace tauguard::geometry

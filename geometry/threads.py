@@ -1,0 +1,27 @@
+"""The argument ``threads`` of every native kernel."""
+
+from __future__ import annotations
+
+import operator
+import os
+
+#: More threads than this are a mistake in the argument, not a wish.
+MOST_THREADS = 1024
+
+
+def thread_count(threads: int) -> int:
+    """``threads`` with 0 as all processors.
+
+    Raises:
+        ValueError: no integer, negative, or more than 1024.
+    """
+    try:
+        count = operator.index(threads)
+    except TypeError:
+        count = -1
+    if isinstance(threads, bool) or not 0 <= count <= MOST_THREADS:
+        raise ValueError(
+            f"threads: {threads!r:.40}, expected an integer from 0 (all processors) "
+            f"to {MOST_THREADS}"
+        )
+    return count or os.cpu_count() or 1
