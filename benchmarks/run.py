@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from tauguard.benchmarks import STUDIES
@@ -11,9 +11,17 @@ from tauguard.report import Row, machine, table, versions, write_json
 
 
 def run_study(
-    name: str, *, quick: bool, seed: int, json_path: Path | None, figure_path: Path | None
+    name: str,
+    *,
+    quick: bool,
+    seed: int,
+    json_path: Path | None,
+    figure_path: Path | None,
+    more: Mapping[str, str] | None = None,
 ) -> list[Row]:
     """Run the study ``name``: print its table, draw its figure, write its JSON.
+
+    ``more`` holds keywords that this study alone takes.
 
     Raises:
         ValueError: no such study; the message lists those there are.
@@ -21,7 +29,7 @@ def run_study(
     if name not in STUDIES:
         raise ValueError(f"no study {name!r}: there are {', '.join(STUDIES) or 'none yet'}")
     study = importlib.import_module(f"tauguard.benchmarks.{STUDIES[name].module}")
-    rows: list[Row] = study.run(quick=quick, seed=seed)
+    rows: list[Row] = study.run(quick=quick, seed=seed, **(more or {}))
     shown: Callable[[list[Row]], list[Row]] | None = getattr(study, "shown", None)
     print(table(shown(rows) if shown else rows, notes=getattr(study, "NOTES", {})))
 

@@ -6,7 +6,7 @@ from tauguard.lazy import on_demand
 
 if TYPE_CHECKING:
     from tauguard.detectors.calibration.calibrate import Calibration, Priors, calibrate
-    from tauguard.detectors.detector import Detector
+    from tauguard.detectors.detector import Detector, FittedDetector, ScoreStream
     from tauguard.detectors.diagnosis.diagnosis import Diagnoser, Diagnosis, diagnose
     from tauguard.detectors.diagnosis.diagnosis_metrics import diagnosis_figures, judge_diagnoses
     from tauguard.detectors.dynamics.friction import FrictionModel
@@ -22,53 +22,53 @@ if TYPE_CHECKING:
     from tauguard.detectors.estimation.observer import MomentumObserver, observe
     from tauguard.detectors.evaluation.events import Matching, find_alarms, judge, match
     from tauguard.detectors.evaluation.metrics import figures, poisson_rate
-    from tauguard.detectors.methods.pipeline import CollisionDetector, DetectorSettings
+    from tauguard.detectors.methods.srq_svr import PlainSrqSvr, SrqSvr
     from tauguard.detectors.methods.svr_regressor import SrqSVR, srq_kernel
-    from tauguard.detectors.ranking_file import load_model, save_model
+    from tauguard.detectors.model_file import load_model, save_model
     from tauguard.detectors.registry import DETECTORS, make_detector
+    from tauguard.detectors.thresholds.alarm import AlarmStream, CollisionAlarm
     from tauguard.detectors.thresholds.confirmation import Confirmation, confirmed
-    from tauguard.detectors.thresholds.conformal import (
-        EpisodeLevels,
-        Promise,
-        calibrate_threshold,
-        promised,
-    )
-    from tauguard.detectors.thresholds.quiet import QuietDetector, QuietThresholds
-    from tauguard.detectors.thresholds.thresholded import Thresholded
+    from tauguard.detectors.thresholds.free_scores import FreeScores
+    from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
+    from tauguard.detectors.thresholds.law import held_out, train, with_guarantee, with_rate
+    from tauguard.detectors.thresholds.speed_levels import SpeedLevels
     from tauguard.report import rate as wilson
 
 __all__ = [
     "DETECTORS",
+    "AlarmStream",
     "ArmModel",
     "Calibration",
-    "CollisionDetector",
+    "CollisionAlarm",
     "Confirmation",
     "Detector",
-    "DetectorSettings",
     "Diagnoser",
     "Diagnosis",
-    "EpisodeLevels",
     "Estimate",
     "Estimator",
+    "FittedDetector",
+    "FreeScores",
     "FrictionModel",
+    "Guarantee",
     "Matching",
     "MomentumObserver",
+    "PlainSrqSvr",
     "Priors",
-    "Promise",
-    "QuietDetector",
-    "QuietThresholds",
     "RobotNumbers",
+    "ScoreStream",
+    "SpeedLevels",
     "SrqSVR",
-    "Thresholded",
+    "SrqSvr",
     "Unknowns",
     "calibrate",
-    "calibrate_threshold",
     "confirmed",
     "diagnose",
     "diagnosis_figures",
     "figures",
     "find_alarms",
     "gravity_torque",
+    "guaranteed_threshold",
+    "held_out",
     "inverse_dynamics",
     "judge",
     "judge_diagnoses",
@@ -80,10 +80,12 @@ __all__ = [
     "momentum_terms",
     "observe",
     "poisson_rate",
-    "promised",
     "save_model",
     "srq_kernel",
+    "train",
     "wilson",
+    "with_guarantee",
+    "with_rate",
 ]
 
 __getattr__ = on_demand(__name__)

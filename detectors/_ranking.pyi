@@ -17,3 +17,13 @@ def forest(
     out: Array,
     threads: int,
 ) -> None: ...
+def network(
+    x: Array,
+    widths: Ids,
+    weights: Array,
+    biases: Array,
+    centre: Array,
+    scale: Array,
+    out: Array,
+    threads: int,
+) -> None: ...

@@ -1,10 +1,8 @@
-"""The interface that every collision detector shares: fit on traces, then one score a sample.
+"""The protocol of a detection method: fit on traces, then one score a sample, in batch or online.
 
-A detector ranks; what counts as an alarm is decided outside of it, the same way for all: a
-threshold on the score and the confirmation filter
-(:class:`~tauguard.detectors.thresholds.thresholded.Thresholded`), and the threshold from a rate
-(:mod:`~tauguard.detectors.thresholds.rates`) or by calibration on episodes
-(:mod:`~tauguard.detectors.thresholds.conformal`).
+A method ranks samples. What counts as an alarm is decided outside of it, in the same way for all
+methods: :class:`~tauguard.detectors.thresholds.alarm.CollisionAlarm` adds a threshold and a
+confirmation time.
 """
 
 from __future__ import annotations
@@ -22,35 +20,47 @@ Array = NDArray[np.float64]
 
 
 class Detector(Protocol):
-    """What can be trained and asked for scores."""
+    """The settings of a method; it can be trained."""
 
     @property
     def name(self) -> str:
-        """Its name in the table of detectors."""
+        """Its name in reports."""
 
-    @property
-    def settle(self) -> float:
-        """Seconds at the beginning of a trace whose scores mean nothing yet."""
-
-    @property
-    def arm(self) -> ArmModel:
-        """What it believes of the arm after training; ``ValueError`` before."""
-
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> Detector:
+    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedDetector:
         """Learn from traces of one arm at one sample rate.
 
         Args:
-            traces: with truth where collisions are in them; every detector needs collision-free
+            traces: with truth where collisions are in them; every method needs collision-free
                 motion, those that learn a ranking need collisions too.
-            robot: what is believed of the arm before any training: nominal numbers, drive gains
-                and, where known, friction.
-
-        Returns:
-            Itself.
+            arm: the model before training: nominal numbers, drive gains and, where known, friction.
 
         Raises:
-            ValueError: traces that do not fit or miss what this detector needs.
+            ValueError: traces that do not fit or lack what this method needs.
         """
+
+
+class FittedDetector(Protocol):
+    """A trained method: complete and immutable.
+
+    A frozen dataclass of numbers, text, arrays, tuples and other such dataclasses can be written
+    into a model file.
+    """
+
+    @property
+    def name(self) -> str:
+        """The method's name."""
+
+    @property
+    def arm(self) -> ArmModel:
+        """The arm model after training."""
+
+    @property
+    def dt(self) -> float:
+        """Sample interval of the training traces [s]."""
+
+    @property
+    def settle(self) -> float:
+        """Seconds at the beginning of a trace whose scores mean nothing."""
 
     def scores(self, trace: Trace) -> Array:
         """One score a sample, shape (T,): higher is more like a collision.
@@ -58,37 +68,57 @@ class Detector(Protocol):
         Causal: a score depends on this sample and those before it.
 
         Raises:
-            ValueError: not fitted, other joints or another sample rate than the training's.
+            ValueError: other joints or another sample rate than the training's.
+        """
+
+    def stream(self) -> ScoreStream:
+        """The same scores sample by sample, from the next sample on."""
+
+
+class ScoreStream(Protocol):
+    """The scores of one recording as its samples come in."""
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
+        """The score of this sample, equal to that of :meth:`FittedDetector.scores`.
+
+        Args:
+            q: [rad], float64, shape (n,).
+            qd: [rad/s], shape (n,).
+            current: [A], shape (n,).
+            dt: time since the last sample [s] (default: the training's interval).
+
+        Raises:
+            ValueError: wrong shapes or numbers that are not finite.
         """
 
 
-def common_interval(traces: Sequence[Trace], robot: ArmModel) -> float:
+def common_interval(traces: Sequence[Trace], arm: ArmModel) -> float:
     """The sample interval of training traces [s].
 
     Raises:
-        ValueError: no traces, joints that are not the robot's, or rates that differ (named).
+        ValueError: no traces, joints that are not the arm's, or rates that differ (named).
     """
-    check_joints(traces, robot)
+    check_joints(traces, arm)
     dt = float(np.median([trace.dt for trace in traces]))
     for k, trace in enumerate(traces):
         check_interval(f"trace {k}", trace, dt)
     return dt
 
 
-def check_joints(traces: Sequence[Trace], robot: ArmModel) -> None:
-    """Refuse traces that are none, of another arm or of fewer than two samples.
+def check_joints(traces: Sequence[Trace], arm: ArmModel) -> None:
+    """Refuse an empty list, traces of another arm and traces of fewer than two samples.
 
     Raises:
         ValueError: says which.
     """
     if not traces:
         raise ValueError("no traces to train on")
-    joints = robot.robot.joints
+    joints = arm.robot.joints
     for k, trace in enumerate(traces):
         if len(trace.joint_names) != joints:
             raise ValueError(
                 f"trace {k} has {len(trace.joint_names)} joints, the robot {joints}: "
-                f"{', '.join(robot.robot.joint_names)}"
+                f"{', '.join(arm.robot.joint_names)}"
             )
         if len(trace.t) < 2:
             raise ValueError(f"trace {k} has {len(trace.t)} samples: expected 2 or more")
@@ -111,9 +141,14 @@ def check_interval(what: str, trace: Trace, dt: float) -> None:
     Raises:
         ValueError: names ``what`` and both intervals.
     """
-    if len(trace.t) > 1 and not 0.8 < trace.dt / dt < 1.25:
+    if len(trace.t) > 1 and not same_rate(trace.dt, dt):
         raise ValueError(
             f"{what} has a sample every {1e3 * trace.dt:g} ms, this detector works at "
             f"{1e3 * dt:g} ms: resample the recording to that, "
             "or train a detector on recordings of its rate"
         )
+
+
+def same_rate(dt: float, trained: float) -> bool:
+    """Whether two sample intervals are equal to a quarter."""
+    return 0.8 < dt / trained < 1.25

@@ -1,162 +1,188 @@
-"""A detector as a file: arrays and scikit-learn's own types, so that skops distrusts nothing."""
+"""Model files: one container with a kind, a version and what it was made with, written by skops.
+
+The content is dictionaries, arrays, numbers and text only: nothing in a file is code, and a class
+is built only if it is one of ours or of a module that the user has named. A checksum over the
+content refuses damage; numbers are range-checked by the classes that take them.
+"""
 
 from __future__ import annotations
 
+import importlib.metadata
+import json
 import os
 import zipfile
-import zlib
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import skops.io
-from sklearn.svm import SVR
 
-from tauguard.detectors.features.windows import Envelope, Features, WindowShape
-from tauguard.detectors.methods.pipeline import CollisionDetector, DetectorSettings
-from tauguard.detectors.methods.svr_regressor import SrqSVR
-from tauguard.detectors.model_parts import arm_from_parts, arm_parts, plain
+from tauguard.detectors.codec import checksum, decode, encode
+from tauguard.detectors.registry import file_type
+from tauguard.detectors.thresholds.alarm import CollisionAlarm
 
-FORMAT = "tauguard detector 1"
-#: Of :mod:`tauguard.detectors.ranking_file`: any other detector, with its threshold.
-RANKING = "tauguard ranking detector 2"
-#: What another kind of detector is told where samples come one at a time.
-_WHOLE = (
-    "which watches whole recordings only (`tauguard detect`); expected one that takes one sample "
-    "at a time, as environments do: srq-svr, which `tauguard train --traces` writes without "
-    "--levelled"
-)
-#: What a file of another format or version is told.
-ANEW = "train the detector anew by `tauguard train --traces`"
-#: What reading a damaged archive may raise, by where it is damaged.
-_DAMAGE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    KeyError,
-    ValueError,
-    TypeError,
-    AttributeError,
-    EOFError,
-    OSError,
-)
+FORMAT, VERSION = "tauguard model", 1
+#: The kind of file that holds a trained detector with its threshold.
+ALARM = "collision-alarm"
+#: Versions that are written into a file.
+MADE_WITH = ("tauguard", "mujoco", "numpy", "scikit-learn")
+#: Unpacked bytes of a file: no detector is larger.
+LARGEST = 256 * 2**20
+#: What a file of another format or version needs.
+ANEW = "train the detector anew by `tauguard train`"
+#: Formats of earlier versions, which are refused by name.
+EARLIER = ("tauguard detector", "tauguard ranking detector", "tauguard free-motion detector")
+
+#: What builds the value of a file from its content, by kind.
+READERS: dict[str, Callable[[Any], Any]] = {ALARM: lambda content: decode(content, file_type)}
 
 
-def save_detector(detector: CollisionDetector, path: str | os.PathLike[str]) -> None:
-    """Write a fitted detector; whole or not at all.
+def save_model(alarm: CollisionAlarm, path: str | os.PathLike[str]) -> None:
+    """Write a fitted detector with its threshold; the whole file or nothing.
 
     Raises:
-        ValueError: it is not fitted, or the folder cannot be written.
+        ValueError: a threshold that is not finite, a detector that holds something else than
+            numbers, text, arrays and dataclasses of these, or a folder that cannot be written.
     """
-    write_archive(path, detector_parts(detector))
+    if not np.isfinite(alarm.threshold):
+        raise ValueError(f"threshold {alarm.threshold}: expected a finite one in a model file")
+    write_model(path, ALARM, alarm)
 
 
-def detector_parts(detector: CollisionDetector) -> dict[str, Any]:
-    """A fitted detector as a dictionary of arrays, plain values and an SVR."""
-    arm, features, regressor = detector._fitted()
-    return {
+def load_model(path: str | os.PathLike[str]) -> CollisionAlarm:
+    """Read what :func:`save_model` wrote.
+
+    Raises:
+        ValueError: missing, damaged or of another kind or version (the message says what would
+            do), or a detector that gives no finite score for an arm at rest.
+    """
+    alarm = read_model(path, ALARM)
+    if not isinstance(alarm, CollisionAlarm):
+        raise ValueError(f"{path}: holds a {type(alarm).__name__}, not a detector; {ANEW}")
+    try:
+        rest = np.zeros(alarm.detector.arm.robot.joints)
+        stream = alarm.stream()
+        finite = all(np.isfinite((stream.step(rest, rest, rest), stream.score)[1]) for _ in "12")
+    except (ValueError, TypeError, AttributeError, IndexError) as error:
+        raise ValueError(f"{path}: a detector that gives no score ({error})") from None
+    if not finite:
+        raise ValueError(f"{path}: a detector whose score at rest is not a number; {ANEW}")
+    return alarm
+
+
+def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
+    """Write ``value`` (see :func:`tauguard.detectors.codec.encode`); the whole file or nothing.
+
+    Raises:
+        ValueError: it cannot be in a file, or the folder cannot be written.
+    """
+    content = encode(value)
+    container = {
         "format": FORMAT,
-        "settings": asdict(detector.settings),
-        "threshold": float(detector.threshold),
-        "dt": float(detector.dt),
-        **arm_parts(arm),
-        "features": plain(features)
-        | {
-            "shape": plain(features.shape),
-            "envelope": features.envelope.weights if features.envelope else None,
-        },
-        "svr": regressor.svr_,
-        "vectors": regressor.support_vectors_,
+        "version": VERSION,
+        "kind": kind,
+        "made_with": {name: importlib.metadata.version(name) for name in MADE_WITH},
+        "checksum": checksum(content),
+        "content": content,
     }
-
-
-def write_archive(path: str | os.PathLike[str], content: dict[str, Any]) -> None:
-    """Write ``content`` by skops; whole or not at all.
-
-    Raises:
-        ValueError: the folder cannot be written.
-    """
     target = Path(path)
     part = target.with_name(target.name + ".part")
     try:
         with open(part, "wb") as file:
-            file.write(skops.io.dumps(content))
+            file.write(skops.io.dumps(container))
         os.replace(part, target)
     except OSError as error:
         part.unlink(missing_ok=True)
         raise ValueError(f"{target}: cannot be written ({error.strerror})") from None
 
 
-def read_archive(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What :func:`write_archive` wrote, its ``format`` not looked at.
+def read_model(path: str | os.PathLike[str], kind: str) -> Any:
+    """The value of a file of this kind.
 
     Raises:
-        ValueError: missing, truncated or no dictionary, or holding types that a detector does not
-            need (nothing of them is built).
+        ValueError: missing, damaged, of another kind, format or version, or with content that the
+            kind's classes refuse; one line that names the file.
     """
-    target = Path(path)
+    container = _container(Path(path))
+    version, own = container.get("version"), container.get("kind")
+    if version != VERSION:
+        raise ValueError(f"{path}: version {version} of the format, expected {VERSION}; {ANEW}")
+    if own != kind or own not in READERS:
+        raise ValueError(f"{path}: a file of the kind {own!r}, expected {kind!r}")
+    content = container.get("content")
     try:
-        data = target.read_bytes()
+        if checksum(content) != container.get("checksum"):
+            raise ValueError("its content does not fit its checksum: it was damaged or changed")
+        return READERS[kind](content)
+    except (ValueError, TypeError, KeyError, AttributeError, IndexError, RecursionError) as error:
+        raise ValueError(f"{path}: {_line(error)}") from None
+
+
+def _container(path: Path) -> Mapping[str, Any]:
+    """The outer dictionary of a file of ours."""
+    try:
+        data = path.read_bytes()
     except OSError as error:
-        raise ValueError(f"{target}: cannot be read ({error.strerror})") from None
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
     try:
+        _bounded(path)
         strangers = skops.io.get_untrusted_types(data=data)
-        content = None if strangers else skops.io.loads(data, trusted=[])
-    except _DAMAGE as error:
-        raise ValueError(
-            f"{target}: not a detector file, or a damaged one ({type(error).__name__})"
-        ) from None
+        found = None if strangers else skops.io.loads(data, trusted=[])
+    except Exception as error:  # whatever a damaged archive makes the readers of its parts raise
+        earlier = _json_format(data)
+        if earlier:
+            raise ValueError(f"{path}: of the earlier format {earlier!r}; {ANEW}") from None
+        raise ValueError(f"{path}: not a model file, or a damaged one ({_line(error)})") from None
     if strangers:
-        raise ValueError(f"{target}: holds types not to be trusted: {', '.join(strangers)}")
-    if not isinstance(content, dict):
-        raise ValueError(f"{target}: not a detector file of this version ({FORMAT!r}); {ANEW}")
-    return content
+        raise ValueError(f"{path}: holds types that no detector needs: {', '.join(strangers)}")
+    name = found.get("format") if isinstance(found, dict) else None
+    if isinstance(name, str) and name.startswith(EARLIER):
+        raise ValueError(f"{path}: of the earlier format {name!r}; {ANEW}")
+    if not isinstance(found, dict) or name != FORMAT:
+        raise ValueError(f"{path}: not a model file of tauguard; {ANEW}")
+    return found
 
 
-def load_detector(path: str | os.PathLike[str]) -> CollisionDetector:
-    """Read what :func:`save_detector` wrote.
+def _bounded(path: Path) -> None:
+    """Refuse an archive that unpacks to more than :data:`LARGEST`, and arrays larger than theirs.
 
     Raises:
-        ValueError: missing, truncated or of another kind (the message says which would do), or
-            holding types that a detector does not need (nothing of them is built).
+        ValueError: says which.
     """
-    from tauguard.detectors.methods.free_motion_file import is_free_motion
+    with zipfile.ZipFile(path) as archive:
+        total = sum(member.file_size for member in archive.infolist())
+        if total > LARGEST:
+            raise ValueError(f"unpacks to {total / 2**20:.0f} MB, expected {LARGEST >> 20} at most")
+        for member in archive.infolist():
+            if member.filename.endswith(".npy"):
+                with archive.open(member) as file:
+                    _check_array(file, member.file_size)
 
-    if is_free_motion(path):
-        raise ValueError(f"{path}: a real arm's detector (train --free), {_WHOLE}")
-    content = read_archive(path)
-    if content.get("format") == RANKING:
-        levelled = "levelled " if content.get("levels") else ""
-        raise ValueError(f"{path}: a {levelled}{content.get('detector')}, {_WHOLE}")
-    if content.get("format") != FORMAT:
-        raise ValueError(f"{path}: not a detector file of this version ({FORMAT!r}); {ANEW}")
+
+def _check_array(file: Any, size: int) -> None:
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0
+    if version != (1, 0):
+        read = np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    count = 1
+    for length in shape:
+        count *= int(length)
+    if dtype.hasobject or count * dtype.itemsize > size:
+        raise ValueError(f"an array that declares a shape of {shape} in {size} bytes")
+
+
+def _json_format(data: bytes) -> str:
+    """The format that a JSON file of an earlier version names, else nothing."""
     try:
-        return rebuilt(content)
-    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
-        raise ValueError(f"{path}: a detector file with a part missing ({error})") from None
+        found = json.loads(data)
+    except (ValueError, RecursionError):
+        return ""
+    name = found.get("format") if isinstance(found, dict) else None
+    return name if isinstance(name, str) and name.startswith(EARLIER) else ""
 
 
-def rebuilt(content: dict[str, Any]) -> CollisionDetector:
-    """The detector again from :func:`detector_parts`."""
-    settings = content["settings"]
-    for name in ("joints", "reference"):
-        settings[name] = tuple(settings[name])
-    detector = CollisionDetector(DetectorSettings(**settings))
-    detector.arm = arm_from_parts(content)
-    parts = content["features"]
-    envelope = parts["envelope"]
-    detector.features = Features(
-        tuple(int(j) for j in parts["joints"]),
-        WindowShape(**parts["shape"]),
-        None if envelope is None else Envelope(np.asarray(envelope)),
-        float(parts["factor"]),
-        float(parts["units"]),
-        bool(parts["compress"]),
-        tuple(parts["notes"]),
-    )
-    svr, vectors = content["svr"], np.asarray(content["vectors"], dtype=np.float64)
-    if not isinstance(svr, SVR) or vectors.shape != (len(svr.support_), detector.features.size):
-        raise KeyError("regressor")
-    detector.regressor = SrqSVR.restored(svr, vectors, detector.settings.sigma)
-    detector.threshold, detector.dt = float(content["threshold"]), float(content["dt"])
-    return detector
+def _line(error: Exception) -> str:
+    text = str(error).splitlines()
+    return f"{type(error).__name__}: {text[0][:200]}" if text else type(error).__name__

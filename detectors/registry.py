@@ -1,24 +1,48 @@
-"""The table of detectors: a name, and what makes an unfitted one with its defaults."""
+"""The registry of detection methods: a name, and what makes its settings with their defaults."""
 
 from __future__ import annotations
 
 import difflib
+import importlib
 from collections.abc import Callable
+from typing import Any
 
 from tauguard.detectors.detector import Detector
+from tauguard.detectors.dynamics.friction import FrictionModel
+from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.estimation.velocity import SensorNoise
+from tauguard.detectors.features.envelope import Envelope
+from tauguard.detectors.features.front_end import FrontEnd
+from tauguard.detectors.features.scaling import Scaling
+from tauguard.detectors.features.windows import WindowShape
 from tauguard.detectors.methods.boosting import Boosting
-from tauguard.detectors.methods.current_network import CurrentNetwork
-from tauguard.detectors.methods.current_threshold import CurrentThreshold
-from tauguard.detectors.methods.cusum import Cusum
+from tauguard.detectors.methods.current_network import (
+    CurrentNetwork,
+    FittedCurrentNetwork,
+    Inputs,
+)
+from tauguard.detectors.methods.current_threshold import CurrentThreshold, FittedCurrentThreshold
+from tauguard.detectors.methods.cusum import Cusum, FittedCusum
+from tauguard.detectors.methods.forest import Forest
+from tauguard.detectors.methods.kernel_machine import KernelMachine
+from tauguard.detectors.methods.network import Network
 from tauguard.detectors.methods.one_class import OneClass
-from tauguard.detectors.methods.residual_thresholds import MovingThresholds, ResidualThresholds
-from tauguard.detectors.methods.srq_svr import SvrDetector
-from tauguard.detectors.methods.window_network import WindowNetwork
+from tauguard.detectors.methods.residual_thresholds import (
+    FittedThresholds,
+    MovingThresholds,
+    ResidualThresholds,
+)
+from tauguard.detectors.methods.srq_svr import PlainSrqSvr, SrqSvr
+from tauguard.detectors.methods.window_network import OneOutput, WindowNetwork
+from tauguard.detectors.methods.windowed import FittedWindowed
+from tauguard.detectors.thresholds.alarm import CollisionAlarm
+from tauguard.detectors.thresholds.speed_levels import SpeedLevels
 
-#: Every detector, in the order that reports show them.
+#: Every method, in the order that reports show them.
 DETECTORS: dict[str, Callable[[], Detector]] = {
-    "srq-svr": SvrDetector,
-    "srq-svr-plain": SvrDetector.plain,
+    "srq-svr": SrqSvr,
+    "srq-svr-plain": PlainSrqSvr,
     "current-network": CurrentNetwork,
     "current-network-static": CurrentNetwork.static,
     "current-threshold": CurrentThreshold,
@@ -30,15 +54,100 @@ DETECTORS: dict[str, Callable[[], Detector]] = {
     "boosting": Boosting,
 }
 
+#: Classes that a model file may hold, by their names there.
+FILE_TYPES: dict[str, type] = {
+    kind.__qualname__: kind
+    for kind in (
+        ArmModel,
+        CollisionAlarm,
+        Envelope,
+        FittedCurrentNetwork,
+        FittedCurrentThreshold,
+        FittedCusum,
+        FittedThresholds,
+        FittedWindowed,
+        Forest,
+        FrictionModel,
+        FrontEnd,
+        Inputs,
+        KernelMachine,
+        Network,
+        OneOutput,
+        RobotNumbers,
+        Scaling,
+        SensorNoise,
+        SpeedLevels,
+        WindowShape,
+    )
+}
+
+#: Modules of others that the user has named in this process.
+_NAMED: set[str] = set()
+
 
 def make_detector(name: str) -> Detector:
-    """An unfitted detector by its name.
+    """The settings of a method by its name, or of another's class as ``module:Class``.
+
+    A module that is named here may also be loaded from model files.
 
     Raises:
-        ValueError: no such name; the message lists those there are.
+        ValueError: no such name or class; the message lists the names that there are.
     """
+    if ":" in name:
+        return _of_another(name)
     if name not in DETECTORS:
         near = difflib.get_close_matches(name, DETECTORS, n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise ValueError(f"no detector {name!r}: {hint}there are {', '.join(DETECTORS)}")
+        raise ValueError(
+            f"no detector {name!r}: {hint}there are {', '.join(DETECTORS)}, and module:Class"
+        )
     return DETECTORS[name]()
+
+
+def _of_another(name: str) -> Detector:
+    module, _, attribute = name.partition(":")
+    admit(module)
+    try:
+        made: Any = getattr(importlib.import_module(module), attribute)()
+    except AttributeError:
+        raise ValueError(f"detector {name!r}: {module} has no {attribute}") from None
+    if not (callable(getattr(made, "fit", None)) and isinstance(getattr(made, "name", None), str)):
+        raise ValueError(f"detector {name!r}: expected a class with `name` and `fit(traces, arm)`")
+    found: Detector = made
+    return found
+
+
+def admit(module: str) -> None:
+    """Allow model files to build classes of a module of others.
+
+    Raises:
+        ValueError: it cannot be imported.
+    """
+    try:
+        importlib.import_module(module)
+    except ImportError as error:
+        raise ValueError(
+            f"detector of {module!r}: it cannot be imported ({error}); install it, or name its "
+            "folder in PYTHONPATH"
+        ) from None
+    _NAMED.add(module)
+
+
+def file_type(name: str) -> type:
+    """The class that a model file calls ``name``.
+
+    Raises:
+        ValueError: not one of ours, nor of a module that was named in this process.
+    """
+    if name in FILE_TYPES:
+        return FILE_TYPES[name]
+    module, _, own = name.partition(":")
+    if module not in _NAMED:
+        raise ValueError(
+            f"holds a {name}, which is not of tauguard: name its module by --detector "
+            f"{module}:CLASS, or call tauguard.detectors.registry.admit({module!r}) first"
+        )
+    kind = getattr(importlib.import_module(module), own, None)
+    if not isinstance(kind, type):
+        raise ValueError(f"holds a {name}, which {module} does not have")
+    return kind

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tauguard.envs import _plant
 from tauguard.envs.actions import Entry, action_scale, action_table, observation_table
 from tauguard.envs.plant import make_plant
-from tauguard.envs.sensing import Sensing, make_detector
+from tauguard.envs.sensing import Sensing, listening
 from tauguard.envs.settings import CONTROLS
 from tauguard.envs.watching import Watching
 from tauguard.envs.world import RegionInfo, World
@@ -82,12 +82,9 @@ class Cell:
 
     def attach(self, detector: object) -> None:
         """Put a detector into every copy's loop; ``None`` takes it out."""
-        needed = detector is not None or self.world.settings.noise
-        self.sensing = (
-            [Sensing(self.world, make_detector(self.world, detector)) for _ in range(self.rows)]
-            if needed
-            else None
-        )
+        make = listening(self.world, detector)
+        needed = make is not None or self.world.settings.noise
+        self.sensing = [Sensing(self.world, make) for _ in range(self.rows)] if needed else None
         self.residual[:], self.alarm[:] = 0.0, False
 
     def place(self, i: int, q: Array) -> None:

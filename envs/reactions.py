@@ -92,11 +92,11 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         self._forget()
 
     def _dead_zone(self) -> Array:
-        """What the residual may be without contact [N m]: the detector's thresholds, if it says."""
-        sensing, n = self._arm.cell.sensing, len(self._deceleration)
-        detector = sensing[0].detector if sensing and self.trigger == "alarm" else None
-        threshold = np.asarray(getattr(detector, "threshold", 0.0), dtype=float)
-        return threshold if threshold.shape == (n,) else np.zeros(n)
+        """What the residual may be without contact [N m]; nothing where it is the truth."""
+        sensing = self._arm.cell.sensing
+        if not sensing or self.trigger != "alarm":
+            return np.zeros(len(self._deceleration))
+        return sensing[0].bounds
 
     def _forget(self) -> None:
         self._since: float | None = None

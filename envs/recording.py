@@ -103,7 +103,7 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
             detector = self._arm.cell.sensing[0].detector
             alarm, residual = np.concatenate(rows.alarm), np.concatenate(rows.residual)
             detection = Detection(
-                detector=str(getattr(detector, "name", type(detector).__name__)),
+                detector=detector.name,
                 t=trace.t,
                 residual=residual,
                 score=alarm.astype(float),

@@ -2,52 +2,68 @@
 
 from __future__ import annotations
 
-import copy
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors import CollisionDetector, MomentumObserver, RobotNumbers
+from tauguard.detectors import (
+    CollisionAlarm,
+    Estimator,
+    MomentumObserver,
+    RobotNumbers,
+    Unknowns,
+)
+from tauguard.detectors.detector import same_rate
+from tauguard.detectors.estimation.observer import PLAIN_GAIN
 from tauguard.envs.actions import observation_table
 from tauguard.envs.settings import DETECTORS
 from tauguard.envs.world import World
 from tauguard.models import Drive, cura6_drive, pin_model
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 #: The plain detector's thresholds: times the breakaway friction, plus a share of the torque limit.
 FRICTION_SHARE, TORQUE_SHARE = 1.5, 0.03
 #: An arm without torque limits gets this threshold [N m].
 PLAIN_THRESHOLD = 5.0
+#: A trained detector's residual may be so many standard deviations without contact.
+SIGMAS = 3.0
 #: Slope of the nominal friction around standstill [rad/s].
 STANDSTILL = 0.05
 
 
-class Detector(Protocol):
-    """What an environment asks of a detector.
+class Listener(Protocol):
+    """A detector in one copy of an environment; it begins anew when it is made."""
 
-    One that also has ``steps(q, qd, current)`` for samples of shape (T, n), which returns residuals
-    (T, n) and alarms (T,), is called once an action; ``settings.settle`` [s] is how long it is
-    silent after a reset.
-    """
+    @property
+    def name(self) -> str:
+        """The detector's name."""
 
-    def step(self, q: Array, qd: Array, current: Array) -> bool:
-        """Judge one sample, arrays of shape (n,): whether the alarm is up."""
-        ...
+    @property
+    def settle(self) -> float:
+        """Seconds after a reset without an alarm."""
 
-    def reset(self) -> None:
-        """Begin anew."""
-        ...
+    @property
+    def bounds(self) -> Array:
+        """What the residual may be without contact [N m], shape (n,)."""
+
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
+        """Samples of shape (T, n) in turn: residuals (T, n) [N m] and alarms (T,)."""
 
 
-class ObserverDetector:
+class ObserverListener:
     """The momentum observer with fixed thresholds: nothing is trained, so any arm can have it.
 
     Friction is compensated by its nominal Coulomb and viscous part; what static friction may hide
     decides the threshold. A trained detector is several times as sensitive.
     """
+
+    name, settle = "observer", 0.0
 
     def __init__(self, robot: RobotNumbers, drive: Drive, dt: float, gain: float = 50.0) -> None:
         """Take the nominal numbers.
@@ -58,26 +74,15 @@ class ObserverDetector:
             dt: of the samples [s].
             gain: of the observer [1/s].
         """
-        self._observer = MomentumObserver(robot, gain, dt)
-        self._robot, self._gain, self._dt, self._drive = robot, gain, dt, drive
+        self._observer, self._drive = MomentumObserver(robot, gain, dt), drive
         limit = np.where(np.isfinite(drive.torque_limit), drive.torque_limit, np.nan)
         share = TORQUE_SHARE * limit
         if drive.friction is not None:
             share = share + FRICTION_SHARE * drive.friction.static
-        self.threshold = np.where(np.isfinite(share), share, PLAIN_THRESHOLD)
-        self.residual = np.zeros(robot.joints)
+        self.bounds: Array = np.where(np.isfinite(share), share, PLAIN_THRESHOLD)
 
-    def reset(self) -> None:
-        """Begin anew."""
-        self._observer = MomentumObserver(self._robot, self._gain, self._dt)
-        self.residual = np.zeros(self._robot.joints)
-
-    def step(self, q: Array, qd: Array, current: Array) -> bool:
-        """Judge one sample: whether a residual exceeds its threshold."""
-        return bool(self.steps(q[None], qd[None], current[None])[1][0])
-
-    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Judge samples of shape (T, n) in turn: residuals [N m], and alarms of shape (T,)."""
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
+        """An alarm is up where a residual exceeds its bound."""
         tau = self._drive.gain * current
         friction = self._drive.friction
         if friction is not None:
@@ -85,34 +90,53 @@ class ObserverDetector:
         residuals, step = np.empty_like(q), self._observer.step
         for row in range(len(q)):
             step(q[row], qd[row], tau[row], out=residuals[row])
-        self.residual = residuals[-1]
-        alarms: NDArray[np.bool_] = np.any(np.abs(residuals) > self.threshold, axis=1)
+        return residuals, np.any(np.abs(residuals) > self.bounds, axis=1)
+
+
+class AlarmListener:
+    """A trained detector with its threshold; the residual is the plain observer's."""
+
+    def __init__(self, alarm: CollisionAlarm) -> None:
+        """Begin anew."""
+        arm = alarm.detector.arm
+        self.name, self.settle = alarm.detector.name, alarm.settle
+        self.bounds: Array = SIGMAS * np.asarray(arm.noise)
+        self._stream = alarm.stream()
+        self._observer = Estimator(arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none())
+
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
+        """See :class:`Listener`."""
+        residuals, alarms = np.empty_like(q), np.zeros(len(q), dtype=np.bool_)
+        spare = np.empty((2, q.shape[1]))
+        for row in range(len(q)):
+            sample = (q[row], qd[row], current[row])
+            alarms[row] = self._stream.step(*sample)
+            self._observer.step(*sample, (residuals[row], *spare))
         return residuals, alarms
 
 
-class _PerArm:
-    """One detector an arm, for scenes with several; joints of the arms follow one another."""
+class PerArm:
+    """One listener an arm, for scenes with several; joints of the arms follow one another."""
 
-    def __init__(self, parts: list[Any]) -> None:
-        self.parts = parts
+    def __init__(self, parts: Sequence[Listener]) -> None:
+        """Take one of each arm, in order."""
+        self._parts = parts
+        self.name, self.settle = parts[0].name, max(part.settle for part in parts)
+        self.bounds: Array = np.concatenate([part.bounds for part in parts])
 
-    @property
-    def residual(self) -> Array:
-        return np.concatenate([part.residual for part in self.parts])
-
-    def reset(self) -> None:
-        for part in self.parts:
-            part.reset()
-
-    def step(self, q: Array, qd: Array, current: Array) -> bool:
-        n = len(q) // len(self.parts)
-        cuts = [slice(k * n, (k + 1) * n) for k in range(len(self.parts))]
-        found = [p.step(q[c], qd[c], current[c]) for p, c in zip(self.parts, cuts, strict=True)]
-        return any(found)
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
+        """See :class:`Listener`."""
+        n = q.shape[1] // len(self._parts)
+        found = [
+            part.steps(*(np.ascontiguousarray(x[:, k * n : k * n + n]) for x in (q, qd, current)))
+            for k, part in enumerate(self._parts)
+        ]
+        residuals, alarms = zip(*found, strict=True)
+        return np.concatenate(residuals, axis=1), np.any(alarms, axis=0)
 
 
-def make_detector(world: World, wanted: object) -> Detector | None:
-    """A fresh detector for one copy of ``world``: by name, from a model file, or a copy of one.
+def listening(world: World, wanted: object) -> Callable[[], Listener] | None:
+    """What makes a detector for each copy of ``world``: by name, of a model file, or trained.
 
     Raises:
         ValueError: nothing that can detect, or a model file of another arm.
@@ -120,29 +144,39 @@ def make_detector(world: World, wanted: object) -> Detector | None:
     if wanted is None:
         return None
     if isinstance(wanted, str) and wanted in DETECTORS:
-        parts = [ObserverDetector(*part, world.settings.timestep) for part in _arms(world)]
-        return parts[0] if len(parts) == 1 else _PerArm(parts)
+        dt, arms = world.settings.timestep, _arms(world)
+
+        def observers() -> Listener:
+            parts = [ObserverListener(*arm, dt) for arm in arms]
+            return parts[0] if len(parts) == 1 else PerArm(parts)
+
+        return observers
     if isinstance(wanted, str):
         try:
-            wanted = CollisionDetector.load(wanted)
+            wanted = CollisionAlarm.load(wanted)
         except ValueError as error:
             raise ValueError(f"detector {error}") from None
-    if not (hasattr(wanted, "step") and hasattr(wanted, "reset")):
+    if not isinstance(wanted, CollisionAlarm):
         raise ValueError(
-            f"detector: {type(wanted).__name__} has no step and reset; expected "
-            f"{', '.join(DETECTORS)}, the path of a trained srq-svr detector, or an object with "
-            "step(q, qd, current) and reset()"
+            f"detector: a {type(wanted).__name__}; expected {', '.join(DETECTORS)}, the path of a "
+            "trained detector, or a tauguard.detectors.CollisionAlarm"
         )
-    if isinstance(wanted, CollisionDetector):
-        joints = wanted.arm.robot.joints if wanted.arm else 0
-        if joints != len(world.scene.joint_names):
-            raise ValueError(
-                f"detector: trained on {joints} joints, the scene has "
-                f"{len(world.scene.joint_names)}; train one on this arm"
-            )
-        wanted.reset()
-    fresh: Detector = copy.deepcopy(wanted)
-    return fresh
+    return partial(AlarmListener, _fitting(world, wanted))
+
+
+def _fitting(world: World, alarm: CollisionAlarm) -> CollisionAlarm:
+    """The alarm, if it is of an arm and a sample rate like the world's."""
+    joints, own = alarm.detector.arm.robot.joints, len(world.scene.joint_names)
+    if joints != own:
+        raise ValueError(
+            f"detector: trained on {joints} joints, the scene has {own}; train one on this arm"
+        )
+    if not same_rate(world.settings.timestep, alarm.detector.dt):
+        raise ValueError(
+            f"detector: works at {1e3 * alarm.detector.dt:g} ms a sample, the scene's time step is "
+            f"{1e3 * world.settings.timestep:g} ms; train one at this rate"
+        )
+    return alarm
 
 
 def _arms(world: World) -> list[tuple[RobotNumbers, Drive]]:
@@ -163,13 +197,12 @@ class Sensing:
         alarms: shape (substeps,).
     """
 
-    def __init__(self, world: World, detector: Detector | None) -> None:
-        """Keep the parts."""
+    def __init__(self, world: World, make: Callable[[], Listener] | None) -> None:
+        """Keep the parts; ``make`` gives a fresh detector, ``None``: there is none."""
         self._sensors = world.scene.drive.sensors
         self._gain = world.nominal.gain
-        self.detector = detector
-        #: The detector is silent for this long after a reset [s], as a trained one is.
-        self.settle = float(getattr(getattr(detector, "settings", None), "settle", 0.0))
+        self._make = make
+        self.detector = make() if make else None
         table = observation_table(world)
         self._low = np.array([entry.low for entry in table])
         self._high = np.array([entry.high for entry in table])
@@ -181,8 +214,17 @@ class Sensing:
 
     def reset(self) -> None:
         """A new episode."""
-        if self.detector is not None:
-            self.detector.reset()
+        self.detector = self._make() if self._make else None
+
+    @property
+    def settle(self) -> float:
+        """The detector is silent for this long after a reset [s]."""
+        return self.detector.settle if self.detector else 0.0
+
+    @property
+    def bounds(self) -> Array:
+        """What the residual may be without contact [N m], shape (n,)."""
+        return self.detector.bounds if self.detector else self._none
 
     def measure(
         self, rng: np.random.Generator, q: Array, qd: Array, current: Array
@@ -199,13 +241,7 @@ class Sensing:
         """Residual at the last sample [N m], and whether the alarm was up at any."""
         if self.detector is None:
             return self._none, False
-        steps = getattr(self.detector, "steps", None)
-        if steps is not None:  # all samples of the action in one call
-            self.residuals[:], self.alarms[:] = steps(q, qd, current)
-            return self.residuals[-1], bool(self.alarms.any())
-        for row in range(len(q)):
-            self.alarms[row] = self.detector.step(q[row], qd[row], current[row])
-            self.residuals[row] = getattr(self.detector, "residual", self._none)
+        self.residuals[:], self.alarms[:] = self.detector.steps(q, qd, current)
         return self.residuals[-1], bool(self.alarms.any())
 
     def show(self, observation: Array, q: Array, qd: Array, current: Array) -> None:

@@ -34,7 +34,7 @@ class Settings:
     obstacles: tuple[str | BodyProxy, ...] = ()  #: body regions, or proxies placed by hand
     table: Table | None = None  #: a board that the arm can touch
     cloth: Cloth | None = None  #: a hanging cloth
-    detector: Any = None  #: one of :data:`DETECTORS`, a model file, or an object with ``step``
+    detector: Any = None  #: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``
     checkers: tuple[str, ...] = ()  #: contact checkers that watch every physics step
     labels: bool = True  #: contact sensors: without them force, cost and tau_ext stay 0
     noise: bool = False  #: observe measured instead of true positions, velocities and currents
@@ -75,7 +75,7 @@ class Settings:
         if named and not os.path.isfile(self.detector):
             raise ValueError(
                 f"detector {self.detector!r}: no such model file; expected "
-                f"{', '.join(DETECTORS)}, the path of a trained srq-svr, or None"
+                f"{', '.join(DETECTORS)}, the path of a trained detector, or None"
             )
 
     @property

@@ -17,8 +17,8 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tauguard.detectors.detector import Detector
-    from tauguard.detectors.thresholds.conformal import EpisodeLevels
+    from tauguard.detectors import FittedDetector
+    from tauguard.detectors.thresholds.free_scores import FreeScores
     from tauguard.envs import Episode
     from tauguard.models import Mismatch
 
@@ -68,19 +68,18 @@ def episodes(seed: int, count: int, seconds: float, arm: Mismatch) -> Iterator[E
         )
 
 
-def levels_of(job: tuple[Sequence[Detector], Episode]) -> list[EpisodeLevels]:
+def levels_of(job: tuple[Sequence[FittedDetector], Episode]) -> list[FreeScores]:
     """The levels of every detector on one episode; its trace is not kept."""
-    from tauguard.detectors import Thresholded
-    from tauguard.detectors.thresholds.conformal import EpisodeLevels
+    from tauguard.detectors import CollisionAlarm, FreeScores
     from tauguard.envs import simulate
 
     detectors, episode = job
     trace = simulate(episode)
-    return [EpisodeLevels.of(Thresholded(d, float("inf")), trace) for d in detectors]
+    return [FreeScores.of(CollisionAlarm(d, float("inf")), trace) for d in detectors]
 
 
 def promise_rows(
-    detectors: Sequence[Detector],
+    detectors: Sequence[FittedDetector],
     arm: Mismatch,
     plan: Plan,
     seed: int,
@@ -113,16 +112,16 @@ def promise_rows(
     ]
 
 
-def _row(name: str, levels: Sequence[EpisodeLevels], asked: float, plan: Plan, seed: int) -> Row:
+def _row(name: str, levels: Sequence[FreeScores], asked: float, plan: Plan, seed: int) -> Row:
     from tauguard.detectors import poisson_rate
-    from tauguard.detectors.thresholds.conformal import calibrate_threshold
+    from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
 
     rng = np.random.default_rng([seed, 8])
     outcomes = []
     for draw in range(1 + plan.draws):
         order = np.arange(len(levels)) if draw == 0 else rng.permutation(len(levels))
         picked = [levels[i] for i in order]
-        promise = calibrate_threshold(picked[: plan.calibration], asked, plan.confidence)
+        promise = guaranteed_threshold(picked[: plan.calibration], asked, plan.confidence)
         fresh = picked[plan.calibration :]
         alarms = sum(episode.alarms(promise.threshold) for episode in fresh)
         counted = poisson_rate(alarms, sum(episode.seconds for episode in fresh) / 3600)
@@ -147,7 +146,7 @@ def _row(name: str, levels: Sequence[EpisodeLevels], asked: float, plan: Plan, s
     }
 
 
-def trained(names: Sequence[str], arm: Mismatch, seed: int, *, quick: bool) -> list[Detector]:
+def trained(names: Sequence[str], arm: Mismatch, seed: int, *, quick: bool) -> list[FittedDetector]:
     """Detectors by name, fitted on simulated motion of ``arm`` with and without collisions."""
     from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
     from tauguard.detectors import ArmModel, RobotNumbers, make_detector

@@ -26,13 +26,11 @@ from tauguard.benchmarks.detection.diagnosis_pool import (
 from tauguard.benchmarks.detection.fleet import CALIBRATE, TEST, Training, nominal, stream
 from tauguard.benchmarks.detection.pool import SPEEDS, free_pool
 from tauguard.benchmarks.harness import measure
-from tauguard.detectors import Diagnoser, Diagnosis, Thresholded, make_detector
+from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
 from tauguard.detectors.diagnosis.aftermath import Aftermath, AftermathOf
 from tauguard.detectors.diagnosis.classification import KINDS
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
-from tauguard.detectors.diagnosis.diagnosis import believed
 from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors, contact_at
-from tauguard.detectors.thresholds.rates import threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.models import LinkSurface, cura6, link_surface
 from tauguard.report import Row, rate
@@ -137,26 +135,21 @@ def run(quick: bool, seed: int) -> list[Row]:
     return [*rows, cost_row(sample, watchers[sample.arm], surface)]
 
 
-def watcher(seed: int, arm: int, size: Size) -> Thresholded:
+def watcher(seed: int, arm: int, size: Size) -> CollisionAlarm:
     """The detector of one arm, trained and thresholded on motion of its own."""
     detector = make_detector(DETECTOR).fit(size.training.traces(seed, arm), nominal())
-    open_ended = Thresholded(detector, np.inf)
-    levels, dt = [], 1e-3
-    for speed in size.speeds:
-        hours = size.calibration_hours / len(size.speeds)
-        for _, episode in free_pool(stream(seed, CALIBRATE, 5), speed, (arm,), hours):
-            levels.append(open_ended.levels(simulate(episode)))
-    return Thresholded(detector, threshold_for_rate(levels, dt, PER_HOUR))
+    hours = size.calibration_hours / len(size.speeds)
+    pools = (free_pool(stream(seed, CALIBRATE, 5), s, (arm,), hours) for s in size.speeds)
+    return with_rate(detector, [simulate(e) for pool in pools for _, e in pool], PER_HOUR)
 
 
-def judge(event: Event, watching: Thresholded, surface: LinkSurface) -> Judged:
+def judge(event: Event, watching: CollisionAlarm, surface: LinkSurface) -> Judged:
     """All methods' answers to one event."""
     known = (event.kind, event.speed, event.collision, event.mass)
     if event.alarm is None:
         return Judged(*known, None, {}, {})
-    arm, envelope = believed(watching)
-    diagnoser = Diagnoser(arm, surface, envelope)
-    after = AftermathOf(arm, envelope, event.trace).at(event.alarm.start)
+    diagnoser = Diagnoser.of(watching.detector.arm, surface)
+    after = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace).at(event.alarm.start)
     found = diagnoser.explain(event.alarm, after)
     if event.collision is None:
         return Judged(*known, found, {}, {})
@@ -292,13 +285,12 @@ def payload_rows(judged: Sequence[Judged]) -> list[Row]:
     return rows
 
 
-def cost_row(event: Event, watching: Thresholded, surface: LinkSurface) -> Row:
+def cost_row(event: Event, watching: CollisionAlarm, surface: LinkSurface) -> Row:
     """Microseconds of a diagnosis, and of what must be computed before."""
     alarm = event.alarm
     assert alarm is not None
-    arm, envelope = believed(watching)
-    diagnoser = Diagnoser(arm, surface, envelope)
-    looked = AftermathOf(arm, envelope, event.trace)
+    diagnoser = Diagnoser.of(watching.detector.arm, surface)
+    looked = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace)
     after = looked.at(alarm.start)
     times: dict[str, Any] = measure(
         {

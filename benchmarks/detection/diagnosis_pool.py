@@ -9,7 +9,7 @@ import numpy as np
 
 from tauguard.benchmarks.detection.pool import FORCES, PAYLOADS, Conditions, struck_pool
 from tauguard.datasets.plans import BEGIN, collision_plans, episode_seconds
-from tauguard.detectors import Thresholded
+from tauguard.detectors import CollisionAlarm
 from tauguard.detectors.diagnosis.aftermath import AFTER
 from tauguard.detectors.evaluation.events import detection_window
 from tauguard.envs import Episode, PayloadPick, simulate
@@ -39,7 +39,7 @@ class Event:
 
 
 def struck_events(
-    seed: int, speed: float, watchers: dict[int, Thresholded], per_stratum: int
+    seed: int, speed: float, watchers: dict[int, CollisionAlarm], per_stratum: int
 ) -> Iterator[Event]:
     """Collisions of the detection study: strikes, pulses and clamps, every severity alike."""
     for struck in struck_pool(seed, speed, list(watchers), per_stratum):
@@ -53,7 +53,7 @@ def struck_events(
 
 
 def push_events(
-    seed: int, speed: float, watchers: dict[int, Thresholded], episodes: int, each: int = 5
+    seed: int, speed: float, watchers: dict[int, CollisionAlarm], episodes: int, each: int = 5
 ) -> Iterator[Event]:
     """Intended pushes of a hand, half of them while the arm dwells."""
     rng = np.random.default_rng([seed, round(100 * speed), 21])
@@ -79,7 +79,7 @@ def push_events(
 
 
 def payload_events(
-    seed: int, speed: float, watchers: dict[int, Thresholded], episodes: int
+    seed: int, speed: float, watchers: dict[int, CollisionAlarm], episodes: int
 ) -> Iterator[Event]:
     """Payloads that are taken up and put down again without a word."""
     rng = np.random.default_rng([seed, round(100 * speed), 22])

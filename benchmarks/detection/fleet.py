@@ -8,11 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauguard.benchmarks.detection.pool import Conditions, free_pool
-from tauguard.benchmarks.detection.thresholds import Pieces, free_pieces
+from tauguard.benchmarks.detection.thresholds import free_scores, joined
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
-from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
-from tauguard.detectors.detector import Detector
-from tauguard.detectors.features.front_end import FrontEnd, shared_front_ends
+from tauguard.detectors import ArmModel, FittedDetector, FreeScores, FrictionModel, RobotNumbers
 from tauguard.detectors.registry import make_detector
 from tauguard.envs import simulate
 from tauguard.models import SceneSpec, compose, cura6_drive, pin_model
@@ -68,30 +66,23 @@ def nominal() -> ArmModel:
 
 
 def training_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Detectors that are trained together: those with one front end, then the rest in two parts."""
-    together = tuple(n for n in names if getattr(make_detector(n), "front", None) == FrontEnd())
-    rest = [n for n in names if n not in together]
-    return [group for group in (together, tuple(rest[::2]), tuple(rest[1::2])) if group]
+    """Detectors that are trained together; neighbours of the registry share their front end."""
+    half = -(-len(names) // 2)
+    return [group for group in (tuple(names[:half]), tuple(names[half:])) if group]
 
 
-def train(seed: int, arm: int, names: Sequence[str], training: Training) -> dict[str, Detector]:
+def train(
+    seed: int, arm: int, names: Sequence[str], training: Training
+) -> dict[str, FittedDetector]:
     """The detectors of one arm, trained on its slices."""
-    traces = training.traces(seed, arm)
-    robot = nominal()
-    detectors: dict[str, Detector] = {name: make_detector(name) for name in names}
-    fronts = shared_front_ends(detectors.values())
-    for detector in detectors.values():
-        detector.fit(traces, robot)
-    for front in fronts:
-        front.forget()
-    return detectors
+    traces, robot = training.traces(seed, arm), nominal()
+    return {name: make_detector(name).fit(traces, robot) for name in names}
 
 
-def calibration_pieces(
-    seed: int, arm: int, detectors: dict[str, Detector], speed: float, hours: float
-) -> dict[str, Pieces]:
+def calibration_scores(
+    seed: int, arm: int, detectors: dict[str, FittedDetector], speed: float, hours: float
+) -> dict[str, list[FreeScores]]:
     """What detectors say of the arm's collision-free motion with the training payloads."""
     under = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
     pool = free_pool(stream(seed, CALIBRATE), speed, (arm,), hours, under)
-    found = [free_pieces(detectors, simulate(episode)) for _, episode in pool]
-    return {name: Pieces.joined([f[name] for f in found]) for name in detectors}
+    return joined([free_scores(detectors, simulate(episode)) for _, episode in pool])

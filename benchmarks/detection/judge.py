@@ -55,10 +55,9 @@ def judge_free(fleet: Fleet, trace: Trace) -> Tallies:
     span = (float(trace.t[0]) + BEGIN, float(trace.t[-1]))
     found: Tallies = {}
     for name, own in fleet.items():
-        plain, levelled = own.curves(trace)
+        _, levels = own.sustained(trace)
         for point, threshold in own.thresholds.items():
-            level = levelled if own.levelled(point) else plain
-            m = match(find_alarms(trace.t, level > threshold), (), span)
+            m = match(find_alarms(trace.t, levels[point] > threshold), (), span)
             found[name, point] = Tally(
                 [], m.cases, m.false_cases, len(m.false_alarms), m.free_seconds
             )
@@ -77,11 +76,11 @@ def judge_struck(fleet: Fleet, struck: Struck) -> Tallies:
     ]
     found: Tallies = {}
     for name, own in fleet.items():
-        plain, levelled = own.curves(trace)
+        plain, levels = own.sustained(trace)
         peaks = [float(plain[(trace.t >= a) & (trace.t <= b)].max()) for a, b in windows]
         for point, threshold in own.thresholds.items():
-            level = levelled if own.levelled(point) else plain
-            m = match(find_alarms(trace.t, level > threshold), trace.truth.collisions, span)
+            alarms = find_alarms(trace.t, levels[point] > threshold)
+            m = match(alarms, trace.truth.collisions, span)
             outcomes = [
                 Outcome(struck.arm, struck.payload_g, c, d, peak)
                 for c, d, k, peak in zip(m.collisions, m.delays, kept, peaks, strict=True)

@@ -1,9 +1,10 @@
 """What one sample costs online: observer and SVR, the kernel beside scikit-learn, fewer vectors.
 
-The detector runs sample by sample through :meth:`CollisionDetector.step` on a motion with
-collisions that it was not trained on. scikit-learn's ``SVR.predict`` gets the same windows, one row
-a call; its kernel is precomputed and it is charged with the kernel row against the support vectors
-alone, in NumPy: less than its own callable kernels compute.
+The alarm runs sample by sample through :meth:`AlarmStream.step` on a motion with collisions that
+its detector was not trained on, for every method of the registry. scikit-learn's ``SVR.predict``
+gets the same windows as the kernel sum, one row a call; its kernel is precomputed and it is charged
+with the kernel row against the support vectors alone, in NumPy: less than its own callable kernels
+compute.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from tauguard.report import Row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tauguard.detectors import CollisionDetector
+    from tauguard.detectors import CollisionAlarm
+    from tauguard.detectors.methods.kernel_machine import KernelMachine
     from tauguard.detectors.methods.svr_regressor import SrqSVR
     from tauguard.traces import Trace
 
@@ -32,6 +34,8 @@ Array = NDArray[np.float64]
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75)
 #: A controller's period at 1 kHz, and what a sample may take of it at the median [us].
 PERIOD, GOAL = 1000.0, 100.0
+#: False alarms per hour that thresholds aim at.
+PER_HOUR = 10.0
 
 #: What the columns of each table mean.
 NOTES = {
@@ -55,11 +59,10 @@ class Extent:
     single: int  #: rows that scikit-learn predicts, one a call
 
 
-def trained(extent: Extent, seed: int) -> tuple[CollisionDetector, Trace]:
-    """A detector of a simulated arm, and a motion with collisions it has not seen."""
-    from tauguard.benchmarks.detection.fleet import TRAINING_SPEEDS, nominal
+def motions(extent: Extent, seed: int) -> tuple[list[Trace], Trace]:
+    """Training traces of a simulated arm, and a motion with collisions that is not among them."""
+    from tauguard.benchmarks.detection.fleet import TRAINING_SPEEDS
     from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
-    from tauguard.detectors import CollisionDetector
     from tauguard.envs import simulate
     from tauguard.models import Mismatch
 
@@ -67,15 +70,8 @@ def trained(extent: Extent, seed: int) -> tuple[CollisionDetector, Trace]:
     payloads = TRAINING_PAYLOADS[:: max(1, 15 // extent.slices)]
     planned = struck_episodes(3 * seed, extent.slices, 5, TRAINING_SPEEDS, payloads, arm)
     planned += free_episodes(3 * seed + 1, extent.free, 30.0, TRAINING_SPEEDS, payloads, arm)
-    robot = nominal()
-    detector = CollisionDetector().fit(
-        [simulate(episode) for episode in planned],
-        robot.robot,
-        robot.drive_gain,
-        friction=robot.friction,
-    )
     unseen = struck_episodes(3 * seed + 2, 1, 8, (40.0,), (1500.0,), arm)
-    return detector, simulate(unseen[0])
+    return [simulate(episode) for episode in planned], simulate(unseen[0])
 
 
 def timed(calls: Callable[[int], object], count: int) -> Array:
@@ -94,38 +90,30 @@ def spread(spent: Array) -> Row:
     return {"median": median, "low": low, "high": high}
 
 
-def step_row(detector: CollisionDetector, trace: Trace, samples: int) -> Row:
-    """``step``: one sample through observer, payload estimate, features, SVR and filter."""
-    batch = detector.detect(trace)
+def step_row(alarm: CollisionAlarm, trace: Trace, samples: int) -> Row:
+    """``step``: one sample through observer, payload estimate, method, threshold and filter."""
     count = min(samples, len(trace.t))
-    scores = np.empty(count)
-
-    def step(k: int) -> None:
-        detector.step(trace.q[k], trace.qd[k], trace.current[k])
+    score, dt = alarm.scores(trace)[:count], [None, *np.diff(trace.t[:count])]
+    rows = list(zip(trace.q[:count], trace.qd[:count], trace.current[:count], dt, strict=True))
+    timed_stream, kept_stream, grown_stream = (alarm.stream() for _ in range(3))
+    online = np.empty(count)
 
     def kept(k: int) -> None:
-        step(k)
-        scores[k] = detector.score
+        kept_stream.step(*rows[k])
+        online[k] = kept_stream.score
 
-    for k in range(500):
-        step(k)
-    detector.reset()
-    spent = timed(step, count)
-    detector.reset()
+    spent = timed(lambda k: timed_stream.step(*rows[k]), count)[500:]
     timed(kept, count)
-    detector.reset()
-    grown = allocated(step, count // 4)
-    _, _, regressor = detector._fitted()
     return {
         "study": "step",
-        "support_vectors": len(regressor.support_vectors_),
+        "detector": alarm.detector.name,
         "samples": count,
         "us": spread(spent),
         "us_p99": float(np.percentile(spent, 99)),
         "us_max": float(spent.max()),
         "over_a_period": int((spent > PERIOD).sum()),
-        "difference_to_batch": float(np.abs(scores - batch.score[:count]).max()),
-        "bytes_kept_a_call": grown,
+        "difference_to_batch": float(np.abs(online - score).max()),
+        "bytes_kept_a_call": allocated(lambda k: grown_stream.step(*rows[k]), count // 4),
         "met": bool(np.median(spent) <= GOAL),
     }
 
@@ -145,17 +133,9 @@ def allocated(call: Callable[[int], object], count: int) -> float:
     return (after - before) / count
 
 
-def windows_of(detector: CollisionDetector, trace: Trace) -> Array:
-    """The windows of every sample, shape (T, size)."""
-    _, features, _ = detector._fitted()
-    estimate = detector._estimate(trace)
-    signal = features.signal(estimate.left, trace.qd, estimate.acceleration)
-    return features.windows(signal, np.arange(len(trace.t)))
-
-
 def peer(regressor: SrqSVR) -> Callable[[Array], Array]:
     """scikit-learn's own ``predict`` of the fitted SVR on one window, shape (1, size)."""
-    svr, vectors = regressor.svr_, regressor.support_vectors_
+    svr, vectors = regressor.svr_, regressor.machine_.vectors
     row = np.zeros((1, svr.shape_fit_[0]))
     columns, scale = svr.support_, 1 / regressor.sigma**2
 
@@ -174,40 +154,52 @@ def kernel_rows(regressor: SrqSVR, windows: Array, single: int, seed: int) -> li
     own = np.ascontiguousarray(windows[rng.integers(len(windows), size=single)])
     value = np.empty(single)
     slices = [own[k : k + 1] for k in range(single)]
-    theirs = peer(regressor)
-    full = regressor.predict(windows)
-    total = len(regressor.support_vectors_)
-    models = [regressor] + [regressor.reduced(max(1, round(s * total))) for s in SHARES]
+    theirs, machine = peer(regressor), regressor.machine_
+    full, total = machine(windows), len(machine.vectors)
     rows = []
-    for model in models:
+    for model in (machine, *(machine.reduced(max(1, round(s * total))) for s in SHARES)):
         call = _one_window(model, slices)
         timed(call, min(200, single))
         ours = timed(call, single)
-        row: Row = {"study": "kernel", "support_vectors": len(model.support_vectors_)}
+        row: Row = {"study": "kernel", "support_vectors": len(model.vectors)}
         row |= {"us": spread(ours), "us_p99": float(np.percentile(ours, 99))}
         again = timed(lambda k: value.__setitem__(k, theirs(slices[k])[0]), single)
         row |= {"sklearn_us": spread(again), "speedup": float(np.median(again) / np.median(ours))}
-        row["difference_to_sklearn"] = float(np.abs(model.predict(own) - value).max())
-        error = np.abs(model.predict(windows) - full)
+        row["difference_to_sklearn"] = float(np.abs(model(own) - value).max())
+        error = np.abs(model(windows) - full)
         row |= {"error_rms": float(np.sqrt(np.mean(error**2))), "error_max": float(error.max())}
         rows.append(row)
     return sorted(rows, key=lambda r: -int(r["support_vectors"]))
 
 
-def _one_window(model: SrqSVR, slices: list[Array]) -> Callable[[int], object]:
+def _one_window(model: KernelMachine, slices: list[Array]) -> Callable[[int], object]:
     """The kernel sum at the k-th window, one thread."""
-    kernel, out = model.kernel_sum(), np.empty(1)
+    kernel, out = model.native, np.empty(1)
     return lambda k: kernel.rows(slices[k], out, 1)
 
 
 def run(quick: bool, seed: int) -> list[Row]:
-    """Rows ``step`` (the whole detector) and ``kernel`` (full and reduced sets, scikit-learn)."""
+    """Rows ``step`` (whole detectors) and ``kernel`` (full and reduced sets, scikit-learn)."""
+    from tauguard.benchmarks.detection.fleet import nominal
+    from tauguard.detectors import DETECTORS, SrqSvr, held_out, make_detector, train
+    from tauguard.detectors.methods.svr_regressor import SrqSVR
+
     extent = Extent(5, 5, 15_000, 1000) if quick else Extent(15, 20, 27_000, 5000)
-    detector, trace = trained(extent, seed)
-    _, _, regressor = detector._fitted()
-    found = [step_row(detector, trace, extent.samples)]
-    found += kernel_rows(regressor, windows_of(detector, trace), extent.single, seed)
-    return found
+    traces, trace = motions(extent, seed)
+    arm = nominal()
+    alarms = (train(make_detector(name), traces, arm, PER_HOUR) for name in DETECTORS)
+    rows = [step_row(alarm, trace, extent.samples) for alarm in alarms]
+    full: list[SrqSVR] = []
+
+    class Keeping(SrqSvr):
+        def learn(self, x: Array, y: Array) -> KernelMachine:
+            full.append(SrqSVR(self.sigma, self.C, self.epsilon).fit(x, y))
+            return full[-1].machine_
+
+    fitted = Keeping(vectors=0).fit(held_out(traces)[0], arm)
+    signal = fitted.front.scaled(trace, fitted.scaling)
+    windows = fitted.shape.of(signal, np.arange(len(signal)))
+    return rows + kernel_rows(full[-1], windows, extent.single, seed)
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

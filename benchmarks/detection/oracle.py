@@ -7,13 +7,11 @@ what is left above its delay is the detector's own. One that needs less torque c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.benchmarks.detection.thresholds import Watched
-from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.benchmarks.detection.thresholds import Operated
+from tauguard.detectors import ArmModel, CollisionAlarm, ScoreStream
 from tauguard.traces import Trace
 
 Array = NDArray[np.float64]
@@ -26,16 +24,12 @@ LEVELS = (2.0, 4.0)
 class Oracle:
     """A detector whose score is the largest |tau_ext| of joints 1-4 itself [N m]."""
 
-    name, settle = ORACLE, 0.0
+    name, settle, dt = ORACLE, 0.0, 1e-3
 
     @property
     def arm(self) -> ArmModel:
         """It has none."""
         raise ValueError("the oracle knows the torque, not the arm")
-
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> Oracle:
-        """There is nothing to learn."""
-        return self
 
     def scores(self, trace: Trace) -> Array:
         """The true torque, shape (T,); ``ValueError`` without truth."""
@@ -44,10 +38,15 @@ class Oracle:
         torque: Array = np.abs(trace.truth.tau_ext[:, :4]).max(axis=1)
         return torque
 
+    def stream(self) -> ScoreStream:
+        """No sample carries the truth: ``ValueError``."""
+        raise ValueError("the oracle needs a trace with truth")
 
-def oracle() -> Watched:
+
+def oracle() -> Operated:
     """The oracle with a point for each of :data:`LEVELS`."""
-    return Watched(Oracle(), None, {at_level(level): level for level in LEVELS})
+    known = Oracle()
+    return Operated(known, {at_level(level): CollisionAlarm(known, level) for level in LEVELS})
 
 
 def at_level(level: float) -> str:

@@ -8,7 +8,7 @@ arm, and are judged on motions with payloads that no slice had and nobody tells.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from tauguard.benchmarks.detection import chart as detection_chart
@@ -19,7 +19,7 @@ from tauguard.benchmarks.detection.fleet import (
     NETWORK,
     TEST,
     Training,
-    calibration_pieces,
+    calibration_scores,
     stream,
     train,
     training_groups,
@@ -34,9 +34,9 @@ from tauguard.benchmarks.detection.pool import (
     free_pool,
     struck_pool,
 )
-from tauguard.benchmarks.detection.thresholds import Fleet, Pieces, watched
+from tauguard.benchmarks.detection.thresholds import Fleet, Free, operated
 from tauguard.benchmarks.workers import Workers
-from tauguard.detectors.detector import Detector
+from tauguard.detectors import FittedDetector, make_detector
 from tauguard.envs import simulate
 from tauguard.report import Row
 from tauguard.traces import STRATA
@@ -73,7 +73,7 @@ NOTES = {
 }
 
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
-Trained = Mapping[int, dict[str, Detector]]
+Trained = Mapping[int, dict[str, FittedDetector]]
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,16 @@ QUICK = Size(
 )
 
 
-def run(quick: bool, seed: int) -> list[Row]:
-    """Rows of all studies; see :mod:`tauguard.benchmarks.detection.rows` for their fields."""
-    return study(QUICK if quick else FULL, seed)
+def run(quick: bool, seed: int, detector: str | None = None) -> list[Row]:
+    """Rows of all studies; see :mod:`tauguard.benchmarks.detection.rows` for their fields.
+
+    ``detector`` is one more method, as module:Class.
+    """
+    size = QUICK if quick else FULL
+    if detector is not None and detector not in size.detectors:
+        make_detector(detector)  # names what is wrong before anything is simulated
+        size = replace(size, detectors=(*size.detectors, detector))
+    return study(size, seed)
 
 
 def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
@@ -151,30 +158,30 @@ def _trained(size: Size, seed: int, arms: Sequence[int], each: Each) -> Trained:
     """Every arm's detectors, in the order of their names."""
     groups = training_groups(size.detectors)
     jobs = [(size, seed, arm, group) for arm in arms for group in groups]
-    found: dict[int, dict[str, Detector]] = {arm: {} for arm in arms}
+    found: dict[int, dict[str, FittedDetector]] = {arm: {} for arm in arms}
     for (_, _, arm, _), own in zip(jobs, each(_train, jobs), strict=True):
         found[arm].update(own)
     return {arm: {name: own[name] for name in size.detectors} for arm, own in found.items()}
 
 
-def _train(job: tuple[Size, int, int, tuple[str, ...]]) -> dict[str, Detector]:
+def _train(job: tuple[Size, int, int, tuple[str, ...]]) -> dict[str, FittedDetector]:
     size, seed, arm, group = job
     return train(seed, arm, group, size.training)
 
 
 def _calibrated(size: Size, seed: int, trained: Trained, each: Each) -> dict[int, Fleet]:
-    """Every arm's detectors with levels and thresholds from that arm's own motion."""
+    """Every arm's detectors with their alarms, from that arm's own motion."""
     hours = size.calibration_hours / len(SPEEDS)
     jobs = [(seed, arm, own, speed, hours) for arm, own in trained.items() for speed in SPEEDS]
-    pieces: dict[int, dict[float, dict[str, Pieces]]] = {arm: {} for arm in trained}
+    free: dict[int, dict[float, Free]] = {arm: {} for arm in trained}
     for (_, arm, _, speed, _), found in zip(jobs, each(_calibrate, jobs), strict=True):
-        pieces[arm][speed] = found
+        free[arm][speed] = found
     network = NETWORK if NETWORK in size.detectors else None
-    return {arm: watched(own, pieces[arm], network, size.target) for arm, own in trained.items()}
+    return {arm: operated(own, free[arm], network, size.target) for arm, own in trained.items()}
 
 
-def _calibrate(job: tuple[int, int, dict[str, Detector], float, float]) -> dict[str, Pieces]:
-    return calibration_pieces(*job)
+def _calibrate(job: tuple[int, int, dict[str, FittedDetector], float, float]) -> Free:
+    return calibration_scores(*job)
 
 
 def _vary(job: tuple[str, int, Fleet, int]) -> list[Row]:

@@ -1,7 +1,8 @@
-"""Thresholds of one arm's detectors, from that arm's collision-free calibration motion.
+"""Thresholds of one arm's detectors at the study's operating points, by the product's law.
 
-First every score is levelled (see :mod:`tauguard.detectors.thresholds.speed_levels`), so that
-one threshold of a detector serves all speeds of its arm; then it is chosen at each operating point.
+Scores of the arm's collision-free calibration motion are reduced, normalised over the speed and
+followed along their tail by :mod:`tauguard.detectors.thresholds`; what the study adds is the
+dissertation's operating points, which are shares of non-collision cases.
 """
 
 from __future__ import annotations
@@ -13,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.datasets.plans import BEGIN
-from tauguard.detectors.detector import Detector
-from tauguard.detectors.evaluation.events import CASE_SECONDS, MERGE_GAP
-from tauguard.detectors.thresholds.confirmation import CONFIRMATION, confirmation_samples
-from tauguard.detectors.thresholds.rates import block_maxima, sustained, tail_level
-from tauguard.detectors.thresholds.speed_levels import SpeedLevels, recent_speed
+from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores
+from tauguard.detectors.thresholds.free_scores import speed_levels
+from tauguard.detectors.thresholds.law import threshold_for_rate
+from tauguard.detectors.thresholds.rates import tail_level
 from tauguard.traces import Trace
 
 Array = NDArray[np.float64]
@@ -28,178 +28,112 @@ AMPERES = (1.6, 2.0)
 HOURLY = "hourly"
 #: Names of the operating points, in the order of the tables.
 POINTS = ("1.6", "2.0", HOURLY)
-#: Motion is kept as the peaks of pieces this long [s].
-PIECE = 0.02
-#: Share of the blocks whose peaks are the tail that is followed to rarer alarms.
-TAIL = 0.02
-#: The same of the cases, which are fewer.
+#: Share of the cases that are the tail, which is extrapolated to rarer ones.
 CASE_TAIL = 0.1
 
-
-@dataclass(frozen=True)
-class Peaks:
-    """Collision-free scores of one detector, reduced: how high they stayed for t_c."""
-
-    cases: Array  #: peak of every non-collision case
-    blocks: Array  #: peak of every merge gap
-    hours: float
-
-    @classmethod
-    def joined(cls, parts: Sequence[Peaks]) -> Peaks:
-        """All parts together."""
-        return cls(
-            np.concatenate([p.cases for p in parts]),
-            np.concatenate([p.blocks for p in parts]),
-            sum(p.hours for p in parts),
-        )
-
-    def expected(self, threshold: float) -> float:
-        """The share of cases expected above ``threshold``: that of N seen, Jeffreys' prior.
-
-        None of N says that fewer than about one in 2 N are.
-        """
-        return (float(np.sum(self.cases > threshold)) + 0.5) / (len(self.cases) + 1)
-
-    def at_share(self, share: float) -> float:
-        """The threshold that a ``share`` of the cases is expected to exceed, along their tail."""
-        ordered = np.sort(self.cases)[::-1]
-        return tail_level(ordered, share * len(ordered), max(2, round(CASE_TAIL * len(ordered))))
-
-    def at_rate(self, per_hour: float) -> float:
-        """The threshold that ``per_hour`` blocks an hour exceed, along the tail of the blocks."""
-        ordered = np.sort(self.blocks)[::-1]
-        return tail_level(ordered, per_hour * self.hours, max(2, round(TAIL * len(ordered))))
+#: Collision-free scores of one speed: by detector, an episode each.
+Free = Mapping[str, Sequence[FreeScores]]
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """Collision-free scores of one detector, settled: the peak of every piece of every episode."""
+class Operated:
+    """A trained detector of one arm and its alarm at every operating point."""
 
-    level: tuple[Array, ...]  #: of an episode, shape (pieces,)
-    speed: tuple[Array, ...]  #: recent speed at those peaks [rad/s], shape (pieces,)
-    seconds: float
+    detector: FittedDetector
+    alarms: Mapping[str, CollisionAlarm]
 
-    @classmethod
-    def of(cls, level: Array, speed: Array, dt: float) -> Pieces:
-        """From sustained scores of one episode and the recent speed, both of shape (T,)."""
-        high, where = block_maxima(level, max(1, round(PIECE / dt)))
-        return cls((high,), (speed[where],), len(level) * dt)
+    @property
+    def thresholds(self) -> dict[str, float]:
+        """By operating point."""
+        return {point: alarm.threshold for point, alarm in self.alarms.items()}
 
-    @classmethod
-    def joined(cls, parts: Sequence[Pieces]) -> Pieces:
-        """All parts together."""
-        return cls(
-            tuple(level for p in parts for level in p.level),
-            tuple(speed for p in parts for speed in p.speed),
-            sum(p.seconds for p in parts),
-        )
+    def sustained(self, trace: Trace) -> tuple[Array, dict[str, Array]]:
+        """Scores that lasted for t_c, as they are, and as every point's alarm compares them.
 
-    def levels(self) -> SpeedLevels:
-        """What its blocks' peaks reach at each speed."""
-        rows = round(MERGE_GAP / PIECE)
-        found = [block_maxima(level, rows) for level in self.level]
-        speeds = [speed[where] for speed, (_, where) in zip(self.speed, found, strict=True)]
-        return SpeedLevels.fit(np.concatenate([high for high, _ in found]), np.concatenate(speeds))
-
-    def peaks(self, levels: SpeedLevels | None = None) -> Peaks:
-        """Peaks of the levelled score, or of the score itself.
-
-        Levelled is what a piece's highest score becomes: the recent speed hardly changes within a
-        piece, so that this is nearly the piece's highest levelled score.
+        All are of shape (T,), and -inf until every detector of the study has settled.
         """
-        cases, blocks = [], []
-        for level, speed in zip(self.level, self.speed, strict=True):
-            score = levels(level, speed) if levels else level
-            rows = round(CASE_SECONDS / PIECE)
-            whole = len(score) // rows * rows
-            cases.append(score[:whole].reshape(-1, rows).max(axis=1))
-            blocks.append(block_maxima(score, round(MERGE_GAP / PIECE))[0])
-        return Peaks(np.concatenate(cases), np.concatenate(blocks), self.seconds / 3600)
+        score, early = self.detector.scores(trace), trace.t - trace.t[0] < BEGIN
+        plain = _plain(self.detector).sustained(trace, score)
+        levels = {point: alarm.sustained(trace, score) for point, alarm in self.alarms.items()}
+        for level in (plain, *levels.values()):
+            level[early] = -np.inf
+        return plain, levels
 
 
-@dataclass(frozen=True)
-class Watched:
-    """A trained detector of one arm and when it alarms there."""
-
-    detector: Detector
-    levels: SpeedLevels | None  #: None: the score is taken as it is
-    thresholds: Mapping[str, float]  #: by operating point
-    amperes: bool = False  #: the first two thresholds are on the score itself
-
-    def levelled(self, point: str) -> bool:
-        """Whether a point's threshold is on the levelled score."""
-        return self.levels is not None and not (self.amperes and point != HOURLY)
-
-    def curves(self, trace: Trace) -> tuple[Array, Array]:
-        """What the last t_c of scores reach, and the same levelled; shape (T,) both.
-
-        Both are -inf until every detector has settled.
-        """
-        score = self.detector.scores(trace)
-        plain = _settled(score, trace)
-        if self.levels is None:
-            return plain, plain
-        return plain, _settled(self.levels(score, recent_speed(trace.qd, trace.dt)), trace)
+Fleet = Mapping[str, Operated]
 
 
-Fleet = Mapping[str, Watched]
+def _plain(detector: FittedDetector) -> CollisionAlarm:
+    return CollisionAlarm(detector, np.inf)
 
 
-def _settled(score: Array, trace: Trace) -> Array:
-    level = sustained(score, confirmation_samples(CONFIRMATION, trace.dt)).copy()
-    level[trace.t - trace.t[0] < BEGIN] = -np.inf
-    return level
+def free_scores(
+    detectors: Mapping[str, FittedDetector], trace: Trace
+) -> dict[str, list[FreeScores]]:
+    """Every detector's scores over a collision-free trace."""
+    return {name: [FreeScores.of(_plain(d), trace)] for name, d in detectors.items()}
 
 
-def free_pieces(detectors: Mapping[str, Detector], trace: Trace) -> dict[str, Pieces]:
-    """Every detector's pieces over a collision-free trace."""
-    settled = trace.t - trace.t[0] >= BEGIN
-    speed = recent_speed(trace.qd, trace.dt)[settled]
-    return {
-        name: Pieces.of(_settled(d.scores(trace), trace)[settled], speed, trace.dt)
-        for name, d in detectors.items()
-    }
+def joined(parts: Sequence[Free]) -> dict[str, list[FreeScores]]:
+    """All episodes of several traces, by detector."""
+    return {name: [one for part in parts for one in part[name]] for name in parts[0]}
 
 
-def watched(
-    detectors: Mapping[str, Detector],
-    pieces: Mapping[float, Mapping[str, Pieces]],
+def expected(scores: Sequence[FreeScores], threshold: float) -> float:
+    """The share of cases expected above ``threshold``: that of N seen, Jeffreys' prior.
+
+    None of N says that fewer than about one in 2 N are.
+    """
+    cases = np.concatenate([one.cases() for one in scores])
+    return (float(np.sum(cases > threshold)) + 0.5) / (len(cases) + 1)
+
+
+def at_share(scores: Sequence[FreeScores], share: float) -> float:
+    """The threshold that a ``share`` of the cases is expected to exceed, along their tail."""
+    ordered = np.sort(np.concatenate([one.cases() for one in scores]))[::-1]
+    return tail_level(ordered, share * len(ordered), max(2, round(CASE_TAIL * len(ordered))))
+
+
+def operated(
+    detectors: Mapping[str, FittedDetector],
+    free: Mapping[float, Free],
     network: str | None,
     per_hour: float,
-) -> dict[str, Watched]:
-    """Detectors with their levels and their thresholds at the operating points.
+) -> dict[str, Operated]:
+    """Detectors with their alarms at the operating points.
 
     The network's first two thresholds are its residual current. Every other detector gets at each
     the lowest threshold with which it is expected, at every speed, to be as specific as the
     network: rows then compare speed by speed. Where the network raises none in N cases, the others
-    may raise one in 2 N. The third is for a rate over all speeds, which the levelled score spreads
-    evenly. It bounds the other two, which ask for more alarms over all speeds; at a single one that
-    can leave a detector less specific than the network.
+    may raise one in 2 N. The third is for a rate over all speeds, which the normalised score
+    spreads evenly. It bounds the other two, which ask for more alarms over all speeds; at a single
+    one that can leave a detector less specific than the network.
 
     Args:
         detectors: trained, by name.
-        pieces: of collision-free motion of their arm, by speed [%], then by detector.
+        free: scores of collision-free motion of their arm, by speed [%], then by detector.
         network: the name whose specificity is matched; ``None``: the third point alone.
         per_hour: false alarms that the third point aims at.
     """
     found = {}
-    quiet = {
-        (amperes, speed): own[network].peaks().expected(amperes)
+    matched = {
+        (amperes, speed): expected(own[network], amperes)
         for amperes in AMPERES
-        for speed, own in pieces.items()
+        for speed, own in free.items()
         if network
     }
     for name, detector in detectors.items():
-        levels = Pieces.joined([own[name] for own in pieces.values()]).levels()
-        peaks = {speed: own[name].peaks(levels) for speed, own in pieces.items()}
-        thresholds = {}
-        hourly = Peaks.joined(list(peaks.values())).at_rate(per_hour)
+        levels = speed_levels([one for own in free.values() for one in own[name]])
+        normal = {speed: [one.over(levels) for one in own[name]] for speed, own in free.items()}
+        hourly = threshold_for_rate([one for own in normal.values() for one in own], per_hour)
+        alarms = {}
         for amperes in AMPERES if network else ():
             if name == network:
-                thresholds[str(amperes)] = amperes
-            else:
-                matched = (p.at_share(quiet[amperes, s]) for s, p in peaks.items())
-                thresholds[str(amperes)] = min(max(matched), hourly)
-        thresholds[HOURLY] = hourly
-        found[name] = Watched(detector, levels, thresholds, name == network)
+                alarms[str(amperes)] = CollisionAlarm(detector, amperes)
+                continue
+            shares = (at_share(own, matched[amperes, s]) for s, own in normal.items())
+            threshold = min(max(shares), hourly)
+            alarms[str(amperes)] = CollisionAlarm(detector, threshold, levels=levels)
+        alarms[HOURLY] = CollisionAlarm(detector, hourly, levels=levels)
+        found[name] = Operated(detector, alarms)
     return found

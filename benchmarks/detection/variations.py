@@ -24,14 +24,12 @@ from tauguard.benchmarks.detection.rows import headline
 from tauguard.benchmarks.detection.thresholds import (
     HOURLY,
     Fleet,
-    Pieces,
-    Watched,
-    free_pieces,
-    watched,
+    Operated,
+    free_scores,
+    joined,
+    operated,
 )
-from tauguard.detectors import CollisionDetector, DetectorSettings
-from tauguard.detectors.detector import Detector
-from tauguard.detectors.methods.srq_svr import SvrDetector
+from tauguard.detectors import FittedDetector, PlainSrqSvr, SrqSvr
 from tauguard.detectors.registry import make_detector
 from tauguard.envs import PayloadPick, simulate
 from tauguard.report import Row
@@ -75,12 +73,11 @@ def judged(fleet: Fleet, both: Pools) -> dict[str, Tally]:
 
 
 def own_thresholds(
-    detectors: dict[str, Detector], calibration: Iterable[Trace], target: float
-) -> dict[str, Watched]:
+    detectors: dict[str, FittedDetector], calibration: Iterable[Trace], target: float
+) -> dict[str, Operated]:
     """Detectors that are not in the table, with their third operating point."""
-    found = [free_pieces(detectors, trace) for trace in calibration]
-    joined = {name: Pieces.joined([f[name] for f in found]) for name in detectors}
-    return watched(detectors, {0.0: joined}, None, target)
+    found = joined([free_scores(detectors, trace) for trace in calibration])
+    return operated(detectors, {0.0: found}, None, target)
 
 
 def conditions(fleet: Fleet, arm: int, seed: int, extent: Extent) -> list[Row]:
@@ -151,7 +148,7 @@ def training_size(bench: Bench, names: Sequence[str]) -> list[Row]:
     for count in TRAINING_COLLISIONS:
         traces = bench.training(Training(collisions=count))
         for name in names:
-            own: dict[str, Detector] = {name: make_detector(name).fit(traces, nominal())}
+            own: dict[str, FittedDetector] = {name: make_detector(name).fit(traces, nominal())}
             fleet = own_thresholds(own, calibration, bench.extent.target)
             tally = judged(fleet, both)[name]
             rows.append(_row("training_size", {"collisions": 15 * count}, name, tally))
@@ -163,14 +160,13 @@ def sigmas(bench: Bench) -> list[Row]:
     calibration, both = bench.calibration(), bench.pools()
     traces = bench.training(Training())
     rows = []
-    cases = [("srq-svr", DetectorSettings(sigma=sigma)) for sigma in SIGMAS]
+    cases = [("srq-svr", SrqSvr(sigma=sigma)) for sigma in SIGMAS]
     cases += [
-        ("srq-svr-plain", DetectorSettings.plain_form()),
-        ("srq-svr-plain, residuals in N m", DetectorSettings.plain_form(distance=0.0)),
+        ("srq-svr-plain", PlainSrqSvr()),
+        ("srq-svr-plain, residuals in N m", PlainSrqSvr(distance=0.0)),
     ]
     for name, settings in cases:
-        detector = SvrDetector(CollisionDetector(settings))
-        own: dict[str, Detector] = {name: detector.fit(traces, nominal())}
+        own: dict[str, FittedDetector] = {name: settings.fit(traces, nominal())}
         fleet = own_thresholds(own, calibration, bench.extent.target)
         tally = judged(fleet, both)[name]
         rows.append(_row("sigma", {"sigma": settings.sigma}, name, tally))
@@ -183,8 +179,8 @@ def sample_rate(bench: Bench) -> list[Row]:
     traces = bench.training(Training())
     rows = []
     for stride in (1, CURA6_STRIDE):
-        detector = SvrDetector().fit([every(t, stride) for t in traces], nominal())
-        own: dict[str, Detector] = {"srq-svr": detector}
+        detector = SrqSvr().fit([every(t, stride) for t in traces], nominal())
+        own: dict[str, FittedDetector] = {"srq-svr": detector}
         fleet = own_thresholds(own, [every(t, stride) for t in calibration], bench.extent.target)
         struck = [replace(s, trace=every(s.trace, stride)) for s in both[0]]
         free = [every(t, stride) for t in both[1]]

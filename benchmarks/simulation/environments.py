@@ -18,7 +18,7 @@ from tauguard.cli.demo import FALSE_ALARMS_PER_HOUR
 from tauguard.cli.fitting import trained
 from tauguard.contacts import registered
 from tauguard.datasets import demo_plan, simulate_all
-from tauguard.detectors import CollisionDetector
+from tauguard.detectors import CollisionAlarm
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.cell import DIVERGED
 from tauguard.envs.react import ReactEnv
@@ -74,7 +74,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     return rows + answers(rows)
 
 
-def trained_detector(seed: int) -> CollisionDetector:
+def trained_detector(seed: int) -> CollisionAlarm:
     """The demo's: trained on its arm and motions, none of which is a swing of this study."""
     episodes = list(simulate_all(demo_plan(seed).train, None, "simulate training"))
     return trained(episodes, FALSE_ALARMS_PER_HOUR)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tauguard.detectors.dynamics.robot import momentum_regressor
 from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel, Estimate, Estimator
 from tauguard.detectors.estimation.observer import intervals, low_pass
-from tauguard.detectors.features.windows import Envelope
+from tauguard.detectors.features.envelope import Envelope
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,8 @@ from tauguard.detectors.diagnosis.classification import Signs, signs
 from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
 from tauguard.detectors.diagnosis.isolation import Trust, isolate, last_joint, moments
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.features.windows import Envelope
+from tauguard.detectors.features.envelope import Envelope
+from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.traces.trace import Alarm, Detection, Trace
 
@@ -52,15 +52,8 @@ class Diagnosis:
         return self.kind == "push"
 
 
-class Watcher(Protocol):
-    """A detector with a threshold: a ``CollisionDetector`` or a ``Thresholded``."""
-
-    def detect(self, trace: Trace) -> Detection:
-        """Judge a trace."""
-
-
 def diagnose(
-    detector: Watcher,
+    alarm: CollisionAlarm,
     trace: Trace,
     detection: Detection | None = None,
     robot: str | Path | LinkSurface | None = None,
@@ -69,9 +62,9 @@ def diagnose(
     """Explain every alarm of a detector on a trace.
 
     Args:
-        detector: fitted, with a threshold.
+        alarm: a fitted detector with its threshold.
         trace: of its arm.
-        detection: what the detector said about the trace, if it is known already.
+        detection: the alarms of the trace, where they are known already.
         robot: MJCF or URDF of the arm with its collision shapes, or its sampled surface (default:
             the ``arm.xml`` that simulated traces carry).
         after: how long an alarm is looked at [s].
@@ -80,36 +73,15 @@ def diagnose(
         A diagnosis for each alarm, in order.
 
     Raises:
-        ValueError: not fitted, no shapes to look for a contact on, or another arm.
+        ValueError: no shapes to look for a contact on, or another arm.
     """
-    found = detection or detector.detect(trace)
+    found = detection or alarm.detect(trace)
     if robot is None:
         if "arm.xml" not in trace.attachments:
             raise ValueError("the trace has no arm.xml: give the robot's file with its shapes")
         robot = trace.attachments["arm.xml"]
     surface = robot if isinstance(robot, LinkSurface) else link_surface(robot)
-    arm, envelope = believed(detector)
-    return Diagnoser(arm, surface, envelope).diagnose(trace, found.alarms, after)
-
-
-def believed(detector: Any) -> tuple[ArmModel, Envelope | None]:
-    """What a detector has learned of its arm, and the envelope of free motion if it has one.
-
-    Raises:
-        ValueError: not fitted.
-    """
-    inner = getattr(detector, "detector", detector)
-    inner = getattr(inner, "chain", inner)
-    arm = inner.arm
-    if arm is None:
-        raise ValueError("this detector is not fitted: call fit or load first")
-    for holder in (getattr(inner, "front", None), getattr(inner, "features", None)):
-        envelope: Envelope | None = getattr(holder, "envelope", None)
-        if envelope is not None:
-            # A detector that doubts a payload counts the joints that carry it less, so that their
-            # envelope is less than what the residual itself does.
-            return arm, envelope.at_least(arm.noise)
-    return arm, None
+    return Diagnoser.of(alarm.detector.arm, surface).diagnose(trace, found.alarms, after)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +92,17 @@ class Diagnoser:
     surface: LinkSurface
     envelope: Envelope | None = None  #: of free motion; None: the arm's noise at every speed
     trust: Trust = field(default_factory=Trust)
+
+    @classmethod
+    def of(cls, arm: ArmModel, surface: LinkSurface) -> Diagnoser:
+        """With the envelope that the arm's detector has learned, if it has.
+
+        Where a detector reduces the residual of joints that carry an uncertain payload, its
+        envelope is less than what the residual itself does: the noise is the least.
+        """
+        known = arm.envelope
+        least = None if known is None or arm.noise is None else known.at_least(arm.noise)
+        return cls(arm, surface, least)
 
     def diagnose(
         self, trace: Trace, alarms: Iterable[Alarm], after: float = AFTER

@@ -19,6 +19,7 @@ from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers, same_rows
 from tauguard.detectors.estimation.observer import intervals, per_joint
 from tauguard.detectors.estimation.velocity import SensorNoise
+from tauguard.detectors.features.envelope import Envelope
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ class Unknowns:
             raise ValueError(f"doubt {self.doubt}: expected a number, 0 or more")
 
     @classmethod
-    def wary(cls) -> Unknowns:
+    def for_detection(cls) -> Unknowns:
         """For detectors: errors of the model last some 0.2 s, twenty corrections long."""
         return cls(doubt=20.0)
 
@@ -84,6 +85,8 @@ class ArmModel:
     friction: FrictionModel | None = None  #: None: no friction model
     noise: Array | None = None  #: standard deviation of the residual without collision [N m], (n,)
     sensors: SensorNoise | None = None  #: fuses position and velocity; None: as measured
+    envelope: Envelope | None = None
+    """Standard deviation of the residual without collision, over the motion; None: ``noise``."""
 
     def __post_init__(self) -> None:
         """Check shapes: ``ValueError`` names the field."""

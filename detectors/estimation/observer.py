@@ -18,6 +18,9 @@ from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms, rows
 
 Array = NDArray[np.float64]
 
+#: Rate of the plain observer whose residual reports and recordings show [1/s].
+PLAIN_GAIN = 100.0
+
 
 def per_joint(name: str, value: ArrayLike, joints: int) -> Array:
     """``value`` as one positive number a joint, shape (joints,).

@@ -1,10 +1,10 @@
-"""What the detectors on the residual share: a calibrated arm and what free motion leaves of it."""
+"""What the residual-based methods share: a calibrated arm, its estimator and its envelope."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,177 +12,151 @@ from numpy.typing import NDArray
 from tauguard.detectors.calibration.calibrate import calibrate, free_rows
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
-from tauguard.detectors.features.windows import Envelope
-from tauguard.detectors.model_parts import arm_from_parts, arm_parts
+from tauguard.detectors.features.envelope import Envelope
+from tauguard.detectors.features.scaling import Scaling
+from tauguard.detectors.frozen import Frozen
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
-#: Every so many samples of free motion are enough to fit an envelope.
+#: Every so many samples of collision-free motion are enough to fit an envelope.
 THIN = 5
 
 
-@dataclass
-class FrontEnd:
-    """From a trace to the residual in units of its envelope.
-
-    The envelope is the standard deviation that free motion shows at this speed and acceleration
-    (see :class:`~tauguard.detectors.features.windows.Envelope`), so a ratio of 5 means the same at
-    rest and at full speed.
-
-    Several detectors can hold one front end (:func:`shared_front_ends`): what it found for the same
-    traces is kept, so that the second to ask pays nothing.
-    """
+@dataclass(frozen=True)
+class FrontEndSettings:
+    """How the residual is estimated."""
 
     gain: float = 200.0  #: of the observer [1/s]
     adapt: bool = True  #: track payload, offsets and friction errors
     settle: float = 3.0  #: until the payload is found [s]
-    joints: int = 4  #: the first so many joints are looked at (all, if there are fewer)
-    arm: ArmModel | None = None
-    envelope: Envelope | None = None
-    dt: float = 1e-3  #: sample interval [s]
-    _shared: bool = field(default=False, init=False, repr=False, compare=False)
-    _trained: tuple[object, object, list[Estimate]] | None = field(
-        default=None, init=False, repr=False, compare=False
-    )
-    _recent: tuple[Trace, Array] | None = field(default=None, init=False, repr=False, compare=False)
+    joints: tuple[int, ...] = (1, 2, 3, 4)  #: that are used, 1-based; those that exist
+    calibrate: bool = True  #: identify friction, inertia and gains from the collision-free motion
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Without what is kept for the next to ask."""
-        return {**self.__dict__, "_trained": None, "_recent": None}
+    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FrontEnd:
+        """Identify the arm and its envelope from the collision-free rows.
 
-    def forget(self) -> None:
-        """Let go of the traces that were seen last."""
-        self._trained = self._recent = None
-
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> list[Estimate]:
-        """Identify the arm from the collision-free rows, and the envelope.
-
-        Returns:
-            The estimates of the traces, which training goes on with.
+        The last result for these settings is kept while its traces live: methods with equal
+        settings share it.
 
         Raises:
-            ValueError: traces that do not fit, or without collision-free motion.
+            ValueError: traces that do not fit, or without collision-free motion, or joints that
+                do not exist.
         """
-        if self._trained and self._trained[0] is traces and self._trained[1] is robot:
-            return self._trained[2]
-        self.dt = common_interval(traces, robot)
+        given = (*traces, arm)
+        known, found = _FITTED.get(self, ((), None))
+        same = len(known) == len(given) and all(
+            ref() is value for ref, value in zip(known, given, strict=True)
+        )
+        if found is None or not same:
+            found = self._fit(traces, arm)
+            _FITTED[self] = tuple(weakref.ref(value) for value in given), found
+        return found
+
+    def _fit(self, traces: Sequence[Trace], arm: ArmModel) -> FrontEnd:
+        dt, count = common_interval(traces, arm), arm.robot.joints
+        joints = tuple(j - 1 for j in self.joints if 1 <= j <= count)
+        if not joints:
+            raise ValueError(f"joints {self.joints}: expected some of 1 to {count}")
         free = [np.flatnonzero(free_rows(trace, self.settle))[::THIN] for trace in traces]
         if not sum(len(rows) for rows in free):
             raise ValueError(
                 f"no collision-free motion after the first {self.settle:g} s of any trace"
             )
-        self.arm = calibrate(robot, traces, friction=robot.friction).arm
-        estimates = [self._run(self.arm, trace) for trace in traces]
+        if self.calibrate:
+            arm = calibrate(arm, traces, friction=arm.friction).arm
+        bare = FrontEnd(self.gain, self.adapt, self.settle, joints, arm, dt)
+        estimates = [bare.estimator().run(t.t, t.q, t.qd, t.current) for t in traces]
         tables = (
             [e.left for e in estimates],
             [t.qd for t in traces],
             [e.acceleration for e in estimates],
         )
-        gathered = [
-            np.concatenate([values[rows] for values, rows in zip(own, free, strict=True)])
-            for own in tables
-        ]
-        self.envelope = Envelope.fit(*gathered)
-        self._recent = None
-        if self._shared:
-            self._trained = traces, robot, estimates
-        return estimates
-
-    def fitted(self) -> tuple[ArmModel, Envelope]:
-        """The arm and its envelope; ``ValueError`` before :meth:`fit`."""
-        if self.arm is None or self.envelope is None:
-            raise ValueError("this detector is not fitted: call fit or load a model file first")
-        return self.arm, self.envelope
-
-    def ratio(self, trace: Trace, estimate: Estimate | None = None) -> Array:
-        """Residual over envelope of the joints looked at, shape (T, joints).
-
-        Args:
-            trace: of the arm, at the rate of training.
-            estimate: of this trace, where it is known already.
-
-        Raises:
-            ValueError: not fitted, other joints or another rate.
-        """
-        arm, envelope = self.fitted()
-        if self._recent and self._recent[0] is trace:
-            return self._recent[1]
-        check_trace(trace, arm.robot.joints, self.dt)
-        known = estimate or self._run(arm, trace)
-        ratio = known.left / envelope.scale(trace.qd, known.acceleration)
-        found = np.ascontiguousarray(ratio[:, : self.joints])
-        found.flags.writeable = False
-        if self._shared:
-            self._recent = trace, found
+        envelope = Envelope.fit(
+            *(
+                np.concatenate([values[rows] for values, rows in zip(own, free, strict=True)])
+                for own in tables
+            )
+        )
+        found = replace(bare, arm=replace(arm, envelope=envelope))
+        for trace, estimate in zip(traces, estimates, strict=True):
+            _remember(trace, found, estimate)
         return found
 
-    def _run(self, arm: ArmModel, trace: Trace) -> Estimate:
-        unknowns = Unknowns.wary() if self.adapt else Unknowns.none()
-        estimator = Estimator(arm, self.gain, self.dt, unknowns)
-        return estimator.run(trace.t, trace.q, trace.qd, trace.current)
 
-    def parts(self) -> dict[str, Any]:
-        """What a model file keeps of it."""
-        arm, envelope = self.fitted()
-        return {
-            "gain": self.gain,
-            "adapt": self.adapt,
-            "settle": self.settle,
-            "joints": self.joints,
-            "dt": self.dt,
-            "arm": arm_parts(arm),
-            "envelope": envelope.weights,
-        }
+@dataclass(frozen=True, eq=False)
+class FrontEnd(Frozen):
+    """A fitted front end: from a trace to the residual that the model does not explain."""
 
-    @classmethod
-    def from_parts(cls, parts: dict[str, Any]) -> FrontEnd:
-        """The front end again from :meth:`parts`."""
-        return cls(
-            gain=float(parts["gain"]),
-            adapt=bool(parts["adapt"]),
-            settle=float(parts["settle"]),
-            joints=int(parts["joints"]),
-            dt=float(parts["dt"]),
-            arm=arm_from_parts(parts["arm"]),
-            envelope=Envelope(np.asarray(parts["envelope"], dtype=np.float64)),
-        )
+    gain: float  #: of the observer [1/s]
+    adapt: bool  #: track payload, offsets and friction errors
+    settle: float  #: [s]
+    joints: tuple[int, ...]  #: that are used, 0-based
+    arm: ArmModel  #: calibrated
+    dt: float  #: sample interval [s]
 
+    def __post_init__(self) -> None:
+        """Check: ``ValueError``."""
+        if not (self.dt > 0 and self.gain > 0 and self.settle >= 0):
+            raise ValueError(f"dt {self.dt}, gain {self.gain}, settle {self.settle}: out of range")
+        if not self.joints or not 0 <= min(self.joints) <= max(self.joints) < self.arm.robot.joints:
+            raise ValueError(f"joints {self.joints}: expected some of 0 to below the arm's number")
 
-def shared_front_ends(detectors: Iterable[object]) -> list[FrontEnd]:
-    """Give unfitted detectors with equal front ends one in common.
+    def estimator(self) -> Estimator:
+        """A fresh estimator of this arm."""
+        unknowns = Unknowns.for_detection() if self.adapt else Unknowns.none()
+        return Estimator(self.arm, self.gain, self.dt, unknowns)
 
-    Args:
-        detectors: those with an attribute ``front`` are changed.
+    def estimate(self, trace: Trace) -> Estimate:
+        """The estimate of a trace; the last one is kept while the trace lives.
 
-    Returns:
-        The front ends that are left; :meth:`FrontEnd.forget` frees what they hold after training.
-    """
-    fronts: list[FrontEnd] = []
-    for detector in detectors:
-        own = getattr(detector, "front", None)
-        if isinstance(own, FrontEnd) and own.arm is None:
-            known = next((front for front in fronts if front == own), None)
-            if known is None:
-                own._shared = True
-                fronts.append(own)
-            else:
-                detector.front = known  # type: ignore[attr-defined]
-    return fronts
+        Raises:
+            ValueError: another arm or another rate.
+        """
+        front, known = _ESTIMATES.get(id(trace), (None, None))
+        if front is self and known is not None:
+            return known
+        check_trace(trace, self.arm.robot.joints, self.dt)
+        found = self.estimator().run(trace.t, trace.q, trace.qd, trace.current)
+        _remember(trace, self, found)
+        return found
+
+    def scaling(self, units: float = 1.0) -> Scaling:
+        """The residual over ``units`` envelopes."""
+        return Scaling(self.joints, self.arm.envelope, units)
+
+    def scaled(self, trace: Trace, scaling: Scaling) -> Array:
+        """The scaled residual of a trace, shape (T, joints)."""
+        estimate = self.estimate(trace)
+        return scaling.rows(estimate.left, trace.qd, estimate.acceleration)
+
+    def stream(self, scaling: Scaling) -> ResidualStream:
+        """The scaled residual sample by sample."""
+        return ResidualStream(self, scaling)
 
 
-@dataclass
-class OnFrontEnd:
-    """A detector that starts from a front end, and takes arm and settling time from it."""
+class ResidualStream:
+    """Estimator and scaling, sample by sample."""
 
-    front: FrontEnd = field(default_factory=FrontEnd)
+    def __init__(self, front: FrontEnd, scaling: Scaling) -> None:
+        """Begin anew."""
+        self._estimator, self._scaling = front.estimator(), scaling
+        self._residual, self._left, self._acceleration = np.zeros((3, 1, front.arm.robot.joints))
+        self._out = (self._residual[0], self._left[0], self._acceleration[0])
+        self._row = np.zeros((1, len(scaling.joints)))
 
-    @property
-    def settle(self) -> float:
-        """Seconds at the beginning of a trace whose scores mean nothing yet."""
-        return self.front.settle
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> Array:
+        """The scaled residual of this sample, shape (1, joints); valid until the next step."""
+        self._estimator.step(q, qd, current, self._out, dt)
+        return self._scaling.rows(self._left, qd[None], self._acceleration, self._row)
 
-    @property
-    def arm(self) -> ArmModel:
-        """The calibrated arm."""
-        return self.front.fitted()[0]
+
+_FITTED: dict[FrontEndSettings, tuple[tuple[weakref.ref[object], ...], FrontEnd]] = {}
+_ESTIMATES: dict[int, tuple[FrontEnd, Estimate]] = {}
+
+
+def _remember(trace: Trace, front: FrontEnd, estimate: Estimate) -> None:
+    """Keep the estimate until the trace dies or another front end estimates it."""
+    if id(trace) not in _ESTIMATES:
+        weakref.finalize(trace, _ESTIMATES.pop, id(trace), None)
+    _ESTIMATES[id(trace)] = front, estimate

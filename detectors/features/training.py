@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.estimation.observer import intervals, low_pass
-from tauguard.detectors.features.windows import Features
+from tauguard.detectors.features.windows import WindowShape
 from tauguard.traces.trace import Bools, Trace
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ def peaks(score: Array, count: int, gap: int) -> NDArray[np.int64]:
 def draw_windows(
     rng: np.random.Generator,
     prepared: Sequence[Prepared],
-    features: Features,
+    shape: WindowShape,
     count: int,
     positive: float = 0.2,
 ) -> tuple[Array, Array]:
@@ -93,7 +93,7 @@ def draw_windows(
         for p, mask in zip(prepared, masks, strict=True):
             rows = np.flatnonzero(mask)
             own = rows[picks[(picks >= start) & (picks < start + len(rows))] - start]
-            x.append(features.windows(p.signal, own))
+            x.append(shape.of(p.signal, own))
             y.append(p.target[own] if name == "struck" else np.zeros(len(own)))
             start += len(rows)
     return np.concatenate(x), np.concatenate(y)

@@ -2,7 +2,7 @@
 
 A network learns on collision-free motion what current every motor draws, from the joint positions,
 windows of velocities and accelerations, and (the auto-regressive form) the currents of a moment
-ago: those carry the payload, the temperature and the friction of the day, which no position tells.
+ago: those carry the payload, the temperature and the friction of the day, which no position does.
 That form predicts the change since then, so that what stays the same need not be learnt.
 The score is the largest difference between measured and predicted current over the joints, so its
 threshold is in amperes (1.6 A and 2.0 A in the original).
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.methods.current_threshold import smoothed
+from tauguard.detectors.features.low_pass import LowPass, smoothed
+from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.methods.network import Network
-from tauguard.detectors.model_parts import arm_from_parts, arm_parts
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
@@ -33,13 +33,69 @@ THRESHOLDS = (1.6, 2.0)
 DERIVATIVE = 100.0
 #: Friction changes its sign within about this velocity [rad/s].
 REVERSAL = 0.02
-#: Added to the sum of |acceleration| when samples are drawn, so that rest is seen too [rad/s^2].
+#: Added to the sum of |acceleration| when samples are drawn, so that rest is drawn too [rad/s^2].
 STILL = 0.5
 
 
-@dataclass
+class Sample(NamedTuple):
+    """Signals of some samples, shape (N, n) each."""
+
+    q: Array
+    qd: Array
+    qdd: Array  #: filtered derivative of the velocity
+    current: Array
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What the network sees."""
+
+    lags: tuple[float, ...]  #: ages of the window's samples [s]
+    memory: float  #: age of the past sample that is fed back [s]; 0: none
+    dt: float  #: [s]
+
+    @property
+    def ages(self) -> tuple[int, ...]:
+        """Ages of the window's samples and, if there is one, of the sample that is fed back."""
+        own = tuple(round(lag / self.dt) for lag in self.lags)
+        return (*own, max(1, round(self.memory / self.dt))) if self.memory > 0 else own
+
+    def of(self, now: Sample, past: Sequence[Sample]) -> Array:
+        """The inputs, shape (N, d).
+
+        Position as sine and cosine, direction of motion, velocity and acceleration at the window's
+        ages, and the past sample's currents and position.
+
+        Args:
+            now: the samples.
+            past: the samples that are :attr:`ages` older.
+        """
+        parts = [np.sin(now.q), np.cos(now.q), np.tanh(now.qd / REVERSAL)]
+        for sample in past[: len(self.lags)]:
+            parts += [sample.qd, sample.qdd]
+        if self.memory > 0:
+            fed = past[-1]
+            parts += [fed.current, fed.q - now.q, np.tanh(fed.qd / REVERSAL)]
+        return np.concatenate(parts, axis=1)
+
+    def base(self, now: Sample, past: Sequence[Sample]) -> Array:
+        """What the network's output is added to [A], shape (N, n)."""
+        return past[-1].current if self.memory > 0 else np.zeros_like(now.current)
+
+    def rows(self, trace: Trace, rows: NDArray[np.intp]) -> tuple[Sample, list[Sample]]:
+        """Samples of a trace and their past; before the first sample is the first."""
+        signals = (trace.q, trace.qd, self.acceleration(trace), trace.current)
+        past = [Sample(*(x[np.maximum(rows - age, 0)] for x in signals)) for age in self.ages]
+        return Sample(*(x[rows] for x in signals)), past
+
+    def acceleration(self, trace: Trace) -> Array:
+        """The filtered derivative of the velocity [rad/s^2], shape (T, n)."""
+        return DERIVATIVE * (trace.qd - smoothed(trace.qd, DERIVATIVE, self.dt))
+
+
+@dataclass(frozen=True)
 class CurrentNetwork:
-    """Predicts every motor's current from the motion; what is left over is the score."""
+    """Predicts every motor's current from the motion; the largest error is the score."""
 
     lags: tuple[float, ...] = (0.0, 0.025, 0.05)  #: ages of the window's samples [s]
     memory: float = 0.05  #: age of the past sample that is fed back [s]; 0: none, the static form
@@ -48,117 +104,101 @@ class CurrentNetwork:
     epochs: int = 60
     seed: int = 0
     settle: float = 0.5  #: [s]
-    network: Network | None = None
-    dt: float = 1e-3
-    known: ArmModel | None = None  #: as given; nothing of it is used
     name: str = "current-network"
 
     @classmethod
     def static(cls) -> CurrentNetwork:
-        """The form without past currents: a payload that it is not told is a residual."""
+        """The form without past currents: an unknown payload is a residual."""
         return cls(memory=0.0, name="current-network-static")
 
-    @property
-    def arm(self) -> ArmModel:
-        """The arm as it was given."""
-        if self.known is None:
-            raise ValueError("this detector is not fitted: call fit or load a model file first")
-        return self.known
-
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> CurrentNetwork:
+    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedCurrentNetwork:
         """Train on collision-free samples of all traces, more of them where the arm accelerates.
 
         A sample's chance grows with the square root of the sum of |acceleration|: fast starts and
         stops are rare, and are where the errors are.
+
+        Raises:
+            ValueError: traces that do not fit, or without collision-free motion.
         """
-        self.dt, self.known = common_interval(traces, robot), robot
+        inputs = Inputs(self.lags, self.memory, common_interval(traces, arm))
+        x, y = [], []
+        for trace, rows in zip(traces, self._drawn(traces, inputs), strict=True):
+            if len(rows):
+                now, past = inputs.rows(trace, rows)
+                x.append(inputs.of(now, past))
+                y.append(now.current - inputs.base(now, past))
+        network = Network.fit(
+            np.concatenate(x), np.concatenate(y), self.hidden, seed=self.seed, epochs=self.epochs
+        )
+        return FittedCurrentNetwork(self.name, arm, self.settle, inputs, network)
+
+    def _drawn(self, traces: Sequence[Trace], inputs: Inputs) -> list[NDArray[np.intp]]:
+        """Rows of every trace to train on."""
         rng = np.random.default_rng([self.seed, 7])
         free = [np.flatnonzero(free_rows(trace, self.settle)) for trace in traces]
         if not sum(len(rows) for rows in free):
             raise ValueError("no collision-free motion in the traces")
         lively = [
-            np.sqrt(np.abs(self._acceleration(trace)[rows]).sum(axis=1) + STILL)
+            np.sqrt(np.abs(inputs.acceleration(trace)[rows]).sum(axis=1) + STILL)
             for trace, rows in zip(traces, free, strict=True)
         ]
         total = sum(float(weight.sum()) for weight in lively)
-        x, y = [], []
-        for trace, rows, weight in zip(traces, free, lively, strict=True):
-            if not len(rows):
-                continue
+        drawn = []
+        for rows, weight in zip(free, lively, strict=True):
             share = min(len(rows), int(np.ceil(self.rows * weight.sum() / total)))
-            own = np.sort(rng.choice(rows, share, replace=False, p=weight / weight.sum()))
-            x.append(self._inputs(trace, own))
-            y.append(trace.current[own] - self._base(trace, own))
-        self.network = Network.fit(
-            np.concatenate(x), np.concatenate(y), self.hidden, seed=self.seed, epochs=self.epochs
-        )
-        return self
+            if share:
+                rows = rng.choice(rows, share, replace=False, p=weight / weight.sum())
+            drawn.append(np.sort(rows))
+        return drawn
 
-    def _inputs(self, trace: Trace, rows: NDArray[np.intp]) -> Array:
-        """What the network sees at ``rows``, shape (len(rows), d).
 
-        Position as sine and cosine, direction of motion, velocity and acceleration at the window's
-        ages, and the past sample's currents and position.
-        """
-        q, qd = trace.q[rows], trace.qd[rows]
-        parts = [np.sin(q), np.cos(q), np.tanh(qd / REVERSAL)]
-        acceleration = self._acceleration(trace)
-        for lag in self.lags:
-            past = np.maximum(rows - round(lag / self.dt), 0)
-            parts += [trace.qd[past], acceleration[past]]
-        if self.memory > 0:
-            past = self._past(rows)
-            parts += [trace.current[past], trace.q[past] - q]
-            parts.append(np.tanh(trace.qd[past] / REVERSAL))
-        return np.concatenate(parts, axis=1)
+@dataclass(frozen=True, eq=False)
+class FittedCurrentNetwork(Frozen):
+    """A :class:`~tauguard.detectors.detector.FittedDetector`."""
 
-    def _acceleration(self, trace: Trace) -> Array:
-        """The filtered derivative of the velocity [rad/s^2], shape (T, n)."""
-        return DERIVATIVE * (trace.qd - smoothed(trace.qd, DERIVATIVE, self.dt))
+    name: str
+    arm: ArmModel  #: as it was given: nothing of it is used
+    settle: float  #: [s]
+    inputs: Inputs
+    network: Network
 
-    def _past(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-        """The rows that are ``memory`` older."""
-        return np.maximum(rows - max(1, round(self.memory / self.dt)), 0)
-
-    def _base(self, trace: Trace, rows: NDArray[np.intp]) -> Array:
-        """What the network's output is added to [A], shape (len(rows), n)."""
-        if self.memory > 0:
-            return trace.current[self._past(rows)]
-        return np.zeros((len(rows), trace.current.shape[1]))
+    @property
+    def dt(self) -> float:
+        """Sample interval [s]."""
+        return self.inputs.dt
 
     def scores(self, trace: Trace) -> Array:
         """The largest |measured - predicted current| over the joints [A], shape (T,)."""
-        if self.network is None:
-            raise ValueError("this detector is not fitted: call fit or load a model file first")
         check_trace(trace, len(self.network.biases[-1]), self.dt)
-        rows = np.arange(len(trace.t))
-        predicted = self._base(trace, rows) + self.network(self._inputs(trace, rows))
-        score: Array = np.abs(trace.current - predicted).max(axis=1)
+        return self._score(*self.inputs.rows(trace, np.arange(len(trace.t))))
+
+    def _score(self, now: Sample, past: Sequence[Sample]) -> Array:
+        predicted = self.inputs.base(now, past) + self.network(self.inputs.of(now, past))
+        score: Array = np.abs(now.current - predicted).max(axis=1)
         return score
 
-    def parts(self) -> dict[str, Any]:
-        """What a model file keeps."""
-        arm = arm_parts(self.arm)
-        assert self.network is not None
-        return {
-            "lags": list(self.lags),
-            "memory": self.memory,
-            "name": self.name,
-            "settle": self.settle,
-            "dt": self.dt,
-            "network": self.network.parts(),
-            "arm": arm,
-        }
+    def stream(self) -> CurrentNetworkStream:
+        """The same, sample by sample."""
+        return CurrentNetworkStream(self)
 
-    @classmethod
-    def from_parts(cls, parts: dict[str, Any]) -> CurrentNetwork:
-        """The detector again from :meth:`parts`."""
-        return cls(
-            lags=tuple(float(lag) for lag in parts["lags"]),
-            memory=float(parts["memory"]),
-            name=str(parts["name"]),
-            settle=float(parts["settle"]),
-            dt=float(parts["dt"]),
-            network=Network.from_parts(parts["network"]),
-            known=arm_from_parts(parts["arm"]),
-        )
+
+class CurrentNetworkStream:
+    """Sample by sample, with the samples up to the oldest age kept."""
+
+    def __init__(self, detector: FittedCurrentNetwork) -> None:
+        """Begin anew."""
+        self._detector, self._ages = detector, detector.inputs.ages
+        self._low_pass = LowPass(DERIVATIVE, detector.dt)
+        self._kept: list[Sample] = []
+        self._at = 0
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
+        """The score of this sample."""
+        acceleration = DERIVATIVE * (qd - self._low_pass.step(qd))
+        now = Sample(*(x[None].copy() for x in (q, qd, acceleration, current)))
+        if not self._kept:
+            self._kept = [now] * (1 + max(self._ages))
+        self._at = (self._at + 1) % len(self._kept)
+        self._kept[self._at] = now
+        past = [self._kept[self._at - age] for age in self._ages]
+        return float(self._detector._score(now, past)[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -82,12 +82,3 @@ class Forest:
         tables = (self.roots, self.feature, self.threshold, self.left, self.right, self.value)
         _ranking.forest(rows, *tables, self.base, out, threads)
         return out
-
-    def parts(self) -> dict[str, Any]:
-        """What a model file keeps."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
-
-    @classmethod
-    def from_parts(cls, parts: dict[str, Any]) -> Forest:
-        """The forest again from :meth:`parts`."""
-        return cls(**parts)

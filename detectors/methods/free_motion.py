@@ -40,8 +40,8 @@ from tauguard.detectors.features.allowance import (
     terms,
     torque_change,
 )
+from tauguard.detectors.features.standstill import still
 from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
-from tauguard.detectors.thresholds.quiet import still
 from tauguard.detectors.thresholds.rates import followed, sustained
 from tauguard.traces.trace import Bools, Detection, Trace
 
@@ -309,8 +309,8 @@ def resting(q: Array, qd: Array, dt: float) -> Bools:
     """Which joints are at rest at each sample, shape (T, n).
 
     A joint comes to rest when it has stood still for a while (see
-    :mod:`~tauguard.detectors.thresholds.quiet`) and leaves it by ``RELEASE`` of travel: the twitch
-    of a joint that is shaken by the others is no motion.
+    :mod:`~tauguard.detectors.features.standstill`) and leaves it by ``RELEASE`` of travel: the
+    twitch of a joint that is shaken by the others is no motion.
     """
     stopped = still(qd, dt)
     out = np.empty_like(stopped)

@@ -1,22 +1,25 @@
-"""A small feed-forward network: scikit-learn fits it, plain arrays keep it, numpy evaluates it."""
+"""A small feed-forward network: scikit-learn fits it, native code evaluates it."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
 
+from tauguard.detectors import _ranking
+from tauguard.detectors.frozen import Frozen
+
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Network:
+class Network(Frozen):
     """Affine layers with rectifiers in between, on standardised inputs and outputs."""
 
     weights: tuple[Array, ...]  #: of each layer, shape (in, out)
@@ -65,30 +68,20 @@ class Network:
         weights[-1], biases[-1] = weights[-1] * spread, biases[-1] * spread + mean
         return cls(tuple(weights), tuple(biases), centre, scale)
 
-    def __call__(self, x: Array) -> Array:
-        """Outputs at the rows of x, shape (N, d) -> (N, m)."""
-        value = (x - self.centre) / self.scale
-        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            value = value @ weight + bias
-            if k + 1 < len(self.weights):
-                np.maximum(value, 0.0, out=value)
-        return value
-
-    def parts(self) -> dict[str, Any]:
-        """What a model file keeps."""
-        return {
-            "weights": list(self.weights),
-            "biases": list(self.biases),
-            "centre": self.centre,
-            "scale": self.scale,
-        }
-
-    @classmethod
-    def from_parts(cls, parts: dict[str, Any]) -> Network:
-        """The network again from :meth:`parts`."""
-        return cls(
-            tuple(np.asarray(w) for w in parts["weights"]),
-            tuple(np.asarray(b) for b in parts["biases"]),
-            np.asarray(parts["centre"]),
-            np.asarray(parts["scale"]),
+    @cached_property
+    def _flat(self) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
+        widths = [len(self.centre), *(len(bias) for bias in self.biases)]
+        return (
+            np.array(widths, dtype=np.int64),
+            np.concatenate([weight.ravel() for weight in self.weights]),
+            np.concatenate(self.biases),
+            np.ascontiguousarray(self.centre),
+            np.ascontiguousarray(self.scale),
         )
+
+    def __call__(self, x: Array) -> Array:
+        """Outputs at the rows of x, shape (N, d) -> (N, m); each depends on its row alone."""
+        rows = np.ascontiguousarray(x, dtype=np.float64)
+        out = np.empty((len(rows), len(self.biases[-1])))
+        _ranking.network(rows, *self._flat, out, 0)
+        return out

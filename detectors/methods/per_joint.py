@@ -1,54 +1,84 @@
-"""What the detectors with one learned number a joint share: the front end and that number."""
+"""What the methods with one learned number a joint share."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, field
+from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.calibration.calibrate import free_rows
-from tauguard.detectors.estimation.estimator import ArmModel, Estimate
-from tauguard.detectors.features.front_end import FrontEnd, OnFrontEnd
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
+from tauguard.detectors.features.scaling import Scaling
+from tauguard.detectors.frozen import Frozen
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
 
-@dataclass
-class PerJoint(OnFrontEnd, ABC):
-    """A detector that compares each joint's deviation with what free motion seldom exceeds."""
+@dataclass(frozen=True, eq=False)
+class FittedPerJoint(Frozen, ABC):
+    """What fitted methods share; with scores they are a ``FittedDetector``."""
 
-    limits: Array | None = None  #: deviation that counts one, shape (joints,)
+    front: FrontEnd
+    scaling: Scaling
+    limits: Array  #: scaled residual that counts one, shape (joints,)
+
+    def __post_init__(self) -> None:
+        """Check: ``ValueError``."""
+        if self.limits.shape != (len(self.scaling.joints),) or not (self.limits > 0).all():
+            raise ValueError("limits: expected one number above 0 a joint")
+
+    @property
+    def arm(self) -> ArmModel:
+        """The calibrated arm."""
+        return self.front.arm
+
+    @property
+    def dt(self) -> float:
+        """Sample interval [s]."""
+        return self.front.dt
+
+    @property
+    def settle(self) -> float:
+        """Until the estimator has settled [s]."""
+        return self.front.settle
+
+
+Fitted = TypeVar("Fitted", bound=FittedPerJoint)
+
+
+@dataclass(frozen=True)
+class PerJoint(ABC, Generic[Fitted]):
+    """Settings of a method that compares each joint's residual with a limit.
+
+    A limit is what collision-free motion exceeds in a share 1 - ``share`` of its samples.
+    """
+
+    front: FrontEndSettings = field(default_factory=FrontEndSettings)
+    share: float = 0.999
     name: ClassVar[str] = "per-joint"
-    share: ClassVar[float] = 0.999  #: of free motion that stays below a limit
 
     @abstractmethod
-    def deviation(self, trace: Trace, estimate: Estimate) -> Array:
-        """What is compared with the limits in training, signed, shape (T, joints)."""
+    def fitted(self, front: FrontEnd, scaling: Scaling, limits: Array) -> Fitted:
+        """The fitted method."""
 
-    @abstractmethod
-    def scores(self, trace: Trace) -> Array:
-        """One score a sample, shape (T,)."""
+    def scaling(self, front: FrontEnd) -> Scaling:
+        """What is compared with the limits."""
+        return front.scaling()
 
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> Self:
-        """Calibrate the arm, fit the envelope and take each joint's quantile of free motion."""
-        estimates = self.front.fit(traces, robot)
-        free = [
-            np.abs(self.deviation(t, e)[free_rows(t, self.settle)])
-            for t, e in zip(traces, estimates, strict=True)
-        ]
-        self.limits = np.maximum(np.quantile(np.concatenate(free), self.share, axis=0), 1e-9)
-        return self
+    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> Fitted:
+        """Calibrate the arm, fit the envelope and take each joint's quantile.
 
-    def parts(self) -> dict[str, Any]:
-        """What a model file keeps."""
-        return {"front": self.front.parts(), "limits": self.limits}
-
-    @classmethod
-    def from_parts(cls, parts: dict[str, Any]) -> Self:
-        """The detector again from :meth:`parts`."""
-        return cls(FrontEnd.from_parts(parts["front"]), np.asarray(parts["limits"]))
+        Raises:
+            ValueError: traces that do not fit, or without collision-free motion.
+        """
+        front = self.front.fit(traces, arm)
+        scaling = self.scaling(front)
+        free = [np.abs(front.scaled(t, scaling)[free_rows(t, front.settle)]) for t in traces]
+        limits = np.maximum(np.quantile(np.concatenate(free), self.share, axis=0), 1e-9)
+        return self.fitted(front, scaling, limits)

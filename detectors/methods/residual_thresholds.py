@@ -1,4 +1,4 @@
-"""Per-joint thresholds on the residual: constant ones, and ones that move with the motion."""
+"""Per-joint thresholds on the residual: constant ones, and ones that follow the motion."""
 
 from __future__ import annotations
 
@@ -8,60 +8,79 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.detector import check_trace
-from tauguard.detectors.estimation.estimator import Estimate
-from tauguard.detectors.features.front_end import FrontEnd
-from tauguard.detectors.methods.per_joint import PerJoint
-from tauguard.detectors.thresholds.thresholded import PLAIN_GAIN, plain_residual
+from tauguard.detectors.estimation.observer import PLAIN_GAIN
+from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
+from tauguard.detectors.features.scaling import Scaling
+from tauguard.detectors.methods.per_joint import FittedPerJoint, PerJoint
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
 
-@dataclass
-class ResidualThresholds(PerJoint):
+@dataclass(frozen=True)
+class ResidualThresholds(PerJoint["FittedThresholds"]):
     """The classical detector: the calibrated momentum observer, one constant threshold a joint.
 
     The score is the largest ratio of |residual| to its joint's limit [N m], so a threshold of 1 on
-    the score is what training showed free motion to reach in one sample of a thousand.
+    the score is what collision-free motion exceeds in one training sample of a thousand.
     """
 
-    front: FrontEnd = field(
-        default_factory=lambda: FrontEnd(gain=PLAIN_GAIN, adapt=False, settle=0.5)
+    front: FrontEndSettings = field(
+        default_factory=lambda: FrontEndSettings(gain=PLAIN_GAIN, adapt=False, settle=0.5)
     )
     name: ClassVar[str] = "residual-thresholds"
 
-    def deviation(self, trace: Trace, estimate: Estimate) -> Array:
-        """The residual [N m]."""
-        return estimate.left[:, : self.front.joints]
+    def scaling(self, front: FrontEnd) -> Scaling:
+        """The residual in N m."""
+        return Scaling(front.joints)
 
-    def scores(self, trace: Trace) -> Array:
-        """The largest |residual| over its joint's limit, shape (T,)."""
-        arm, _ = self.front.fitted()
-        assert self.limits is not None
-        check_trace(trace, arm.robot.joints, self.front.dt)
-        residual = plain_residual(arm, trace)[:, : len(self.limits)]
-        score: Array = (np.abs(residual) / self.limits).max(axis=1)
-        return score
+    def fitted(self, front: FrontEnd, scaling: Scaling, limits: Array) -> FittedThresholds:
+        """See the class."""
+        return FittedThresholds(front, scaling, limits, self.name)
 
 
-@dataclass
-class MovingThresholds(PerJoint):
+@dataclass(frozen=True)
+class MovingThresholds(PerJoint["FittedThresholds"]):
     """Thresholds that follow speed, acceleration and what has been learned of the payload.
 
-    The score is the largest ratio of |residual left by the payload-tracking estimator| to its
-    envelope, in units of the ratio that free motion exceeds in one sample of a thousand.
+    The score is the largest ratio of |residual that the payload-tracking estimator cannot explain|
+    to its envelope, in units of the ratio that collision-free motion exceeds in one sample of a
+    thousand.
     """
 
     name: ClassVar[str] = "moving-thresholds"
 
-    def deviation(self, trace: Trace, estimate: Estimate) -> Array:
-        """The residual over its envelope."""
-        return self.front.ratio(trace, estimate)
+    def fitted(self, front: FrontEnd, scaling: Scaling, limits: Array) -> FittedThresholds:
+        """See the class."""
+        return FittedThresholds(front, scaling, limits, self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedThresholds(FittedPerJoint):
+    """The largest ratio of scaled residual to limit."""
+
+    name: str
 
     def scores(self, trace: Trace) -> Array:
-        """The largest ratio over its limit, shape (T,)."""
-        ratio = np.abs(self.front.ratio(trace))
-        assert self.limits is not None
-        score: Array = (ratio / self.limits).max(axis=1)
+        """The largest ratio over the joints, shape (T,)."""
+        return self._score(self.front.scaled(trace, self.scaling))
+
+    def _score(self, scaled: Array) -> Array:
+        score: Array = (np.abs(scaled) / self.limits).max(axis=1)
         return score
+
+    def stream(self) -> ThresholdStream:
+        """The same, sample by sample."""
+        return ThresholdStream(self)
+
+
+class ThresholdStream:
+    """Sample by sample."""
+
+    def __init__(self, detector: FittedThresholds) -> None:
+        """Begin anew."""
+        self._score, self._residual = detector._score, detector.front.stream(detector.scaling)
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
+        """The score of this sample."""
+        return float(self._score(self._residual.step(q, qd, current, dt))[0])

@@ -1,68 +1,94 @@
-"""SVR with the SRQ kernel behind the shared interface, in its strong and in its plain form."""
+"""Support vector regression with the SRQ kernel on windows of the residual, in two forms."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.detector import check_interval, common_interval
-from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.methods.pipeline import CollisionDetector, DetectorSettings
+from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
+from tauguard.detectors.features.scaling import Scaling
+from tauguard.detectors.features.training import Prepared, binary_target, draw_windows
+from tauguard.detectors.features.windows import WindowShape, median_distance
+from tauguard.detectors.methods.kernel_machine import KernelMachine
+from tauguard.detectors.methods.svr_regressor import SrqSVR
+from tauguard.detectors.methods.windowed import Regressor, Windowed
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
+#: Windows that the scale of the features is found with.
+SAMPLED = 1000
 
-@dataclass
-class SvrDetector:
-    """:class:`~tauguard.detectors.methods.pipeline.CollisionDetector` as a ranking.
 
-    Attributes:
-        chain: the detector inside; its own threshold plays no part here.
+@dataclass(frozen=True)
+class SrqSvr(Windowed):
+    """The dissertation's regressor on the residual over its envelope.
+
+    One factor brings the median distance between windows of collisions and of collision-free
+    motion to ``distance``, a length that the kernel resolves.
     """
 
-    chain: CollisionDetector = field(default_factory=CollisionDetector)
-    name: str = "srq-svr"
+    windows: int = 3000
+    mined: int = 300
+    sigma: float = 3.0  #: of the SRQ kernel
+    C: float = 1.0
+    epsilon: float = 0.02
+    distance: float = 2.0  #: median distance after scaling; 0 leaves the windows as they are
+    vectors: int = 0  #: support vectors that are kept, at most; 0 keeps all
+    name: ClassVar[str] = "srq-svr"
+    mining_gap: ClassVar[float] = 0.1
+    stream_of_seeds: ClassVar[int] = 1
 
-    @classmethod
-    def plain(cls) -> SvrDetector:
-        """The dissertation's form: residuals times one factor, labels 0/1, no friction model."""
-        return cls(CollisionDetector(DetectorSettings.plain_form()), "srq-svr-plain")
+    def learn(self, x: Array, y: Array) -> KernelMachine:
+        """Epsilon-SVR."""
+        return SrqSVR(self.sigma, self.C, self.epsilon).fit(x, y).machine_
 
-    @property
-    def settle(self) -> float:
-        """Seconds at the beginning of a trace whose scores mean nothing yet."""
-        return self.chain.settings.settle
+    def finished(self, regressor: Regressor) -> Regressor:
+        """With no more than ``vectors`` support vectors."""
+        assert isinstance(regressor, KernelMachine)
+        few = 0 < self.vectors < len(regressor.vectors)
+        return regressor.reduced(self.vectors) if few else regressor
 
-    @property
-    def arm(self) -> ArmModel:
-        """The calibrated arm."""
-        return self.chain._fitted()[0]
+    def bare(self, front: FrontEnd) -> Scaling:
+        """The scaling before its factor is known."""
+        return replace(front.scaling(self.units), compress=True)
 
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> SvrDetector:
-        """Calibrate, scale and train; needs collisions and collision-free motion."""
-        common_interval(traces, robot)
-        self.chain.fit(traces, robot.robot, robot.drive_gain, friction=robot.friction)
-        return self
+    def scaling(self, traces: Sequence[Trace], front: FrontEnd, shape: WindowShape) -> Scaling:
+        """Bring the median distance of windows to ``distance``."""
+        bare = self.bare(front)
+        if self.distance <= 0:
+            return bare
+        rng = np.random.default_rng(self.seed)
+        prepared = [self.prepare(trace, front, bare) for trace in traces]
+        windows, target = draw_windows(rng, prepared, shape, SAMPLED)
+        spread = median_distance(windows[target > 0], windows[target == 0], rng)
+        return replace(bare, factor=self.distance / spread if spread > 0 else 1.0)
 
-    def parts(self) -> dict[str, Any]:
-        """What a model file keeps."""
-        from tauguard.detectors.model_file import detector_parts
 
-        return {"chain": detector_parts(self.chain), "name": self.name}
+@dataclass(frozen=True)
+class PlainSrqSvr(SrqSvr):
+    """The dissertation's form: residuals in N m times one factor, labels 0/1, no friction model.
 
-    @classmethod
-    def from_parts(cls, parts: dict[str, Any]) -> SvrDetector:
-        """The detector again from :meth:`parts`."""
-        from tauguard.detectors.model_file import rebuilt
+    Residuals in N m lie some 100 apart, where a kernel of sigma = 3 is diagonal and nothing is
+    learnt; the factor brings the median distance to sigma. ``distance=0`` is the literal form.
+    """
 
-        return cls(rebuilt(parts["chain"]), str(parts["name"]))
+    mined: int = 0
+    distance: float = 3.0
+    front: FrontEndSettings = field(
+        default_factory=lambda: FrontEndSettings(adapt=False, settle=0.5, calibrate=False)
+    )
+    name: ClassVar[str] = "srq-svr-plain"
 
-    def scores(self, trace: Trace) -> Array:
-        """Output of the regressor, shape (T,)."""
-        check_interval("the trace", trace, self.chain.dt)
-        return self.chain.detect(trace).score
+    def bare(self, front: FrontEnd) -> Scaling:
+        """Residuals in N m."""
+        return Scaling(front.joints)
+
+    def prepare(self, trace: Trace, front: FrontEnd, scaling: Scaling) -> Prepared:
+        """With the labels 0 and 1."""
+        target = binary_target(trace)
+        return self.prepared(trace, front, scaling, target, target > 0)

@@ -13,6 +13,7 @@ from sklearn.svm import SVR
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from tauguard.detectors import _kernel
+from tauguard.detectors.methods.kernel_machine import KernelMachine
 
 Array = NDArray[np.float64]
 
@@ -45,9 +46,7 @@ class SrqSVR(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     Attributes:
         svr_: the fitted ``sklearn.svm.SVR(kernel="precomputed")``.
-        support_vectors_: rows of X that carry the solution, shape (S, d).
-        dual_coef_: their coefficients, shape (S,).
-        intercept_: constant term.
+        machine_: the fitted function, without scikit-learn.
     """
 
     def __init__(self, sigma: float = 3.0, C: float = 1.0, epsilon: float = 0.02) -> None:
@@ -62,53 +61,17 @@ class SrqSVR(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         rows, y = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
         svr = SVR(kernel="precomputed", C=self.C, epsilon=self.epsilon, cache_size=500)
         svr.fit(srq_kernel(rows, rows, self.sigma), y)
-        return self._adopt(svr, rows[svr.support_])
-
-    def _adopt(self, svr: SVR, vectors: Array) -> SrqSVR:
         self.svr_ = svr
-        self.support_vectors_ = np.ascontiguousarray(vectors)
-        self.dual_coef_ = np.ascontiguousarray(svr.dual_coef_[0])
-        self.intercept_ = float(svr.intercept_[0])
+        self.machine_ = KernelMachine(
+            np.ascontiguousarray(rows[svr.support_]),
+            np.ascontiguousarray(svr.dual_coef_[0]),
+            float(svr.intercept_[0]),
+            float(self.sigma),
+        )
         return self
-
-    @classmethod
-    def restored(cls, svr: SVR, vectors: Array, sigma: float) -> SrqSVR:
-        """The estimator again from what a model file holds: a fitted SVR and its vectors."""
-        model = cls(sigma=sigma, C=svr.C, epsilon=svr.epsilon)
-        model.n_features_in_ = vectors.shape[1]
-        return model._adopt(svr, vectors)
-
-    def reduced(self, count: int) -> SrqSVR:
-        """The same function, nearly, with at most ``count`` support vectors.
-
-        See :func:`tauguard.detectors.methods.reduced_set.reduced_set`. ``svr_`` stays the full one,
-        which is what a model file keeps: reduce again after loading.
-
-        Raises:
-            ValueError: a count outside 1 to the number of support vectors.
-        """
-        from tauguard.detectors.methods.reduced_set import reduced_set
-
-        check_is_fitted(self)
-        model = SrqSVR(self.sigma, self.C, self.epsilon)
-        model.n_features_in_, model.svr_ = self.n_features_in_, self.svr_
-        model.intercept_ = self.intercept_
-        model.support_vectors_, model.dual_coef_ = reduced_set(
-            self.support_vectors_, self.dual_coef_, self.sigma, count
-        )
-        return model
-
-    def kernel_sum(self) -> _kernel.KernelSum:
-        """The native form of the fitted function."""
-        check_is_fitted(self)
-        return _kernel.KernelSum(
-            self.support_vectors_, self.dual_coef_, self.intercept_, float(self.sigma)
-        )
 
     def predict(self, X: ArrayLike) -> Array:
         """Values at the rows of X, shape (N, d) -> (N,)."""
         check_is_fitted(self)
         rows: Array = validate_data(self, X, dtype=np.float64, reset=False, order="C")
-        out = np.empty(len(rows))
-        self.kernel_sum().rows(rows, out, 0)
-        return out
+        return self.machine_(rows)

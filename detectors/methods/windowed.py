@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.calibration.calibrate import free_rows
-from tauguard.detectors.estimation.estimator import ArmModel, Estimate
-from tauguard.detectors.features.front_end import FrontEnd, OnFrontEnd
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
+from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.features.training import Prepared, draw_windows, peaks, severity_target
-from tauguard.detectors.features.windows import Features, WindowShape
+from tauguard.detectors.features.windows import WindowShape
+from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
 from tauguard.traces.trace import Trace
 
@@ -22,117 +24,160 @@ Array = NDArray[np.float64]
 
 #: Torque that counts 1 in the training target, one a joint; the last is repeated [N m].
 REFERENCE = (20.0, 20.0, 15.0, 6.0)
-#: Windows that are judged at once: memory stays small.
+#: A target above this is a collision that can be felt.
+FELT = 0.05
+#: Windows that are evaluated at once: memory stays small.
 CHUNK = 20_000
 
 
-@dataclass
-class Windowed(OnFrontEnd, ABC):
-    """A regressor on windows of the residual over its envelope, compressed by asinh.
+class Regressor(Protocol):
+    """A fitted function of windows."""
 
-    Training windows are drawn from collisions and from free motion; then, twice, the free moments
-    that score highest are added as negatives.
+    def __call__(self, x: Array) -> Array:
+        """Values at the rows of x, shape (N, d) -> (N,); each depends on its row alone."""
+
+
+@dataclass(frozen=True)
+class Windowed(ABC):
+    """Settings of a regressor on windows of the residual over its envelope, compressed by asinh.
+
+    Training windows are drawn from collisions and from collision-free motion; then, twice, the
+    collision-free moments that score highest are added as negatives.
     """
 
     windows: int = 20_000  #: training windows, a fifth of them from collisions
-    mined: int = 2_000  #: free moments added in each of two rounds
+    mined: int = 2_000  #: collision-free moments added in each of two rounds
     units: float = 5.0  #: envelopes that count one before the asinh
     seed: int = 0
-    features: Features | None = None
+    front: FrontEndSettings = field(default_factory=FrontEndSettings)
     name: ClassVar[str] = "windowed"
+    mining_gap: ClassVar[float] = 0.05  #: between two mined moments [s]
+    stream_of_seeds: ClassVar[int] = 3  #: that the windows are drawn from
 
     @abstractmethod
-    def _learn(self, x: Array, y: Array) -> None:
+    def learn(self, x: Array, y: Array) -> Regressor:
         """Fit the regressor on windows (N, size) and targets (N,)."""
 
-    @abstractmethod
-    def _predict(self, x: Array) -> Array:
-        """Its output at windows (N, size), shape (N,)."""
+    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedWindowed:
+        """Calibrate, draw windows, learn, mine, learn.
 
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> Windowed:
-        """Calibrate, draw windows, learn, mine, learn."""
-        estimates = self.front.fit(traces, robot)
-        joints = tuple(range(min(self.front.joints, robot.robot.joints)))
-        shape = WindowShape.at(self.front.dt, confirmation=CONFIRMATION)
-        self.features = Features(
-            joints, shape, self.front.envelope, 1.0, self.units, True, (shape.note,)
-        )
-        prepared = [self._prepare(t, e) for t, e in zip(traces, estimates, strict=True)]
-        x, y = self._draw(prepared)
-        self._learn(x, y)
+        Raises:
+            ValueError: traces that do not fit, or without collisions or collision-free motion.
+        """
+        front = self.front.fit(traces, arm)
+        shape = WindowShape.at(front.dt, confirmation=CONFIRMATION)
+        scaling = self.scaling(traces, front, shape)
+        prepared = [self.prepare(trace, front, scaling) for trace in traces]
+        x, y = self.draw(np.random.default_rng([self.seed, self.stream_of_seeds]), prepared, shape)
+        regressor = self.learn(x, y)
         for _ in range(2 if self.mined else 0):
-            hardest = self._mine(prepared)
+            hardest = self._mine(prepared, shape, regressor, front.dt)
             x, y = np.concatenate([x, hardest]), np.concatenate([y, np.zeros(len(hardest))])
-            self._learn(x, y)
-        return self
+            regressor = self.learn(x, y)
+        return FittedWindowed(self.name, front, scaling, shape, self.finished(regressor))
 
-    def _prepare(self, trace: Trace, estimate: Estimate) -> Prepared:
-        assert self.features is not None
-        joints = self.features.joints
-        signal = self.features.signal(estimate.left, trace.qd, estimate.acceleration)
-        own = np.array([REFERENCE[min(j, len(REFERENCE) - 1)] for j in joints])
-        target = severity_target(trace, joints, own, self.front.gain)
-        settled = trace.t >= trace.t[0] + self.settle
-        free = free_rows(trace, self.settle)
-        return Prepared(signal, target, free, (target > 0.05) & settled)
+    def scaling(self, traces: Sequence[Trace], front: FrontEnd, shape: WindowShape) -> Scaling:
+        """How the residual is scaled."""
+        return replace(front.scaling(self.units), compress=True)
 
-    def _draw(self, prepared: Sequence[Prepared]) -> tuple[Array, Array]:
-        assert self.features is not None
-        rng = np.random.default_rng([self.seed, 3])
-        return draw_windows(rng, prepared, self.features, self.windows)
+    def finished(self, regressor: Regressor) -> Regressor:
+        """What is kept of the last regressor."""
+        return regressor
 
-    def _mine(self, prepared: Sequence[Prepared]) -> Array:
-        """The free moments with the highest output now, an equal number from every trace."""
-        assert self.features is not None
+    def prepare(self, trace: Trace, front: FrontEnd, scaling: Scaling) -> Prepared:
+        """The signal, the target and the usable rows of a training trace."""
+        own = np.array([REFERENCE[min(k, len(REFERENCE) - 1)] for k in range(len(front.joints))])
+        target = severity_target(trace, front.joints, own, front.gain)
+        return self.prepared(trace, front, scaling, target, target > FELT)
+
+    @staticmethod
+    def prepared(
+        trace: Trace, front: FrontEnd, scaling: Scaling, target: Array, felt: NDArray[np.bool_]
+    ) -> Prepared:
+        """A training trace with its target, and the rows whose collision can be felt."""
+        settled = trace.t >= trace.t[0] + front.settle
+        free = free_rows(trace, front.settle)
+        return Prepared(front.scaled(trace, scaling), target, free, felt & settled)
+
+    def draw(
+        self, rng: np.random.Generator, prepared: Sequence[Prepared], shape: WindowShape
+    ) -> tuple[Array, Array]:
+        """Training windows and their targets."""
+        return draw_windows(rng, prepared, shape, self.windows)
+
+    def _mine(
+        self, prepared: Sequence[Prepared], shape: WindowShape, regressor: Regressor, dt: float
+    ) -> Array:
+        """The collision-free moments with the highest output, as many from every trace."""
         share = -(-self.mined // len(prepared))
-        thin = max(1, self.features.shape.lag // 2)
-        gap = max(1, round(0.05 / self.front.dt) // thin)
+        thin = max(1, shape.lag // 2)
+        gap = max(1, round(self.mining_gap / dt) // thin)
         found = []
         for p in prepared:
             rows = np.flatnonzero(p.free)[::thin]
             if len(rows):
-                worst = peaks(self._rows(p.signal, rows), share, gap)
-                found.append(self.features.windows(p.signal, rows[worst]))
+                worst = peaks(evaluated(regressor, p.signal, shape, rows), share, gap)
+                found.append(shape.of(p.signal, rows[worst]))
         return np.concatenate(found)
 
-    def _rows(self, signal: Array, rows: NDArray[np.intp]) -> Array:
-        assert self.features is not None
-        out = np.empty(len(rows))
-        for begin in range(0, len(rows), CHUNK):
-            part = rows[begin : begin + CHUNK]
-            out[begin : begin + CHUNK] = self._predict(self.features.windows(signal, part))
-        return out
+
+def evaluated(
+    regressor: Regressor, signal: Array, shape: WindowShape, rows: NDArray[np.intp]
+) -> Array:
+    """The regressor at the windows that end at ``rows``, shape (len(rows),)."""
+    out = np.empty(len(rows))
+    for begin in range(0, len(rows), CHUNK):
+        part = rows[begin : begin + CHUNK]
+        out[begin : begin + CHUNK] = regressor(shape.of(signal, part))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class FittedWindowed(Frozen):
+    """A fitted regressor on windows: a :class:`~tauguard.detectors.detector.FittedDetector`."""
+
+    name: str
+    front: FrontEnd
+    scaling: Scaling
+    shape: WindowShape
+    regressor: Regressor
+
+    @property
+    def arm(self) -> ArmModel:
+        """The calibrated arm."""
+        return self.front.arm
+
+    @property
+    def dt(self) -> float:
+        """Sample interval [s]."""
+        return self.front.dt
+
+    @property
+    def settle(self) -> float:
+        """Until the payload is found [s]."""
+        return self.front.settle
 
     def scores(self, trace: Trace) -> Array:
         """Output of the regressor, shape (T,)."""
-        if self.features is None:
-            raise ValueError("this detector is not fitted: call fit or load a model file first")
-        ratio = self.front.ratio(trace)
-        signal = np.ascontiguousarray(self.features.factor * np.arcsinh(ratio / self.units))
-        return self._rows(signal, np.arange(len(signal)))
+        signal = self.front.scaled(trace, self.scaling)
+        return evaluated(self.regressor, signal, self.shape, np.arange(len(signal)))
 
-    def parts(self) -> dict[str, Any]:
-        """What a model file keeps."""
-        return {"front": self.front.parts(), "units": self.units, **self._own_parts()}
+    def stream(self) -> WindowStream:
+        """The same, sample by sample."""
+        return WindowStream(self)
 
-    @abstractmethod
-    def _own_parts(self) -> dict[str, Any]:
-        """The regressor's share of :meth:`parts`."""
 
-    @abstractmethod
-    def _restore(self, parts: dict[str, Any]) -> None:
-        """Take up what :meth:`_own_parts` gave."""
+class WindowStream:
+    """Residual, window and regressor, sample by sample."""
 
-    @classmethod
-    def from_parts(cls, parts: dict[str, Any]) -> Windowed:
-        """The detector again from :meth:`parts`."""
-        front = FrontEnd.from_parts(parts["front"])
-        detector = cls(front, units=float(parts["units"]))
-        arm, envelope = front.fitted()
-        joints = tuple(range(min(front.joints, arm.robot.joints)))
-        shape = WindowShape.at(front.dt, confirmation=CONFIRMATION)
-        detector.features = Features(
-            joints, shape, envelope, 1.0, detector.units, True, (shape.note,)
-        )
-        detector._restore(parts)
-        return detector
+    def __init__(self, detector: FittedWindowed) -> None:
+        """Begin anew."""
+        joints, shape = len(detector.scaling.joints), detector.shape
+        self._residual = detector.front.stream(detector.scaling)
+        self._window, self._regressor = shape.stream(joints), detector.regressor
+        self._x = np.zeros((1, joints * shape.count))
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
+        """The score of this sample."""
+        self._window.step(self._residual.step(q, qd, current, dt), self._x)
+        return float(self._regressor(self._x)[0])

@@ -12,13 +12,8 @@
 #include <vector>
 
 #include "bindings.hpp"
+#include "tauguard/geometry/lanes.hpp"
 #include "tauguard/geometry/thread_pool.hpp"
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__)
-#define TAUGUARD_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define TAUGUARD_WIDE
-#endif
 
 namespace tauguard::detectors {
 
@@ -36,8 +31,8 @@ inline Four load(const double* p) {
 
 // sum_i coef_i / (1 + |x - z_i|^2 inv)^2 over `blocks` blocks of lanes vectors of d numbers, lane
 // last.
-TAUGUARD_WIDE double weighted_sum(const double* x, const double* vectors, const double* coef,
-                                  std::size_t blocks, std::size_t d, double inv) {
+TAUGUARD_CLONES double weighted_sum(const double* x, const double* vectors, const double* coef,
+                                    std::size_t blocks, std::size_t d, double inv) {
   Four sum[fours] = {};
   for (std::size_t b = 0; b < blocks; ++b) {
     Four square[fours] = {};
@@ -139,58 +134,47 @@ void series(const KernelSum& kernel, In2 signal, std::size_t lag, std::size_t co
   });
 }
 
-// Online: scales a residual, keeps the last window of it, and evaluates the kernel sum. All memory
-// is taken in the constructor; a step allocates nothing.
-class Sliding {
+// Residuals of the chosen joints in units of their envelope, row by row.
+class Scaling {
  public:
   // weights: of the envelope, a row of four a joint; no rows: the residual in N m times `factor`.
-  Sliding(const KernelSum& kernel, Ids joints, In2 weights, double units, double factor,
-          bool compress, std::size_t lag, std::size_t count)
-      : kernel_(kernel),
+  Scaling(Ids joints, In2 weights, double units, double factor, bool compress)
+      : joints_(joints.data(), joints.data() + joints.shape(0)),
+        weights_(weights.data(), weights.data() + weights.shape(0) * weights.shape(1)),
         units_(units),
         factor_(factor),
-        compress_(compress),
-        lag_(lag),
-        count_(count) {
-    require(joints.shape(0) * count == kernel.dimension() && lag > 0 && count > 0,
-            "Sliding: sizes differ");
-    require(weights.shape(0) == 0 || weights.shape(1) == 4, "Sliding: four weights a joint");
-    joints_.assign(joints.data(), joints.data() + joints.shape(0));
-    weights_.assign(weights.data(), weights.data() + weights.shape(0) * weights.shape(1));
-    rows_.resize((lag * (count - 1) + 1) * joints_.size());
-    window_.resize(kernel.dimension());
+        compress_(compress) {
+    require(weights.shape(0) == 0 || weights.shape(1) == 4, "Scaling: four weights a joint");
   }
 
-  void reset() { filled_ = false; }
-
-  double step(In1 left, In1 qd, In1 acceleration) {
-    const std::size_t n = left.shape(0), m = joints_.size(), length = rows_.size() / m;
-    require(qd.shape(0) == n && acceleration.shape(0) == n &&
-                (weights_.empty() || weights_.size() == 4 * n),
-            "step: expected one number a joint");
-    double speed = 0.0, shaken = 0.0;
-    for (std::size_t j = 0; j < n; ++j) {
-      speed += std::abs(qd.data()[j]);
-      shaken += std::abs(acceleration.data()[j]);
-    }
-    at_ = filled_ ? (at_ + 1) % length : 0;
-    double* row = rows_.data() + at_ * m;
-    for (std::size_t k = 0; k < m; ++k) {
-      const auto j = static_cast<std::size_t>(joints_[k]);
-      require(j < n, "step: expected one number a joint");
-      row[k] = scaled(left.data()[j], j, std::abs(qd.data()[j]), speed, shaken);
-    }
-    if (!filled_)
-      for (std::size_t r = 1; r < length; ++r) std::copy(row, row + m, rows_.data() + r * m);
-    filled_ = true;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const double* past = rows_.data() + ((at_ + length - (count_ - 1 - i) * lag_) % length) * m;
-      for (std::size_t k = 0; k < m; ++k) window_[k * count_ + i] = past[k];
-    }
-    return kernel_.at(window_.data());
+  void rows(In2 left, In2 qd, In2 acceleration, Out2 out) const {
+    const std::size_t n = left.shape(1), m = joints_.size();
+    require(qd.shape(0) == left.shape(0) && acceleration.shape(0) == left.shape(0) &&
+                out.shape(0) == left.shape(0) && out.shape(1) == m && qd.shape(1) == n &&
+                acceleration.shape(1) == n && (weights_.empty() || weights_.size() == 4 * n),
+            "Scaling: expected one number a joint");
+    for (const auto j : joints_)
+      require(j >= 0 && static_cast<std::size_t>(j) < n, "Scaling: expected one number a joint");
+    nb::gil_scoped_release release;
+    for (std::size_t t = 0; t < left.shape(0); ++t)
+      row(left.data() + t * n, qd.data() + t * n, acceleration.data() + t * n, n,
+          out.data() + t * m);
   }
 
  private:
+  void row(const double* left, const double* qd, const double* acceleration, std::size_t n,
+           double* out) const {
+    double speed = 0.0, shaken = 0.0;
+    for (std::size_t j = 0; j < n; ++j) {
+      speed += std::abs(qd[j]);
+      shaken += std::abs(acceleration[j]);
+    }
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      const auto j = static_cast<std::size_t>(joints_[k]);
+      out[k] = scaled(left[j], j, std::abs(qd[j]), speed, shaken);
+    }
+  }
+
   double scaled(double left, std::size_t j, double own, double speed, double shaken) const {
     if (weights_.empty()) return left * factor_;
     const double* w = weights_.data() + 4 * j;
@@ -198,12 +182,41 @@ class Sliding {
     return factor_ * (compress_ ? std::asinh(ratio) : ratio);
   }
 
-  KernelSum kernel_;
   std::vector<std::int64_t> joints_;
+  std::vector<double> weights_;
   double units_, factor_;
-  bool compress_, filled_ = false;
-  std::size_t lag_, count_, at_ = 0;
-  std::vector<double> weights_, rows_, window_;
+  bool compress_;
+};
+
+// The window that ends with the latest row, as `window` gives it of the whole series. All memory is
+// taken in the constructor.
+class Window {
+ public:
+  Window(std::size_t columns, std::size_t lag, std::size_t count)
+      : columns_(columns), lag_(lag), count_(count), rows_((lag * (count - 1) + 1) * columns) {
+    require(columns > 0 && lag > 0 && count > 0, "Window: sizes must be above 0");
+  }
+
+  void step(In2 row, Out2 out) {
+    require(row.shape(0) == 1 && row.shape(1) == columns_ && out.shape(0) == 1 &&
+                out.shape(1) == columns_ * count_,
+            "Window: arrays differ in shape");
+    const std::size_t length = rows_.size() / columns_;
+    at_ = filled_ ? (at_ + 1) % length : 0;
+    for (std::size_t r = at_; r < (filled_ ? at_ + 1 : length); ++r)
+      std::copy(row.data(), row.data() + columns_, rows_.data() + r * columns_);
+    filled_ = true;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double* past =
+          rows_.data() + ((at_ + length - (count_ - 1 - i) * lag_) % length) * columns_;
+      for (std::size_t k = 0; k < columns_; ++k) out.data()[k * count_ + i] = past[k];
+    }
+  }
+
+ private:
+  std::size_t columns_, lag_, count_, at_ = 0;
+  bool filled_ = false;
+  std::vector<double> rows_;
 };
 
 // K_ij between the rows of a and b.
@@ -234,10 +247,12 @@ NB_MODULE(_kernel, m) {
       .def(nb::init<In2, In1, double, double>())
       .def("rows", &rows, nb::arg(), nb::arg().noconvert(), nb::arg())
       .def("series", &series, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
-  nb::class_<Sliding>(m, "Sliding")
-      .def(nb::init<const KernelSum&, Ids, In2, double, double, bool, std::size_t, std::size_t>())
-      .def("reset", &Sliding::reset)
-      .def("step", &Sliding::step);
+  nb::class_<Scaling>(m, "Scaling")
+      .def(nb::init<Ids, In2, double, double, bool>())
+      .def("rows", &Scaling::rows, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+  nb::class_<Window>(m, "Window")
+      .def(nb::init<std::size_t, std::size_t, std::size_t>())
+      .def("step", &Window::step, nb::arg(), nb::arg().noconvert());
   m.def("gram", &gram, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
   m.def("windows", &windows, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
 }

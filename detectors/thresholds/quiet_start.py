@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from tauguard.detectors import (
-    RobotNumbers,
-    Thresholded,
-    confirmed,
-    find_alarms,
-    observe,
-)
 from tauguard.detectors.calibration.plausible import drive_torque, plausible
+from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.detectors.estimation.observer import observe
+from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.methods.free_motion import FreeMotionDetector
-from tauguard.detectors.methods.srq_svr import SvrDetector
-from tauguard.detectors.thresholds.confirmation import confirmation_samples
+from tauguard.detectors.thresholds.alarm import CollisionAlarm
+from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
 from tauguard.traces.trace import Array, Bools, Detection, Trace
 
 GAIN = 20.0  # [1/s] of the observer: what 100 Hz and a real arm's friction allow
@@ -123,23 +119,14 @@ def used(joints: Sequence[int] | None, count: int) -> np.ndarray:
     return np.isin(np.arange(1, count + 1), list(chosen))
 
 
-def watch_with(watched: Thresholded, trace: Trace) -> Watch:
+def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
     """Look for collisions with a trained detector.
 
     Raises:
         ValueError: another number of joints or another sample rate than it was trained at.
     """
-    detector = watched.detector
-    noise = detector.arm.noise
-    thresholds = np.ones(detector.arm.robot.joints) if noise is None else noise
-    settled = float(trace.t[0] + detector.settle)
-    if not isinstance(detector, SvrDetector):
-        return Watch(watched.detect(trace), thresholds, settled, ())
-    # One pass; its residual is what payload, offsets and friction leave, and names the joint.
-    chain = detector.chain.at(watched.threshold, watched.confirmation)
-    chosen = used(chain.settings.joints, len(thresholds))
-    found = replace(chain.detect(trace), detector=detector.name)
-    return Watch(found, np.where(chosen, thresholds, np.inf), settled, chain.notes)
+    noise = np.asarray(alarm.detector.arm.noise)
+    return Watch(alarm.detect(trace), noise, float(trace.t[0] + alarm.settle), ())
 
 
 def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:

@@ -1,13 +1,9 @@
-"""The threshold for a number of false alarms per hour, from collision-free scores."""
+"""Peaks of scores and their tails."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
-
-from tauguard.detectors.evaluation.events import MERGE_GAP
 
 Array = NDArray[np.float64]
 
@@ -21,47 +17,12 @@ def sustained(score: Array, samples: int) -> Array:
     return lowest
 
 
-def block_peaks(level: Array, rows: int) -> Array:
-    """The maximum of each block of ``rows`` samples (the last may be shorter)."""
-    return block_maxima(level, rows)[0]
-
-
 def block_maxima(level: Array, rows: int) -> tuple[Array, NDArray[np.intp]]:
-    """:func:`block_peaks`, and the first row where each stands."""
+    """The maximum of each block of ``rows`` samples (the last may be shorter) and its row."""
     rows = max(1, rows)
     padded = np.append(level, np.full(-len(level) % rows, -np.inf)).reshape(-1, rows)
     where = padded.argmax(axis=1) + rows * np.arange(len(padded))
     return level[where], where
-
-
-def threshold_for_rate(
-    levels: Sequence[Array], dt: float, per_hour: float, tail: float = 0.02
-) -> float:
-    """The threshold at which collision-free motion gives ``per_hour`` false alarms.
-
-    Alarms are counted as blocks of the merge gap that exceed the threshold (an overcount where an
-    alarm spans several). If the rate allows at least one alarm in the time given, the threshold is
-    the peak that is exceeded that often; otherwise an exponential tail is fitted to the largest
-    share ``tail`` of the block peaks and followed down to the rate.
-
-    Args:
-        levels: sustained scores of collision-free stretches, each of shape (T,).
-        dt: sample interval [s].
-        per_hour: the false alarms to accept, above 0.
-        tail: share of the block peaks in the tail.
-
-    Raises:
-        ValueError: no scores, or a rate that is not above 0.
-    """
-    if not per_hour > 0:
-        raise ValueError(f"per_hour: {per_hour}, expected above 0")
-    rows = max(1, round(MERGE_GAP / dt))
-    parts = [block_peaks(level, rows) for level in levels if len(level)]
-    if not parts:
-        raise ValueError("no collision-free scores to choose a threshold by")
-    peaks = np.sort(np.concatenate(parts))[::-1]
-    hours = sum(len(level) for level in levels) * dt / 3600
-    return followed(peaks, per_hour * hours, max(2, round(tail * len(peaks))))
 
 
 def followed(peaks: Array, allowed: float, count: int) -> float:

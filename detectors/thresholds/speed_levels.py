@@ -1,14 +1,14 @@
-"""A score that means the same at every speed: what free motion reaches is levelled out.
+"""Scores normalised over the speed, so that one threshold gives one rate of false alarms at all.
 
-Free motion leaves more of a residual the faster the arm moves, whatever the detector makes of it.
-One threshold on the score is then set by the fastest motion and is far too high for the slow.
-Levelled, a score is counted from what free motion's peaks at this speed seldom exceed, in units of
-their mean excess beyond that, so that one threshold asks for one rate at every speed.
+Collision-free motion leaves more of a residual the faster the arm moves, in every method. One
+threshold on the score is then set by the fastest motion and is far too high for the slow. A
+normalised score is counted from what the peaks of collision-free motion at this speed seldom
+exceed, in units of their mean excess beyond that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,18 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d
 from sklearn.isotonic import IsotonicRegression
 
-from tauguard.detectors.calibration.calibrate import free_rows
-from tauguard.detectors.detector import Detector
-from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.evaluation.events import MERGE_GAP
-from tauguard.detectors.thresholds.rates import block_maxima
-from tauguard.traces.trace import Trace
-
 Array = NDArray[np.float64]
 
-#: A motion is remembered this long [s]: what stiction leaves comes after a stop.
+#: A motion counts for this long after it [s]: what stiction causes comes after a stop.
 MEMORY = 0.5
-#: Speeds that are told apart, and blocks that one of them needs at least.
+#: Speeds with levels of their own, and blocks that each of them needs at least.
 BINS, FEWEST = 10, 40
 #: Share of a speed's blocks whose peaks are its tail.
 TAIL = 0.1
@@ -57,9 +50,30 @@ def _samples(dt: float, memory: float) -> int:
     return max(1, round(memory / dt))
 
 
+class RecentSpeed:
+    """:func:`recent_speed`, sample by sample."""
+
+    def __init__(self, dt: float, memory: float = MEMORY) -> None:
+        """Take the sample interval and the memory [s]."""
+        self._samples, self._at = _samples(dt, memory), 0
+        self._falling: deque[tuple[int, float]] = deque()  # candidates for the maximum
+
+    def step(self, qd: Array) -> float:
+        """The recent speed at this sample [rad/s]."""
+        total = float(np.abs(qd).sum())
+        kept = self._falling
+        while kept and kept[-1][1] <= total:
+            kept.pop()
+        kept.append((self._at, total))
+        if kept[0][0] <= self._at - self._samples:
+            kept.popleft()
+        self._at += 1
+        return kept[0][1]
+
+
 @dataclass(frozen=True, eq=False)
 class SpeedLevels:
-    """What the peaks of free motion's scores reach, as functions of the recent speed.
+    """What the peaks of collision-free scores reach, as functions of the recent speed.
 
     Both grow with the speed, are linear between the speeds given and constant beyond them.
     """
@@ -73,6 +87,8 @@ class SpeedLevels:
         shapes = [np.shape(value) for value in (self.speed, self.base, self.unit)]
         if len(shapes[0]) != 1 or not shapes[0][0] or len(set(shapes)) != 1:
             raise ValueError(f"speed, base, unit: shapes {shapes}, expected (K,) each, K > 0")
+        if not ((np.diff(self.speed) >= 0).all() and (self.unit > 0).all()):
+            raise ValueError("speed, unit: expected rising speeds and units above 0")
 
     @classmethod
     def fit(cls, peaks: ArrayLike, speeds: ArrayLike) -> SpeedLevels:
@@ -105,12 +121,18 @@ class SpeedLevels:
         )
 
     def __call__(self, score: ArrayLike, speed: ArrayLike) -> Array:
-        """The levelled score at a recent speed [rad/s], both of one shape."""
+        """The normalised score at a recent speed [rad/s], both of one shape."""
         at = np.asarray(speed, dtype=np.float64)
         base = np.interp(at, self.speed, self.base)
         unit = np.interp(at, self.speed, self.unit)
-        levelled: Array = (np.asarray(score, dtype=np.float64) - base) / unit
-        return levelled
+        normalised: Array = (np.asarray(score, dtype=np.float64) - base) / unit
+        return normalised
+
+    def one(self, score: float, speed: float) -> float:
+        """:meth:`__call__` of one number."""
+        base = np.interp(speed, self.speed, self.base)
+        unit = np.interp(speed, self.speed, self.unit)
+        return float((score - base) / unit)
 
 
 def _bins(blocks: int) -> int:
@@ -120,61 +142,3 @@ def _bins(blocks: int) -> int:
 def _mean_excess(peaks: Array, base: float) -> float:
     above = peaks[peaks > base]
     return float(np.mean(above - base)) if len(above) else 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Levelled:
-    """A fitted detector whose score is levelled; a :class:`~tauguard.detectors.detector.Detector`.
-
-    Attributes:
-        detector: fitted.
-        levels: of its score on free motion.
-    """
-
-    detector: Detector
-    levels: SpeedLevels
-
-    @classmethod
-    def on(cls, detector: Detector, traces: Sequence[Trace]) -> Levelled:
-        """Level a detector on the collision-free rows of ``traces``.
-
-        Motion that it was not trained on tells more of what free motion reaches.
-
-        Raises:
-            ValueError: no motion is left after the detector has settled.
-        """
-        peaks, speeds = [], []
-        for trace in traces:
-            free = free_rows(trace, detector.settle)
-            score = detector.scores(trace)[free]
-            speed = recent_speed(trace.qd, trace.dt)[free]
-            if len(score):
-                high, where = block_maxima(score, max(1, round(MERGE_GAP / trace.dt)))
-                peaks.append(high)
-                speeds.append(speed[where])
-        if not peaks:
-            raise ValueError("no collision-free motion to level by after the detector has settled")
-        return cls(detector, SpeedLevels.fit(np.concatenate(peaks), np.concatenate(speeds)))
-
-    @property
-    def name(self) -> str:
-        """The detector's."""
-        return self.detector.name
-
-    @property
-    def settle(self) -> float:
-        """The detector's [s]."""
-        return self.detector.settle
-
-    @property
-    def arm(self) -> ArmModel:
-        """The detector's."""
-        return self.detector.arm
-
-    def fit(self, traces: Sequence[Trace], robot: ArmModel) -> Levelled:
-        """Train the detector anew; the levels are then those of its free training rows."""
-        return Levelled.on(self.detector.fit(traces, robot), traces)
-
-    def scores(self, trace: Trace) -> Array:
-        """The levelled score, shape (T,)."""
-        return self.levels(self.detector.scores(trace), recent_speed(trace.qd, trace.dt))

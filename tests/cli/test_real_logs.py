@@ -154,7 +154,7 @@ def test_an_untold_load_names_its_log(folder, capsys):
         (("--traces", "x", "--sensitivity"), "--sensitivity: with --free only"),
         (("--traces", "x", "--robot", "r", "--gains", "1"), "--robot, --gains: with --free only"),
         (("--traces", "x", "--calibration", "x"), "--calibration x: is --traces"),
-        (("--free", "x", "--robot", "r", "--levelled"), "go with --traces, not with --free"),
+        (("--free", "x", "--robot", "r", "--confidence", "0.9"), "go with --traces only"),
         (("--free", "x", "--robot", "r", "--model", "m.skops"), "ends in .json"),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import CollisionDetector, DetectorSettings, RobotNumbers
+from tauguard.detectors import ArmModel, RobotNumbers, SrqSvr, train
 from tauguard.envs import simulate
 from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
 
@@ -34,6 +34,11 @@ def unseen():
 
 
 @pytest.fixture(scope="session")
-def detector(training, robot, drive_gain):
-    settings = DetectorSettings(windows=1200, mined=200, false_alarms_per_hour=20.0)
-    return CollisionDetector(settings).fit(training, robot, drive_gain)
+def arm(robot, drive_gain):
+    return ArmModel(robot, drive_gain)
+
+
+@pytest.fixture(scope="session")
+def alarm(training, arm):
+    """A trained detector with its threshold."""
+    return train(SrqSvr(windows=1200, mined=200), training, arm, 20.0)

@@ -1,4 +1,4 @@
-"""Every detector of the table keeps the shared contract."""
+"""Every method of the registry keeps the shared contract, and so does one of another's."""
 
 import dataclasses
 import json
@@ -8,44 +8,26 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-import skops.io
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from tauguard.detectors import ArmModel, CollisionDetector, calibrate
+from tauguard.detectors import CollisionAlarm, calibrate, held_out
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.features import front_end
-from tauguard.detectors.methods import pipeline
-from tauguard.detectors.ranking_file import FORMAT, load_model, save_model
 from tauguard.detectors.registry import DETECTORS, make_detector
-from tauguard.detectors.thresholds.speed_levels import Levelled, SpeedLevels
-from tauguard.detectors.thresholds.thresholded import Thresholded
+from tauguard.detectors.thresholds.speed_levels import SpeedLevels
 from tauguard.traces import Trace
 
-
-@pytest.fixture(scope="module")
-def arm(robot, drive_gain):
-    return ArmModel(robot, drive_gain)
-
-
-SMALLER = {
-    "windows": 2000,
-    "mined": 200,
-    "epochs": 15,
-    "rows": 6000,
-    "trees": 20,
-}
+#: Less training, so that the tests are quick.
+SMALLER = {"windows": 2000, "mined": 200, "epochs": 15, "rows": 6000, "trees": 20}
 
 
 def small(name):
-    """The detector with less training, so that the tests are quick."""
-    detector = make_detector(name)
+    """The method with less training."""
+    detector, less = make_detector(name), dict(SMALLER)
     if name.startswith("srq-svr"):
-        settings = detector.chain.settings
-        less = dataclasses.replace(settings, windows=800, mined=min(settings.mined, 100))
-        detector.chain = CollisionDetector(less)
-    for field, value in SMALLER.items():
-        if hasattr(detector, field):
-            setattr(detector, field, value)
-    return detector
+        less |= {"windows": 800, "mined": min(detector.mined, 100), "vectors": 0}
+    return dataclasses.replace(detector, **{k: v for k, v in less.items() if hasattr(detector, k)})
 
 
 @pytest.fixture(scope="module")
@@ -55,40 +37,46 @@ def some(training):
 
 
 @pytest.fixture(scope="module")
-def identified(some, arm):
-    """One identification for all: what it finds is tested where it belongs."""
-    return calibrate(arm, some)
-
-
-@pytest.fixture(scope="module", params=list(DETECTORS))
-def fitted(request, some, arm, identified):
+def fitted(some, arm):
+    """Every method; one identification for all: what it finds is tested where it belongs."""
+    identified = calibrate(arm, some)
+    fewer = held_out(some)[0]
     with pytest.MonkeyPatch.context() as patch:
-        for module in (front_end, pipeline):
-            patch.setattr(module, "calibrate", lambda *_, **__: identified)
-        return small(request.param).fit(some, arm)
+        patch.setattr(front_end, "calibrate", lambda *_, **__: identified)
+        return {
+            name: small(name).fit(fewer if name.startswith("srq-svr") else some, arm)
+            for name in DETECTORS
+        }
 
 
-def first(trace, rows):
+@pytest.fixture(params=list(DETECTORS))
+def detector(request, fitted):
+    return fitted[request.param]
+
+
+def rows_of(trace, rows):
     tables = ("t", "q", "qd", "current", "q_des", "qd_des", "qdd_des")
-    cut = {name: getattr(trace, name)[:rows] for name in tables}
+    cut = {name: getattr(trace, name)[rows] for name in tables}
     return dataclasses.replace(trace, **cut, truth=None)
 
 
-def test_the_table_names_its_detectors():
+def first(trace, rows):
+    return rows_of(trace, slice(rows))
+
+
+def streamed(stream, trace):
+    """The stream's answers to all samples of a trace."""
+    dt = [None, *np.diff(trace.t)]
+    return np.array(
+        [stream.step(*row) for row in zip(trace.q, trace.qd, trace.current, dt, strict=True)]
+    )
+
+
+def test_the_registry_names_its_methods():
     for name in DETECTORS:
-        detector = make_detector(name)
-        assert detector.name == name
+        assert make_detector(name).name == name
     with pytest.raises(ValueError, match="did you mean 'srq-svr'"):
         make_detector("srq-svm")
-
-
-def test_scores_are_finite_and_causal(fitted, unseen):
-    trace = first(unseen[0], 6_000)
-    score = fitted.scores(trace)
-    assert score.shape == trace.t.shape
-    assert np.isfinite(score).all()
-    rows = 4_500
-    np.testing.assert_allclose(fitted.scores(first(trace, rows)), score[:rows], rtol=0, atol=1e-9)
 
 
 GOLDEN = json.loads((Path(__file__).parent / "golden_scores.json").read_text())
@@ -97,152 +85,119 @@ GOLDEN = json.loads((Path(__file__).parent / "golden_scores.json").read_text())
 @pytest.mark.skipif(
     GOLDEN["mujoco"] != mujoco.__version__, reason="simulated traces are of another MuJoCo"
 )
-def test_golden_scores(fitted, unseen):
-    score = fitted.scores(first(unseen[0], 6_000))
+def test_golden_scores(detector, unseen):
+    score = detector.scores(first(unseen[0], 6_000))
     # Training runs through BLAS, whose last bits depend on the processor.
-    np.testing.assert_allclose(score[GOLDEN["rows"]], GOLDEN["scores"][fitted.name], 1e-6, 1e-9)
+    np.testing.assert_allclose(score[GOLDEN["rows"]], GOLDEN["scores"][detector.name], 1e-6, 1e-9)
 
 
-def test_hard_collisions_score_above_free_motion(fitted, unseen):
-    if fitted.name == "srq-svr-plain":
+def test_scores_are_finite_and_causal(detector, unseen):
+    trace = first(unseen[0], 6_000)
+    score = detector.scores(trace)
+    assert score.shape == trace.t.shape
+    assert np.isfinite(score).all()
+    rows = 4_500
+    assert detector.scores(first(trace, rows)).tobytes() == score[:rows].tobytes()
+
+
+@settings(max_examples=6, deadline=None)
+@given(
+    name=st.sampled_from(list(DETECTORS)),
+    begin=st.integers(0, 9_000),
+    count=st.integers(1, 700),
+    noise=st.floats(0, 3),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_a_stream_scores_as_the_batch_does(fitted, unseen, name, begin, count, noise, seed):
+    rng = np.random.default_rng(seed)
+    trace = rows_of(unseen[seed % 2], slice(begin, begin + count))
+    jitter = np.cumsum(rng.uniform(0.9e-3, 1.1e-3, count))
+    current = trace.current + rng.normal(scale=noise, size=trace.current.shape)
+    trace = dataclasses.replace(trace, t=jitter, current=current)
+    detector = dataclasses.replace(fitted[name])
+    assert streamed(detector.stream(), trace).tobytes() == detector.scores(trace).tobytes()
+
+
+def test_a_stream_scores_as_the_batch_does_while_it_settles(detector, unseen):
+    trace = first(unseen[1], 3_300)
+    assert streamed(detector.stream(), trace).tobytes() == detector.scores(trace).tobytes()
+
+
+def test_hard_collisions_score_above_free_motion(detector, unseen):
+    if detector.name == "srq-svr-plain":
         pytest.skip("its kernel is almost diagonal on raw residuals: it ranks nothing")
     free, inside = [], []
     for trace in unseen:
-        score = fitted.scores(trace)
-        quiet = free_rows(trace, fitted.settle)
-        free.append(score[quiet])
+        score = detector.scores(trace)
+        free.append(score[free_rows(trace, detector.settle)])
         hard = [c for c in trace.truth.collisions if c.peak_tau > 16]
         inside += [score[(trace.t >= c.onset) & (trace.t < c.end + 0.1)].max() for c in hard]
     assert len(inside) >= 5
-    # An untold payload is a residual for the form without past currents.
-    least = 0.4 if fitted.name == "current-network-static" else 0.7
+    # An unknown payload is a residual for the form without past currents.
+    least = 0.4 if detector.name == "current-network-static" else 0.7
     assert np.mean(np.array(inside) > np.quantile(np.concatenate(free), 0.98)) >= least
 
 
-def test_no_alarm_before_it_has_settled_and_levels_say_when(fitted, unseen):
+def test_no_alarm_before_it_has_settled_and_sustained_scores_say_when(detector, unseen):
     trace = first(unseen[0], 4_500)
-    watched = Thresholded(fitted, -np.inf)
-    found = watched.detect(trace)
-    begin = fitted.settle + 0.002
+    alarm = CollisionAlarm(detector, -1e300)
+    found = alarm.detect(trace)
+    begin = detector.settle + 0.002
     assert found.alarms[0].start == pytest.approx(begin, abs=1e-9)
-    level = watched.levels(trace)
+    level = alarm.sustained(trace)
     np.testing.assert_array_equal(level > -np.inf, found.alarm)
     middle = float(np.median(level[found.alarm]))
-    again = Thresholded(fitted, middle).detect(trace)
+    again = CollisionAlarm(detector, middle).detect(trace)
     np.testing.assert_array_equal(level > middle, again.alarm)
 
 
-def test_foreign_traces_are_refused(fitted, unseen):
+def test_foreign_traces_are_refused(detector, unseen):
     trace = first(unseen[0], 4_000)
     with pytest.raises(ValueError, match="sample every 10 ms"):
-        fitted.scores(dataclasses.replace(trace, t=trace.t * 10))
+        detector.scores(dataclasses.replace(trace, t=trace.t * 10))
     tables = ("q", "qd", "current")
     fewer = {name: getattr(trace, name)[:, :3] for name in tables}
     other = Trace(trace.joint_names[:3], trace.t, **fewer)
     with pytest.raises(ValueError, match="3 joints"):
-        fitted.scores(other)
+        detector.scores(other)
 
 
-def test_an_unfitted_detector_says_so(unseen, training, arm):
+def test_a_method_needs_traces(arm):
     for name in DETECTORS:
-        with pytest.raises(ValueError, match="not fitted"):
-            make_detector(name).scores(unseen[0])
         with pytest.raises(ValueError, match="no traces"):
             make_detector(name).fit([], arm)
 
 
-def test_a_file_gives_equal_scores_and_holds_nothing_to_distrust(fitted, unseen, tmp_path):
+def test_a_file_gives_equal_scores(detector, unseen, tmp_path):
     path = tmp_path / "model.skops"
-    save_model(Thresholded(fitted, 0.25, 0.005), path)
-    assert skops.io.get_untrusted_types(file=path) == []
-    again = load_model(path)
+    levels = SpeedLevels(np.array([0.0, 2.0]), np.array([1.0, 3.0]), np.ones(2))
+    own = CollisionAlarm(detector, 0.25, 0.005, levels)
+    own.save(path)
+    again = CollisionAlarm.load(path)
     assert (again.threshold, again.confirmation) == (0.25, 0.005)
-    assert again.detector.name == fitted.name
-    assert again.detector.settle == fitted.settle
+    assert (again.detector.name, again.settle) == (detector.name, detector.settle)
     trace = first(unseen[0], 4_000)
-    assert again.detector.scores(trace).tobytes() == fitted.scores(trace).tobytes()
-    np.testing.assert_array_equal(
-        again.detect(trace).residual, Thresholded(fitted, 0.25).detect(trace).residual
-    )
+    assert again.detector.scores(trace).tobytes() == detector.scores(trace).tobytes()
+    one, two = own.detect(trace), again.detect(trace)
+    assert one.score.tobytes() == two.score.tobytes() != detector.scores(trace).tobytes()
+    np.testing.assert_array_equal(one.residual, two.residual)
 
 
-def test_a_levelled_detector_comes_back_from_its_file(fitted, unseen, tmp_path):
-    own = Levelled(fitted, SpeedLevels(np.array([0.0, 2.0]), np.array([1.0, 3.0]), np.ones(2)))
-    save_model(Thresholded(own, 7.0), tmp_path / "model.skops")
-    again = load_model(tmp_path / "model.skops")
-    assert (again.threshold, again.detector.name) == (7.0, fitted.name)
-    trace = first(unseen[0], 4_000)
-    scores = again.detector.scores(trace)
-    assert scores.tobytes() == own.scores(trace).tobytes() != fitted.scores(trace).tobytes()
-
-
-def test_a_file_that_takes_no_single_samples_says_which_would(fitted, tmp_path):
-    path = tmp_path / "model.skops"
-    own = Levelled(fitted, SpeedLevels(np.array([0.0, 2.0]), np.array([1.0, 3.0]), np.ones(2)))
-    remedy = "expected one that takes one sample at a time.*srq-svr.*without --levelled"
-    save_model(Thresholded(own, 7.0), path)
-    with pytest.raises(ValueError, match=rf"model\.skops: a levelled {fitted.name}, .*{remedy}"):
-        CollisionDetector.load(path)
-    save_model(Thresholded(fitted, 7.0), path)
-    if fitted.name == "srq-svr":
-        assert CollisionDetector.load(path).threshold == 7.0
-        return
-    with pytest.raises(ValueError, match=rf"model\.skops: a {fitted.name}, .*{remedy}"):
-        CollisionDetector.load(path)
-
-
-def test_damaged_and_foreign_files_are_named(tmp_path):
-    bad = tmp_path / "bad.skops"
-    for content, message in (
-        (
-            {"format": "other"},
-            "not a detector file of this version .*anew by .tauguard train --traces",
-        ),
-        ({"format": FORMAT, "detector": "none"}, "with a part missing"),
-        ({"format": FORMAT, "detector": "cusum", "parts": {}}, "with a part missing"),
-        ([1], "not a detector file"),
-    ):
-        skops.io.dump(content, bad)
-        with pytest.raises(ValueError, match=message):
-            load_model(bad)
-    bad.write_bytes(b"hello")
-    with pytest.raises(ValueError, match=r"bad\.skops: not a detector file"):
-        load_model(bad)
-
-
-def test_the_chain_s_own_file_is_read_too(detector, unseen, tmp_path):
-    path = tmp_path / "model.skops"
-    detector.save(path)
-    trace = first(unseen[0], 12_000)
-    watched = load_model(path)
-    np.testing.assert_array_equal(watched.detect(trace).alarm, detector.detect(trace).alarm)
-
-
-def test_an_unfitted_detector_cannot_be_saved(tmp_path):
-    for name in DETECTORS:
-        with pytest.raises(ValueError, match="not fitted"):
-            save_model(Thresholded(make_detector(name), 0.0), tmp_path / "model.skops")
-    assert not list(tmp_path.iterdir())
-
-
-def test_detectors_with_one_front_end_say_what_they_say_alone(some, arm, identified):
+def test_methods_with_one_front_end_share_it_and_say_what_they_say_alone(some, arm):
     names = ("residual-thresholds", "moving-thresholds", "cusum")
+    identified = calibrate(arm, some)
     with pytest.MonkeyPatch.context() as patch:
         calls = []
         patch.setattr(front_end, "calibrate", lambda *_, **__: calls.append(1) or identified)
-        alone = [make_detector(name).fit(some, arm).scores(some[0]) for name in names]
+        alone = [make_detector(n).fit([*some], dataclasses.replace(arm)) for n in names]
         assert len(calls) == 3
-        together = [make_detector(name) for name in names]
-        fronts = front_end.shared_front_ends(together)
-        assert len(fronts) == 2  # the first has another one: it does not track the payload
-        for detector in together:
-            detector.fit(some, arm)
-        assert len(calls) == 5
-    for front in fronts:
-        front.forget()
+        together = [make_detector(n).fit(some, arm) for n in names]
+        assert len(calls) == 5  # the first has another one: it does not track the payload
+    assert together[1].front is together[2].front
     again = pickle.loads(pickle.dumps(together))
     assert again[1].front is again[2].front
-    for trace_scores, detector, copy in zip(alone, together, again, strict=True):
-        for one in (detector, copy, detector):
-            assert one.scores(some[0]).tobytes() == trace_scores.tobytes()
-            one.scores(some[1])  # what was kept of a trace is not said of another
+    for one, detector, copy in zip(alone, together, again, strict=True):
+        scores = one.scores(some[0]).tobytes()
+        for other in (detector, copy, detector):
+            assert other.scores(some[0]).tobytes() == scores
+            other.scores(some[1])  # what was kept of a trace is not said of another

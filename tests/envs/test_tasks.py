@@ -1,7 +1,6 @@
 """React, ClothReach and TwoArms: what happens in them is what their names say."""
 
 import warnings
-from types import SimpleNamespace
 
 import gymnasium as gym
 import mujoco
@@ -9,7 +8,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from tauguard.models import BodyProxy
+from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers
+from tauguard.models import BodyProxy, cura6, cura6_drive, pin_model
 
 from ..models.arms import SEVEN, TETRAHEDRON
 
@@ -86,27 +86,43 @@ def test_react_begins_at_the_first_touch_at_about_the_asked_speed(speed):
 
 
 class Slow:
-    """Must settle for 0.4 s, keeps what it sees, and never raises an alarm."""
+    """A method of another's: must settle for 0.4 s, keeps what it sees, never raises an alarm."""
 
-    settings = SimpleNamespace(settle=0.4)
+    name, dt, settle = "slow", 1e-3, 0.4
 
     def __init__(self):
-        self.reset()
-
-    def reset(self):
+        self.arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), cura6_drive().gain)
         self.seen = []
 
-    def step(self, q, qd, current):
+    def scores(self, trace):
+        return np.zeros(len(trace.t))
+
+    def stream(self):
+        self.seen = []
+        return self
+
+    def step(self, q, qd, current, dt=None):
         self.seen.append(np.abs(qd).max())
-        return False
+        return 0.0
 
 
 def test_react_waits_for_a_detector_that_must_settle():
-    env = gym.make("tauguard/React-v0", detector=Slow()).unwrapped
+    slow = Slow()
+    env = gym.make("tauguard/React-v0", detector=CollisionAlarm(slow, 0.5)).unwrapped
     _, info = env.reset(seed=0)
-    seen = env.cell.sensing[0].detector.seen
+    seen = slow.seen
     assert max(seen[100:400]) < 0.05 < max(seen[400:500])
     assert info["onset_time"] > 0.4
+    assert np.abs(info["residual"]).max() > 0
+
+
+def test_a_detector_of_another_arm_or_rate_is_refused():
+    slow = Slow()
+    slow.dt = 4e-3
+    with pytest.raises(ValueError, match="works at 4 ms a sample, the scene's time step is 1 ms"):
+        gym.make("tauguard/Reach-v0", detector=CollisionAlarm(slow, 0.5))
+    with pytest.raises(ValueError, match="trained on 6 joints, the scene has 12"):
+        gym.make("tauguard/TwoArms-v0", detector=CollisionAlarm(Slow(), 0.5))
 
 
 def test_react_with_a_detector_begins_at_its_alarm():

@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from tauguard.envs.sensing import ObserverListener
 from tauguard.envs.wrappers import (
     REACTIONS,
     DetectorObservation,
@@ -210,11 +211,12 @@ def test_the_observer_judges_a_block_as_it_judges_sample_by_sample():
     env = gym.make("tauguard/Reach-v0", detector="observer").unwrapped
     env.reset(seed=1)
     block = env.cell.sensing[0].detector
-    single = env.cell.sensing[0].detector.__class__(block._robot, block._drive, 1e-3)
+    single = ObserverListener(block._observer.robot, block._drive, 1e-3)
     rng = np.random.default_rng(0)
     for _ in range(20):
         env.step(rng.uniform(-1, 1, 6))
         measured = env.cell.sensing[0].measured
         for row, sample in enumerate(zip(*measured, strict=True)):
-            assert single.step(*sample) == env.cell.sensing[0].alarms[row]
-            assert np.array_equal(single.residual, env.cell.sensing[0].residuals[row])
+            residual, alarm = single.steps(*(x[None] for x in sample))
+            assert alarm == env.cell.sensing[0].alarms[row]
+            assert np.array_equal(residual[0], env.cell.sensing[0].residuals[row])

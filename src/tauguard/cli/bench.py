@@ -13,6 +13,7 @@ def command(
     /,
     quick: bool = False,
     seed: int = 0,
+    detector: str | None = None,
     json: Path | None = None,
     figure: Path | None = None,
 ) -> None:
@@ -22,6 +23,7 @@ def command(
         name: the study: one of those `tauguard bench list` names.
         quick: a shorter run, 60 s or less on 2 cores (the full one takes up to 30 minutes).
         seed: of every random input.
+        detector: a method of your own as module:Class, beside those of the study `detection`.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
     """
@@ -32,4 +34,7 @@ def command(
         for name, study in STUDIES.items():
             print(f"  {name}  {study.line}")
         return
-    run_study(name, quick=quick, seed=seed, json_path=json, figure_path=figure)
+    if detector is not None and name != "detection":
+        raise ValueError(f"--detector goes with the study detection, not with {name}")
+    more = {} if detector is None else {"detector": detector}
+    run_study(name, quick=quick, seed=seed, json_path=json, figure_path=figure, more=more)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tauguard.detectors import CollisionDetector
+    from tauguard.detectors import CollisionAlarm
     from tauguard.envs import Episode
     from tauguard.traces import Trace
 
@@ -49,14 +49,14 @@ def command(
     detections = [detector.detect(trace) for trace in judged]
     detected = time.perf_counter()
     matchings = [
-        judge(detection, trace, detector.settings.settle)
+        judge(detection, trace, detector.settle)
         for detection, trace in zip(detections, judged, strict=True)
     ]
     summary: dict[str, Any] = {
         "seed": seed,
         "simulated_seconds": plan.seconds,
         "judged_seconds": sum(m.free_seconds for m in matchings),
-        "not_judged_seconds": detector.settings.settle * len(judged),
+        "not_judged_seconds": detector.settle * len(judged),
         "collisions_by_kind": count(judged, lambda c: c.kind),
         "collisions_by_link": count(judged, lambda c: str(c.link)),
         "threshold": detector.threshold,
@@ -85,7 +85,7 @@ def closing(out: Path) -> None:
     print(f"look at the recording with: .uv/bin/uv run rerun {out / 'demo.rrd'}")
 
 
-def leave(out: Path, showcase: Trace, detector: CollisionDetector) -> None:
+def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
     """Write the recording, what the viewer shows of it, and the detector into the folder."""
     from tauguard.detectors import diagnose
     from tauguard.replay import write_rrd
@@ -114,13 +114,13 @@ def simulation_timing(episode: Episode) -> float:
 
 
 def detector_timing(
-    detector: CollisionDetector, traces: list[Trace], seconds: float
+    detector: CollisionAlarm, traces: list[Trace], seconds: float
 ) -> dict[str, float]:
     """Microseconds per sample of the momentum observer alone and of all the rest of a detection."""
     from tauguard.detectors import observe
 
-    assert detector.arm is not None
-    robot, gain = detector.arm.robot, detector.arm.drive_gain
+    arm = detector.detector.arm
+    robot, gain = arm.robot, arm.drive_gain
     started = time.perf_counter()
     for trace in traces:
         observe(robot, trace.t, trace.q, trace.qd, gain * trace.current)

@@ -113,8 +113,8 @@ def watched(model: Path, trace: Trace) -> tuple[Any, Watch]:
     if is_free_motion(model):
         free = load_free_motion(model)
         return free, watch_free(free, trace)
-    detector = load_model(model)
-    return detector, watch_with(detector, trace)
+    alarm = load_model(model)
+    return alarm.detector, watch_with(alarm, trace)
 
 
 def plainly(
@@ -147,14 +147,14 @@ def explained(
     detector: Any, trace: Trace, found: Watch, robot: Path
 ) -> tuple[Sequence[Diagnosis], tuple[str, ...]]:
     """What each alarm was, where the robot's file has shapes to look for a contact on."""
-    from tauguard.detectors import diagnose
+    from tauguard.detectors import Diagnoser
     from tauguard.models import link_surface
 
     try:
         surface = link_surface(robot)
     except ValueError:
         return (), (f"{robot.name} has no collision shapes: links and forces are not looked for",)
-    return diagnose(detector, trace, found.detection, surface), ()
+    return Diagnoser.of(detector.arm, surface).diagnose(trace, found.detection.alarms), ()
 
 
 def summary(

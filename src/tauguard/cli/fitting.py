@@ -7,38 +7,22 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tauguard.detectors import ArmModel, CollisionDetector, Thresholded
+    from tauguard.detectors import ArmModel, CollisionAlarm
     from tauguard.traces import Trace
 
 
-def trained(traces: Sequence[Trace], false_alarms_per_hour: float) -> CollisionDetector:
-    """A detector that knows the nominal arm, fitted to ``traces``.
+def trained(
+    traces: Sequence[Trace], false_alarms_per_hour: float, name: str = "srq-svr"
+) -> CollisionAlarm:
+    """A method of the registry that knows the nominal arm, fitted to ``traces``.
 
     Raises:
-        ValueError: no nominal arm is attached to the recordings, or they cannot be trained on.
+        ValueError: no such method, no nominal arm is attached to the recordings, or they cannot be
+            trained on.
     """
-    from tauguard.detectors import CollisionDetector, DetectorSettings
+    from tauguard.detectors import make_detector, train
 
-    settings = DetectorSettings(
-        windows=1500, mined=200, false_alarms_per_hour=false_alarms_per_hour
-    )
-    arm = nominal(traces)
-    return CollisionDetector(settings).fit(traces, arm.robot, arm.drive_gain, friction=arm.friction)
-
-
-def fitted(name: str, traces: Sequence[Trace], false_alarms_per_hour: float) -> Thresholded:
-    """A detector of the table, fitted to ``traces``; only the SVR brings a threshold of its own.
-
-    Raises:
-        ValueError: as :func:`trained`.
-    """
-    from tauguard.detectors import Thresholded, make_detector
-    from tauguard.detectors.methods.srq_svr import SvrDetector
-
-    if name == "srq-svr":
-        chain = trained(traces, false_alarms_per_hour)
-        return Thresholded(SvrDetector(chain), chain.threshold, chain.settings.confirmation)
-    return Thresholded(make_detector(name).fit(traces, nominal(traces)), float("inf"))
+    return train(make_detector(name), traces, nominal(traces), false_alarms_per_hour)
 
 
 def nominal(traces: Sequence[Trace]) -> ArmModel:

@@ -17,7 +17,6 @@ def command(
     calibration: Path | None = None,
     false_alarms_per_hour: float | None = None,
     confidence: float | None = None,
-    levelled: bool = False,
     free: tuple[Path, ...] = (),
     robot: Path | None = None,
     columns: str | None = None,
@@ -27,8 +26,9 @@ def command(
 ) -> None:
     """Train a detector and write its model file.
 
-    With --traces: on labelled recordings, some with collisions. With --calibration the threshold
-    keeps a promise: no more than the false alarms per hour that you name, on motion like that.
+    With --traces: on labelled recordings, some with collisions; a third of the collision-free ones
+    is kept for the threshold. With --calibration the threshold is guaranteed instead: no more than
+    the false alarms per hour that you name, on motion like that.
     With --free and --robot: a detector of a real arm from logs in which nothing touched it; three
     or more, with dwells and with moves of single joints among them, or those raise alarms later.
 
@@ -36,15 +36,12 @@ def command(
         traces: folder of MCAP recordings with truth (`tauguard simulate` writes such).
         model: the model file; one that is there is replaced if it is named (default: model.skops,
             or model.json with --free).
-        detector: with --traces, one of tauguard.detectors.DETECTORS; all but the momentum-observer
-            SVR need --calibration.
+        detector: with --traces, one of tauguard.detectors.DETECTORS, or module:Class of your own.
         calibration: folder of collision-free recordings that are not in --traces. Those with
             labelled collisions are refused; collisions without a label raise the threshold.
-        false_alarms_per_hour: what the threshold aims at on collision-free training motion
-            (default: 10, or 1 with --free), or promises with --calibration.
-        confidence: with --calibration, how sure the promise is to be (default: 0.95).
-        levelled: with --calibration, count the score from what free motion reaches at the speed of
-            the moment: slow motion is then watched more closely. For evaluate and detect.
+        false_alarms_per_hour: what the threshold aims at on motion like the training's
+            (default: 10, or 1 with --free), or guarantees with --calibration.
+        confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder; a contact in them raises the
             bounds, so that others like it are missed later.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains.
@@ -56,13 +53,10 @@ def command(
     if (traces is None) == (not free):
         raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
     target = _target(model, "model.json" if free else "model.skops")
-    if free and (calibration or levelled or confidence is not None or detector != "srq-svr"):
-        raise ValueError(
-            "--detector, --calibration, --confidence and --levelled go with --traces, "
-            "not with --free"
-        )
-    if calibration is None and (levelled or confidence is not None):
-        raise ValueError("--confidence and --levelled go with a promise: give --calibration")
+    if free and (calibration or confidence is not None or detector != "srq-svr"):
+        raise ValueError("--detector, --calibration and --confidence go with --traces only")
+    if calibration is None and confidence is not None:
+        raise ValueError("--confidence belongs to a guarantee: give --calibration")
     if traces is not None:
         own: dict[str, object] = {
             "--robot": robot,
@@ -75,7 +69,7 @@ def command(
             raise ValueError(f"{', '.join(given)}: with --free only, not with --traces")
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
         sure = 0.95 if confidence is None else confidence
-        labelled_motion(traces, target, detector, calibration, rate, sure, levelled)
+        labelled_motion(traces, target, detector, calibration, rate, sure)
         return
     if target.suffix == ".skops":
         raise ValueError(f"--model {target}: --free writes JSON; give a name that ends in .json")
@@ -102,47 +96,35 @@ def labelled_motion(
     calibration: Path | None,
     rate: float,
     confidence: float,
-    levelled: bool,
 ) -> None:
     """Train on labelled recordings."""
-    from dataclasses import replace
-
-    from tauguard.cli.fitting import fitted
+    from tauguard.cli.fitting import trained
     from tauguard.cli.folder import labelled
-    from tauguard.detectors import DETECTORS, make_detector, promised, save_model
-    from tauguard.detectors.thresholds.conformal import check_promise
-    from tauguard.detectors.thresholds.speed_levels import Levelled
+    from tauguard.detectors import make_detector, save_model, with_guarantee
+    from tauguard.detectors.thresholds.guarantee import check_guarantee
 
-    if name not in DETECTORS:
-        make_detector(name)  # says which there are
-    if calibration is None and name != "srq-svr":
-        raise ValueError(
-            f"--detector {name} needs --calibration, a folder of collision-free recordings "
-            "(`tauguard simulate --collisions 0` writes some)"
-        )
-    # First: what cannot be used, or cannot promise, is better named before training than after.
+    # First: what cannot be used, or cannot be guaranteed, is better named before training.
+    make_detector(name)
     if calibration is not None and calibration.resolve() == traces.resolve():
         raise ValueError(f"--calibration {calibration}: is --traces; give recordings not in it")
     free = labelled(calibration) if calibration is not None else []
     if free:
-        check_promise([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
+        check_guarantee([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
     recordings = labelled(traces)
-    watched = fitted(name, recordings, rate)
-    if levelled:
-        watched = replace(watched, detector=Levelled.on(watched.detector, recordings))
+    alarm, guarantee = trained(recordings, rate, name), None
     if free:
-        watched, promise = promised(watched, free, rate, confidence)
-    save_model(watched, model)
+        alarm, guarantee = with_guarantee(alarm, free, rate, confidence)
+    save_model(alarm, model)
     collisions = sum(len(t.truth.collisions) for t in recordings if t.truth)
     print(
         f"{model}: {name} trained on {len(recordings)} recordings with {collisions} collisions, "
-        f"threshold {watched.threshold:.3g}"
+        f"threshold {alarm.threshold:.3g}"
     )
-    if free:
+    if guarantee:
         print(
-            f"promised: at most {rate:g} false alarms per hour on motion like that of "
-            f"{calibration} ({promise.episodes} episodes, {promise.hours:.2g} h), with a "
-            f"confidence of {promise.confidence:.0%}"
+            f"guaranteed: at most {rate:g} false alarms per hour on motion like that of "
+            f"{calibration} ({guarantee.episodes} episodes, {guarantee.hours:.2g} h), with a "
+            f"confidence of {guarantee.confidence:.0%}"
         )
 
 

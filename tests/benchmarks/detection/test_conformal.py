@@ -11,7 +11,7 @@ from tauguard.models import Mismatch
 class Loudness:
     """Trains on nothing: the size of the first joint's current."""
 
-    name, settle = "loudness", 0.5
+    name, settle, dt = "loudness", 0.5, 1e-3
 
     def scores(self, trace):
         return np.abs(trace.current[:, 0])

@@ -29,7 +29,7 @@ def test_the_full_set_has_no_error_and_fewer_vectors_have_some(regressor):
     model, _ = regressor
     windows = np.random.default_rng(2).normal(size=(100, 6))
     full, *fewer = kernel_rows(model, windows, 30, 0)
-    assert full["support_vectors"] == len(model.support_vectors_)
+    assert full["support_vectors"] == len(model.machine_.vectors)
     assert full["error_max"] == 0.0
     assert full["difference_to_sklearn"] < 1e-9
     counts = [row["support_vectors"] for row in fewer]

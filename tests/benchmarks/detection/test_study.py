@@ -33,9 +33,17 @@ from tauguard.benchmarks.detection.pool import (
     wishes,
 )
 from tauguard.benchmarks.detection.study import ALL
-from tauguard.benchmarks.detection.thresholds import POINTS, Peaks, Pieces, Watched, watched
+from tauguard.benchmarks.detection.thresholds import (
+    POINTS,
+    Operated,
+    at_share,
+    expected,
+    operated,
+)
 from tauguard.benchmarks.detection.variations import every
+from tauguard.detectors import CollisionAlarm, FreeScores
 from tauguard.detectors.evaluation.events import find_alarms
+from tauguard.detectors.thresholds.free_scores import CASE, PIECE
 from tauguard.envs import simulate
 from tauguard.traces import STRATA, Collision, Trace
 
@@ -97,81 +105,64 @@ def test_conditions_scale_the_mismatch_and_set_the_temperature():
     assert episode.temperature == 10.0
 
 
+def scores(peaks, seconds=None, speed=0.0):
+    """Free scores whose blocks and cases are ``peaks``, one after the other."""
+    pieces = np.repeat(peaks, CASE)
+    return FreeScores(pieces, np.full(len(pieces), speed), seconds or len(pieces) * PIECE)
+
+
 def test_a_share_of_cases_is_matched_along_the_tail_also_below_one_in_all():
     rng = np.random.default_rng(4)
     quiet, other = rng.uniform(size=400), rng.exponential(size=400)
-    hers, ours = Peaks(quiet, quiet, 1.0), Peaks(other, other, 1.0)
-    assert hers.expected(1.0) == pytest.approx(0.5 / 401)  # none of 400
-    assert hers.expected(-1.0) == pytest.approx(400.5 / 401)
+    hers, ours = [scores(quiet)], [scores(other)]
+    assert expected(hers, 1.0) == pytest.approx(0.5 / 401)  # none of 400
+    assert expected(hers, -1.0) == pytest.approx(400.5 / 401)
     for threshold in (0.5, 0.9, 0.98, 1.0):
-        share = hers.expected(threshold)
-        assert ours.at_share(share) == pytest.approx(-np.log(share), rel=0.25)
-    wild = Peaks(np.append(other, 1e3), other, 1.0)  # one that is no part of the tail
-    assert wild.at_share(0.5 / 402) < 500
-
-
-def test_threshold_at_a_rate_follows_the_tail():
-    rng = np.random.default_rng(0)
-    for draw, level in (
-        (rng.exponential, lambda p: -np.log(p)),
-        (rng.uniform, lambda p: 1 - p),  # it ends: nothing to extrapolate to
-    ):
-        blocks = draw(size=7200)
-        peaks = Peaks(blocks[:1800], blocks, 1.0)
-        for per_hour in (5.0, 0.5, 0.1):
-            assert peaks.at_rate(per_hour) == pytest.approx(level(per_hour / 7200), rel=0.25)
-        assert np.sum(blocks > peaks.at_rate(720.0)) == 720
-
-
-def test_peaks_agree_with_scores_looked_at_one_by_one():
-    rng = np.random.default_rng(1)
-    level = rng.normal(size=20_000)
-    pieces = Pieces.of(level, np.arange(20_000.0), DT)
-    peaks = pieces.peaks()
-    assert peaks.hours == pytest.approx(20 / 3600)
-    assert len(peaks.cases) == 10
-    assert len(peaks.blocks) == 40
-    for k in range(10):
-        assert peaks.cases[k] == level[2000 * k : 2000 * (k + 1)].max()
-    for speed, high in zip(pieces.speed[0], pieces.level[0], strict=True):
-        assert level[int(speed)] == high
+        share = expected(hers, threshold)
+        assert at_share(ours, share) == pytest.approx(-np.log(share), rel=0.25)
+    wild = [scores(np.append(other, 1e3))]  # one that is no part of the tail
+    assert at_share(wild, 0.5 / 402) < 500
 
 
 def made_up(rng, seconds, top, speed):
-    samples = round(seconds / DT)
-    now = np.full(samples, speed)
+    pieces = round(seconds / PIECE)
+    now = np.full(pieces, speed)
     return {
-        "network": Pieces.of(rng.uniform(0, top, samples) ** 40 * top**-39, now, DT),
-        "other": Pieces.of(speed * rng.exponential(size=samples), now, DT),
+        "network": [FreeScores(rng.uniform(0, top, pieces) ** 40 * top**-39, now, seconds)],
+        "other": [FreeScores(speed * rng.exponential(size=pieces), now, seconds)],
     }
 
 
 def test_others_are_as_specific_as_the_network_at_every_speed_and_keep_the_rate():
     rng = np.random.default_rng(2)
-    pieces = {s: made_up(rng, 3600.0, top, s) for s, top in ((10.0, 2.2), (60.0, 3.0))}
-    found = watched({"network": None, "other": None}, pieces, "network", 1.0)
-    own, levels = found["other"].thresholds, found["other"].levels
+    free = {s: made_up(rng, 3600.0, top, s) for s, top in ((10.0, 2.2), (60.0, 3.0))}
+    given = {"network": Given(), "other": Given()}
+    found = operated(given, free, "network", 1.0)
+    own, levels = found["other"].thresholds, found["other"].alarms["hourly"].levels
     assert found["network"].thresholds["1.6"] == 1.6
     assert found["network"].thresholds["2.0"] == 2.0
-    assert not found["network"].levelled("1.6")
-    assert found["network"].levelled("hourly")
-    peaks = {s: p["other"].peaks(levels) for s, p in pieces.items()}
+    assert found["network"].alarms["1.6"].levels is None
+    assert found["network"].alarms["hourly"].levels is not None
+    normal = {s: [one.over(levels) for one in p["other"]] for s, p in free.items()}
     for name in ("1.6", "2.0"):
         margins = [
-            p["network"].peaks().expected(float(name)) - peaks[s].expected(own[name])
-            for s, p in pieces.items()
+            expected(p["network"], float(name)) - expected(normal[s], own[name])
+            for s, p in free.items()
         ]
         assert min(margins) == pytest.approx(0.0, abs=2e-3)  # somewhere it is just as specific
-    # Of an hour at each speed: the same levels are passed as often at both, 1 an hour in all.
-    alarms = [np.sum(p.blocks > own["hourly"] - 3.0) for p in peaks.values()]
+    # Of an hour at each speed: the same levels are exceeded as often at both, 1 an hour in all.
+    blocks = [p[0].blocks()[0] for p in normal.values()]
+    alarms = [np.sum(b > own["hourly"] - 3.0) for b in blocks]
     assert max(alarms) < 2.0 * min(alarms)
-    assert sum(np.sum(p.blocks > own["hourly"]) for p in peaks.values()) <= 6
+    assert sum(np.sum(b > own["hourly"]) for b in blocks) <= 6
 
 
 class Given:
     """A detector whose scores are given."""
 
-    def __init__(self, score):
+    name, settle, dt = "given", 0.0, DT
+
+    def __init__(self, score=None):
         self._score = score
 
     def scores(self, trace: Trace):
@@ -190,7 +181,9 @@ def test_false_alarms_and_cases_by_hand():
     for begin in (1.0, 4.0, 4.2, 9.5):  # the first before detectors have settled, two are one
         score[round(begin / DT) : round(begin / DT) + 10] = 5.0
     score[7000:7002] = 5.0  # shorter than t_c
-    tally = judge_free({"d": Watched(Given(score), None, {"hourly": 1.0})}, trace)["d", "hourly"]
+    tally = judge_free(
+        {"d": Operated(Given(score), {"hourly": CollisionAlarm(Given(score), 1.0)})}, trace
+    )["d", "hourly"]
     assert tally.false_alarms == 2
     assert tally.cases == 4
     assert tally.false_cases == 2
@@ -203,7 +196,7 @@ def test_collisions_that_do_not_count_are_left_out(struck):
     score = np.zeros(len(one.trace.t))
     for c in truth.collisions:
         score[(one.trace.t >= c.onset + 0.02) & (one.trace.t <= c.onset + 0.04)] = 2.0
-    own = Watched(Given(score), None, dict.fromkeys(POINTS, 1.0))
+    own = Operated(Given(score), dict.fromkeys(POINTS, CollisionAlarm(Given(score), 1.0)))
     tallies = judge_struck({"d": own}, one)
     outcomes = tallies["d", "hourly"].outcomes
     assert len(outcomes) == sum(one.kept)

@@ -4,10 +4,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tauguard.detectors import ArmModel, Diagnoser, RobotNumbers, Thresholded, diagnose
+from tauguard.detectors import ArmModel, Diagnoser, RobotNumbers, diagnose
 from tauguard.detectors.diagnosis.aftermath import Aftermath, AftermathOf
 from tauguard.detectors.diagnosis.classification import KINDS, load, signs
-from tauguard.detectors.diagnosis.diagnosis import believed
 from tauguard.envs import CollisionPlan, Episode, PayloadPick, simulate
 from tauguard.models import cura6, cura6_drive, link_surface, pin_model
 from tauguard.traces import Alarm
@@ -134,20 +133,18 @@ def test_what_was_known_before_the_alarm_is_kept(trace):
     assert looked.t[-1] == pytest.approx(0.3, abs=2e-3)
 
 
-def test_alarms_of_any_detector_are_explained(trace, detector):
-    explained = diagnose(detector, trace)
-    assert len(explained) == len(detector.detect(trace).alarms)
-    arm, envelope = believed(Thresholded(detector, 1.0))
-    assert arm is detector.arm
-    learned = detector.features.envelope.weights
-    np.testing.assert_array_equal(envelope.weights[:, 1:], learned[:, 1:])
-    np.testing.assert_array_equal(envelope.weights[:, 0], np.maximum(learned[:, 0], arm.noise))
+def test_alarms_of_any_detector_are_explained(trace, alarm):
+    explained = diagnose(alarm, trace)
+    assert len(explained) == len(alarm.detect(trace).alarms)
+    arm, surface = alarm.detector.arm, link_surface(XML, 40)
+    learned, used = arm.envelope.weights, Diagnoser.of(arm, surface).envelope
+    np.testing.assert_array_equal(used.weights[:, 1:], learned[:, 1:])
+    np.testing.assert_array_equal(used.weights[:, 0], np.maximum(learned[:, 0], arm.noise))
+    assert Diagnoser.of(ARM, surface).envelope is None
     with pytest.raises(ValueError, match=r"no arm\.xml"):
-        diagnose(detector, replace(trace, attachments={}))
+        diagnose(alarm, replace(trace, attachments={}))
     with pytest.raises(ValueError, match="start 99"):
-        AftermathOf(arm, envelope, trace).at(99.0)
-    with pytest.raises(ValueError, match="not fitted"):
-        believed(type(detector)())
+        AftermathOf(arm, used, trace).at(99.0)
 
 
 @pytest.mark.parametrize("stride", [1, 10, 42])

@@ -55,15 +55,15 @@ def test_a_payload_never_told_is_tracked(training, detector):
 
 def test_doubt_makes_less_of_what_an_unknown_payload_could_explain(training, detector):
     trace = next(t for t in training if not t.truth.collisions)
-    plain, wary = (
+    plain, careful = (
         Estimator(detector.arm, unknowns=u).run(
             trace.t, trace.q, trace.qd, trace.current, keep=True
         )
-        for u in (Unknowns(), Unknowns.wary())
+        for u in (Unknowns(), Unknowns.for_detection())
     )
-    np.testing.assert_array_equal(plain.unknowns, wary.unknowns)
-    np.testing.assert_array_equal(np.sign(plain.left), np.sign(wary.left))
-    share = np.abs(wary.left) / np.maximum(np.abs(plain.left), 1e-12)
+    np.testing.assert_array_equal(plain.unknowns, careful.unknowns)
+    np.testing.assert_array_equal(np.sign(plain.left), np.sign(careful.left))
+    share = np.abs(careful.left) / np.maximum(np.abs(plain.left), 1e-12)
     assert share.max() <= 1
     # A payload's part is a guess in the beginning and known once the arm has moved.
     assert share[2:9, 1].max() < 0.2 < np.median(share[5000:, 1])

@@ -51,10 +51,10 @@ def test_a_smooth_function_needs_few_vectors():
     rng = np.random.default_rng(1)
     x = rng.uniform(-2, 2, size=(400, 2))
     model = SrqSVR(epsilon=0.001, C=10).fit(x, np.sin(x[:, 0]) * x[:, 1])
-    small = model.reduced(40)
-    assert len(small.support_vectors_) == 40 < len(model.support_vectors_) / 3
+    small = model.machine_.reduced(40)
+    assert len(small.vectors) == 40 < len(model.machine_.vectors) / 3
     fresh = rng.uniform(-2, 2, size=(200, 2))
-    assert np.abs(small.predict(fresh) - model.predict(fresh)).max() < 0.02
+    assert np.abs(small(fresh) - model.predict(fresh)).max() < 0.02
 
 
 @pytest.mark.parametrize("count", [0, 6])

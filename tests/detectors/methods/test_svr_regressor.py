@@ -46,7 +46,7 @@ def test_same_bits_for_any_number_of_threads_and_row_by_row():
     rng = np.random.default_rng(0)
     model = SrqSVR().fit(rng.normal(size=(300, 8)), rng.normal(size=300))
     signal = np.ascontiguousarray(rng.normal(size=(1500, 2)))
-    kernel = model.kernel_sum()
+    kernel = model.machine_.native
     outs = []
     for threads in (1, 2, 5):
         out = np.empty(1500)

@@ -1,4 +1,4 @@
-"""Levelling: causal, and one rate at every speed where the tails grow with it."""
+"""Speed levels: causal, and one rate at every speed where the tails grow with it."""
 
 from dataclasses import replace
 
@@ -7,12 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tauguard.detectors.thresholds.law import with_rate
 from tauguard.detectors.thresholds.rates import block_maxima, tail_level
-from tauguard.detectors.thresholds.speed_levels import (
-    Levelled,
-    SpeedLevels,
-    recent_speed,
-)
+from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels, recent_speed
 from tauguard.traces import Trace
 
 
@@ -27,6 +24,8 @@ def test_recent_speed_is_the_maximum_of_the_last_moments(speeds, memory):
     count = max(1, round(memory / dt))
     expected = [total[max(0, k - count + 1) : k + 1].max() for k in range(len(total))]
     np.testing.assert_array_equal(recent_speed(qd, dt, memory), expected)
+    stream = RecentSpeed(dt, memory)
+    assert [stream.step(row) for row in qd] == expected
 
 
 def test_one_level_is_passed_as_often_at_every_speed():
@@ -41,7 +40,7 @@ def test_one_level_is_passed_as_often_at_every_speed():
     assert plain[0] == 0 < plain[-1]  # what one threshold on the score itself does
 
 
-def test_levels_grow_with_the_speed_and_the_levelled_score_with_the_score():
+def test_levels_grow_with_the_speed_and_the_normalised_score_with_the_score():
     rng = np.random.default_rng(1)
     levels = SpeedLevels.fit(rng.normal(size=3000), rng.uniform(0, 5, 3000))
     assert (np.diff(levels.speed) > 0).all()
@@ -52,7 +51,7 @@ def test_levels_grow_with_the_speed_and_the_levelled_score_with_the_score():
     assert levels(2.0, 1e3) == levels(2.0, levels.speed[-1])
 
 
-def test_a_score_that_never_changes_can_be_levelled():
+def test_a_score_that_never_changes_can_be_normalised():
     levels = SpeedLevels.fit(np.full(10, 0.3), np.arange(10.0))
     assert np.isfinite(levels(0.3, 4.0))
 
@@ -78,7 +77,7 @@ def test_a_memory_below_zero_is_refused():
 class Given:
     """A detector whose score is the first joint's current."""
 
-    name, settle = "given", 0.1
+    name, settle, dt = "given", 0.1, 1e-2
 
     def scores(self, trace):
         return trace.current[:, 0]
@@ -90,17 +89,17 @@ def motion(rng, seconds=60.0, dt=1e-2):
     return Trace(("j",), t, np.zeros_like(qd), qd, qd * rng.exponential(size=qd.shape))
 
 
-def test_a_detector_is_levelled_on_free_motion_and_stays_causal():
+def test_an_alarm_gets_levels_and_a_rate_from_free_motion_and_stays_causal():
     rng = np.random.default_rng(2)
-    own = Levelled.on(Given(), [motion(rng) for _ in range(8)])
-    assert (own.name, own.settle) == ("given", 0.1)
+    own = with_rate(Given(), [motion(rng) for _ in range(8)], 60.0)
+    assert own.levels is not None
     trace = motion(rng)
     whole = own.scores(trace)
     names = ("t", "q", "qd", "current")
     early = replace(trace, **{name: getattr(trace, name)[:2000] for name in names})
     np.testing.assert_array_equal(own.scores(early), whole[:2000])
     with pytest.raises(ValueError, match="no collision-free motion"):
-        Levelled.on(Given(), [])
+        with_rate(Given(), [], 60.0)
 
 
 def test_maxima_of_blocks_and_where_they_are():

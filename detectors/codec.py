@@ -1,0 +1,100 @@
+"""Frozen dataclasses as plain dictionaries and arrays, and back, for model files."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+#: Nesting of a file's content: no detector is deeper.
+DEEPEST = 20
+_TYPE, _FIELDS, _TUPLE = "type", "fields", "tuple"
+
+
+def encode(value: object) -> Any:
+    """``value`` as dictionaries, lists, arrays, numbers and text.
+
+    Raises:
+        ValueError: something else in it; the message names the type.
+    """
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.generic):
+        return encode(value.item())
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+        return np.ascontiguousarray(value)
+    if isinstance(value, tuple):
+        return {_TUPLE: [encode(item) for item in value]}
+    if is_dataclass(value) and not isinstance(value, type):
+        own = {field.name: encode(getattr(value, field.name)) for field in fields(value)}
+        return {_TYPE: type_name(type(value)), _FIELDS: own}
+    raise ValueError(
+        f"a {type(value).__name__} cannot be in a model file: expected numbers, text, arrays, "
+        "tuples and frozen dataclasses of these"
+    )
+
+
+def decode(content: Any, known: Callable[[str], type], depth: int = 0) -> Any:
+    """What :func:`encode` took apart.
+
+    Args:
+        content: of a file.
+        known: the class of a name that :func:`type_name` gave; raises where it is not known.
+        depth: how deep in the file's content this is.
+
+    Raises:
+        ValueError: unknown classes, other fields than theirs, numbers that are not finite or out
+            of range, or too deep a content.
+    """
+    if depth > DEEPEST:
+        raise ValueError("nested too deeply")
+    if isinstance(content, dict) and set(content) == {_TUPLE}:
+        return tuple(decode(item, known, depth + 1) for item in content[_TUPLE])
+    if isinstance(content, dict):
+        kind = known(str(content.get(_TYPE)))
+        given, expected = content.get(_FIELDS, {}), {field.name for field in fields(kind)}
+        if set(given) != expected:
+            different = ", ".join(sorted(set(given) ^ expected))
+            raise ValueError(f"{kind.__name__} with a part missing or added: {different}")
+        return kind(**{name: decode(own, known, depth + 1) for name, own in given.items()})
+    if isinstance(content, np.ndarray):
+        if content.dtype.kind not in "fiub" or not np.isfinite(content).all():
+            raise ValueError("an array with numbers that are not finite")
+        return content
+    if content is None or isinstance(content, bool | int | str):
+        return content
+    if isinstance(content, float) and np.isfinite(content):
+        return content
+    raise ValueError(f"unexpected {content!r:.40}")
+
+
+def type_name(kind: type) -> str:
+    """A class's name in files: that of ours, or module and name of another's."""
+    ours = kind.__module__.startswith("tauguard.")
+    return kind.__qualname__ if ours else f"{kind.__module__}:{kind.__qualname__}"
+
+
+def checksum(content: Any) -> str:
+    """SHA-256 over all of an encoded content."""
+    digest = hashlib.sha256()
+    _feed(digest.update, content)
+    return digest.hexdigest()
+
+
+def _feed(update: Callable[[bytes], None], content: Any) -> None:
+    if isinstance(content, dict):
+        for key in sorted(content):
+            update(f"{{{key}:".encode())
+            _feed(update, content[key])
+    elif isinstance(content, list):
+        update(f"[{len(content)}".encode())
+        for item in content:
+            _feed(update, item)
+    elif isinstance(content, np.ndarray):
+        update(f"{content.dtype.str}{content.shape}".encode())
+        update(np.ascontiguousarray(content).tobytes())
+    else:
+        update(f"{type(content).__name__} {content!r};".encode())

@@ -1,0 +1,168 @@
+"""From scores to alarms, the same way for every method, in batch and online."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.detector import FittedDetector, same_rate
+from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
+from tauguard.detectors.estimation.observer import PLAIN_GAIN
+from tauguard.detectors.evaluation.events import find_alarms
+from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.thresholds.confirmation import (
+    CONFIRMATION,
+    Confirmation,
+    confirmation_samples,
+    confirmed,
+)
+from tauguard.detectors.thresholds.rates import sustained
+from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels, recent_speed
+from tauguard.traces.trace import Detection, Trace
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionAlarm(Frozen):
+    """A fitted detector with what makes an alarm of its score.
+
+    The alarm is up where the score, normalised by the speed levels, has stayed above the threshold
+    for the confirmation time; never before the detector has settled.
+    """
+
+    detector: FittedDetector
+    threshold: float  #: of the normalised score
+    confirmation: float = CONFIRMATION  #: t_c [s]
+    levels: SpeedLevels | None = None  #: None: the score is compared as it is
+
+    def __post_init__(self) -> None:
+        """Check: ``ValueError``."""
+        confirmation_samples(self.confirmation, self.detector.dt)
+        if np.isnan(self.threshold):
+            raise ValueError("threshold: not a number")
+
+    @property
+    def settle(self) -> float:
+        """Seconds at the beginning without an alarm."""
+        return self.detector.settle
+
+    @property
+    def samples(self) -> int:
+        """Successive samples above the threshold that make an alarm."""
+        return confirmation_samples(self.confirmation, self.detector.dt)
+
+    def normalised(self, score: Array, trace: Trace) -> Array:
+        """Scores of a trace relative to the speed levels, shape (T,)."""
+        if self.levels is None:
+            return score
+        return self.levels(score, recent_speed(trace.qd, trace.dt))
+
+    def scores(self, trace: Trace) -> Array:
+        """The normalised score, shape (T,)."""
+        return self.normalised(self.detector.scores(trace), trace)
+
+    def sustained(self, trace: Trace, score: Array | None = None) -> Array:
+        """What the normalised score has reached throughout the last t_c, shape (T,).
+
+        Above the threshold is an alarm; -inf before the detector has settled.
+
+        Args:
+            trace: of the detector's arm.
+            score: of the detector, before it is normalised, where it is known.
+        """
+        known = self.detector.scores(trace) if score is None else score
+        level = self.normalised(known, trace)
+        return sustained(np.where(self._settled(trace), level, -np.inf), self.samples)
+
+    def _settled(self, trace: Trace) -> NDArray[np.bool_]:
+        return np.asarray(trace.t - trace.t[0] > self.settle - self.detector.dt / 2)
+
+    def detect(self, trace: Trace) -> Detection:
+        """The alarms of a trace; its residual is the plain momentum observer's.
+
+        Raises:
+            ValueError: another number of joints or another sample rate.
+        """
+        score = self.scores(trace)
+        alarm = confirmed((score > self.threshold) & self._settled(trace), self.samples)
+        return Detection(
+            detector=self.detector.name,
+            t=trace.t,
+            residual=plain_residual(self.detector.arm, trace),
+            score=score,
+            threshold=self.threshold,
+            alarm=alarm,
+            alarms=find_alarms(trace.t, alarm),
+        )
+
+    def stream(self) -> AlarmStream:
+        """The alarm sample by sample, from the next sample on."""
+        return AlarmStream(self)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a model file (see :func:`tauguard.detectors.model_file.save_model`)."""
+        from tauguard.detectors.model_file import save_model
+
+        save_model(self, path)
+
+    @staticmethod
+    def load(path: str | os.PathLike[str] | Path) -> CollisionAlarm:
+        """Read a model file (see :func:`tauguard.detectors.model_file.load_model`)."""
+        from tauguard.detectors.model_file import load_model
+
+        return load_model(path)
+
+
+class AlarmStream:
+    """An alarm as the samples of one recording come in.
+
+    Attributes:
+        score: the normalised score at the last sample.
+    """
+
+    def __init__(self, alarm: CollisionAlarm) -> None:
+        """Begin anew."""
+        self._scores, self._levels = alarm.detector.stream(), alarm.levels
+        self._dt, self._settle = alarm.detector.dt, alarm.settle - alarm.detector.dt / 2
+        self._speed = RecentSpeed(self._dt)
+        self._confirmation, self._threshold = Confirmation(alarm.samples), alarm.threshold
+        self._time = -1.0
+        self.score = 0.0
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> bool:
+        """Whether the alarm is up at this sample; equal to :meth:`CollisionAlarm.detect`.
+
+        Args:
+            q: [rad], float64, shape (n,).
+            qd: [rad/s], shape (n,).
+            current: [A], shape (n,).
+            dt: time since the last sample [s] (default: that of the training traces).
+
+        Raises:
+            ValueError: wrong shapes, numbers that are not finite, or another sample rate than the
+                training's.
+        """
+        interval = self._dt if dt is None else dt
+        first = self._time < 0
+        if not first and not same_rate(interval, self._dt):
+            raise ValueError(
+                f"dt {1e3 * interval:g} ms: this detector works at {1e3 * self._dt:g} ms; feed it "
+                "every sample, or train one at this rate"
+            )
+        score = self._scores.step(q, qd, current, dt)
+        self._time = 0.0 if first else self._time + interval
+        if self._levels is not None:
+            score = self._levels.one(score, self._speed.step(qd))
+        self.score = score
+        return self._confirmation.step(score > self._threshold and self._time > self._settle)
+
+
+def plain_residual(arm: ArmModel, trace: Trace) -> Array:
+    """The momentum observer's estimate of tau_ext at 100/s with no unknowns [N m], shape (T, n)."""
+    estimator = Estimator(arm, PLAIN_GAIN, trace.dt, Unknowns.none())
+    return estimator.run(trace.t, trace.q, trace.qd, trace.current).residual

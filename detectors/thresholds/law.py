@@ -1,0 +1,142 @@
+"""From collision-free motion to a threshold: the one way, for the command line and all studies.
+
+Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
+(:mod:`.speed_levels`), and the threshold is where the tail of the peaks meets the rate of false
+alarms that is accepted (:mod:`.rates`), or the one that a calibration set guarantees
+(:mod:`.guarantee`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tauguard.detectors.detector import Detector, FittedDetector
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.thresholds.alarm import CollisionAlarm
+from tauguard.detectors.thresholds.confirmation import CONFIRMATION
+from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
+from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
+from tauguard.detectors.thresholds.rates import tail_level
+from tauguard.traces.trace import Trace
+
+#: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
+TAIL = 0.02
+#: Share of the collision-free training traces that the threshold comes from.
+HELD_OUT = 0.34
+
+
+def held_out(traces: Sequence[Trace], share: float = HELD_OUT) -> tuple[list[Trace], list[Trace]]:
+    """Traces to train on, and collision-free ones for the threshold.
+
+    Returns:
+        The two lists; with fewer than two collision-free traces each holds all traces, and the
+        threshold then comes from motion that the detector was trained on.
+    """
+    free = [i for i, t in enumerate(traces) if not (t.truth and t.truth.collisions)]
+    count = min(len(free) - 1, max(1, round(share * len(free)))) if len(free) > 1 else 0
+    if count == 0:
+        return list(traces), list(traces)
+    # Evenly through the list, which often goes through speeds and payloads in turn.
+    kept = {free[round((k + 0.5) * len(free) / count - 0.5)] for k in range(count)}
+    return [t for i, t in enumerate(traces) if i not in kept], [traces[i] for i in sorted(kept)]
+
+
+def train(
+    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float
+) -> CollisionAlarm:
+    """Fit a detector on a part of the traces and choose its threshold by the rest.
+
+    Args:
+        detector: settings of a method.
+        traces: with truth, of one arm at one sample rate.
+        arm: the model before training.
+        per_hour: false alarms to accept in an hour of motion like the training's.
+
+    Raises:
+        ValueError: traces that do not fit or lack what the method needs.
+    """
+    own, rest = held_out(traces)
+    return with_rate(detector.fit(own, arm), rest, per_hour)
+
+
+def with_rate(
+    detector: FittedDetector,
+    traces: Sequence[Trace],
+    per_hour: float,
+    confirmation: float = CONFIRMATION,
+) -> CollisionAlarm:
+    """Speed levels and the threshold for a rate of false alarms.
+
+    Args:
+        detector: fitted.
+        traces: their collision-free rows count; motion that the detector was not trained on.
+        per_hour: false alarms to accept in an hour of such motion.
+        confirmation: t_c [s].
+
+    Raises:
+        ValueError: no collision-free motion, or a rate that is not above 0.
+    """
+    plain = CollisionAlarm(detector, np.inf, confirmation)
+    scores = [FreeScores.of(plain, trace) for trace in long_enough(plain, traces)]
+    levels = speed_levels(scores)
+    threshold = threshold_for_rate([one.over(levels) for one in scores], per_hour)
+    return replace(plain, levels=levels, threshold=threshold)
+
+
+def with_guarantee(
+    alarm: CollisionAlarm, traces: Sequence[Trace], per_hour: float, confidence: float = 0.95
+) -> tuple[CollisionAlarm, Guarantee]:
+    """The same alarm with a threshold that calibration episodes guarantee.
+
+    Args:
+        alarm: its threshold is replaced; its speed levels must not come from ``traces``.
+        traces: collision-free motion episodes that the detector was not trained on.
+        per_hour: false alarms per hour to accept.
+        confidence: see :func:`~tauguard.detectors.thresholds.guarantee.guaranteed_threshold`.
+
+    Raises:
+        ValueError: an episode with collisions, or too few for the guarantee.
+    """
+    for trace in traces:
+        if trace.truth is not None and trace.truth.collisions:
+            raise ValueError(
+                f"an episode with {len(trace.truth.collisions)} collisions: calibration takes "
+                "collision-free motion"
+            )
+    scores = [FreeScores.of(alarm, trace) for trace in traces]
+    guarantee = guaranteed_threshold(scores, per_hour, confidence)
+    return replace(alarm, threshold=guarantee.threshold), guarantee
+
+
+def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
+    """The threshold that collision-free motion exceeds ``per_hour`` times an hour.
+
+    Alarms are counted as blocks of the merge gap that exceed the threshold; rarer alarms than the
+    motion shows are extrapolated along a generalised Pareto tail of the blocks' peaks.
+
+    Raises:
+        ValueError: no scores, or a rate that is not above 0.
+    """
+    if not per_hour > 0:
+        raise ValueError(f"per_hour: {per_hour}, expected above 0")
+    peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
+    hours = sum(one.seconds for one in scores) / 3600
+    return tail_level(peaks, per_hour * hours, max(2, round(TAIL * len(peaks))))
+
+
+def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:
+    """Traces that last until the detector has settled.
+
+    Raises:
+        ValueError: there are none.
+    """
+    found = [t for t in traces if t.t[-1] - t.t[0] > alarm.settle + alarm.confirmation]
+    if not found:
+        raise ValueError(
+            f"no collision-free motion after the {alarm.settle:g} s that {alarm.detector.name} "
+            "needs to settle"
+        )
+    return found

@@ -1,0 +1,55 @@
+"""Collision-free scores reduced to pieces, and the threshold for a rate."""
+
+import numpy as np
+import pytest
+
+from tauguard.detectors import CollisionAlarm, FreeScores
+from tauguard.detectors.thresholds.free_scores import GAP, PIECE
+from tauguard.detectors.thresholds.law import threshold_for_rate
+from tauguard.traces import Trace
+
+
+class Given:
+    """A detector whose score is the first joint's current."""
+
+    name, settle, dt = "given", 0.0, 1e-3
+
+    def scores(self, trace):
+        return trace.current[:, 0]
+
+
+def test_pieces_agree_with_scores_looked_at_one_by_one():
+    rng = np.random.default_rng(1)
+    score, t = rng.normal(size=20_000), np.arange(20_000) * 1e-3
+    trace = Trace(("j",), t, *(x[:, None] for x in (t, np.maximum(t, 0), score)))
+    found = FreeScores.of(CollisionAlarm(Given(), np.inf, confirmation=0.0), trace)
+    assert found.seconds == pytest.approx(20)
+    assert len(found.peaks) == 1000
+    assert len(found.cases()) == 10
+    assert len(found.blocks()[0]) == 40
+    for k in range(10):
+        assert found.cases()[k] == score[2000 * k : 2000 * (k + 1)].max()
+    for speed, high in zip(found.speeds, found.peaks, strict=True):
+        assert score[round(speed / 1e-3)] == high
+    short = FreeScores.of(CollisionAlarm(Given(), np.inf, confirmation=3e-3), trace)
+    lowest = np.lib.stride_tricks.sliding_window_view(score, 3).min(axis=-1)
+    assert short.peak == lowest.max()
+
+
+@pytest.mark.parametrize(
+    ("draw", "level"),
+    [
+        (lambda rng, n: rng.exponential(size=n), lambda p: -np.log(p)),
+        # It ends: nothing to extrapolate to.
+        (lambda rng, n: rng.uniform(size=n), lambda p: 1 - p),
+    ],
+)
+def test_the_threshold_for_a_rate_lies_on_the_tail(draw, level):
+    blocks = draw(np.random.default_rng(0), 7200)
+    pieces = np.repeat(blocks, GAP)
+    free = [FreeScores(pieces, np.zeros_like(pieces), len(pieces) * PIECE)]
+    for per_hour in (5.0, 0.5, 0.1):
+        assert threshold_for_rate(free, per_hour) == pytest.approx(level(per_hour / 7200), rel=0.25)
+    assert np.sum(blocks > threshold_for_rate(free, 720.0)) == 720
+    with pytest.raises(ValueError, match="per_hour: 0"):
+        threshold_for_rate(free, 0)
