@@ -36,7 +36,8 @@ ALLOWED = {
     "report": set(),
     # The environments study trains its detector by the command line's rules.
     "benchmarks": PRODUCT | {"report", "cli"},
-    "cli": PRODUCT | {"report", "benchmarks"},
+    "hard_cases": PRODUCT,
+    "cli": PRODUCT | {"report", "benchmarks", "hard_cases"},
 }
 FOLDERS = {room: ROOT / ("src/tauguard/cli" if room == "cli" else room) for room in ALLOWED}
 

@@ -1,0 +1,12 @@
+"""Named hard cases with exact answers, for our kernels and for anybody's.
+
+A library takes part through an adapter: an object with a ``name`` and a method for each kind of
+case that it can answer (:class:`~tauguard.hard_cases.adapter.Adapter` lists them). A kind without
+a method is not asked.
+"""
+
+from tauguard.hard_cases.adapter import Adapter, adapters
+from tauguard.hard_cases.case import Case, load_cases
+from tauguard.hard_cases.verdicts import run
+
+__all__ = ["Adapter", "Case", "adapters", "load_cases", "run"]

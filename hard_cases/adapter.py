@@ -1,0 +1,74 @@
+"""What a library implements to be asked, and the adapters there are."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any, Protocol
+
+#: The adapters that come with the package: name of the library and where its adapter is.
+BUILT_IN = {
+    "tauguard": "tauguard.hard_cases.adapters.ours:Ours",
+    "ipctk": "tauguard.hard_cases.adapters.ipctk_adapter:Ipctk",
+    "coal": "tauguard.hard_cases.adapters.coal_adapter:Coal",
+    "mujoco": "tauguard.hard_cases.adapters.mujoco_adapter:MuJoCo",
+    "mujoco-speculative": "tauguard.hard_cases.adapters.mujoco_adapter:Speculative",
+    "explicit-observer": "tauguard.hard_cases.adapters.explicit_observer:ExplicitObserver",
+}
+
+
+class Adapter(Protocol):
+    """A library to be asked. Only ``name`` is needed; a method that is absent is not asked.
+
+    The methods and what they answer::
+
+        vertex_face(x_t0, x_t1) -> time of impact or None     rows v, f0, f1, f2; shape (4, 3)
+        edge_edge(x_t0, x_t1) -> time of impact or None       rows a0, a1, b0, b1; shape (4, 3)
+        convex_overlap(a, b) -> bool                          corners, shapes (n, 3) and (m, 3)
+        convex_sweep(a, b, displacement) -> time or None      b moves, a rests; touching counts
+        convex_motion(a, b, motion_a, motion_b) -> time or None   see below
+        scene(mjcf, seconds) -> float                         last value of the sensor "answer"
+        observer(mjcf, t, q, qd, tau, gain) -> float          last residual of the first joint
+
+    Times are in [0, 1] of the step. A motion is a dictionary: ``position`` [m] and ``rotation``
+    (a rotation vector [rad]) of the body's frame at the start, ``linear`` [m] and ``angular``
+    [rad] over the step, at constant rates. A scene starts from its first keyframe, if it has one.
+    """
+
+    name: str
+
+
+def adapters(names: tuple[str, ...] = ()) -> list[Adapter]:
+    """Adapters by name of a library or by ``module:Class``; all that are installed by default.
+
+    Raises:
+        ValueError: neither a known name nor a class that can be imported.
+    """
+    if not names:
+        return [one for one in map(_installed, BUILT_IN.values()) if one is not None]
+    return [_named(name) for name in names]
+
+
+def _installed(place: str) -> Adapter | None:
+    try:
+        return _make(place)
+    except ImportError:
+        return None
+
+
+def _named(name: str) -> Adapter:
+    place = BUILT_IN.get(name, name)
+    if ":" not in place:
+        raise ValueError(f"adapter {name!r}: there are {', '.join(BUILT_IN)}, or module:Class")
+    try:
+        return _make(place)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"adapter {name!r}: {error}") from None
+
+
+def _make(place: str) -> Adapter:
+    module, _, attribute = place.partition(":")
+    made: Any = getattr(importlib.import_module(module), attribute)()
+    if not isinstance(getattr(made, "name", None), str):
+        raise ValueError(f"adapter {place!r}: it has no name")
+    adapter: Adapter = made
+    return adapter

@@ -1,0 +1,1 @@
+"""One adapter a file: how a library is asked."""

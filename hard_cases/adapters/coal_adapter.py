@@ -1,0 +1,32 @@
+"""coal's GJK on convex hulls."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import coal
+import numpy as np
+
+
+class Coal:
+    """The defaults of ``coal.collide``; faces come from SciPy's Qhull, whose errors are raised."""
+
+    name = "coal"
+
+    def convex_overlap(self, a: Any, b: Any) -> bool:
+        """Overlap of two hulls."""
+        request, result = coal.CollisionRequest(), coal.CollisionResult()
+        still = coal.Transform3s.Identity()
+        return bool(coal.collide(_hull(a), still, _hull(b), still, request, result))
+
+
+def _hull(points: Any) -> Any:
+    from scipy.spatial import ConvexHull
+
+    cloud, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for point in points:
+        cloud.append(np.array(point, dtype=np.float64))
+    # coal's own hull builder ends the process where Qhull fails, as it does on flat bodies.
+    for face in ConvexHull(points).simplices:
+        triangles.append(coal.Triangle(*map(int, face)))
+    return coal.Convex(cloud, triangles)

@@ -1,0 +1,71 @@
+"""tauguard's own kernels: cloth queries, convex bodies, guarded steps, the momentum observer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tauguard.cloth import edge_edge, vertex_face
+from tauguard.rigid import Hulls, Motion, overlap, sweep, time_of_impact
+
+
+class Ours:
+    """The defaults of every room, as a user gets them."""
+
+    name = "tauguard"
+
+    def vertex_face(self, x_t0: Any, x_t1: Any) -> float | None:
+        """The method ab2pf."""
+        return _toi(vertex_face([x_t0], [x_t1]))
+
+    def edge_edge(self, x_t0: Any, x_t1: Any) -> float | None:
+        """The method ab2pf."""
+        return _toi(edge_edge([x_t0], [x_t1]))
+
+    def convex_overlap(self, a: Any, b: Any) -> bool:
+        """Convex hulls, the method ``auto``."""
+        return bool(overlap(_hull(a), _hull(b)).hit[0])
+
+    def convex_sweep(self, a: Any, b: Any, displacement: Any) -> float | None:
+        """Convex hulls, the method ``auto``."""
+        return _toi(sweep(_hull(a), _hull(b), displacement))
+
+    def convex_motion(self, a: Any, b: Any, motion_a: Any, motion_b: Any) -> float | None:
+        """Convex hulls at constant linear and angular velocity."""
+        return _toi(time_of_impact(_hull(a), _hull(b), _motion(motion_a), _motion(motion_b)))
+
+    def scene(self, mjcf: str, seconds: float) -> float:
+        """MuJoCo's steps under the guard."""
+        from tauguard.contacts import GuardedStepper
+        from tauguard.hard_cases.adapters.mujoco_adapter import answer, start
+
+        model, data = start(mjcf)
+        with GuardedStepper(model, data) as stepper:
+            while data.time < seconds - model.opt.timestep / 2:
+                stepper.step()
+        return answer(model, data)
+
+    def observer(self, mjcf: str, t: Any, q: Any, qd: Any, tau: Any, gain: float) -> float:
+        """The momentum observer of the nominal model."""
+        from tauguard.detectors import RobotNumbers, observe
+        from tauguard.models import pin_model
+
+        return float(observe(RobotNumbers.from_pin(pin_model(mjcf)), t, q, qd, tau, gain)[-1, 0])
+
+
+def _hull(points: Any) -> Hulls:
+    return Hulls(np.array(points, dtype=np.float64), np.array([0, len(points)]))
+
+
+def _motion(given: Any) -> Motion:
+    from scipy.spatial.transform import Rotation
+
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_rotvec(given["rotation"]).as_matrix()
+    pose[:3, 3] = given["position"]
+    return Motion(pose, given["linear"], given["angular"])
+
+
+def _toi(impacts: Any) -> float | None:
+    return float(impacts.toi[0]) if impacts.hit[0] else None

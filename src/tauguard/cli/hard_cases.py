@@ -1,0 +1,34 @@
+"""``tauguard hard-cases``: named cases with exact answers, put to our kernels and to others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+def command(
+    adapter: tuple[str, ...] = (),
+    case: tuple[str, ...] = (),
+    json: Path | None = None,
+) -> None:
+    """Put the hard cases to every library that is installed and print the verdicts.
+
+    Args:
+        adapter: libraries to ask: names, or module:Class of your own adapter (default: all).
+        case: names of cases, or beginnings of names (default: all).
+        json: write a row for every answer here as JSON.
+    """
+    from tauguard.hard_cases import adapters, load_cases, run
+    from tauguard.hard_cases.verdicts import verdicts
+    from tauguard.report import machine, table, versions, write_json
+
+    cases = [one for one in load_cases() if not case or one.name.startswith(case)]
+    if not cases:
+        raise ValueError(f"case {', '.join(case)}: no case begins so")
+    rows = run(cases, adapters(adapter))
+    shown = ("case", "library", "expected", "answer", "right")
+    print(table([{key: row[key] for key in shown} for row in rows]))
+    print("\n" + table(verdicts(rows)))
+    if json is not None:
+        payload = {"machine": machine(), "versions": versions(), "rows": rows}
+        write_json(json, {"name": "hard-cases", **payload})
+        print(f"json: {json}")
