@@ -41,12 +41,12 @@ def test_commands_exist(page):
 
     shell = "\n".join(re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL))
     told = shell + "\n".join(re.findall(r"`(tauguard [^`]+)`", page.read_text()))
-    for command, rest in re.findall(r"tauguard ([a-z]+)([^\n]*)", told):
+    for command, rest in re.findall(r"tauguard ([a-z-]+)([^\n]*)", told):
         if command == "bench":
             assert rest.split()[0] in {"NAME", "list", *STUDIES}, rest
             continue
         assert command in COMMANDS, command
-        source = (ROOT / "src" / "tauguard" / "cli" / f"{command}.py").read_text()
+        source = (ROOT / "src" / "tauguard" / "cli" / f"{command.replace('-', '_')}.py").read_text()
         for flag in re.findall(r"--([a-z-]+)", rest):
             assert re.search(rf"\b{flag.replace('-', '_')}:", source), f"{command} --{flag}"
 
