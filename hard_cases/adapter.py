@@ -7,12 +7,12 @@ from typing import Any, Protocol
 
 #: The adapters that come with the package: name of the library and where its adapter is.
 BUILT_IN = {
-    "tauguard": "tauguard.hard_cases.adapters.ours:Ours",
-    "ipctk": "tauguard.hard_cases.adapters.ipctk_adapter:Ipctk",
-    "coal": "tauguard.hard_cases.adapters.coal_adapter:Coal",
-    "mujoco": "tauguard.hard_cases.adapters.mujoco_adapter:MuJoCo",
-    "mujoco-speculative": "tauguard.hard_cases.adapters.mujoco_adapter:Speculative",
-    "explicit-observer": "tauguard.hard_cases.adapters.explicit_observer:ExplicitObserver",
+    "tauguard": "tauguard.hard_cases.libraries.ours:Ours",
+    "ipctk": "tauguard.hard_cases.libraries.ipctk_adapter:Ipctk",
+    "coal": "tauguard.hard_cases.libraries.coal_adapter:Coal",
+    "mujoco": "tauguard.hard_cases.libraries.mujoco_adapter:MuJoCo",
+    "mujoco-speculative": "tauguard.hard_cases.libraries.mujoco_adapter:Speculative",
+    "explicit-observer": "tauguard.hard_cases.libraries.explicit_observer:ExplicitObserver",
 }
 
 

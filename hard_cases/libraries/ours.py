@@ -38,7 +38,7 @@ class Ours:
     def scene(self, mjcf: str, seconds: float) -> float:
         """MuJoCo's steps under the guard."""
         from tauguard.contacts import GuardedStepper
-        from tauguard.hard_cases.adapters.mujoco_adapter import answer, start
+        from tauguard.hard_cases.libraries.mujoco_adapter import answer, start
 
         model, data = start(mjcf)
         with GuardedStepper(model, data) as stepper:

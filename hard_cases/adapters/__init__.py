@@ -1,1 +1,0 @@
-"""One adapter a file: how a library is asked."""

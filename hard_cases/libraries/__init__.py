@@ -1,0 +1,1 @@
+"""How each library is asked: one adapter a file."""
