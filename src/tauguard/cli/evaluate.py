@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tauguard.detectors import CollisionAlarm
+    from tauguard.detectors import CollisionAlarm, Matching
+    from tauguard.models import LinkSurface
     from tauguard.traces import Detection, Trace
 
 
 def command(
-    traces: Path,
+    traces: Path | None = None,
+    data: Path | None = None,
+    splits: tuple[str, ...] = (),
     model: Path = Path("model.skops"),
     detector: str | None = None,
     json: Path | None = None,
@@ -22,33 +26,46 @@ def command(
 
     Args:
         traces: folder of MCAP recordings with truth.
+        data: instead, a dataset (`tauguard generate`): its episodes of the model's arm, split by
+            split.
+        splits: with --data, which ones (default: those whose name begins with "test").
         model: a model file that `tauguard train` wrote.
         detector: module:Class of the method, if it is not one of tauguard's own.
         json: write the figures here.
         figure: draw them here (PNG).
     """
+    from tauguard.cli.dataset import judged
     from tauguard.cli.folder import labelled
     from tauguard.cli.summary import diagnosis_text, draw, text
-    from tauguard.detectors import figures, judge, load_model
+    from tauguard.detectors import figures, load_model
     from tauguard.detectors.methods.free_motion_file import is_free_motion
     from tauguard.detectors.registry import make_detector
     from tauguard.report import machine, versions, write_json
 
+    if (traces is None) == (data is None):
+        raise ValueError("give --traces (a folder of recordings) or --data (a dataset)")
     if is_free_motion(model):
         raise ValueError(f"{model}: a real arm's detector (train --free); use `tauguard detect`")
     if detector is not None:
         make_detector(detector)  # allows the file to hold its classes
     alarm = load_model(model)
-    recordings = labelled(traces)
-    pairs = [(alarm.detect(trace), trace) for trace in recordings]
-    matchings = [judge(found, trace, alarm.settle) for found, trace in pairs]
-    summary = figures(matchings)
-    summary["diagnosis"] = explained(alarm, pairs)
-    print(f"{len(recordings)} recordings in {traces}")
-    print(text(summary))
-    print(diagnosis_text(summary["diagnosis"]))
-    if figure is not None:
-        draw(figure, summary, matchings)
+    parts = (
+        judged(data, alarm.detector.arm.robot, splits)
+        if data is not None
+        else iter([(str(traces), iter(labelled(Path(str(traces)))))])
+    )
+    rows = []
+    for name, recordings in parts:
+        matchings, diagnosis = judged_one_by_one(alarm, recordings)
+        summary = figures(matchings)
+        summary["diagnosis"] = diagnosis
+        rows.append({"split": name, **summary} if data is not None else summary)
+        print(f"{len(matchings)} recordings in {name}")
+        print(text(summary))
+        print(diagnosis_text(diagnosis))
+        if figure is not None:
+            drawn = figure if data is None else figure.with_stem(f"{figure.stem}-{name}")
+            draw(drawn, summary, matchings)
     if json is not None:
         write_json(
             json,
@@ -58,24 +75,38 @@ def command(
                 "machine": machine(),
                 "versions": versions(),
                 "seed": None,
-                "rows": [summary],
+                "rows": rows,
             },
         )
 
 
-def explained(alarm: CollisionAlarm, pairs: Sequence[tuple[Detection, Trace]]) -> dict[str, Any]:
-    """Figures of what is said after the alarms of recordings that carry their arm's file."""
-    from tauguard.detectors import diagnose, diagnosis_figures, judge_diagnoses
+def judged_one_by_one(
+    alarm: CollisionAlarm, recordings: Iterable[Trace]
+) -> tuple[list[Matching], dict[str, Any]]:
+    """Every recording judged, and the figures of what is said after its alarms; one in memory."""
+    from tauguard.detectors import diagnosis_figures, judge
+
+    matchings, said = [], []
+    for trace in recordings:
+        found = alarm.detect(trace)
+        matchings.append(judge(found, trace, alarm.settle))
+        said += explained(alarm, found, trace)
+    return matchings, diagnosis_figures(said)
+
+
+def explained(alarm: CollisionAlarm, detection: Detection, trace: Trace) -> list[Any]:
+    """What is said after the alarms of a recording that carries its arm's file, judged."""
+    from tauguard.detectors import diagnose, judge_diagnoses
+
+    arm = trace.attachments.get("arm.xml")
+    if arm is None:
+        return []
+    return list(judge_diagnoses(diagnose(alarm, trace, detection, surface(arm)), trace))
+
+
+@functools.cache
+def surface(arm: str) -> LinkSurface:
+    """Points on the links of an arm, from its MJCF text."""
     from tauguard.models import link_surface
 
-    judged = []
-    surfaces: dict[str, Any] = {}
-    for detection, trace in pairs:
-        arm = trace.attachments.get("arm.xml")
-        if arm is None:
-            continue
-        if arm not in surfaces:
-            surfaces[arm] = link_surface(arm)
-        said = diagnose(alarm, trace, detection, surfaces[arm])
-        judged += judge_diagnoses(said, trace)
-    return diagnosis_figures(judged)
+    return link_surface(arm)

@@ -39,7 +39,7 @@ def nominal(traces: Sequence[Trace]) -> ArmModel:
     arm = traces[0].attachments.get("arm.xml")
     if arm is None:
         raise ValueError("no arm.xml attached: train on recordings that tauguard simulated")
-    drive = cura6_drive()
+    drive = cura6_drive(traces[0].meta.get("arm", "cura6"))
     # The ripple's frequencies follow from the gear; its heights and phases are identified.
     cycles = np.outer(drive.gear, drive.ripple.cycles) if drive.ripple else np.empty((0, 0))
     robot = RobotNumbers.from_pin(pin_model(arm))

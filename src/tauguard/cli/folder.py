@@ -9,8 +9,12 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
-def labelled(folder: Path) -> list[Trace]:
-    """All MCAP recordings of a folder, in the order of their names.
+def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
+    """All MCAP recordings of a folder, in the order of their names; of a dataset its first split.
+
+    Args:
+        folder: of recordings, or a dataset that `tauguard generate` made.
+        arm: of a dataset with several arms, whose episodes.
 
     Raises:
         ValueError: no recordings there, or one without truth (named).
@@ -18,10 +22,16 @@ def labelled(folder: Path) -> list[Trace]:
     """
     from tqdm import tqdm
 
+    from tauguard.cli.dataset import training
+    from tauguard.datasets.reader import is_dataset
     from tauguard.traces import read_mcap
 
     if not folder.is_dir():
         raise FileNotFoundError(f"{folder}: no such folder; `tauguard simulate --out` makes one")
+    if is_dataset(folder):
+        return training(folder, arm)
+    if arm is not None:
+        raise ValueError(f"--arm {arm}: {folder} is no dataset, so its recordings are of one arm")
     paths = sorted(folder.glob("*.mcap"))
     if not paths:
         raise ValueError(f"{folder}: no .mcap files; `tauguard simulate --out` writes some")

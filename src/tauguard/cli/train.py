@@ -23,6 +23,7 @@ def command(
     gains: tuple[float, ...] = (),
     payload: tuple[str, ...] = (),
     sensitivity: bool = False,
+    arm: str | None = None,
 ) -> None:
     """Train a detector and write its model file.
 
@@ -33,7 +34,8 @@ def command(
     or more, with dwells and with moves of single joints among them, or those raise alarms later.
 
     Args:
-        traces: folder of MCAP recordings with truth (`tauguard simulate` writes such).
+        traces: folder of MCAP recordings with truth (`tauguard simulate` writes such), or a
+            dataset (`tauguard generate`), whose first split it is trained on.
         model: the model file; one that is there is replaced if it is named (default: model.skops,
             or model.json with --free).
         detector: with --traces, one of tauguard.detectors.DETECTORS, or module:Class of your own.
@@ -49,6 +51,7 @@ def command(
         gains: N m per ampere, one a joint (known for calibrated robot files and for ur10e).
         payload: what the logs carried, see `tauguard calibrate`.
         sensitivity: with --free, also print the smallest added blow that is found, for each joint.
+        arm: of a dataset with several arms, the one that the detector is for.
     """
     if (traces is None) == (not free):
         raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
@@ -69,7 +72,7 @@ def command(
             raise ValueError(f"{', '.join(given)}: with --free only, not with --traces")
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
         sure = 0.95 if confidence is None else confidence
-        labelled_motion(traces, target, detector, calibration, rate, sure)
+        labelled_motion(traces, target, detector, calibration, rate, sure, arm)
         return
     if target.suffix == ".skops":
         raise ValueError(f"--model {target}: --free writes JSON; give a name that ends in .json")
@@ -96,6 +99,7 @@ def labelled_motion(
     calibration: Path | None,
     rate: float,
     confidence: float,
+    arm: str | None = None,
 ) -> None:
     """Train on labelled recordings."""
     from tauguard.cli.fitting import trained
@@ -110,7 +114,7 @@ def labelled_motion(
     free = labelled(calibration) if calibration is not None else []
     if free:
         check_guarantee([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
-    recordings = labelled(traces)
+    recordings = labelled(traces, arm)
     alarm, guarantee = trained(recordings, rate, name), None
     if free:
         alarm, guarantee = with_guarantee(alarm, free, rate, confidence)
