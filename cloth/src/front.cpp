@@ -1,5 +1,6 @@
 #include "front.hpp"
 
+#include <algorithm>
 #include <atomic>
 
 #include "tauguard/geometry/interrupt.hpp"
@@ -77,6 +78,10 @@ class Walk {
   // itself is apart, it takes their place.
   void move(const NodePair* begin, const NodePair* end) {
     while (begin < end) {
+      // Nodes lie anywhere in memory: what is looked at some entries later is asked for now.
+      const NodePair& later = begin[std::min<std::ptrdiff_t>(ahead, end - begin - 1)];
+      fetch(a_, later.a);
+      fetch(b_, later.b);
       NodePair child[4];
       const NodePair up = parent(*begin);
       const int n = up.a > 0 && up.b > 0 ? children(up, child) : 0;
@@ -115,6 +120,13 @@ class Walk {
   }
 
   const FeatureTree &a_, &b_;
+  static constexpr std::ptrdiff_t ahead = 8;
+  static void fetch(const FeatureTree& tree, std::int32_t node) {
+    constexpr int line = 16;  // floats
+    const float* at = tree.node(node);
+    for (int i = 0; i < 2 * tree.slots() * tree.times(); i += line) __builtin_prefetch(at + i);
+  }
+
   bool self_;
   NodeTest test_;
   Total& total_;

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <limits>
 #include <optional>
 
+#include "binary.hpp"
 #include "forms.hpp"
 
 namespace tauguard::cloth {
@@ -14,44 +14,13 @@ namespace {
 
 using Vector = std::array<Form<1>, 3>;
 
-constexpr int coordinate_bits = 116;
-
-// A finite double as mantissa 2^exponent; the mantissa is odd or zero.
-struct Binary {
-  std::int64_t mantissa;
-  int exponent;
-  explicit Binary(double x) {
-    std::uint64_t bits;
-    std::memcpy(&bits, &x, sizeof bits);
-    const int field = static_cast<int>(bits >> 52 & 0x7ff);
-    mantissa = static_cast<std::int64_t>((bits & ((std::uint64_t{1} << 52) - 1)) |
-                                         std::uint64_t{field != 0} << 52);
-    const int zeros = mantissa ? __builtin_ctzll(mantissa) : 0;
-    mantissa >>= zeros;
-    exponent = std::max(field, 1) - 1075 + zeros;
-    if (bits >> 63) mantissa = -mantissa;
-  }
-  int bits() const { return 64 - __builtin_clzll(mantissa < 0 ? -mantissa : mantissa); }
-};
-
 // Coordinates k of four vertices at both ends, [vertex][end], in units of a power of two (each axis
-// its own, which changes neither contact nor its time); false where they do not fit.
+// its own); false where they do not fit.
 bool on_axis(const Ends& x, const std::int32_t* row, int k, FixedInt<2> (*out)[2]) {
-  int least = std::numeric_limits<int>::max(), most = std::numeric_limits<int>::min();
+  double values[8];
   for (int v = 0; v < 4; ++v)
-    for (int e = 0; e < 2; ++e) {
-      const Binary b(x.at(e, row[v])[k]);
-      if (b.mantissa == 0) continue;
-      least = std::min(least, b.exponent);
-      most = std::max(most, b.exponent + b.bits());
-    }
-  if (least < most && most - least > coordinate_bits) return false;
-  for (int v = 0; v < 4; ++v)
-    for (int e = 0; e < 2; ++e) {
-      const Binary b(x.at(e, row[v])[k]);
-      out[v][e] = FixedInt<2>(b.mantissa).shifted(b.mantissa ? b.exponent - least : 0);
-    }
-  return true;
+    for (int e = 0; e < 2; ++e) values[2 * v + e] = x.at(e, row[v])[k];
+  return as_integers(values, 8, out[0]);
 }
 
 Form<2> cross(const Vector& a, const Vector& b, int k) {

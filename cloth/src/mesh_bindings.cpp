@@ -134,6 +134,7 @@ void add_counts(nb::dict& d, const Stats& s) {
   d["axes"] = s.axes;
   d["cubic_sign"] = s.cubic_sign;
   d["roots"] = s.roots;
+  d["at_start"] = s.at_start;
   d["resolved"] = s.resolved;
   d["intervals"] = s.intervals;
   d["exact"] = s.exact;

@@ -16,6 +16,7 @@
 #include "integer_contact.hpp"
 #include "intervals.hpp"
 #include "query.hpp"
+#include "start_contact.hpp"
 #include "tauguard/geometry/interrupt.hpp"
 #include "tauguard/geometry/scratch.hpp"
 
@@ -174,6 +175,14 @@ int make_pieces(Batch& b, int n, Stats& stats) {
   return single;
 }
 
+// Is the cubic zero at the start, as far as rounding lets that be seen?
+bool may_touch_at_start(const Batch& b, std::int32_t query) {
+  const Group& group = b.groups[query / width];
+  const int lane = query % width;
+  return (group.odd >> lane & 1) ||
+         !(std::fabs(group.value[Group::cubic][lane]) > group.value[Group::error][lane]);
+}
+
 // One batch: the time of contact of each query, or `never`.
 template <bool vf>
 void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& stats) {
@@ -208,7 +217,12 @@ void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& s
     }
     while (i < b.count && b.pieces[i].query == query) ++i;
   }
-  for (int i = 0; i < b.left; ++i) toi[b.open[i]] = resolve<vf>(x, rows + 4 * b.open[i], 0, stats);
+  for (int i = 0; i < b.left; ++i) {
+    const std::int32_t query = b.open[i], *row = rows + 4 * query;
+    const bool touching = may_touch_at_start(b, query) && at_start(vf, x, row) == AtStart::touching;
+    stats.at_start += touching;
+    toi[query] = touching ? 0 : resolve<vf>(x, row, 0, stats);
+  }
 }
 
 // A block: what no axis keeps apart goes on in batches.

@@ -26,6 +26,16 @@ def pairs(frame):
     return frame.vf.tolist(), frame.ee.tolist()
 
 
+@pytest.fixture
+def ctrl_c():
+    """SIGINT as in a terminal (a job in the background ignores it), sent once after 0.4 s."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    killer = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT))
+    yield killer.start
+    killer.join()
+    signal.signal(signal.SIGINT, before)
+
+
 def run_python(code, seconds=60):
     """Output of a process of its own, which may hang or die where this one may not."""
     done = subprocess.run(
@@ -202,33 +212,29 @@ os._exit(0)
 
 
 @pytest.mark.parametrize("method", ["ab2pf", "exact"])
-def test_ctrl_c_ends_a_find_of_identical_vertices(method):
+def test_ctrl_c_ends_a_find_of_identical_vertices(method, ctrl_c):
     n = 1500
     faces, x = np.arange(n).reshape(-1, 3), np.zeros((n, 3))
     ccd = MeshCCD(faces, method=method, threads=2)
-    killer = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT))
-    killer.start()
+    ctrl_c()
     start = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         ccd.find(x, x)
     assert time.perf_counter() - start < 5
-    killer.join()
     # The same object goes on.
     spread = x + np.arange(n)[:, None]
     assert len(ccd.find(spread, spread).ee) == 0
 
 
-def test_ctrl_c_ends_single_queries():
+def test_ctrl_c_ends_single_queries(ctrl_c):
     x = np.zeros((400_000, 4, 3))
     x[:, 1, 0] = 1e-300
     x[:, 2:, 1] = [1.0, 1e300]
-    killer = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT))
-    killer.start()
+    ctrl_c()
     start = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         edge_edge(x, x, method="exact")
     assert time.perf_counter() - start < 20
-    killer.join()
 
 
 def test_a_signal_handler_that_asks_the_same_mesh_is_refused():

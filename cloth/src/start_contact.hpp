@@ -1,0 +1,16 @@
+// Do two features touch at the start of the step? Exact. Bodies at rest on one another, and
+// whatever starts in contact, need no more than this.
+#pragma once
+
+#include <cstdint>
+
+#include "ends.hpp"
+
+namespace tauguard::cloth {
+
+enum class AtStart { apart, touching, unknown };
+
+// unknown where the coordinates on one axis span more than 116 bits. row: 4 vertices.
+AtStart at_start(bool vf, const Ends& x, const std::int32_t* row);
+
+}  // namespace tauguard::cloth
