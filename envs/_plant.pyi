@@ -28,6 +28,10 @@ class Joint:
         load: float,
         kp: float,
         kd: float,
+        rated_speed: float,
+        no_load_speed: float,
+        known_coulomb: float,
+        known_viscous: float,
         cycles: Sequence[float],
         amplitude: Sequence[float],
         phase: Sequence[float],
@@ -108,6 +112,8 @@ class Controls:
         centre: Sequence[float],
         max_speed: Sequence[float],
         torque_limit: Sequence[float],
+        low: Sequence[float],
+        high: Sequence[float],
     ) -> None: ...
 
 class Physics:

@@ -176,6 +176,8 @@ def _controls(world: World) -> _plant.Controls:
         centre=centre.tolist(),
         max_speed=world.max_speed.tolist(),
         torque_limit=world.torque_limit.tolist(),
+        low=world.joint_range[:, 0].tolist(),
+        high=world.joint_range[:, 1].tolist(),
     )
 
 

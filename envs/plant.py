@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.envs import _plant
-from tauguard.models import Drive, Scene
+from tauguard.models import Drive, Scene, derive
 
 Array = NDArray[np.float64]
 
@@ -25,21 +25,44 @@ class Gains:
     kd: Array  #: [N m s/rad], shape (n,)
 
     @classmethod
-    def for_scene(cls, scene: Scene, bandwidth: float = 30.0) -> Gains:
-        """Critically damped gains for the arm's inertia in its first pose.
+    def for_scene(cls, scene: Scene) -> Gains:
+        """Critically damped gains for the largest inertia that each joint has over its range.
 
-        Args:
-            scene: the composed scene.
-            bandwidth: natural frequency of every joint's loop [rad/s].
+        The natural frequency is the arm's ``bandwidth``; one that nobody stated is lowered where
+        the time step asks for it. (The CURA6-like arm's gains are those of its home pose.)
+
+        Raises:
+            ValueError: the time step is too long for the stated bandwidth; the message names the
+                joint and what would hold.
         """
-        data = mujoco.MjData(scene.model)
-        if scene.model.nkey:
-            mujoco.mj_resetDataKeyframe(scene.model, data, 0)
-        mujoco.mj_forward(scene.model, data)
-        mass = np.zeros((scene.model.nv, scene.model.nv))
-        mujoco.mj_fullM(scene.model, data, mass)
-        inertia = np.diag(mass)[scene.dof_adr]
-        return cls(bandwidth**2 * inertia, 2 * bandwidth * inertia)
+        facts, model = scene.facts, scene.model
+        inertia = facts.servo_inertia
+        if inertia is None:
+            inertia = _home_inertia(scene)
+            return cls(facts.bandwidth**2 * inertia, 2 * facts.bandwidth * inertia)
+        w, names = facts.bandwidth, scene.joint_names[: len(facts.joints)]
+        mode, joint = derive.stiffest_mode(model, names, w**2 * inertia, 2 * w * inertia)
+        if facts.sources.get("bandwidth") == "default":
+            w = w * min(1.0, derive.MOST_PER_STEP / mode)
+        elif mode > derive.LIMIT_PER_STEP:
+            dt, share = float(model.opt.timestep), derive.MOST_PER_STEP / mode
+            raise ValueError(
+                f"timestep {dt} s: too long for the servo of joint {names[joint]!r} at a bandwidth "
+                f"of {w[joint]:g} rad/s; expected a timestep of at most {dt * share:.1g} s, or a "
+                f"bandwidth of at most {w[joint] * share:.2g} rad/s"
+            )
+        return cls(w**2 * inertia, 2 * w * inertia)
+
+
+def _home_inertia(scene: Scene) -> Array:
+    """Of each joint in the model's first keyframe [kg m^2], shape (n,)."""
+    data = mujoco.MjData(scene.model)
+    if scene.model.nkey:
+        mujoco.mj_resetDataKeyframe(scene.model, data, 0)
+    mujoco.mj_forward(scene.model, data)
+    mass = np.zeros((scene.model.nv, scene.model.nv))
+    mujoco.mj_fullM(scene.model, data, mass)
+    return np.asarray(np.diag(mass)[scene.dof_adr])
 
 
 @functools.cache
@@ -82,6 +105,7 @@ def _joints(scene: Scene, nominal: Drive, gains: Gains) -> list[_plant.Joint]:
     warm = 0.0 if friction is None else friction.temperature - friction.reference_temperature
     level = 0.0 if friction is None else 1 + friction.coulomb_per_kelvin * warm
     thick = 0.0 if friction is None else 1 + friction.viscous_per_kelvin * warm
+    known, share = nominal.friction, scene.facts.compensation
     return [
         _plant.Joint(
             qpos=int(scene.qpos_adr[i]),
@@ -98,6 +122,10 @@ def _joints(scene: Scene, nominal: Drive, gains: Gains) -> list[_plant.Joint]:
             load=0.0 if friction is None else friction.load[i],
             kp=gains.kp[i],
             kd=gains.kd[i],
+            rated_speed=0.0 if drive.rated_speed is None else drive.rated_speed[i],
+            no_load_speed=0.0 if drive.no_load_speed is None else drive.no_load_speed[i],
+            known_coulomb=0.0 if known is None else share * float(known.coulomb[i]),
+            known_viscous=0.0 if known is None else share * float(known.viscous[i]),
             cycles=[] if ripple is None else ripple.cycles.tolist(),
             amplitude=[] if ripple is None else ripple.amplitude[i].tolist(),
             phase=[] if ripple is None else ripple.phase[i].tolist(),

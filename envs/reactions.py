@@ -14,7 +14,6 @@ from tauguard.envs.base import ArmEnv
 from tauguard.envs.cell import BRAKE, FREE, LIMP, VELOCITY
 from tauguard.envs.detecting import arm_env
 from tauguard.envs.settings import one_of
-from tauguard.models import cura6
 
 Array = NDArray[np.float64]
 
@@ -24,8 +23,6 @@ REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
 TRIGGERS = ("alarm", "contact")
 #: Brakes hold this long after the power is cut [s] (assumed; data sheets say 10 to 50 ms).
 BRAKE_DELAY = 0.02
-#: Deceleration of an arm whose limits are not known [rad/s^2].
-DECELERATION = 10.0
 #: A retraction follows the way back at this share of the speed it came with, and for this long [s]
 #: beyond where it was when the reaction began.
 RETRACT_SPEED, RETRACT_TIME = 0.5, 0.3
@@ -81,7 +78,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         self.reaction, self.trigger = reaction, trigger
         world = self._arm.world
         n = len(world.scene.joint_names)
-        own = cura6.MAX_ACCELERATION if world.settings.robot == "cura6" else (DECELERATION,)
+        own = world.scene.facts.max_acceleration
         self._deceleration = np.resize(own if deceleration is None else deceleration, n)
         self._period = 1 / world.settings.control_rate
         # Critically damped gains: kp = w^2 M and kd = 2 w M.

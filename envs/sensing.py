@@ -20,9 +20,10 @@ from tauguard.detectors import (
 from tauguard.detectors.detector import same_rate
 from tauguard.detectors.estimation.observer import PLAIN_GAIN
 from tauguard.envs.actions import observation_table
+from tauguard.envs.joint_ends import JointEnds
 from tauguard.envs.settings import DETECTORS
 from tauguard.envs.world import World
-from tauguard.models import Drive, cura6_drive, pin_model
+from tauguard.models import Drive, pin_model
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -65,7 +66,14 @@ class ObserverListener:
 
     name, settle = "observer", 0.0
 
-    def __init__(self, robot: RobotNumbers, drive: Drive, dt: float, gain: float = 50.0) -> None:
+    def __init__(
+        self,
+        robot: RobotNumbers,
+        drive: Drive,
+        dt: float,
+        gain: float = 50.0,
+        ranges: Array | None = None,
+    ) -> None:
         """Take the nominal numbers.
 
         Args:
@@ -73,7 +81,10 @@ class ObserverListener:
             drive: nominal drive.
             dt: of the samples [s].
             gain: of the observer [1/s].
+            ranges: of the joints [rad], (n, 2): a joint at an end of its range feels its stop.
         """
+        free = np.tile([-np.inf, np.inf], (robot.joints, 1))
+        self._ends = JointEnds(free if ranges is None else ranges, dt, gain)
         self._observer, self._drive = MomentumObserver(robot, gain, dt), drive
         limit = np.where(np.isfinite(drive.torque_limit), drive.torque_limit, np.nan)
         share = TORQUE_SHARE * limit
@@ -90,6 +101,7 @@ class ObserverListener:
         residuals, step = np.empty_like(q), self._observer.step
         for row in range(len(q)):
             step(q[row], qd[row], tau[row], out=residuals[row])
+        self._ends.clear(q, residuals)
         return residuals, np.any(np.abs(residuals) > self.bounds, axis=1)
 
 
@@ -144,10 +156,13 @@ def listening(world: World, wanted: object) -> Callable[[], Listener] | None:
     if wanted is None:
         return None
     if isinstance(wanted, str) and wanted in DETECTORS:
-        dt, arms = world.settings.timestep, _arms(world)
+        n, dt, arms = len(world.scene.facts.joints), world.settings.timestep, _arms(world)
+        ranges = [world.joint_range[k * n : (k + 1) * n] for k in range(world.arms)]
 
         def observers() -> Listener:
-            parts = [ObserverListener(*arm, dt) for arm in arms]
+            parts = [
+                ObserverListener(*arm, dt, ranges=r) for arm, r in zip(arms, ranges, strict=True)
+            ]
             return parts[0] if len(parts) == 1 else PerArm(parts)
 
         return observers
@@ -181,8 +196,8 @@ def _fitting(world: World, alarm: CollisionAlarm) -> CollisionAlarm:
 
 def _arms(world: World) -> list[tuple[RobotNumbers, Drive]]:
     """Nominal numbers of each arm; the second one looks the other way, which gravity cannot see."""
-    robot = RobotNumbers.from_pin(pin_model(world.scene.arm_xml))
-    drive = cura6_drive() if world.settings.robot == "cura6" else world.nominal
+    robot = RobotNumbers.from_pin(pin_model(world.scene.arm_model))
+    drive = world.scene.facts.nominal
     if world.settings.ideal_drive:
         drive = replace(drive, friction=None)
     return [(robot, drive)] * world.arms

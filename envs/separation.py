@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.cell import FREE, VELOCITY
 from tauguard.envs.detecting import arm_env
-from tauguard.envs.reactions import DECELERATION
 from tauguard.envs.settings import positive
-from tauguard.models import cura6
 
 Array = NDArray[np.float64]
 
@@ -85,7 +83,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
             and (model.geom_contype[g] or model.geom_conaffinity[g])
         ]
         self._targets = [int(model.body_geomadr[r.body]) for r in world.regions]
-        own = cura6.MAX_ACCELERATION if world.settings.robot == "cura6" else (DECELERATION,)
+        own = world.scene.facts.max_acceleration
         self._deceleration = np.resize(own, len(world.scene.joint_names))
         self._stopped = False
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.models import BodyProxy, Cloth, Mismatch, Table
+from tauguard.models import BodyProxy, Cloth, Mismatch, Robot, Table
 from tauguard.models.body_regions import body_region
 from tauguard.models.scene import INTEGRATORS
 
@@ -28,7 +28,7 @@ class Settings:
     control_rate: float = 100.0  #: actions a second [Hz]
     timestep: float = 1e-3  #: of the physics [s]
     integrator: str = "implicitfast"  #: of the physics
-    robot: str = "cura6"  #: or an MJCF or URDF file with one serial arm in it
+    robot: str | Robot = "cura6"  #: or a name, a file or a robot, see ``tauguard robot``
     payload_g: float = 0.0  #: carried, not told to controller and observer [g]
     mismatch: Mismatch | int | None = None  #: simulated against nominal arm; a number is a seed
     obstacles: tuple[str | BodyProxy, ...] = ()  #: body regions, or proxies placed by hand

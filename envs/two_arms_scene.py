@@ -9,9 +9,9 @@ import numpy as np
 
 from tauguard.models import BodyProxy, Drive, Scene
 from tauguard.models.arm import ARM_BITS, OBSTACLE_BITS
-from tauguard.models.mjcf import xml_text
+from tauguard.models.mjcf import SpecText
 from tauguard.models.obstacles import Obstacle, add_pairs
-from tauguard.models.scene import _add_label, without_visuals
+from tauguard.models.scene import _add_label, lean_model
 
 #: Names of the second arm's parts begin with this.
 PREFIX = "arm2_"
@@ -77,26 +77,26 @@ def _of_second(body: mujoco.MjsBody) -> bool:
 
 
 def _located(scene: Scene, whole: mujoco.MjSpec, links: list[str]) -> Scene:
-    shown, xml = whole.compile(), xml_text(whole)
-    model = without_visuals(whole, shown)
+    text = SpecText(whole)
+    model = lean_model(whole)
     names = (*scene.joint_names, *(PREFIX + name for name in scene.joint_names))
     joints = [model.joint(name) for name in names]
     bodies = [scene.model.body(int(b)).name for b in scene.link_bodies] + links
     return replace(
         scene,
         model=model,
-        xml=xml,
+        text=text,
         joint_names=names,
         link_bodies=np.array([model.body(name).id for name in bodies]),
         qpos_adr=np.array([joint.qposadr[0] for joint in joints]),
         dof_adr=np.array([joint.dofadr[0] for joint in joints]),
         payload_body=model.body("payload").id if scene.payload_body >= 0 else -1,
-        drive=_both(scene.drive),
+        drive=both_drives(scene.drive),
         home=np.tile(scene.home, 2),
     )
 
 
-def _both(drive: Drive) -> Drive:
+def both_drives(drive: Drive) -> Drive:
     """The drives of both arms: every row that belongs to a joint twice."""
     parts: dict[str, object] = {}
     for field in fields(drive):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tauguard.envs.plant import Gains
 from tauguard.envs.settings import Settings
-from tauguard.envs.two_arms_scene import add_second_arm
+from tauguard.envs.two_arms_scene import add_second_arm, both_drives
 from tauguard.models import (
     BodyProxy,
     Drive,
@@ -19,17 +19,11 @@ from tauguard.models import (
     Scene,
     SceneSpec,
     compose,
-    cura6,
-    cura6_drive,
     set_payload,
 )
 
 Array = NDArray[np.float64]
 
-#: Joint speed of an arm whose file states none [rad/s].
-DEFAULT_SPEED = 2.0
-#: Poses are drawn this far around home, the CURA6-like arm's joints and others' [rad].
-CURA6_SPREAD, SPREAD = (1.2, 0.5, 0.6, 0.9, 0.9, 1.5), 0.8
 #: A tool pose to reach lies at least this high and this far from the base's axis [m].
 LOWEST, NEAREST = 0.12, 0.2
 #: Where the body regions cross: position and direction in units of the arm's reach, span [reach].
@@ -120,7 +114,8 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
         cloth=settings.cloth,
     )
     bare = compose(
-        replace(spec, payload=False, labels=False, region_labels=False, cloth=None, mismatch=None)
+        replace(spec, payload=False, labels=False, region_labels=False, cloth=None, mismatch=None),
+        visuals=False,
     )
     reach = arm_reach(bare)
     proxies = tuple(
@@ -135,6 +130,8 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
             scene.drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None
         )
         scene = replace(scene, drive=ideal)
+        scene.model.dof_damping[scene.dof_adr] = 0.0
+        scene.model.dof_frictionloss[scene.dof_adr] = 0.0
     if settings.payload_g > 0:
         data = mujoco.MjData(scene.model)
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
@@ -156,20 +153,18 @@ def _known(
     limited = model.jnt_limited[joints].astype(bool)[:, None]
     nominal = nominal_drive(settings, bare)
     gains = Gains.for_scene(bare)
-    own = (
-        np.array(cura6.MAX_SPEED)
-        if settings.robot == "cura6"
-        else np.full(len(bare.joint_names), DEFAULT_SPEED)
-    )
+    own = bare.facts.max_speed
     speed = own if settings.max_speed is None else np.full(len(own), settings.max_speed)
-    bodies = bare.link_bodies
+    # A gripper that moves is rigid in what the controller believes.
+    rigid = bare.arm_model if bare.facts.gripper else bare.model
+    bodies = [rigid.body(bare.model.body(int(b)).name).id for b in bare.link_bodies]
     return World(
         settings=settings,
         scene=scene,
-        nominal=_repeat_drive(nominal, arms),
+        nominal=nominal if arms == 1 else both_drives(nominal),
         gains=Gains(np.tile(gains.kp, arms), np.tile(gains.kd, arms)),
-        nominal_mass=np.tile(bare.model.body_mass[bodies], arms),
-        nominal_com=np.tile(bare.model.body_ipos[bodies], (arms, 1)),
+        nominal_mass=np.tile(rigid.body_mass[bodies], arms),
+        nominal_com=np.tile(rigid.body_ipos[bodies], (arms, 1)),
         joint_range=np.where(limited, model.jnt_range[joints], [-np.inf, np.inf]),
         torque_limit=np.tile(nominal.torque_limit, arms),
         max_speed=np.tile(speed, arms),
@@ -180,21 +175,8 @@ def _known(
 
 
 def nominal_drive(settings: Settings, bare: Scene) -> Drive:
-    """What the controller believes: the arm's nominal drive."""
-    return cura6_drive() if settings.robot == "cura6" else bare.drive
-
-
-def _repeat_drive(drive: Drive, arms: int) -> Drive:
-    """The gains of every arm's drive; friction and the rest stay unknown to the servo."""
-    return replace(
-        drive,
-        gain=np.tile(drive.gain, arms),
-        gear=np.tile(drive.gear, arms),
-        current_limit=np.tile(drive.current_limit, arms),
-        friction=drive.friction if arms == 1 else None,
-        ripple=drive.ripple if arms == 1 else None,
-        sensors=drive.sensors if arms == 1 else None,
-    )
+    """What the controller believes: the arm's nominal drive, with all friction that is known."""
+    return bare.facts.drive if settings.ideal_drive else bare.facts.nominal
 
 
 def crossing(region: str, bare: Scene, reach: float) -> BodyProxy:
@@ -225,9 +207,9 @@ def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:
     found = []
     for a in range(arms):
         body = int(scene.link_bodies[(a + 1) * each - 1])
-        names = ("flange", "attachment_site", "tool0", "ee_site")
+        names = (scene.facts.tool,)
         sites = [s for s in range(model.nsite) if _carried(model, int(model.site_bodyid[s]), body)]
-        named = [s for s in sites if model.site(s).name.split("arm2_")[-1] in names]
+        named = [s for s in sites if model.site(s).name.removeprefix("arm2_") in names]
         found.append((named[0] if named else -1, body, a * each))
     return tuple(found)
 
@@ -264,10 +246,7 @@ def pose_box(scene: Scene) -> tuple[Array, Array]:
     """Poses to draw from: around home, within the joints' ranges [rad], shapes (n,)."""
     model = scene.model
     joints = [model.joint(name).id for name in scene.joint_names]
-    known = scene.spec.arm == "cura6"
-    spread = np.resize(CURA6_SPREAD, len(joints)) if known else np.full(len(joints), SPREAD)
-    slides = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
-    spread = np.where(slides, 0.3, spread)
+    spread = np.resize(scene.facts.spread, len(joints))
     limited = model.jnt_limited[joints].astype(bool)
     low = np.where(limited, model.jnt_range[joints, 0], -np.inf)
     high = np.where(limited, model.jnt_range[joints, 1], np.inf)

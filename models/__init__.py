@@ -1,30 +1,36 @@
 """What is simulated: the arm, its drive train, obstacles and the scene composer."""
 
 from tauguard.models import cura6
-from tauguard.models.arm import Arm, load_arm
+from tauguard.models.arm import Arm, Facts, load_arm
 from tauguard.models.body_regions import BODY_REGIONS, BodyRegion, body_region
 from tauguard.models.cloth import Cloth
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.impact import blow_velocity, reflected_mass, standard_mass
+from tauguard.models.known_robots import ROBOTS
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.models.mismatch import Mismatch
 from tauguard.models.nominal import add_payload, compiled, pin_model
 from tauguard.models.obstacles import BodyProxy, Clamp, Striker, Table
 from tauguard.models.payload import set_payload
+from tauguard.models.robot import Robot, RobotDrive
 from tauguard.models.scene import Scene, SceneSpec, compose, with_drive
 
 __all__ = [
     "BODY_REGIONS",
+    "ROBOTS",
     "Arm",
     "BodyProxy",
     "BodyRegion",
     "Clamp",
     "Cloth",
     "Drive",
+    "Facts",
     "Friction",
     "LinkSurface",
     "Mismatch",
     "Ripple",
+    "Robot",
+    "RobotDrive",
     "Scene",
     "SceneSpec",
     "Sensors",

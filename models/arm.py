@@ -1,26 +1,78 @@
-"""An arm from its file: the CURA6-like one by name, or any serial arm as MJCF or URDF."""
+"""An arm ready for a scene: from a name, a file or a :class:`tauguard.models.Robot`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import functools
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.models import cura6
-from tauguard.models.mjcf import compiled
+from tauguard.models import cura6, derive
+from tauguard.models.arm_file import (
+    ARM_BITS,
+    OBSTACLE_BITS,
+    STICK_RADIUS,
+    TOOL_FRAMES,
+    ArmFile,
+    read_arm,
+)
+from tauguard.models.drive import Drive, Friction, cura6_drive
+from tauguard.models.known_robots import ROBOTS, find_file, known_names
+from tauguard.models.robot import Robot, per_joint
+
+__all__ = ["ARM_BITS", "NAMED", "OBSTACLE_BITS", "STICK_RADIUS", "Arm", "Facts", "load_arm"]
 
 Array = NDArray[np.float64]
 
 #: Arms that need no file.
 NAMED = cura6.NAMES
-#: Collision bits: what the arm has and what obstacles have, so that the arm never meets itself.
-ARM_BITS, OBSTACLE_BITS = 1, 2
-#: Radius of the capsule that stands for a link without collision geometry [m].
-STICK_RADIUS = 0.05
-_SITES = ("flange", "attachment_site", "tool0", "ee_site")
+#: Presliding of joints whose friction is known by its level alone [rad].
+_PRESLIDING = 1.5e-3
+#: The back-EMF brakes a joint no faster than with this time constant [s].
+_FADE_TIME = 4e-3
+#: Gear and gain [N m/A] of drives that nobody states.
+_GEAR, _GAIN = 100.0, 10.0
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known or assumed about an arm, joint by joint, and where each part comes from."""
+
+    name: str
+    joints: tuple[str, ...]
+    drive: Drive  #: nominal: gains, limits, the drive's own friction
+    armature: Array  #: rotor inertia at the joint [kg m^2]
+    damping: Array  #: of the file, simulated by MuJoCo [N m s/rad]
+    friction_loss: Array  #: of the file, simulated by MuJoCo [N m]
+    home: Array  #: [rad]
+    max_speed: Array  #: [rad/s]
+    max_acceleration: Array  #: [rad/s^2]
+    spread: Array  #: poses are drawn this far around home [rad]
+    servo_inertia: Array | None  #: [kg m^2]; None: that of the home pose
+    bandwidth: Array  #: of the servo [rad/s]
+    compensation: float  #: share of the known friction that the servo makes up for
+    tool: str | None  #: site, or None: the last link's origin
+    gripper: tuple[str, ...]  #: joints below the flange
+    sources: dict[str, str] = field(default_factory=dict)  #: of each part, in words
+
+    @property
+    def nominal(self) -> Drive:
+        """What controller and observer know: the drive with all friction, the file's included."""
+        if not (self.damping.any() or self.friction_loss.any()):
+            return self.drive
+        own = self.drive.friction or _friction(np.zeros_like(self.damping), self.damping * 0)
+        known = replace(
+            own,
+            coulomb=own.coulomb + self.friction_loss,
+            static=own.static + self.friction_loss,
+            viscous=own.viscous + self.damping,
+            bristle_stiffness=own.bristle_stiffness + self.friction_loss / _PRESLIDING,
+        )
+        return replace(self.drive, friction=known)
 
 
 @dataclass(frozen=True)
@@ -29,9 +81,22 @@ class Arm:
 
     spec: mujoco.MjSpec
     links: tuple[str, ...]  #: the body of each joint, base to tip
-    joints: tuple[str, ...]
-    torque_limit: Array  #: [N m], infinite where the file has none, shape (n,)
-    home: Array  #: joint positions of the file's first keyframe, else all zero [rad], shape (n,)
+    facts: Facts
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names, base to tip."""
+        return self.facts.joints
+
+    @property
+    def home(self) -> Array:
+        """A pose to start from [rad], shape (n,)."""
+        return self.facts.home
+
+    @property
+    def torque_limit(self) -> Array:
+        """[N m], shape (n,)."""
+        return self.facts.drive.torque_limit
 
     def shapes(self) -> list[mujoco.MjsGeom]:
         """The geoms of the links that can touch something, named."""
@@ -44,11 +109,10 @@ class Arm:
         return found
 
     def flange(self) -> mujoco.MjsSite:
-        """The site at the tool flange; the origin of the last link where the file names none."""
-        sites = {site.name: site for site in self.spec.sites}
-        for name in _SITES:
-            if name in sites:
-                return sites[name]
+        """The site of the tool; the origin of the last link where there is none."""
+        name = self.facts.tool
+        if name is not None:
+            return self.spec.site(name)
         return self.spec.body(self.links[-1]).add_site(name="flange")
 
     def place(self, pose: Array) -> None:
@@ -61,140 +125,268 @@ class Arm:
             part.set_frame(frame)
 
 
-def load_arm(source: str) -> Arm:
-    """The arm called or filed as ``source``.
+def load_arm(source: str | Robot) -> Arm:
+    """The arm called, filed or described as ``source``.
 
-    A file's actuators, sensors and keyframes are left out (the drive is ours), welded bodies are
-    fused into the links that carry them, mesh files are written into the text, and a link without
-    collision geometry gets a capsule along it.
+    Args:
+        source: "cura6", a name of :data:`tauguard.models.ROBOTS`, an MJCF or URDF file, a TOML file
+            (:meth:`Robot.from_toml`), or a robot. What it leaves open is derived.
 
     Raises:
         ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
             joints; the message says what would work.
         FileNotFoundError: no such name or file.
     """
-    if source in NAMED:
-        spec = mujoco.MjSpec.from_string(cura6.arm_xml(source))
-        limits = spec.compile().jnt_actfrcrange[:, 1].copy()
-        links = tuple(f"link{i}" for i in range(1, len(cura6.JOINTS) + 1))
-        return Arm(spec, links, cura6.JOINTS, limits, np.array(cura6.HOME))
-    path = Path(source)
+    robot = source if isinstance(source, Robot) else Robot(file=str(source))
+    if robot.file in NAMED:
+        return _cura6(robot)
+    if robot.file.lower().endswith(".toml") and Path(robot.file).is_file():
+        robot = Robot.from_toml(robot.file)
+    path, sources = Path(robot.file), dict[str, str]()
     if not path.is_file():
-        raise FileNotFoundError(
-            f"arm {source!r}: no such file; expected {', '.join(NAMED)} or an MJCF or URDF file"
-        )
+        robot, path, sources = _by_name(robot)
     try:
-        return _from_file(path)
+        arm = _from_file(robot, path, path.stat().st_mtime_ns, tuple(sources.items()))
     except ValueError as error:
-        raise ValueError(f"arm {source}: {' '.join(str(error).split())}") from None
+        raise ValueError(f"arm {robot.file}: {' '.join(str(error).split())}") from None
+    return replace(arm, spec=arm.spec.copy())
 
 
-def _from_file(path: Path) -> Arm:
-    spec = mujoco.MjSpec.from_file(str(path))
-    model = compiled(spec)
-    limits = _torque_limits(model)
-    home = model.key_qpos[0].copy() if model.nkey else model.qpos0.copy()
-    for element in (*spec.actuators, *spec.sensors, *spec.keys):
-        spec.delete(element)
-    _inline(spec, model)
-    _weigh(spec, model)
-    spec.fuse_static()
-    links, joints = _chain(spec)
-    _let_collide(spec, links)
-    arm = Arm(spec, links, joints, limits, home)
-    spec.compile()
-    return arm
+@functools.lru_cache(maxsize=4)
+def _from_file(
+    robot: Robot, path: Path, modified: int, sources: tuple[tuple[str, str], ...]
+) -> Arm:
+    """The arm of a file as it was at a time; its spec is not to be changed."""
+    file = read_arm(path, robot.joints, robot.gripper == "weld", robot.tool)
+    return _completed(robot, file, dict(sources))
 
 
-def _torque_limits(model: mujoco.MjModel) -> Array:
-    """Of the joints, from their own ranges or those of the actuators that drive them."""
-    limits = np.where(model.jnt_actfrclimited, np.abs(model.jnt_actfrcrange).max(axis=1), np.inf)
-    for i in range(model.nu):
-        if (
-            model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT
-            and model.actuator_forcelimited[i]
-        ):
-            joint = int(model.actuator_trnid[i, 0])
-            force = np.abs(model.actuator_forcerange[i] * model.actuator_gear[i, 0]).max()
-            limits[joint] = min(limits[joint], force)
-    return np.asarray(limits, dtype=float)
+def _by_name(robot: Robot) -> tuple[Robot, Path, dict[str, str]]:
+    name = robot.file
+    row = ROBOTS.get(name)
+    if row is None and name not in known_names():
+        raise FileNotFoundError(
+            f"arm {name!r}: no such file or name; expected {', '.join((*NAMED, *ROBOTS))}, an MJCF "
+            "or URDF file, or a TOML file that describes a robot"
+        )
+    path = find_file(name)
+    if row is None:
+        return robot, path, {}
+    plain = Robot(file=name)
+    given = {key: value for key, value in vars(robot).items() if value != getattr(plain, key)}
+    sources = {key: text for key, text in row.sources.items() if key not in given}
+    return replace(row.robot, **given), path, sources
 
 
-def _inline(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Write mesh files into the text and drop textures, so that the text stands alone."""
-    for mesh in spec.meshes:
-        at = model.mesh(mesh.name or Path(mesh.file).stem)
-        first, count = int(model.mesh_vertadr[at.id]), int(model.mesh_vertnum[at.id])
-        face, faces = int(model.mesh_faceadr[at.id]), int(model.mesh_facenum[at.id])
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, model.mesh_quat[at.id])
-        vertices = model.mesh_vert[first : first + count] @ turn.reshape(3, 3).T
-        mesh.name = at.name
-        mesh.uservert = (vertices + model.mesh_pos[at.id]).ravel().tolist()
-        mesh.userface = model.mesh_face[face : face + faces].ravel().tolist()
-        mesh.file, mesh.scale = "", [1, 1, 1]
-        mesh.refpos, mesh.refquat = [0, 0, 0], [1, 0, 0, 0]
-    for texture in list(spec.textures):
-        spec.delete(texture)
-    for material in spec.materials:
-        material.textures = [""] * len(material.textures)
+def _cura6(robot: Robot) -> Arm:
+    name = robot.file
+    spec = mujoco.MjSpec.from_string(cura6.arm_xml(name))
+    links = tuple(f"link{i}" for i in range(1, len(cura6.JOINTS) + 1))
+    model, n, drive = spec.compile(), len(cura6.JOINTS), cura6_drive(name)
+    design = "the arm's design, models/cura6/README.md"
+    speed, home = robot.max_speed, robot.home
+    facts = Facts(
+        name=name,
+        joints=cura6.JOINTS,
+        drive=drive,
+        armature=model.dof_armature.copy(),
+        damping=np.zeros(n),
+        friction_loss=np.zeros(n),
+        home=np.array(cura6.HOME if home is None else home),
+        max_speed=per_joint(cura6.max_speed(name) if speed is None else speed, n, "max_speed"),
+        max_acceleration=np.array(cura6.MAX_ACCELERATION),
+        spread=np.array([1.2, 0.5, 0.6, 0.9, 0.9, 1.5]),
+        servo_inertia=None,
+        bandwidth=per_joint(robot.bandwidth or derive.BANDWIDTH, n, "bandwidth"),
+        compensation=0.0,
+        tool="flange",
+        gripper=(),
+        sources=dict.fromkeys(("drive", "home", "max_speed", "max_acceleration"), design),
+    )
+    return Arm(spec, links, facts)
 
 
-def _weigh(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """State every body's inertia, so that no geom decides it any more."""
-    for body in spec.bodies:
-        if body.name == "world" or body.explicitinertial:
-            continue
-        at = model.body(body.id).id
-        if model.body_mass[at] <= 0:
-            continue
-        body.explicitinertial = True
-        body.mass = float(model.body_mass[at])
-        body.ipos, body.iquat = model.body_ipos[at], model.body_iquat[at]
-        body.inertia = model.body_inertia[at]
+def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
+    """The arm with everything that the file leaves open derived."""
+    spec, joints, n = file.spec, file.joints, len(file.joints)
+    model = file.model
+    said = _Said(robot, sources, n)
+    limit = said.row("torque_limit", file.torque_limit, "the file's limits")
+    if not np.isfinite(limit).all():
+        limit = derive.torque_limit(model, joints, limit)
+        if np.isfinite(limit).all():
+            said.derived("torque_limit", "none in the file: holds and accelerates the arm")
+    drive = _drive(robot.drive, limit, said)
+    armature = _rotor(robot.drive, model, joints, limit, drive, said)
+    for name, inertia in zip(joints, armature, strict=True):
+        spec.joint(name).armature = inertia
+        model.dof_armature[model.joint(name).dofadr[0]] = inertia
+    dofs = model.jnt_dofadr[derive.joint_ids(model, joints)]
+    speed = np.where(np.isfinite(file.max_speed), file.max_speed, derive.DEFAULT_SPEED)
+    words = "the file's limits" if np.isfinite(file.max_speed).all() else "none in the file: 2"
+    tip = model.body(file.links[-1]).id
+    speed = said.row("max_speed", speed, words)
+    drive = _with_speeds(drive, speed, derive.lightest_inertia(model, joints))
+    inertia = derive.servo_inertia(model, joints)
+    facts = Facts(
+        name=Path(robot.file).stem,
+        joints=joints,
+        drive=drive,
+        armature=armature,
+        damping=model.dof_damping[dofs].copy(),
+        friction_loss=model.dof_frictionloss[dofs].copy(),
+        home=_home(said, file, model, joints, tip),
+        max_speed=speed,
+        max_acceleration=said.row(
+            "max_acceleration", np.full(n, derive.DEFAULT_ACCELERATION), "default"
+        ),
+        spread=_spread(model, joints),
+        servo_inertia=inertia,
+        bandwidth=_bandwidth(robot, model, joints, inertia, said),
+        compensation=robot.friction_compensation,
+        tool=_tool(robot, spec, file, said),
+        gripper=file.gripper,
+        sources=said.sources,
+    )
+    if file.gripper:
+        said.sources["gripper"] = f"{robot.gripper}ed: {', '.join(file.gripper)}".replace(
+            "passiveed", "passive"
+        )
+    return Arm(spec, file.links, facts)
 
 
-def _chain(spec: mujoco.MjSpec) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The bodies that move and their joints, base to tip, named."""
-    links: list[str] = []
-    joints: list[str] = []
-    level = list(spec.worldbody.bodies)
-    while level:
-        moving = [body for body in level if body.joints]
-        if len(moving) > 1:
-            names = ", ".join(body.name or "unnamed" for body in moving)
-            raise ValueError(f"it branches into {names}; expected one serial chain of joints")
-        if not moving:
-            level = [child for body in level for child in body.bodies]
-            continue
-        body = moving[0]
-        joint = body.joints[0]
-        kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-        if len(body.joints) > 1 or joint.type not in kinds:
-            raise ValueError(f"body {body.name!r}: expected one hinge or slide joint a body")
-        body.name = body.name or f"link{len(links) + 1}"
-        joint.name = joint.name or f"joint{len(joints) + 1}"
-        links.append(body.name)
-        joints.append(joint.name)
-        level = list(body.bodies)
-    if not links:
-        raise ValueError("no joints; expected an arm of hinge and slide joints")
-    return tuple(links), tuple(joints)
+class _Said:
+    """What the user's description says of each part, and a note of where every part comes from."""
+
+    def __init__(self, robot: Robot, sources: dict[str, str], joints: int) -> None:
+        self.robot, self.joints, self.sources = robot, joints, dict(sources)
+
+    def row(self, name: str, otherwise: Array, words: str) -> Array:
+        value: Any = getattr(self.robot, name)
+        if value is None:
+            self.sources[name] = words
+            return otherwise
+        self.sources.setdefault(name, "given")
+        return per_joint(value, self.joints, name)
+
+    def derived(self, name: str, words: str) -> None:
+        self.sources[name] = f"derived: {words}"
 
 
-def _let_collide(spec: mujoco.MjSpec, links: tuple[str, ...]) -> None:
-    """Every colliding geom of the file gets the arm's bits; links without one get a capsule."""
-    for geom in spec.geoms:
-        if geom.contype or geom.conaffinity:
-            geom.contype, geom.conaffinity = ARM_BITS, OBSTACLE_BITS
-    for i, link in enumerate(links):
-        body = spec.body(link)
-        if any(geom.contype for geom in body.geoms):
-            continue
-        reach = np.array(spec.body(links[i + 1]).pos) if i + 1 < len(links) else np.zeros(3)
-        long = float(np.linalg.norm(reach)) > 2 * STICK_RADIUS
-        kind = mujoco.mjtGeom.mjGEOM_CAPSULE if long else mujoco.mjtGeom.mjGEOM_SPHERE
-        stick = body.add_geom(type=kind, size=[STICK_RADIUS, 0, 0], group=3, mass=0)
-        stick.contype, stick.conaffinity = ARM_BITS, OBSTACLE_BITS
-        if long:
-            stick.fromto = [0, 0, 0, *reach]
+def _friction(coulomb: Array, viscous: Array) -> Friction:
+    n = len(coulomb)
+    return Friction(
+        coulomb=coulomb,
+        static=coulomb,
+        stribeck_velocity=np.full(n, 0.03),
+        viscous=viscous,
+        bristle_stiffness=coulomb / _PRESLIDING,
+        load=np.zeros(n),
+    )
+
+
+def _drive(stated: Any, limit: Array, said: _Said) -> Drive:
+    n = said.joints
+    gear, constant = stated.row("gear", n), stated.row("torque_constant", n)
+    current = stated.row("current_limit", n)
+    ratio = np.full(n, _GEAR) if gear is None else gear
+    gain = np.full(n, _GAIN) if constant is None else ratio * constant
+    coulomb, viscous = stated.row("coulomb", n), stated.row("viscous", n)
+    friction = None
+    if coulomb is not None or viscous is not None:
+        zero = np.zeros(n)
+        friction = _friction(
+            zero if coulomb is None else coulomb, zero if viscous is None else viscous
+        )
+    named = [
+        k for k in ("gear", "torque_constant", "coulomb", "viscous") if stated.row(k, n) is not None
+    ]
+    rest = "no losses, no ripple, no lag" if friction is None else "no ripple, no lag"
+    given = said.sources.get("drive", "given" if named else "")
+    assumed = [] if constant is not None else [f"{_GAIN:g} N m/A"]
+    said.sources["drive"] = "; ".join(x for x in (given, *assumed, rest) if x)
+    return Drive(gain, ratio, limit / gain if current is None else current, None, friction)
+
+
+def _with_speeds(drive: Drive, speed: Array, lightest: Array) -> Drive:
+    """Torque that falls above the largest speed, slowly enough for a step of a few milliseconds."""
+    limit = drive.torque_limit
+    if not np.isfinite(limit).all():
+        return drive
+    span = np.maximum(speed, limit * _FADE_TIME / lightest)
+    return replace(drive, rated_speed=speed, no_load_speed=speed + span)
+
+
+def _rotor(
+    stated: Any,
+    model: mujoco.MjModel,
+    joints: tuple[str, ...],
+    limit: Array,
+    drive: Drive,
+    said: _Said,
+) -> Array:
+    own = stated.row("rotor_inertia", said.joints)
+    if own is not None:
+        said.sources["armature"] = "given: gear^2 times the rotor's inertia"
+        return np.asarray(own * drive.gear**2)
+    given = model.dof_armature[model.jnt_dofadr[derive.joint_ids(model, joints)]] > 0
+    if given.all():
+        said.sources["armature"] = "the file's"
+    else:
+        rule = f"{derive.ROTOR_PER_TORQUE:g} kg m^2 per N m of torque limit"
+        said.derived(
+            "armature", ("the file's where it has one, else " if given.any() else "") + rule
+        )
+    return derive.rotor_inertia(model, joints, limit)
+
+
+def _home(
+    said: _Said, file: ArmFile, model: mujoco.MjModel, joints: tuple[str, ...], tip: int
+) -> Array:
+    low, high = derive.ranges(model, joints)
+    if said.robot.home is not None:
+        pose = said.row("home", np.zeros(0), "")
+        bad = [j for j, q, a, b in zip(joints, pose, low, high, strict=True) if not a <= q <= b]
+        if bad:
+            raise ValueError(f"home: joint {', '.join(bad)} outside its range")
+        return pose
+    if file.home is not None:
+        inside = (file.home >= low) & (file.home <= high)
+        said.sources["home"] = "the file's first keyframe"
+        if not inside.all():
+            said.sources["home"] += ", moved into the joints' ranges"
+        return np.clip(file.home, low, high)
+    said.derived("home", "in front of the base, clear of singular poses and of the joints' ends")
+    return derive.home_pose(model, joints, tip)
+
+
+def _spread(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
+    slides = model.jnt_type[derive.joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_SLIDE
+    return np.where(slides, 0.3, 0.8)
+
+
+def _bandwidth(
+    robot: Robot, model: mujoco.MjModel, joints: tuple[str, ...], inertia: Array, said: _Said
+) -> Array:
+    n = len(joints)
+    if robot.bandwidth is not None:
+        return said.row("bandwidth", np.zeros(n), "")
+    said.sources["bandwidth"] = "default"
+    return np.full(n, derive.BANDWIDTH)
+
+
+def _tool(robot: Robot, spec: mujoco.MjSpec, file: ArmFile, said: _Said) -> str | None:
+    sites = [site.name for site in spec.sites if site.name]
+    if robot.tool is not None:
+        if robot.tool in sites:
+            said.sources["tool"] = "given"
+            return robot.tool
+        raise ValueError(
+            f"tool {robot.tool!r}: no such site or body; sites: {', '.join(sites) or 'none'}"
+        )
+    for name in TOOL_FRAMES:
+        if name in sites:
+            said.sources["tool"] = f"the file's site {name}"
+            return name
+    said.sources["tool"] = f"no known site: the origin of {file.links[-1]}"
+    return None

@@ -45,8 +45,13 @@ class Friction:
         """Check shapes and signs: ``ValueError`` names the field."""
         per_joint = tuple(f.name for f in fields(self) if f.type == "Array")
         shaped(self, (len(self.coulomb),), "one a joint", *per_joint)
-        above_zero(self, "coulomb", "stribeck_velocity", "bristle_stiffness")
-        not_negative(self, "viscous", "load")
+        above_zero(self, "stribeck_velocity")
+        not_negative(self, "coulomb", "bristle_stiffness", "viscous", "load")
+        if not ((self.bristle_stiffness > 0) | (self.coulomb == 0)).all():
+            raise ValueError(
+                f"Friction.bristle_stiffness {self.bristle_stiffness}: expected above 0 where "
+                "there is Coulomb friction"
+            )
         if not (self.static >= self.coulomb).all():
             raise ValueError("Friction.static: below coulomb; the breakaway level is at least it")
         warm = self.temperature - self.reference_temperature
@@ -132,10 +137,21 @@ class Drive:
     friction: Friction | None = None
     ripple: Ripple | None = None
     sensors: Sensors | None = None
+    rated_speed: Array | None = None
+    """Up to it the whole torque is there [rad/s], shape (n,); above it the back-EMF takes of the
+    torque along the motion, all of it at ``no_load_speed``, and brakes beyond."""
+    no_load_speed: Array | None = None  #: [rad/s], above the rated speed, shape (n,)
 
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
         joints = (len(self.gain),)
+        if (self.rated_speed is None) != (self.no_load_speed is None):
+            raise ValueError("Drive.rated_speed, no_load_speed: expected both or neither")
+        if self.rated_speed is not None and self.no_load_speed is not None:
+            shaped(self, joints, "one a joint", "rated_speed", "no_load_speed")
+            above_zero(self, "rated_speed")
+            if not (self.no_load_speed > self.rated_speed).all():
+                raise ValueError("Drive.no_load_speed: expected above rated_speed")
         shaped(self, joints, "one a joint", "gear", "current_limit")
         if not (np.isfinite(self.gain).all() and (self.gain != 0).all()):
             raise ValueError(f"Drive.gain {self.gain}: expected N m/A other than 0")

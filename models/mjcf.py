@@ -38,6 +38,43 @@ def xml_text(spec: mujoco.MjSpec) -> str:
         library._mjPRIVATE__set_xml_precision(before)
 
 
+class SpecText:
+    """The text of a spec as it is now, written when it is first asked for.
+
+    Meshes make it long: an arm with detailed ones takes seconds, and few callers read it.
+    """
+
+    def __init__(self, spec: mujoco.MjSpec) -> None:
+        """Keep a copy of ``spec``."""
+        self._spec = spec.copy()
+        self._text: str | None = None
+
+    def __str__(self) -> str:
+        """MJCF with every digit."""
+        if self._text is None:
+            self._spec.compile()
+            self._text = xml_text(self._spec)
+        return self._text
+
+    def dynamics(self) -> mujoco.MjModel:
+        """The compiled model without shapes; inertial numbers that they would give are kept."""
+        spec = self._spec.copy()
+        if not all(body.explicitinertial for body in spec.bodies if body.name != "world"):
+            return mujoco.MjModel.from_xml_string(str(self))
+        without_shapes(spec, [geom for geom in spec.geoms if geom.parent.name != "world"])
+        return spec.compile()
+
+
+def without_shapes(spec: mujoco.MjSpec, geoms: list[mujoco.MjsGeom]) -> None:
+    """Delete geoms, and the meshes and materials that nothing uses any more."""
+    for geom in geoms:
+        spec.delete(geom)
+    used = {geom.meshname for geom in spec.geoms}
+    for mesh in list(spec.meshes):
+        if mesh.name not in used:
+            spec.delete(mesh)
+
+
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The model of ``spec``, without its mesh geoms where these keep it from compiling.
 

@@ -8,12 +8,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.models.arm import NAMED, Arm, load_arm
+from tauguard.models.arm import NAMED, Arm, Facts, load_arm
 from tauguard.models.checks import rigid_pose
 from tauguard.models.cloth import Cloth, add_cloth
-from tauguard.models.drive import Drive, cura6_drive
+from tauguard.models.drive import Drive
 from tauguard.models.mismatch import Mismatch
-from tauguard.models.mjcf import xml_text
+from tauguard.models.mjcf import SpecText, without_shapes
 from tauguard.models.obstacles import (
     BodyProxy,
     Clamp,
@@ -26,6 +26,7 @@ from tauguard.models.obstacles import (
     add_table,
 )
 from tauguard.models.payload import add_payload_body
+from tauguard.models.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ class SceneSpec:
     clamp: Clamp | None = None
     labels: bool = True  #: a contact sensor on every link
     floor: bool = False  #: a plane at height 0
-    arm: str = "cura6"  #: or an MJCF or URDF file with one serial arm in it
+    arm: str | Robot = "cura6"  #: or a name, a file or a robot, see :func:`load_arm`
     base_pose: tuple[tuple[float, ...], ...] | None = None  #: of the arm's world, (4, 4)
     integrator: str = "implicitfast"  #: one of :data:`INTEGRATORS`
     proxies: tuple[BodyProxy, ...] = ()  #: body regions of a person
@@ -58,7 +59,7 @@ class SceneSpec:
     table: Table | None = None
     cloth: Cloth | None = None
     drive: Drive | None = field(default=None, compare=False)
-    """The nominal drive; without it the CURA6-like arm has its own and other arms an ideal one."""
+    """The nominal drive; without it the arm has its own, see :class:`tauguard.models.arm.Facts`."""
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the one that is out of range."""
@@ -85,9 +86,9 @@ class Scene:
     """A compiled scene and where its parts are."""
 
     model: mujoco.MjModel
-    xml: str  #: MJCF text of the whole scene, self-contained
+    text: SpecText  #: of the whole scene, see :attr:`xml`
     spec: SceneSpec
-    arm_xml: str  #: MJCF text of the nominal arm alone: what an observer believes
+    arm_text: SpecText  #: of the nominal arm alone, see :attr:`arm_xml`
     joint_names: tuple[str, ...]
     link_bodies: NDArray[np.int64]  #: body ids of link 1..n
     qpos_adr: NDArray[np.int64]  #: of the arm's joints in qpos
@@ -96,6 +97,24 @@ class Scene:
     payload_body: int  #: its id, -1 where there is none
     drive: Drive  #: what is simulated
     home: Array  #: a pose to start from [rad], shape (n,)
+    facts: Facts  #: what is known or assumed about the arm (of one, where there are two)
+
+    @property
+    def xml(self) -> str:
+        """MJCF text of the whole scene, self-contained."""
+        return str(self.text)
+
+    @property
+    def arm_xml(self) -> str:
+        """MJCF text of the nominal arm alone: what an observer believes."""
+        return str(self.arm_text)
+
+    @property
+    def arm_model(self) -> mujoco.MjModel:
+        """The nominal arm alone, compiled; without shapes where its file is another's."""
+        if self.facts.name in NAMED:
+            return mujoco.MjModel.from_xml_string(self.arm_xml)
+        return self.arm_text.dynamics()
 
 
 def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
@@ -111,27 +130,25 @@ def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
         FileNotFoundError: no such arm.
     """
     arm = load_arm(spec.arm)
+    facts = arm.facts if spec.drive is None else replace(arm.facts, drive=spec.drive)
     whole = arm.spec
     whole.option.timestep = spec.timestep
     whole.option.gravity = spec.gravity
     whole.option.integrator = INTEGRATORS[spec.integrator]
     if spec.base_pose is not None:
         arm.place(np.array(spec.base_pose))
-    whole.compile()
-    nominal_xml = xml_text(whole)
+    nominal = _nominal_text(arm, spec, whole)
     if spec.mismatch is not None:
         spec.mismatch.perturb_arm(whole, list(arm.links))
     obstacles = _add_parts(arm, spec)
-    model = whole.compile()
-    xml = xml_text(whole)
-    if not visuals:
-        model = without_visuals(whole, model)
+    text = SpecText(whole)
+    model = whole.compile() if visuals else lean_model(whole)
     joints = [model.joint(name) for name in arm.joints]
     return Scene(
         model=model,
-        xml=xml,
+        text=text,
         spec=spec,
-        arm_xml=nominal_xml,
+        arm_text=nominal,
         joint_names=arm.joints,
         link_bodies=np.array([model.body(name).id for name in arm.links]),
         qpos_adr=np.array([joint.qposadr[0] for joint in joints]),
@@ -140,23 +157,38 @@ def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
         payload_body=model.body("payload").id if spec.payload else -1,
         drive=_drive(spec, arm),
         home=arm.home,
+        facts=facts,
     )
 
 
-def without_visuals(whole: mujoco.MjSpec, model: mujoco.MjModel) -> mujoco.MjModel:
+def _nominal_text(arm: Arm, spec: SceneSpec, whole: mujoco.MjSpec) -> SpecText:
+    """MJCF of the arm as an observer believes in it: a gripper that moves is rigid there."""
+    if not (arm.facts.gripper and isinstance(spec.arm, Robot) and spec.arm.gripper == "passive"):
+        return SpecText(whole)
+    rigid = compose(replace(spec, arm=replace(spec.arm, gripper="weld")))
+    return rigid.arm_text
+
+
+def lean_model(whole: mujoco.MjSpec) -> mujoco.MjModel:
     """Compile ``whole`` without the shapes that touch nothing; bodies and joints keep their ids.
 
-    Returns:
-        The new model, or ``model`` where such a shape gives its body mass.
+    Such a shape stays where it gives its body mass. ``whole`` is changed.
     """
+    stated = all(body.explicitinertial for body in whole.bodies if body.name != "world")
+    full = None if stated else whole.compile()
     touching = {name for pair in whole.pairs for name in (pair.geomname1, pair.geomname2)}
-    for geom in list(whole.geoms):
-        if not (geom.contype or geom.conaffinity or geom.name in touching):
-            whole.delete(geom)
+    shown = [
+        geom
+        for geom in whole.geoms
+        if not (geom.contype or geom.conaffinity or geom.name in touching)
+    ]
+    without_shapes(whole, shown)
     lean = whole.compile()
     masses = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
-    same = all(np.array_equal(getattr(lean, name), getattr(model, name)) for name in masses)
-    return lean if same else model
+    same = full is None or all(
+        np.array_equal(getattr(lean, name), getattr(full, name)) for name in masses
+    )
+    return lean if same or full is None else full
 
 
 def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
@@ -195,8 +227,7 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
 def _drive(spec: SceneSpec, arm: Arm) -> Drive:
     drive = spec.drive
     if drive is None:
-        known = spec.arm in NAMED
-        drive = cura6_drive(spec.arm) if known else Drive.ideal(arm.torque_limit)
+        drive = arm.facts.drive
     if len(drive.gain) != len(arm.joints):
         raise ValueError(
             f"drive: of {len(drive.gain)} joints, but the arm has {len(arm.joints)}: "

@@ -29,6 +29,10 @@ struct Table {
   std::size_t width = 0;  // joints
 };
 
+// A reference keeps off the ends of a joint's range by this much [rad] and nears them at most at
+// this rate [1/s], so that the arm does not run into its stops.
+constexpr double end_margin = 0.01, end_rate = 6.0;
+
 struct Command {
   std::vector<double> origin, speed, feed;  // reference [rad], its velocity [rad/s], torque [N m]
   bool servo = false, powered = true, brake = false;
@@ -41,6 +45,7 @@ struct Controls {
   std::vector<double> centre;        // of the position mode [rad]
   std::vector<double> max_speed;     // [rad/s]
   std::vector<double> torque_limit;  // [N m]
+  std::vector<double> low, high;     // ends of the joints' ranges [rad]
   Override override = Override::none;
   std::vector<double> override_speed;  // [rad/s]
   Command command;
@@ -87,8 +92,10 @@ struct Controls {
     } else {
       cartesian(arms, tools, action);
     }
-    for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t i = 0; i < n; ++i) {
       v[i] = std::min(std::max(v[i], -max_speed[i]), max_speed[i]);
+      if (command.servo) v[i] = clear_of_ends(i, v[i]);
+    }
     follow(joints, q);
   }
 
@@ -104,7 +111,7 @@ struct Controls {
     double torque = command.feed[i];
     if (command.servo)
       torque += j.kp * (command.origin[i] + command.speed[i] * elapsed - q) +
-                j.kd * (command.speed[i] - qd);
+                j.kd * (command.speed[i] - qd) + compensation(j, command.speed[i]);
     return torque;
   }
 
@@ -125,6 +132,12 @@ struct Controls {
 
  private:
   static double bounded(double a) { return std::min(std::max(a, -1.0), 1.0); }
+
+  double clear_of_ends(std::size_t i, double speed) const {
+    const double up = end_rate * (high[i] - end_margin - command.origin[i]);
+    const double down = end_rate * (low[i] + end_margin - command.origin[i]);
+    return speed > 0 ? std::min(speed, std::max(up, 0.0)) : std::max(speed, std::min(down, 0.0));
+  }
 
   void cartesian(const Kinematics& arms, const std::vector<Tool>& tools, const double* action) {
     for (std::size_t a = 0; a < tools.size(); ++a) {

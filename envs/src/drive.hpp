@@ -21,6 +21,10 @@ struct Joint {
   double bristle_stiffness = 0.0;                // N m/rad
   double load = 0.0;                             // 1/(N m)
   double kp = 0.0, kd = 0.0;                     // N m/rad, N m s/rad
+  // Above the rated speed the torque along the motion falls, to nothing at the no-load speed, and
+  // brakes beyond [rad/s]; a no-load speed of 0 leaves this out.
+  double rated_speed = 0.0, no_load_speed = 0.0;
+  double known_coulomb = 0.0, known_viscous = 0.0;  // what the servo makes up for; N m, N m s/rad
   std::vector<double> cycles, amplitude, phase;  // per motor revolution; A; rad
 };
 
@@ -55,6 +59,30 @@ inline double ripple(const Joint& j, double q) {
   return j.gain * sum;
 }
 
+// The share of the current limit that is there in the direction of a speed: the rest of the voltage
+// goes into the motor's back-EMF.
+inline double reserve(const Joint& j, double speed) {
+  const double share = (j.no_load_speed - speed) / (j.no_load_speed - j.rated_speed);
+  return std::min(std::max(share, -1.0), 1.0);
+}
+
+// The current [A] that a drive can give of a wanted one at a joint speed.
+inline double possible(const Joint& j, double current, double qd) {
+  double low = -j.current_limit, high = j.current_limit;
+  if (j.no_load_speed > 0.0) {
+    const double speed = j.gain < 0 ? -qd : qd;
+    high *= reserve(j, speed), low *= reserve(j, -speed);
+  }
+  return std::min(std::max(current, low), high);
+}
+
+// What the servo adds at a reference speed to make up for the friction that it knows of [N m]; the
+// Coulomb part rises over `smooth` [rad/s].
+inline double compensation(const Joint& j, double speed) {
+  constexpr double smooth = 0.02;
+  return j.known_coulomb * std::tanh(speed / smooth) + j.known_viscous * speed;
+}
+
 // All drives of a scene and their state.
 struct DriveTrain {
   std::vector<Joint> joints;
@@ -70,8 +98,7 @@ struct DriveTrain {
   double apply(std::size_t i, double wanted, double q, double qd) {
     const Joint& j = joints[i];
     JointState& s = states[i];
-    const double command =
-        std::min(std::max(wanted / j.nominal_gain, -j.current_limit), j.current_limit);
+    const double command = possible(j, wanted / j.nominal_gain, qd);
     s.current = command + (s.current - command) * decay;
     const double tau = j.gain * s.current;
     return tau - friction(j, s, qd, tau, dt) + ripple(j, q);

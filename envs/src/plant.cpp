@@ -87,28 +87,17 @@ void bind_joint(nb::module_& m) {
           [](Joint* self, int qpos, int dof, double gain, double nominal_gain, double current_limit,
              double gear, double coulomb, double breakaway, double stribeck_velocity,
              double viscous, double bristle_stiffness, double load, double kp, double kd,
+             double rated_speed, double no_load_speed, double known_coulomb, double known_viscous,
              Numbers cycles, Numbers amplitude, Numbers phase) {
-            new (self) Joint{qpos,
-                             dof,
-                             gain,
-                             nominal_gain,
-                             current_limit,
-                             gear,
-                             coulomb,
-                             breakaway,
-                             stribeck_velocity,
-                             viscous,
-                             bristle_stiffness,
-                             load,
-                             kp,
-                             kd,
-                             std::move(cycles),
-                             std::move(amplitude),
-                             std::move(phase)};
+            *new (self) Joint() = {qpos, dof, gain, nominal_gain, current_limit, gear, coulomb,
+                                   breakaway, stribeck_velocity, viscous, bristle_stiffness, load,
+                                   kp, kd, rated_speed, no_load_speed, known_coulomb, known_viscous,
+                                   std::move(cycles), std::move(amplitude), std::move(phase)};
           },
           nb::kw_only(), "qpos"_a, "dof"_a, "gain"_a, "nominal_gain"_a, "current_limit"_a, "gear"_a,
           "coulomb"_a, "breakaway"_a, "stribeck_velocity"_a, "viscous"_a, "bristle_stiffness"_a,
-          "load"_a, "kp"_a, "kd"_a, "cycles"_a, "amplitude"_a, "phase"_a);
+          "load"_a, "kp"_a, "kd"_a, "rated_speed"_a, "no_load_speed"_a,
+          "known_coulomb"_a, "known_viscous"_a, "cycles"_a, "amplitude"_a, "phase"_a);
 }
 
 void bind_surroundings(nb::module_& m) {
@@ -173,8 +162,10 @@ void bind_outputs(nb::module_& m) {
       .def(
           "__init__",
           [](Controls* self, int mode, double period, Numbers scale, Numbers centre,
-             Numbers max_speed, Numbers torque_limit) {
+             Numbers max_speed, Numbers torque_limit, Numbers low, Numbers high) {
             new (self) Controls();
+            self->low = std::move(low);
+            self->high = std::move(high);
             self->mode = static_cast<Mode>(mode);
             self->period = period;
             self->scale = std::move(scale);
@@ -184,7 +175,7 @@ void bind_outputs(nb::module_& m) {
             self->torque_limit = std::move(torque_limit);
           },
           nb::kw_only(), "mode"_a, "period"_a, "scale"_a, "centre"_a, "max_speed"_a,
-          "torque_limit"_a);
+          "torque_limit"_a, "low"_a, "high"_a);
 }
 
 void bind_plant(nb::module_& m) {

@@ -1,0 +1,183 @@
+"""What a robot file leaves open, derived from what it says: each rule with its reason."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Rotor inertia at the joint per torque limit [kg m^2 / (N m)]: between geared cobot drives with
+#: small motors (about 0.002: 1e-5 kg m^2 behind a gear of 101 for 54 N m) and the DLR arm's
+#: (0.016: 3.2 kg m^2 for 200 N m).
+ROTOR_PER_TORQUE = 0.005
+#: Where there is no torque limit either: this share of the joint's largest inertia.
+ROTOR_SHARE = 0.05
+#: A torque limit that nobody states holds the arm this many times, overcomes the friction of the
+#: file twice, and accelerates the largest inertia so [rad/s^2] (a UR10e's base: 27).
+HOLDING_FACTOR, SPARE_ACCELERATION = 2.0, 30.0
+#: Joint speed of an arm whose file states none [rad/s], and acceleration of every such arm.
+DEFAULT_SPEED, DEFAULT_ACCELERATION = 2.0, 10.0
+#: Poses that inertia and gravity are looked at in.
+POSES = 64
+#: A pose is drawn within this of zero where a joint has no range [rad].
+FREE_RANGE = np.pi
+#: Home keeps this share of a joint's range from both of its ends.
+HOME_MARGIN = 0.1
+#: A default bandwidth is lowered until the servo's stiffest mode (:func:`stiffest_mode`) changes by
+#: at most this much a step; a stated one may go up to the second number, 2 would be unstable.
+MOST_PER_STEP, LIMIT_PER_STEP = 1.0, 1.5
+#: Bandwidth of a servo that nothing limits [rad/s].
+BANDWIDTH = 30.0
+
+
+def joint_ids(model: mujoco.MjModel, joints: tuple[str, ...]) -> NDArray[np.int64]:
+    """MuJoCo's ids of the named joints, shape (n,)."""
+    return np.array([model.joint(name).id for name in joints])
+
+
+def ranges(model: mujoco.MjModel, joints: tuple[str, ...]) -> tuple[Array, Array]:
+    """Joint ranges [rad], +-pi about 0 where there is none, shapes (n,)."""
+    at = joint_ids(model, joints)
+    limited = model.jnt_limited[at].astype(bool)
+    slides = model.jnt_type[at] == mujoco.mjtJoint.mjJNT_SLIDE
+    free = np.where(slides, 0.5, FREE_RANGE)
+    low = np.where(limited, model.jnt_range[at, 0], -free)
+    high = np.where(limited, model.jnt_range[at, 1], free)
+    return low, high
+
+
+def random_poses(model: mujoco.MjModel, joints: tuple[str, ...], count: int = POSES) -> Array:
+    """The same poses at every call, over the whole range [rad], shape (count, n)."""
+    low, high = ranges(model, joints)
+    middle, half = (low + high) / 2, np.minimum((high - low) / 2, FREE_RANGE)
+    rng = np.random.default_rng(0)
+    return np.asarray(middle + half * rng.uniform(-1, 1, (count, len(joints))))
+
+
+def inertia_matrices(model: mujoco.MjModel, joints: tuple[str, ...], poses: Array) -> Array:
+    """Joint-space inertia at each pose [kg m^2], shape (count, n, n)."""
+    at = joint_ids(model, joints)
+    adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]
+    data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    out = np.empty((len(poses), len(at), len(at)))
+    for k, pose in enumerate(poses):
+        data.qpos[adr] = pose
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_makeM(model, data)
+        mujoco.mj_fullM(model, data, full)
+        out[k] = full[np.ix_(dof, dof)]
+    return out
+
+
+def holding_torque(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
+    """Largest torque that gravity needs over the random poses [N m], shape (n,)."""
+    at = joint_ids(model, joints)
+    adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]
+    data, most = mujoco.MjData(model), np.zeros(len(at))
+    for pose in random_poses(model, joints):
+        data.qpos[adr] = pose
+        mujoco.mj_forward(model, data)
+        most = np.maximum(most, np.abs(data.qfrc_bias[dof]))
+    return most
+
+
+def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) -> Array:
+    """At the joint [kg m^2], for joints whose file has none; 0 for slides, shape (n,)."""
+    at = joint_ids(model, joints)
+    given = model.dof_armature[model.jnt_dofadr[at]]
+    hinge = model.jnt_type[at] == mujoco.mjtJoint.mjJNT_HINGE
+    masses = inertia_matrices(model, joints, random_poses(model, joints))
+    share = ROTOR_SHARE * masses.diagonal(axis1=1, axis2=2).max(axis=0)
+    guess = np.where(np.isfinite(limit), ROTOR_PER_TORQUE * limit, share)
+    return np.where(given > 0, given, np.where(hinge, guess, 0.0))
+
+
+def torque_limit(model: mujoco.MjModel, joints: tuple[str, ...], stated: Array) -> Array:
+    """[N m]; hinges without a limit get one that holds and moves the arm, shape (n,)."""
+    if np.isfinite(stated).all():
+        return stated
+    hinge = model.jnt_type[joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_HINGE
+    masses = inertia_matrices(model, joints, random_poses(model, joints))
+    most = masses.diagonal(axis1=1, axis2=2).max(axis=0)
+    dofs = model.jnt_dofadr[joint_ids(model, joints)]
+    lost = model.dof_frictionloss[dofs] + model.dof_damping[dofs] * DEFAULT_SPEED
+    spare = HOLDING_FACTOR * (holding_torque(model, joints) + lost) + SPARE_ACCELERATION * most
+    return np.where(np.isfinite(stated) | ~hinge, stated, spare)
+
+
+def servo_inertia(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
+    """What a joint's servo has to move [kg m^2]: the largest inertia over the poses, shape (n,)."""
+    masses = inertia_matrices(model, joints, random_poses(model, joints))
+    most: Array = masses.diagonal(axis1=1, axis2=2).max(axis=0)
+    return most
+
+
+def lightest_inertia(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
+    """The least that a joint alone has to move, the others free: 1 / (M^-1)_ii, shape (n,)."""
+    masses = inertia_matrices(model, joints, random_poses(model, joints))
+    least: Array = 1 / np.linalg.inv(masses).diagonal(axis1=1, axis2=2).max(axis=0)
+    return least
+
+
+def stiffest_mode(
+    model: mujoco.MjModel, joints: tuple[str, ...], kp: Array, kd: Array
+) -> tuple[float, int]:
+    """By how much the servo's fastest mode changes in a time step, and the joint that leads it.
+
+    An explicit velocity loop of rate ``d`` and a position loop of ``k`` (per unit of inertia) are
+    stable for ``d dt + k dt^2 / 2 < 2``; this is the largest such sum over the poses.
+    """
+    dt = float(model.opt.timestep)
+    masses = inertia_matrices(model, joints, random_poses(model, joints))
+    loop = np.diag(kd * dt + kp * dt * dt / 2)
+    worst, joint = 0.0, 0
+    for mass in masses:
+        values, vectors = np.linalg.eig(np.linalg.solve(mass, loop))
+        k = int(np.argmax(values.real))
+        if values[k].real > worst:
+            worst = float(values[k].real)
+            shape = np.abs(vectors[:, k]) ** 2 * np.diag(loop)
+            joint = int(np.argmax(shape))
+    return worst, joint
+
+
+def home_pose(model: mujoco.MjModel, joints: tuple[str, ...], tip: int) -> Array:
+    """A pose to work from: in front of the base, clear of singular poses and of the joints' ends.
+
+    Of fixed random poses the one with the most manipulability, weighted by how far the joints are
+    from the ends of their ranges and the tool from the middle of its reach. [rad], shape (n,)
+    """
+    at = joint_ids(model, joints)
+    adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]
+    low, high = ranges(model, joints)
+    inner_low, inner_high = low + HOME_MARGIN * (high - low), high - HOME_MARGIN * (high - low)
+    if len(joints) < 4:
+        return np.clip(np.zeros(len(joints)), inner_low, inner_high)
+    near_low, near_high = np.maximum(inner_low, -2.0), np.minimum(inner_high, 2.0)
+    empty = near_low >= near_high
+    near_low, near_high = (
+        np.where(empty, inner_low, near_low),
+        np.where(empty, inner_high, near_high),
+    )
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    jac_p, jac_r = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    poses = rng.uniform(near_low, near_high, (600, len(joints)))
+    tips, scores = np.empty((len(poses), 3)), np.empty(len(poses))
+    for k, pose in enumerate(poses):
+        data.qpos[adr] = pose
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_jacBody(model, data, jac_p, jac_r, tip)
+        base = data.xanchor[at[0]]
+        tips[k] = data.xpos[tip] - base
+        values = np.linalg.svd(np.vstack([jac_p, jac_r])[:, dof], compute_uv=False)
+        clear = min(float((data.xpos[model.jnt_bodyid[j]] - base)[2]) for j in at[2:])
+        scores[k] = np.prod(values[: min(6, len(at))]) * (clear > -0.05)
+    reach = float(np.linalg.norm(tips, axis=1).max())
+    flat = np.hypot(tips[:, 0], tips[:, 1]) / reach
+    spot = (tips[:, 0] > 0) & (np.abs(tips[:, 1]) < 0.4 * reach) & (tips[:, 2] > 0.1 * reach)
+    well = np.exp(-(((flat - 0.55) / 0.15) ** 2)) * np.where(spot, 1.0, 1e-3)
+    return np.asarray(poses[int(np.argmax(scores * well))])

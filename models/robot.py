@@ -1,0 +1,158 @@
+"""A robot, described once: its file, and whatever the file does not say or says wrongly."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Numbers = tuple[float, ...]
+
+#: What becomes of the joints below the flange.
+GRIPPERS = ("weld", "passive")
+
+
+@dataclass(frozen=True)
+class RobotDrive:
+    """Drives as a data sheet states them; a number is that of every joint.
+
+    ``gear`` and ``torque_constant`` give the gain, ``rotor_inertia`` is the motor's own (the joint
+    feels gear^2 times it). Coulomb and viscous friction are those at the joint.
+    """
+
+    gear: float | Numbers | None = None
+    torque_constant: float | Numbers | None = None  #: of the motor [N m/A]
+    rotor_inertia: float | Numbers | None = None  #: of the motor [kg m^2]
+    current_limit: float | Numbers | None = None  #: [A]
+    coulomb: float | Numbers | None = None  #: [N m]
+    viscous: float | Numbers | None = None  #: [N m s/rad]
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the field."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is None:
+                continue
+            value = _numbers(value, f"drive.{field.name}")
+            object.__setattr__(self, field.name, value)
+            low = 0 if field.name in ("rotor_inertia", "coulomb", "viscous") else None
+            bad = [x for x in np.atleast_1d(value) if not (x >= 0 if low == 0 else x > 0)]
+            if bad:
+                raise ValueError(f"drive.{field.name} {value}: expected above 0")
+
+    def row(self, name: str, joints: int) -> Array | None:
+        """A field for every joint, shape (n,), or None where it is not stated.
+
+        Raises:
+            ValueError: a row of another length.
+        """
+        value = getattr(self, name)
+        return None if value is None else per_joint(value, joints, f"drive.{name}")
+
+
+@dataclass(frozen=True)
+class Robot:
+    """One serial arm; what is ``None`` comes from the file or is derived (``tauguard robot``).
+
+    ``file`` is an MJCF or URDF file, or the name of an arm that :data:`tauguard.models.ROBOTS`
+    knows.
+    """
+
+    file: str
+    joints: tuple[str, ...] | None = None
+    """Names of the arm's joints, base to tip; all others are welded. Default: the only chain."""
+    gripper: str = "weld"  #: what becomes of joints below the flange, one of :data:`GRIPPERS`
+    home: Numbers | None = None  #: [rad]
+    tool: str | None = None  #: name of a site or body
+    torque_limit: float | Numbers | None = None  #: [N m]
+    max_speed: float | Numbers | None = None  #: [rad/s]
+    max_acceleration: float | Numbers | None = None  #: [rad/s^2]
+    bandwidth: float | Numbers | None = None  #: of the servo [rad/s]
+    friction_compensation: float = 1.0  #: share of the known friction that the servo makes up for
+    drive: RobotDrive = RobotDrive()  #: noqa: RUF009
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the field and what would work."""
+        object.__setattr__(self, "file", str(self.file))
+        if self.gripper not in GRIPPERS:
+            raise ValueError(f"gripper {self.gripper!r}: expected one of {', '.join(GRIPPERS)}")
+        for name in ("home", "torque_limit", "max_speed", "max_acceleration", "bandwidth"):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            value = _numbers(value, name)
+            object.__setattr__(self, name, value)
+            if name != "home" and not all(x > 0 for x in np.atleast_1d(value)):
+                raise ValueError(f"{name} {value}: expected above 0")
+        if self.joints is not None:
+            if isinstance(self.joints, str) or not all(isinstance(j, str) for j in self.joints):
+                raise ValueError(f"joints {self.joints!r}: expected a list of joint names")
+            object.__setattr__(self, "joints", tuple(self.joints))
+        if not 0 <= self.friction_compensation <= 1:
+            raise ValueError(f"friction_compensation {self.friction_compensation}: expected 0 to 1")
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Robot:
+        """The robot that a TOML file describes; ``file`` in it counts from the file's folder.
+
+        Raises:
+            ValueError: not TOML, or a key or value that a robot cannot have.
+            FileNotFoundError: no such file.
+        """
+        path = Path(path)
+        try:
+            values: dict[str, Any] = tomllib.loads(path.read_text())
+            if "file" not in values:
+                raise ValueError('no file; expected file = "arm.xml" (MJCF or URDF)')
+            beside = path.parent / str(values["file"])
+            if beside.is_file():
+                values["file"] = str(beside)
+            return cls.from_mapping(values)
+        except (ValueError, TypeError) as error:
+            raise ValueError(f"{path}: {error}") from None
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Robot:
+        """From the keys of a TOML table."""
+        known = [field.name for field in fields(cls)]
+        parts = dict(values)
+        _check_keys(parts, known, "robot")
+        drive = parts.pop("drive", {})
+        if not isinstance(drive, RobotDrive):
+            _check_keys(drive, [field.name for field in fields(RobotDrive)], "drive")
+            drive = RobotDrive(**drive)
+        return cls(**parts, drive=drive)
+
+
+def _check_keys(found: Mapping[str, Any], known: list[str], where: str) -> None:
+    for key in found:
+        if key not in known:
+            raise ValueError(f"{where}: no key {key!r}; expected some of {', '.join(known)}")
+
+
+def _numbers(value: Any, name: str) -> float | Numbers:
+    try:
+        rows = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} {value!r}: expected a number or one a joint") from None
+    if rows.ndim > 1 or not np.isfinite(rows).all():
+        raise ValueError(f"{name} {value!r}: expected finite numbers, one or one a joint")
+    return float(rows) if rows.ndim == 0 else tuple(rows.tolist())
+
+
+def per_joint(value: float | Numbers, joints: int, name: str) -> Array:
+    """A number for each joint, shape (n,).
+
+    Raises:
+        ValueError: a row of another length.
+    """
+    rows = np.asarray(value, dtype=float)
+    if rows.shape not in ((), (joints,)):
+        raise ValueError(f"{name}: {rows.size} numbers, expected one or {joints}, one a joint")
+    return np.array(np.broadcast_to(rows, (joints,)))

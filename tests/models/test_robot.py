@@ -1,0 +1,139 @@
+"""A robot described once: what is stated is used, what is not is derived and says so."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from tauguard.models import ROBOTS, Robot, RobotDrive, SceneSpec, compose, load_arm, pin_model
+from tests.models.arms import random_arm
+
+
+@pytest.fixture
+def arm(tmp_path):
+    def write(seed, gripper="none"):
+        path = tmp_path / f"arm{seed}{gripper}.xml"
+        path.write_text(random_arm(seed, gripper))
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_unseen_arm_gets_what_its_file_leaves_open(arm, seed):
+    scene = compose(SceneSpec(arm=str(arm(seed))))
+    facts, model = scene.facts, scene.model
+    joints = [model.joint(name).id for name in facts.joints]
+    limited = model.jnt_limited[joints].astype(bool)
+    low, high = model.jnt_range[joints].T
+    assert ((facts.home >= low) & (facts.home <= high))[limited].all()
+    assert (facts.armature > 0).all()
+    np.testing.assert_array_equal(model.dof_armature[scene.dof_adr], facts.armature)
+    assert np.isfinite(facts.drive.torque_limit).all()
+    for part in ("armature", "home", "torque_limit", "max_speed", "bandwidth", "tool", "drive"):
+        assert facts.sources[part], part
+    friction = facts.nominal.friction
+    np.testing.assert_allclose(facts.damping, model.dof_damping[scene.dof_adr])
+    if facts.friction_loss.any():
+        np.testing.assert_allclose(friction.coulomb, facts.friction_loss)
+        np.testing.assert_allclose(friction.viscous, facts.damping)
+
+
+@pytest.mark.parametrize("gripper", ["fingers", "jaw"])
+@pytest.mark.parametrize("kept", ["weld", "passive"])
+def test_a_gripper_is_welded_or_left_passive(arm, gripper, kept):
+    path = arm(3, gripper)
+    bare = load_arm(str(arm(3)))
+    scene = compose(SceneSpec(arm=Robot(str(path), gripper=kept), payload=True))
+    assert scene.joint_names == bare.joints
+    assert len(scene.facts.gripper) == (2 if gripper == "fingers" else 1)
+    assert scene.model.njnt == len(bare.joints) + (len(scene.facts.gripper) * (kept == "passive"))
+    nominal = pin_model(scene.arm_model)
+    assert nominal.nq == len(bare.joints)
+    whole = mujoco.MjModel.from_xml_path(str(path))
+    got = sum(inertia.mass for inertia in nominal.inertias) - nominal.inertias[0].mass
+    assert got == pytest.approx(whole.body_mass.sum(), rel=1e-9), "the gripper's mass is known"
+
+
+def test_other_shapes_name_the_way_out(tmp_path):
+    path = tmp_path / "two.xml"
+    body = (
+        "<body name='{0}'><joint name='{0}1'/><geom size='.1'/><body pos='0 0 .3'>"
+        "<joint name='{0}2' axis='0 1 0'/><geom size='.1'/></body></body>"
+    )
+    both = body.format("l") + body.format("r")
+    path.write_text(f"<mujoco><worldbody>{both}</worldbody></mujoco>")
+    with pytest.raises(ValueError, match=r"l1, l2.*r1, r2.*joints=") as error:
+        load_arm(str(path))
+    assert "\n" not in str(error.value)
+    assert load_arm(Robot(str(path), joints=("l1", "l2"))).joints == ("l1", "l2")
+    with pytest.raises(ValueError, match="no joint 'x'; the file has l1, l2, r1, r2"):
+        load_arm(Robot(str(path), joints=("x",)))
+
+
+def test_a_toml_file_describes_a_robot(arm, tmp_path):
+    path = arm(4)
+    names = load_arm(str(path)).joints
+    text = f"""
+file = "{path.name}"
+home = {[0.2] * len(names)}
+max_speed = 1.5
+bandwidth = 20
+[drive]
+gear = 100
+torque_constant = 0.1
+rotor_inertia = 2e-5
+coulomb = 1.0
+"""
+    description = tmp_path / "arm.toml"
+    description.write_text(text)
+    facts = load_arm(str(description)).facts
+    np.testing.assert_allclose(facts.drive.gain, 10.0)
+    np.testing.assert_allclose(facts.armature, 0.2)
+    np.testing.assert_allclose(facts.max_speed, 1.5)
+    np.testing.assert_allclose(facts.drive.friction.coulomb, 1.0)
+    assert facts.sources["max_speed"] == facts.sources["home"] == "given"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("home = [0]", "no file"),
+        ('file = "a.xml"\nhoem = [0]', "no key 'hoem'; expected some of file"),
+        ('file = "a.xml"\n[drive]\ngear = -1', "drive.gear -1.0: expected above 0"),
+        ('file = "a.xml"\n[drive]\nratio = 1', "drive: no key 'ratio'"),
+        ('file = "a.xml"\nmax_speed = "fast"', "max_speed 'fast': expected a number"),
+        ('file = "a.xml"\ngripper = "glued"', "gripper 'glued': expected one of weld, passive"),
+        ("file =", "arm.toml"),
+    ],
+)
+def test_a_wrong_description_is_named(tmp_path, text, message):
+    path = tmp_path / "arm.toml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message) as error:
+        Robot.from_toml(path)
+    assert "\n" not in str(error.value)
+
+
+def test_stated_rows_have_a_number_a_joint(arm):
+    with pytest.raises(ValueError, match="max_speed: 2 numbers, expected one or"):
+        load_arm(Robot(str(arm(5)), max_speed=(1.0, 2.0)))
+    with pytest.raises(ValueError, match=r"drive\.gear: 3 numbers"):
+        load_arm(Robot(str(arm(5)), drive=RobotDrive(gear=(1.0, 2.0, 3.0))))
+
+
+def test_every_known_arm_names_its_sources():
+    for name, row in ROBOTS.items():
+        stated = {
+            key
+            for key, value in vars(row.robot).items()
+            if key != "file" and value != getattr(Robot(file=name), key)
+        }
+        assert stated == set(row.sources), name
+        assert row.urdf or row.menagerie
+
+
+def test_a_known_arm_without_its_model_says_what_to_install(monkeypatch):
+    monkeypatch.setattr("tauguard.models.known_robots.robot_data_folders", list)
+    monkeypatch.setattr("tauguard.models.known_robots.menagerie_file", lambda name: None)
+    with pytest.raises(FileNotFoundError, match=r"extra `arms`.*or give a file"):
+        load_arm("panda")
