@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from tauguard.models import Mismatch, cura6
+from tauguard.models import Mismatch
 from tauguard.traces import KINDS
 
 
@@ -77,7 +77,7 @@ class Episode:
     temperature: float | None = None  #: of the gears [degC]; None is the drive's own
     ideal_drive: bool = False  #: no friction, ripple, lag or sensor errors
     timestep: float = 1e-3  #: [s]
-    arm: str = "cura6"  #: or one of its other sizes, :data:`tauguard.models.cura6.NAMES`
+    arm: str = "cura6"  #: a name or a file, see :func:`tauguard.models.load_arm`
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names what is wrong and what would work."""
@@ -85,8 +85,6 @@ class Episode:
             value = getattr(self, name)
             if not 0 < value < math.inf:
                 raise ValueError(f"{name} {value}: expected more than 0 and finite")
-        if self.arm not in cura6.NAMES:
-            raise ValueError(f"arm {self.arm!r}: expected one of {', '.join(cura6.NAMES)}")
         if self.temperature is not None and not math.isfinite(self.temperature):
             raise ValueError(f"temperature {self.temperature}: expected a finite number of degC")
         if not 0 < self.speed <= 100:

@@ -39,11 +39,15 @@ class Aim:
     """Finds surface points of a scene's links by ray casting along a motion."""
 
     def __init__(self, scene: Scene, motion: Motion) -> None:
-        """For the scene's collision geometry (group 3) and the motion's references."""
+        """For the scene's collision geometry and the motion's references."""
         self._scene, self._motion = scene, motion
         self._data = mujoco.MjData(scene.model)
         self._ahead = mujoco.MjData(scene.model)
-        self._groups = np.array([0, 0, 0, 1, 0, 0], dtype=np.uint8)
+        model = scene.model
+        links = np.isin(model.geom_bodyid, scene.link_bodies)
+        self._solid = links & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+        self._groups = np.zeros(6, dtype=np.uint8)
+        self._groups[model.geom_group[self._solid]] = 1
 
     def find(self, plan: CollisionPlan, rng: np.random.Generator, last: int) -> Target | None:
         """A target for ``plan`` at the first sample that offers one, up to sample ``last``."""
@@ -117,11 +121,7 @@ class Aim:
     def _inside(self, body: int, rng: np.random.Generator) -> Array:
         """A point near the middle of one of the link's collision geoms."""
         model = self._scene.model
-        geoms = [
-            g
-            for g in range(model.ngeom)
-            if model.geom_bodyid[g] == body and model.geom_group[g] == 3
-        ]
+        geoms = np.flatnonzero(self._solid & (model.geom_bodyid == body))
         geom = geoms[int(rng.integers(len(geoms)))]
         axis = self._data.geom_xmat[geom].reshape(3, 3)[:, 2]
         reach = float(model.geom_size[geom, 1]) * 0.8

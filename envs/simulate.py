@@ -27,35 +27,52 @@ from tauguard.models import (
     Striker,
     compose,
     cura6,
-    cura6_drive,
     pin_model,
     set_payload,
+    without_losses,
 )
 from tauguard.traces import Trace, Truth
 
 Array = NDArray[np.float64]
 
+#: Poses are drawn this far around the CURA6-like arm's home [rad].
+OWN_SPREAD = (1.6, 0.55, 0.7, 1.0, 1.0, 1.5)
+#: The Coulomb part of the compensation rises over this speed [rad/s], as in the native servo.
+FRICTION_SMOOTHING = 0.02
+#: Links stay this high above the floor and this far from the base's axis [m].
+CLEARANCE = (0.15, 0.22)
+
 
 def workspace(scene: Scene) -> Workspace:
     """Where the arm works: a box around its home pose, free of self-collision and of the floor."""
-    model, data = scene.model, mujoco.MjData(scene.model)
-    home = np.array(cura6.HOME)
-    spread = np.array([1.6, 0.55, 0.7, 1.0, 1.0, 1.5])
-    limits = model.jnt_range[[int(model.joint(name).id) for name in scene.joint_names]]
+    model, data, facts = scene.model, mujoco.MjData(scene.model), scene.facts
+    own = facts.name in cura6.NAMES
+    spread = np.array(OWN_SPREAD) if own else facts.spread
+    ids = [int(model.joint(name).id) for name in scene.joint_names]
+    limited = model.jnt_limited[ids].astype(bool)[:, None]
+    limits = np.where(limited, model.jnt_range[ids], [-np.inf, np.inf])
     links = [int(b) for b in scene.link_bodies[2:]]
 
-    def allowed(q: Array) -> bool:
+    def clearance(q: Array) -> tuple[float, float]:
         data.qpos[scene.qpos_adr] = q
         mujoco.mj_kinematics(model, data)
-        low = min(float(data.xpos[b][2]) for b in links)
-        near = min(float(np.hypot(*data.xpos[b][:2])) for b in links[1:])
-        return low > 0.15 and near > 0.22
+        low = min((float(data.xpos[b][2]) for b in links), default=np.inf)
+        near = min((float(np.hypot(*data.xpos[b][:2])) for b in links[1:]), default=np.inf)
+        return low, near
+
+    # An arm whose home is itself nearer to the floor or its base than that may come half as near.
+    at_home = (np.inf, np.inf) if own else clearance(facts.home)
+    least = [min(*pair) for pair in zip(CLEARANCE, np.multiply(at_home, 0.5), strict=True)]
+
+    def allowed(q: Array) -> bool:
+        low, near = clearance(q)
+        return bool(low > least[0] and near > least[1])
 
     return Workspace(
-        low=np.maximum(home - spread, limits[:, 0]),
-        high=np.minimum(home + spread, limits[:, 1]),
-        max_speed=np.array(cura6.max_speed(scene.spec.arm)),
-        max_acceleration=np.array(cura6.MAX_ACCELERATION),
+        low=np.maximum(facts.home - spread, limits[:, 0]),
+        high=np.minimum(facts.home + spread, limits[:, 1]),
+        max_speed=facts.max_speed,
+        max_acceleration=facts.max_acceleration,
         allowed=allowed,
     )
 
@@ -77,10 +94,8 @@ def scene_for(episode: Episode) -> Scene:
     )
     drive = scene.drive
     if episode.ideal_drive:
-        drive = replace(
-            drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None
-        )
-    elif episode.temperature is not None and drive.friction is not None:
+        return without_losses(scene)
+    if episode.temperature is not None and drive.friction is not None:
         drive = replace(drive, friction=replace(drive.friction, temperature=episode.temperature))
     return replace(scene, drive=drive)
 
@@ -104,7 +119,7 @@ class Simulation:
         self._checkers = [_known(c) for c in checkers]
         self.episode = episode
         self.scene = scene_for(episode)
-        self.nominal = nominal or cura6_drive(episode.arm)
+        self.nominal = nominal or self.scene.facts.nominal
         streams = np.random.SeedSequence(episode.seed).spawn(3)
         motion_rng, aim_rng, self._sensor_rng = map(np.random.default_rng, streams)
         self.motion = random_motion(
@@ -114,10 +129,11 @@ class Simulation:
             episode.speed,
             episode.timestep,
         )
-        self.robot = RobotNumbers.from_pin(pin_model(self.scene.arm_xml))
+        self.robot = RobotNumbers.from_pin(pin_model(self.scene.arm_model))
         self._feed_forward = inverse_dynamics(
             self.robot, self.motion.q, self.motion.qd, self.motion.qdd
         )
+        self._feed_forward = self._feed_forward + self._known_friction()
         self.loop = SimulationLoop(self.scene, self.nominal)
         self.loop.reset(self.motion.q[0])
         self.striking = Striking(self.scene, self.motion, self.loop, self._follow, aim_rng)
@@ -149,6 +165,15 @@ class Simulation:
             row = start
         parts.append(self._follow(row, len(payload)))
         return self._trace(_joined(parts), payload, injected)
+
+    def _known_friction(self) -> Array:
+        """What the servo adds to make up for the friction that it knows of [N m], (T, n)."""
+        friction, share = self.nominal.friction, self.scene.facts.compensation
+        if friction is None or share == 0:
+            return np.zeros_like(self.motion.qd)
+        qd = self.motion.qd
+        level = friction.coulomb * np.tanh(qd / FRICTION_SMOOTHING)
+        return np.asarray(share * (level + friction.viscous * qd))
 
     def _row(self, time: float) -> int:
         return round(time / self.episode.timestep)

@@ -20,6 +20,7 @@ from tauguard.models import (
     SceneSpec,
     compose,
     set_payload,
+    without_losses,
 )
 
 Array = NDArray[np.float64]
@@ -126,12 +127,7 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
     if arms == 2:
         scene = add_second_arm(scene, proxies)
     if settings.ideal_drive:
-        ideal = replace(
-            scene.drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None
-        )
-        scene = replace(scene, drive=ideal)
-        scene.model.dof_damping[scene.dof_adr] = 0.0
-        scene.model.dof_frictionloss[scene.dof_adr] = 0.0
+        scene = without_losses(scene)
     if settings.payload_g > 0:
         data = mujoco.MjData(scene.model)
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)

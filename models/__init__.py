@@ -13,7 +13,7 @@ from tauguard.models.nominal import add_payload, compiled, pin_model
 from tauguard.models.obstacles import BodyProxy, Clamp, Striker, Table
 from tauguard.models.payload import set_payload
 from tauguard.models.robot import Robot, RobotDrive
-from tauguard.models.scene import Scene, SceneSpec, compose, with_drive
+from tauguard.models.scene import Scene, SceneSpec, compose, with_drive, without_losses
 
 __all__ = [
     "BODY_REGIONS",
@@ -50,4 +50,5 @@ __all__ = [
     "set_payload",
     "standard_mass",
     "with_drive",
+    "without_losses",
 ]

@@ -264,3 +264,19 @@ def _add_label(spec: mujoco.MjSpec, link: str, name: str) -> None:
 def with_drive(scene: Scene, drive: Drive) -> Scene:
     """The same scene with other drives."""
     return replace(scene, drive=drive)
+
+
+def without_losses(scene: Scene) -> Scene:
+    """The same scene with ideal drives: no friction (the file's neither), ripple, lag or noise.
+
+    The scene's model is changed.
+    """
+    scene.model.dof_damping[scene.dof_adr] = 0.0
+    scene.model.dof_frictionloss[scene.dof_adr] = 0.0
+    none = np.zeros(len(scene.facts.joints))
+    known = replace(scene.facts.drive, friction=None)
+    facts = replace(scene.facts, drive=known, damping=none, friction_loss=none)
+    ideal = replace(
+        scene.drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None
+    )
+    return replace(scene, drive=ideal, facts=facts)
