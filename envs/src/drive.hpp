@@ -15,17 +15,17 @@ struct Joint {
   double nominal_gain = 1.0;   // N m/A, as the controller believes
   double current_limit = 0.0;  // A
   double gear = 1.0;
-  double coulomb = 0.0, breakaway = 0.0;         // N m, at the episode's temperature
-  double stribeck_velocity = 1.0;                // rad/s
-  double viscous = 0.0;                          // N m s/rad, at the episode's temperature
-  double bristle_stiffness = 0.0;                // N m/rad
-  double load = 0.0;                             // 1/(N m)
-  double kp = 0.0, kd = 0.0;                     // N m/rad, N m s/rad
+  double coulomb = 0.0, breakaway = 0.0;  // N m, at the episode's temperature
+  double stribeck_velocity = 1.0;         // rad/s
+  double viscous = 0.0;                   // N m s/rad, at the episode's temperature
+  double bristle_stiffness = 0.0;         // N m/rad
+  double load = 0.0;                      // 1/(N m)
+  double kp = 0.0, kd = 0.0;              // N m/rad, N m s/rad
   // Above the rated speed the torque along the motion falls, to nothing at the no-load speed, and
   // brakes beyond [rad/s]; a no-load speed of 0 leaves this out.
   double rated_speed = 0.0, no_load_speed = 0.0;
   double known_coulomb = 0.0, known_viscous = 0.0;  // what the servo makes up for; N m, N m s/rad
-  std::vector<double> cycles, amplitude, phase;  // per motor revolution; A; rad
+  std::vector<double> cycles, amplitude, phase;     // per motor revolution; A; rad
 };
 
 struct JointState {

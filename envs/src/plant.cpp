@@ -89,15 +89,32 @@ void bind_joint(nb::module_& m) {
              double viscous, double bristle_stiffness, double load, double kp, double kd,
              double rated_speed, double no_load_speed, double known_coulomb, double known_viscous,
              Numbers cycles, Numbers amplitude, Numbers phase) {
-            *new (self) Joint() = {qpos, dof, gain, nominal_gain, current_limit, gear, coulomb,
-                                   breakaway, stribeck_velocity, viscous, bristle_stiffness, load,
-                                   kp, kd, rated_speed, no_load_speed, known_coulomb, known_viscous,
-                                   std::move(cycles), std::move(amplitude), std::move(phase)};
+            *new (self) Joint() = {qpos,
+                                   dof,
+                                   gain,
+                                   nominal_gain,
+                                   current_limit,
+                                   gear,
+                                   coulomb,
+                                   breakaway,
+                                   stribeck_velocity,
+                                   viscous,
+                                   bristle_stiffness,
+                                   load,
+                                   kp,
+                                   kd,
+                                   rated_speed,
+                                   no_load_speed,
+                                   known_coulomb,
+                                   known_viscous,
+                                   std::move(cycles),
+                                   std::move(amplitude),
+                                   std::move(phase)};
           },
           nb::kw_only(), "qpos"_a, "dof"_a, "gain"_a, "nominal_gain"_a, "current_limit"_a, "gear"_a,
           "coulomb"_a, "breakaway"_a, "stribeck_velocity"_a, "viscous"_a, "bristle_stiffness"_a,
-          "load"_a, "kp"_a, "kd"_a, "rated_speed"_a, "no_load_speed"_a,
-          "known_coulomb"_a, "known_viscous"_a, "cycles"_a, "amplitude"_a, "phase"_a);
+          "load"_a, "kp"_a, "kd"_a, "rated_speed"_a, "no_load_speed"_a, "known_coulomb"_a,
+          "known_viscous"_a, "cycles"_a, "amplitude"_a, "phase"_a);
 }
 
 void bind_surroundings(nb::module_& m) {
