@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from tauguard.detectors.calibration.calibrate import Calibration, Priors, calibrate
     from tauguard.detectors.detector import Detector, FittedDetector, ScoreStream
     from tauguard.detectors.diagnosis.diagnosis import Diagnoser, Diagnosis, diagnose
-    from tauguard.detectors.diagnosis.diagnosis_metrics import diagnosis_figures, judge_diagnoses
+    from tauguard.detectors.diagnosis.diagnosis_metrics import diagnosis_figures, match_diagnoses
     from tauguard.detectors.dynamics.friction import FrictionModel
     from tauguard.detectors.dynamics.robot import (
         RobotNumbers,
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     )
     from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
     from tauguard.detectors.estimation.observer import MomentumObserver, observe
-    from tauguard.detectors.evaluation.events import Matching, find_alarms, judge, match
+    from tauguard.detectors.evaluation.events import Matching, find_alarms, match, match_detection
     from tauguard.detectors.evaluation.metrics import figures, poisson_rate
     from tauguard.detectors.methods.srq_svr import PlainSrqSvr, SrqSvr
     from tauguard.detectors.methods.svr_regressor import SrqSVR, srq_kernel
@@ -70,12 +70,12 @@ __all__ = [
     "guaranteed_threshold",
     "held_out",
     "inverse_dynamics",
-    "judge",
-    "judge_diagnoses",
     "load_model",
     "make_detector",
     "mass_matrix",
     "match",
+    "match_detection",
+    "match_diagnoses",
     "momentum_regressor",
     "momentum_terms",
     "observe",

@@ -50,7 +50,7 @@ def residual_rms(
         [N m], shape (n,).
     """
     estimator = Estimator(arm, rate, trace.dt, unknowns or Unknowns.none())
-    left = estimator.run(trace.t, trace.q, trace.qd, trace.current).left
+    left = estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
     level: Array = np.sqrt((left[moving_span(trace, stop=stop)] ** 2).mean(axis=0))
     return level
 
@@ -69,7 +69,7 @@ def explained(arm: ArmModel, traces: Sequence[Trace], rate: float = 20.0) -> tup
     left, torque = np.zeros(arm.robot.joints), np.full(arm.robot.joints, 1e-12)
     for trace in traces:
         estimator = Estimator(arm, rate, trace.dt, Unknowns.none())
-        residual = estimator.run(trace.t, trace.q, trace.qd, trace.current).left
+        residual = estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
         moves = moving_span(trace)[:, None] & (np.abs(trace.qd) > FAST_ENOUGH)
         left += (np.where(moves, residual, 0.0) ** 2).sum(axis=0)
         torque += (np.where(moves, trace.current * arm.drive_gain, 0.0) ** 2).sum(axis=0)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.calibration.consistent import solve_consistent
-from tauguard.detectors.calibration.recording import Recording, is_told, known_load, moving_span
+from tauguard.detectors.calibration.recording import Recording, is_known, known_load, moving_span
 from tauguard.detectors.calibration.regression import Filtered, System, filtered
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import (
@@ -107,7 +107,7 @@ def _deviations(
     heaviest = np.diagonal(mass_matrix(robot, poses), axis1=1, axis2=2).max(axis=0)
     loads, means = [], []
     for recording in recordings:
-        load, told = recording.load, is_told(recording)
+        load, told = recording.load, is_known(recording)
         loads += [1e-6 if load is not None else beliefs.payload]
         loads += [1e-6 if told else beliefs.moment] * 3
         nothing = load is not None and load.mass == 0
@@ -206,7 +206,7 @@ def _fit(
             data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
         if turn and friction.modelled:  # loads that were not told are known by now
             data = [
-                d if is_told(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)
+                d if is_known(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)
                 for d, r, load in zip(data, recordings, loads, strict=True)
             ]
         if turn == 0:

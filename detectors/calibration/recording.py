@@ -70,7 +70,7 @@ def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
     return rows
 
 
-def is_told(recording: Recording) -> bool:
+def is_known(recording: Recording) -> bool:
     """Whether mass and centre of what was carried are known."""
     load = recording.load
     return load is not None and (load.mass == 0 or load.centre is not None)

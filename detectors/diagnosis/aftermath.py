@@ -86,7 +86,7 @@ class AftermathOf:
         first, begin = min(first, max(at - 1, 0)), min(begin, max(at - 1, 0))
         columns = self._payload_columns(slice(begin, last + 1))[first - begin :]
         rows = np.arange(first, first + len(columns))
-        taken = known.residual[first] - known.left[first]
+        taken = known.residual[first] - known.unexplained[first]
         carried = (columns - columns[0]) @ known.unknowns[first, :PAYLOAD]
         return Aftermath(
             rows,

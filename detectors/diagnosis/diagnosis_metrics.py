@@ -29,7 +29,7 @@ def contact_at(trace: Trace, collision: Collision, time: float) -> tuple[Array, 
         ValueError: the trace has no truth.
     """
     if trace.truth is None:
-        raise ValueError("trace has no truth to judge a diagnosis by")
+        raise ValueError("trace has no truth to match a diagnosis with")
     first, last = np.searchsorted(trace.t, (time - LAG, time))
     forces = trace.truth.contact_vector[first : last + 1]
     if not forces.any():
@@ -62,7 +62,7 @@ class ContactErrors:
 
 
 @dataclass(frozen=True)
-class JudgedDiagnosis:
+class MatchedDiagnosis:
     """A diagnosis and the collision that it is about; None for a false alarm."""
 
     diagnosis: Diagnosis
@@ -70,7 +70,7 @@ class JudgedDiagnosis:
     errors: ContactErrors | None
 
 
-def judge_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[JudgedDiagnosis]:
+def match_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[MatchedDiagnosis]:
     """Each diagnosis with the collision that its alarm detected.
 
     The first alarm that starts in a collision's detection window is about it, later ones in the
@@ -80,23 +80,23 @@ def judge_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[Judged
         ValueError: the trace has no truth.
     """
     if trace.truth is None:
-        raise ValueError("trace has no truth to judge a diagnosis by")
-    judged, used = [], set()
+        raise ValueError("trace has no truth to match a diagnosis with")
+    matched, used = [], set()
     for diagnosis in diagnoses:
         start = diagnosis.alarm.start
         windows = [(c, detection_window(c)) for c in trace.truth.collisions]
         about = [c for c, (low, high) in windows if low <= start <= high]
         if not about:
-            judged.append(JudgedDiagnosis(diagnosis, None, None))
+            matched.append(MatchedDiagnosis(diagnosis, None, None))
         elif about[0].onset not in used:
             used.add(about[0].onset)
             truth = contact_at(trace, about[0], diagnosis.time)
             errors = ContactErrors.of(diagnosis.force, diagnosis.point, truth)
-            judged.append(JudgedDiagnosis(diagnosis, about[0], errors))
-    return judged
+            matched.append(MatchedDiagnosis(diagnosis, about[0], errors))
+    return matched
 
 
-def diagnosis_figures(judged: Iterable[JudgedDiagnosis]) -> dict[str, Any]:
+def diagnosis_figures(matched: Iterable[MatchedDiagnosis]) -> dict[str, Any]:
     """All figures over the given diagnoses.
 
     Returns:
@@ -105,7 +105,7 @@ def diagnosis_figures(judged: Iterable[JudgedDiagnosis]) -> dict[str, Any]:
         and ``point_cm`` (median, p95, n); ``called_payload`` over the collisions found and
         ``false_alarms_called_payload`` over the false alarms, rates again.
     """
-    several = list(judged)
+    several = list(matched)
     found = [(j.diagnosis, j.collision) for j in several if j.collision is not None]
     errors = [j.errors for j in several if j.errors is not None]
     false = [j.diagnosis for j in several if j.collision is None]

@@ -46,20 +46,20 @@ class Unknowns:
     fast: float = 1.0  #: time constant of the offset [s]
     clip: float = 3.0  #: an innovation z above this many standard deviations c counts c^2/z
     every: float = 0.01  #: time between two corrections [s]
-    doubt: float = 0.0
-    """What is left of joint j counts noise_j / sqrt(noise_j^2 + doubt s_j^2), with s_j the
-    deviation that the uncertain payload gives its residual: until fast motion has shown it, a
-    payload is a guess. 0: all of it counts; above 1 where a model's errors outlast ``every``."""
+    payload_weight: float = 0.0
+    """The unexplained residual of joint j is multiplied by noise_j / sqrt(noise_j^2 + w s_j^2) with
+    this weight w and s_j the standard deviation that the uncertain payload gives the residual. 0
+    leaves the residual as it is; above 1 where model errors last longer than ``every``."""
 
     def __post_init__(self) -> None:
-        """Check the doubt: ``ValueError``."""
-        if not (np.isfinite(self.doubt) and self.doubt >= 0):
-            raise ValueError(f"doubt {self.doubt}: expected a number, 0 or more")
+        """Check: ``ValueError``."""
+        if not (np.isfinite(self.payload_weight) and self.payload_weight >= 0):
+            raise ValueError(f"payload_weight {self.payload_weight}: expected a number, 0 or more")
 
     @classmethod
     def for_detection(cls) -> Unknowns:
-        """For detectors: errors of the model last some 0.2 s, twenty corrections long."""
-        return cls(doubt=20.0)
+        """For detectors: model errors last some 0.2 s, twenty corrections."""
+        return cls(payload_weight=20.0)
 
     @classmethod
     def none(cls) -> Unknowns:
@@ -112,7 +112,7 @@ class Estimate:
     """What the estimator says of a trace; rows are samples."""
 
     residual: Array  #: the observer's estimate of tau_ext [N m], shape (T, n)
-    left: Array  #: what the unknowns do not explain of it [N m], shape (T, n)
+    unexplained: Array  #: what the unknowns do not explain of it [N m], shape (T, n)
     acceleration: Array  #: velocity differentiated at 30/s [rad/s^2], shape (T, n)
     unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
 
@@ -152,7 +152,7 @@ class Estimator:
             [float(s) for s in arm.noise],
             self.unknowns.clip,
             max(1, round(self.unknowns.every / self.dt)),
-            self.unknowns.doubt,
+            self.unknowns.payload_weight,
             arm.sensors.fusion_gains(self.dt) if arm.sensors else [],
         )
 
@@ -170,11 +170,11 @@ class Estimator:
         """
         joints = self.arm.robot.joints
         q, qd, current = same_rows(joints, q=q, qd=qd, current=current)
-        residual, left, acceleration = (np.empty_like(q) for _ in range(3))
+        residual, unexplained, acceleration = (np.empty_like(q) for _ in range(3))
         tracked = np.empty((len(q) if keep else 0, PAYLOAD + PER_JOINT * joints))
         dt = intervals(t, len(q))
-        self._native.run(dt, q, qd, current, residual, left, acceleration, tracked)
-        return Estimate(residual, left, acceleration, tracked if keep else None)
+        self._native.run(dt, q, qd, current, residual, unexplained, acceleration, tracked)
+        return Estimate(residual, unexplained, acceleration, tracked if keep else None)
 
     def reset(self) -> None:
         """Forget: the next sample is the first."""
@@ -188,7 +188,7 @@ class Estimator:
         out: Array | Sequence[Array],
         dt: float | None = None,
     ) -> None:
-        """One sample into ``out``, three rows of shape (n,): residual, left, acceleration.
+        """One sample into ``out``, three rows of shape (n,): residual, unexplained, acceleration.
 
         Raises:
             ValueError: wrong shapes or numbers that are not finite; the state is as before.

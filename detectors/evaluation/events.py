@@ -80,7 +80,7 @@ def match(
     span: Interval,
     case_seconds: float = CASE_SECONDS,
 ) -> Matching:
-    """Judge the alarms of one trace.
+    """Match the alarms of one trace with its collisions.
 
     A non-collision case is a piece of ``case_seconds`` of collision-free time: every collision-free
     stretch is cut into such pieces from its beginning, and the rest at its end is in no case.
@@ -88,7 +88,7 @@ def match(
     Args:
         alarms: merged alarms, in order.
         collisions: the truth.
-        span: first and last time that is judged [s]; alarms and collisions that start before or
+        span: first and last time that counts [s]; alarms and collisions that start before or
             after it are left out (a detector settles in the beginning).
         case_seconds: length of a non-collision case [s].
     """
@@ -98,16 +98,16 @@ def match(
             f"span {span} s, case_seconds {case_seconds} s: expected begin <= end, > 0"
         )
     inside = [c for c in collisions if begin <= c.onset <= end]
-    judged = [a for a in alarms if begin <= a.start <= end]
+    inner = [a for a in alarms if begin <= a.start <= end]
     delays: list[float | None] = []
     useful: set[int] = set()
     for collision in inside:
         low, high = detection_window(collision)
-        hits = [k for k, a in enumerate(judged) if low <= a.start <= high]
+        hits = [k for k, a in enumerate(inner) if low <= a.start <= high]
         useful.update(hits)
         up_before = any(a.start < low <= a.end for a in alarms)
-        delays.append(None if up_before or not hits else judged[hits[0]].start - low)
-    false_alarms = tuple(a for k, a in enumerate(judged) if k not in useful)
+        delays.append(None if up_before or not hits else inner[hits[0]].start - low)
+    false_alarms = tuple(a for k, a in enumerate(inner) if k not in useful)
     free = collision_free([occupied(c) for c in collisions], span)
     cases = [
         (low + k * case_seconds, low + (k + 1) * case_seconds)
@@ -137,19 +137,19 @@ def collision_free(busy: Sequence[Interval], span: Interval) -> list[Interval]:
     return free
 
 
-def judge(detection: Detection, trace: Trace, skip: float = 0.0) -> Matching:
+def match_detection(detection: Detection, trace: Trace, skip: float = 0.0) -> Matching:
     """Match a detection with its trace's truth.
 
     Args:
         detection: of this trace.
         trace: with truth.
-        skip: seconds at the beginning that are not judged.
+        skip: seconds at the beginning that do not count.
 
     Raises:
         ValueError: the trace has no truth, or the detection belongs to another trace.
     """
     if trace.truth is None:
-        raise ValueError("trace has no truth to judge a detection by")
+        raise ValueError("trace has no truth to match a detection with")
     if detection.t.shape != trace.t.shape:
         raise ValueError(f"detection has {len(detection.t)} samples, the trace {len(trace.t)}")
     span = float(min(trace.t[0] + skip, trace.t[-1])), float(trace.t[-1])

@@ -68,7 +68,7 @@ class FrontEndSettings:
         bare = FrontEnd(self.gain, self.adapt, self.settle, joints, arm, dt)
         estimates = [bare.estimator().run(t.t, t.q, t.qd, t.current) for t in traces]
         tables = (
-            [e.left for e in estimates],
+            [e.unexplained for e in estimates],
             [t.qd for t in traces],
             [e.acceleration for e in estimates],
         )
@@ -128,7 +128,7 @@ class FrontEnd(Frozen):
     def scaled(self, trace: Trace, scaling: Scaling) -> Array:
         """The scaled residual of a trace, shape (T, joints)."""
         estimate = self.estimate(trace)
-        return scaling.rows(estimate.left, trace.qd, estimate.acceleration)
+        return scaling.rows(estimate.unexplained, trace.qd, estimate.acceleration)
 
     def stream(self, scaling: Scaling) -> ResidualStream:
         """The scaled residual sample by sample."""
@@ -141,14 +141,14 @@ class ResidualStream:
     def __init__(self, front: FrontEnd, scaling: Scaling) -> None:
         """Begin anew."""
         self._estimator, self._scaling = front.estimator(), scaling
-        self._residual, self._left, self._acceleration = np.zeros((3, 1, front.arm.robot.joints))
-        self._out = (self._residual[0], self._left[0], self._acceleration[0])
+        rows = np.zeros((3, 1, front.arm.robot.joints))
+        self._out, (_, self._unexplained, self._acceleration) = tuple(rows[:, 0]), rows
         self._row = np.zeros((1, len(scaling.joints)))
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> Array:
         """The scaled residual of this sample, shape (1, joints); valid until the next step."""
         self._estimator.step(q, qd, current, self._out, dt)
-        return self._scaling.rows(self._left, qd[None], self._acceleration, self._row)
+        return self._scaling.rows(self._unexplained, qd[None], self._acceleration, self._row)
 
 
 _FITTED: dict[FrontEndSettings, tuple[tuple[weakref.ref[object], ...], FrontEnd]] = {}

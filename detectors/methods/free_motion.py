@@ -240,7 +240,7 @@ class FreeMotionDetector:
         found = Estimator(model, gain, self.dt, self.settings.unknowns).run(t, q, qd, current)
         change = torque_change(model.robot, t, q, qd, gain)
         rest = resting(q, qd, self.dt)
-        return Judged(found.left, terms(qd, shaken, change, rest, self.dt), rest)
+        return Judged(found.unexplained, terms(qd, shaken, change, rest, self.dt), rest)
 
     @staticmethod
     def _jump(model: ArmModel) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,9 @@ from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels,
 from tauguard.traces.trace import Detection, Trace
 
 Array = NDArray[np.float64]
+
+#: A signal that is finite but absurd has left numbers in the detector that are not.
+LOST = "the score is not a number: a sample was out of any arm's range; begin anew without it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +68,10 @@ class CollisionAlarm(Frozen):
 
     def scores(self, trace: Trace) -> Array:
         """The normalised score, shape (T,)."""
-        return self.normalised(self.detector.scores(trace), trace)
+        score = self.detector.scores(trace)
+        if not np.isfinite(score).all():
+            raise ValueError(f"{LOST}; first at {trace.t[~np.isfinite(score)][0]:g} s")
+        return self.normalised(score, trace)
 
     def sustained(self, trace: Trace, score: Array | None = None) -> Array:
         """What the normalised score has reached throughout the last t_c, shape (T,).
@@ -155,6 +162,8 @@ class AlarmStream:
                 "every sample, or train one at this rate"
             )
         score = self._scores.step(q, qd, current, dt)
+        if not math.isfinite(score):
+            raise ValueError(LOST)
         self._time = 0.0 if first else self._time + interval
         if self._levels is not None:
             score = self._levels.one(score, self._speed.step(qd))

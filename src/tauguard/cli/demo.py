@@ -36,7 +36,7 @@ def command(
     from tauguard.cli.fitting import trained
     from tauguard.cli.summary import draw, text
     from tauguard.datasets import demo_plan, simulate_all
-    from tauguard.detectors import figures, judge
+    from tauguard.detectors import figures, match_detection
     from tauguard.envs import simulate
     from tauguard.report import write_json
 
@@ -49,7 +49,7 @@ def command(
     detections = [detector.detect(trace) for trace in judged]
     detected = time.perf_counter()
     matchings = [
-        judge(detection, trace, detector.settle)
+        match_detection(detection, trace, detector.settle)
         for detection, trace in zip(detections, judged, strict=True)
     ]
     summary: dict[str, Any] = {

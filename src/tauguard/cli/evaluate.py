@@ -22,7 +22,7 @@ def command(
     json: Path | None = None,
     figure: Path | None = None,
 ) -> None:
-    """Judge a trained detector on labelled recordings; they must not be those of its training.
+    """Evaluate a trained detector on labelled recordings; they must not be those of its training.
 
     Args:
         traces: folder of MCAP recordings with truth.
@@ -84,24 +84,24 @@ def judged_one_by_one(
     alarm: CollisionAlarm, recordings: Iterable[Trace]
 ) -> tuple[list[Matching], dict[str, Any]]:
     """Every recording judged, and the figures of what is said after its alarms; one in memory."""
-    from tauguard.detectors import diagnosis_figures, judge
+    from tauguard.detectors import diagnosis_figures, match_detection
 
     matchings, said = [], []
     for trace in recordings:
         found = alarm.detect(trace)
-        matchings.append(judge(found, trace, alarm.settle))
+        matchings.append(match_detection(found, trace, alarm.settle))
         said += explained(alarm, found, trace)
     return matchings, diagnosis_figures(said)
 
 
 def explained(alarm: CollisionAlarm, detection: Detection, trace: Trace) -> list[Any]:
     """What is said after the alarms of a recording that carries its arm's file, judged."""
-    from tauguard.detectors import diagnose, judge_diagnoses
+    from tauguard.detectors import diagnose, match_diagnoses
 
     arm = trace.attachments.get("arm.xml")
     if arm is None:
         return []
-    return list(judge_diagnoses(diagnose(alarm, trace, detection, surface(arm)), trace))
+    return list(match_diagnoses(diagnose(alarm, trace, detection, surface(arm)), trace))
 
 
 @functools.cache

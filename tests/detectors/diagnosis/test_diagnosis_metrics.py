@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tauguard.detectors import Diagnosis, diagnosis_figures, judge_diagnoses
+from tauguard.detectors import Diagnosis, diagnosis_figures, match_diagnoses
 from tauguard.detectors.diagnosis.classification import Signs
 from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors, contact_at
 from tauguard.traces import Alarm, Collision, Trace, Truth
@@ -34,7 +34,7 @@ def said(start, link, kind="impact"):
 def test_each_collision_is_judged_by_its_first_alarm_and_other_alarms_are_false():
     trace = make([collision(0.5, 3), collision(1.5, 4)])
     said_all = [said(0.505, 3), said(0.7, 6), said(1.2, 2, "payload"), said(1.51, 2), said(2.5, 1)]
-    judged = judge_diagnoses(said_all, trace)
+    judged = match_diagnoses(said_all, trace)
     assert [j.collision and j.collision.link for j in judged] == [3, None, 4, None]
     found = diagnosis_figures(judged)
     assert (found["link_right"]["value"], found["link_right"]["n"]) == (0.5, 2)
@@ -46,7 +46,7 @@ def test_each_collision_is_judged_by_its_first_alarm_and_other_alarms_are_false(
 
 
 def test_nothing_judged_is_none_and_not_a_crash():
-    found = diagnosis_figures(judge_diagnoses([], make([])))
+    found = diagnosis_figures(match_diagnoses([], make([])))
     assert found["link_right"]["value"] is None
     assert found["force_error_n"] == {"median": None, "p95": None, "n": 0}
 
@@ -62,4 +62,4 @@ def test_the_truth_behind_an_estimate_is_the_contact_just_before_it():
     assert ContactErrors.of(np.zeros(3), point, (force, point)).direction == 90.0
     bare = Trace(("j",), T, *(np.zeros((len(T), 1)),) * 3)
     with pytest.raises(ValueError, match="no truth"):
-        judge_diagnoses([], bare)
+        match_diagnoses([], bare)

@@ -109,7 +109,7 @@ def test_calibration_finds_the_friction_and_the_payloads(training, robot, drive_
         left = [
             Estimator(model, unknowns=None if limit else Unknowns.none())
             .run(t.t, t.q, t.qd, t.current)
-            .left[3000:]
+            .unexplained[3000:]
             for t in free
         ]
         rms = np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0))

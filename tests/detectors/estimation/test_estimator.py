@@ -12,7 +12,7 @@ def test_without_unknowns_and_friction_it_is_the_momentum_observer(training, rob
     run = plain.run(trace.t, trace.q, trace.qd, trace.current)
     truth = observe(robot, trace.t, trace.q, trace.qd, trace.current * drive_gain, 50.0)
     np.testing.assert_allclose(run.residual, truth, atol=1e-9)
-    np.testing.assert_array_equal(run.residual, run.left)
+    np.testing.assert_array_equal(run.residual, run.unexplained)
 
 
 def test_friction_is_taken_off_the_drive_torque(training, robot, drive_gain):
@@ -28,9 +28,9 @@ def test_friction_is_taken_off_the_drive_torque(training, robot, drive_gain):
     np.testing.assert_allclose(run.residual, truth, atol=1e-9)
 
 
-def test_online_equals_batch_bitwise(training, detector):
+def test_online_equals_batch_bitwise(training, alarm):
     trace = training[1]
-    estimator = Estimator(detector.arm)
+    estimator = Estimator(alarm.detector.arm)
     batch = estimator.run(trace.t, trace.q, trace.qd, trace.current, keep=True)
     estimator.reset()
     out = np.empty((3, 6))
@@ -38,42 +38,43 @@ def test_online_equals_batch_bitwise(training, detector):
         dt = trace.t[k] - trace.t[k - 1] if k else None
         estimator.step(trace.q[k], trace.qd[k], trace.current[k], out, dt)
         assert out[0].tobytes() == batch.residual[k].tobytes()
-        assert out[1].tobytes() == batch.left[k].tobytes()
+        assert out[1].tobytes() == batch.unexplained[k].tobytes()
         assert out[2].tobytes() == batch.acceleration[k].tobytes()
     np.testing.assert_array_equal(estimator.tracked(), batch.unknowns[1999])
 
 
-def test_a_payload_never_told_is_tracked(training, detector):
+def test_an_unknown_payload_is_tracked(training, alarm):
     heavy = next(t for t in training if t.truth.payload[-1] == 4.0 and not t.truth.collisions)
     empty = next(t for t in training if t.truth.payload[-1] == 0.0 and not t.truth.collisions)
     masses = []
+    estimator = Estimator(alarm.detector.arm)
     for trace in (empty, heavy):
-        run = Estimator(detector.arm).run(trace.t, trace.q, trace.qd, trace.current, keep=True)
+        run = estimator.run(trace.t, trace.q, trace.qd, trace.current, keep=True)
         masses.append(-np.median(run.unknowns[10000:, 0]))
     assert masses[1] - masses[0] == pytest.approx(4.0, abs=0.6)
 
 
-def test_doubt_makes_less_of_what_an_unknown_payload_could_explain(training, detector):
+def test_what_an_unknown_payload_could_explain_counts_less(training, alarm):
     trace = next(t for t in training if not t.truth.collisions)
     plain, careful = (
-        Estimator(detector.arm, unknowns=u).run(
+        Estimator(alarm.detector.arm, unknowns=u).run(
             trace.t, trace.q, trace.qd, trace.current, keep=True
         )
         for u in (Unknowns(), Unknowns.for_detection())
     )
     np.testing.assert_array_equal(plain.unknowns, careful.unknowns)
-    np.testing.assert_array_equal(np.sign(plain.left), np.sign(careful.left))
-    share = np.abs(careful.left) / np.maximum(np.abs(plain.left), 1e-12)
+    np.testing.assert_array_equal(np.sign(plain.unexplained), np.sign(careful.unexplained))
+    share = np.abs(careful.unexplained) / np.maximum(np.abs(plain.unexplained), 1e-12)
     assert share.max() <= 1
     # A payload's part is a guess in the beginning and known once the arm has moved.
     assert share[2:9, 1].max() < 0.2 < np.median(share[5000:, 1])
-    with pytest.raises(ValueError, match="doubt -1"):
-        Unknowns(doubt=-1)
+    with pytest.raises(ValueError, match="payload_weight -1"):
+        Unknowns(payload_weight=-1)
 
 
-def test_bad_samples_leave_the_state_alone(training, detector):
+def test_bad_samples_leave_the_state_alone(training, alarm):
     trace = training[0]
-    good, bad = Estimator(detector.arm), Estimator(detector.arm)
+    good, bad = Estimator(alarm.detector.arm), Estimator(alarm.detector.arm)
     a, b = np.empty((3, 6)), np.empty((3, 6))
     for k in range(30):
         sample = trace.q[k], trace.qd[k], trace.current[k]

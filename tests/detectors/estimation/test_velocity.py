@@ -85,7 +85,7 @@ def test_the_estimator_uses_it_online_as_in_batch(pendulum):
     for k in range(len(t)):
         fusing.step(q[k], qd[k], current[k], out, DT if k == 0 else t[k] - t[k - 1])
         rows.append(out[1].copy())
-    np.testing.assert_array_equal(np.array(rows), batch.left)
+    np.testing.assert_array_equal(np.array(rows), batch.unexplained)
     rough = [np.diff(e.residual[300:, 0]).std() for e in (batch, noisy)]
     assert rough[0] < 0.6 * rough[1]
 

@@ -10,14 +10,14 @@ from tauguard.detectors import (
     SrqSvr,
     figures,
     held_out,
-    judge,
+    match_detection,
     train,
 )
 from tauguard.detectors.features.front_end import FrontEndSettings
 
 
 def test_it_finds_collisions_on_unseen_motions_with_unknown_payloads(alarm, unseen):
-    matchings = [judge(alarm.detect(trace), trace, skip=3.0) for trace in unseen]
+    matchings = [match_detection(alarm.detect(trace), trace, skip=3.0) for trace in unseen]
     out = figures(matchings)
     assert out["headline"]["sensitivity"]["n"] >= 6
     assert out["headline"]["sensitivity"]["value"] >= 0.85
@@ -97,6 +97,20 @@ def test_bad_input(alarm, training, robot, arm, unseen):
         alarm.stream().step(unseen[0].q[:1], unseen[0].qd[0], unseen[0].current[0])
     with pytest.raises(ValueError, match="per_hour: 0"):
         train(SrqSvr(windows=300, mined=0), training, arm, 0)
+
+
+def test_absurd_samples_are_named_and_not_taken_for_silence(alarm, unseen):
+    from dataclasses import replace
+
+    trace = unseen[0]
+    qd = trace.qd.copy()
+    qd[4000] = 1e200
+    with pytest.raises(ValueError, match=r"score is not a number.*first at 4 s"):
+        alarm.detect(replace(trace, qd=qd))
+    stream = alarm.stream()
+    stream.step(trace.q[0], trace.qd[0], trace.current[0])
+    with pytest.raises(ValueError, match="score is not a number"):
+        [stream.step(trace.q[k], qd[4000], trace.current[k]) for k in range(1, 20)]
 
 
 def test_another_rate_is_refused_in_batch_and_online(alarm, unseen):

@@ -1,0 +1,47 @@
+"""Names use the words of the glossary, and none that a reader would have to guess."""
+
+import ast
+import re
+from pathlib import Path
+
+import tauguard.detectors as detectors
+
+ROOT = Path(__file__).resolve().parents[1]
+#: Words of our own that had no definition; the field has others.
+PRIVATE = {"zoo", "wary", "doubt", "promise", "promised", "levelled", "levelling", "told"}
+
+
+def glossary() -> set[str]:
+    text = (ROOT / "CONTRIBUTING.md").read_text().partition("## Glossary")[2]
+    rows = [line.rsplit("|", 2)[1] for line in text.splitlines() if line.startswith("| ")]
+    return {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+
+
+def test_every_public_name_of_detection_has_its_term():
+    assert glossary() == set(detectors.__all__)
+
+
+def test_every_public_name_is_there():
+    for name in detectors.__all__:
+        assert getattr(detectors, name) is not None
+
+
+def public_names(path: Path) -> set[str]:
+    """Modules, classes, functions, arguments and fields that a user can see."""
+    names = {path.stem}
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_"):
+            names.add(node.name)
+            if isinstance(node, ast.FunctionDef):
+                names |= {arg.arg for arg in node.args.args + node.args.kwonlyargs}
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            names.add(node.target.id)
+    return names
+
+
+def test_no_public_name_is_a_riddle():
+    for path in (ROOT / "detectors").rglob("*.py"):
+        for name in public_names(path):
+            words = re.findall(r"[A-Z]?[a-z]+", name)
+            private = {word.lower() for word in words} & PRIVATE
+            assert not private, f"{path.relative_to(ROOT)}: {name}"
