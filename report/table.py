@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -35,20 +36,20 @@ def table(
     columns that do not fit follow below, each part with the first columns again.
     """
     blocks: list[str] = []
-    start = 0
-    while start < len(rows):
-        kind = _kind(rows[start])
-        stop = start
-        while stop < len(rows) and _kind(rows[stop]) == kind:
-            stop += 1
-        study, keys = kind
-        parts = _block(keys, rows[start:stop], width)
+    for study, keys, own in blocks_of(rows):
         if study is not None:
             title = f"{study}: {notes[study]}" if study in notes else str(study)
             blocks.append("\n".join(textwrap.wrap(title, width)))
-        blocks += parts
-        start = stop
+        blocks += _block(keys, own, width)
     return "\n\n".join(blocks)
+
+
+def blocks_of(
+    rows: Sequence[Mapping[str, Any]],
+) -> Iterator[tuple[Any, list[str], list[Mapping[str, Any]]]]:
+    """Neighbours of one study with the same keys: the study, the keys without it, the rows."""
+    for (study, keys), own in itertools.groupby(rows, _kind):
+        yield study, keys, list(own)
 
 
 def _kind(row: Mapping[str, Any]) -> tuple[Any, list[str]]:

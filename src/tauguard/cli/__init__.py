@@ -23,6 +23,7 @@ COMMANDS = {
     "evaluate": "a detector's figures on labelled recordings",
     "watch": "an environment live in the rerun viewer",
     "replay": "turn an MCAP recording into an .rrd for the rerun viewer",
+    "report": "the studies and the hard cases in one HTML file",
     "hard-cases": "named cases with exact answers, for our kernels and anybody's",
     "bench": "run one study of speed against error: a table, a figure, --json",
 }

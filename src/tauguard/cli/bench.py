@@ -9,25 +9,31 @@ import tyro
 
 
 def command(
-    name: Annotated[str, tyro.conf.Positional],
+    name: Annotated[str, tyro.conf.Positional] = "all",
     /,
     quick: bool = False,
     seed: int = 0,
     detector: str | None = None,
     json: Path | None = None,
     figure: Path | None = None,
+    out: Path = Path("bench"),
 ) -> None:
-    """Run one study of speed against error and print its table.
+    """Run one study of speed against error and print its table, or all of them.
+
+    All of them leave their figures, charts and tables in a folder; those that it holds already are
+    not run again. `tauguard report` binds the folder into one page.
 
     Args:
-        name: the study: one of those `tauguard bench list` names.
+        name: the study: one of those `tauguard bench list` names, or `all`.
         quick: a shorter run, 60 s or less on 2 cores (the full one takes up to 30 minutes).
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
+        out: the folder of all studies.
     """
     from tauguard.benchmarks import STUDIES
+    from tauguard.benchmarks.collect import collect
     from tauguard.benchmarks.run import run_study
 
     if name == "list":
@@ -37,4 +43,10 @@ def command(
     if detector is not None and name != "detection":
         raise ValueError(f"--detector goes with the study detection, not with {name}")
     more = {} if detector is None else {"detector": detector}
+    if name == "all":
+        if json is not None or figure is not None:
+            raise ValueError("json, figure: of one study; all of them go to the folder --out")
+        if collect(out, STUDIES, quick=quick, seed=seed):
+            raise SystemExit(1)
+        return
     run_study(name, quick=quick, seed=seed, json_path=json, figure_path=figure, more=more)

@@ -1,0 +1,58 @@
+"""Every study, one process each, into a folder; what is there already is not run again."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from tauguard.report import versions
+
+
+def collect(folder: Path, names: Iterable[str], *, quick: bool, seed: int) -> dict[str, str]:
+    """Run the studies ``names`` that ``folder`` does not hold of these settings and versions.
+
+    Each leaves ``NAME.json``, ``NAME.png`` and ``NAME.log``. A study that fails does not stop the
+    others.
+
+    Returns:
+        Why, for each study that failed: the last line that it printed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    failed: dict[str, str] = {}
+    for name in names:
+        if _there(folder / f"{name}.json", quick, seed):
+            print(f"{name}: there already")
+            continue
+        start = time.monotonic()
+        reason = _study(folder, name, quick, seed)
+        if reason is not None:
+            failed[name] = reason
+        print(f"{name}: {reason or 'done'}, {time.monotonic() - start:.0f} s", flush=True)
+    return failed
+
+
+def _there(path: Path, quick: bool, seed: int) -> bool:
+    try:
+        found: dict[str, Any] = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return False
+    return (found["quick"], found["seed"], found["versions"]) == (quick, seed, versions())
+
+
+def _study(folder: Path, name: str, quick: bool, seed: int) -> str | None:
+    command = [sys.executable, "-m", "tauguard", "bench", name, "--seed", str(seed)]
+    command += ["--json", str(folder / f"{name}.json"), "--figure", str(folder / f"{name}.png")]
+    log = folder / f"{name}.log"
+    with log.open("w") as out:
+        done = subprocess.run(
+            [*command, *(["--quick"] if quick else [])], stdout=out, stderr=subprocess.STDOUT
+        )
+    if done.returncode == 0:
+        return None
+    lines = log.read_text().strip().splitlines()
+    return lines[-1] if lines else f"it ended with code {done.returncode}"

@@ -1,0 +1,73 @@
+"""Rows, text and pictures as one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from tauguard.report.table import blocks_of, cell
+
+STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem;
+       color: #1b1b1b; background: #fff; }
+h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
+nav a { margin-right: 1rem; white-space: nowrap; }
+.wide { overflow-x: auto; margin: 0.5rem 0 1.5rem; }
+table { border-collapse: collapse; font-size: 0.8rem; font-variant-numeric: tabular-nums; }
+th, td { border-bottom: 1px solid #ddd; padding: 0.2rem 0.6rem; text-align: left;
+         vertical-align: top; }
+th { background: #f4f4f4; }
+.figures { display: flex; flex-wrap: wrap; gap: 1rem; } .figures img { flex: 1 1 24rem; }
+img { max-width: 100%; height: auto; min-width: 0; } figure { margin: 1rem 0; }
+.no { background: #fde3d3; } .yes { background: #e1f0fa; } .note { color: #444; }
+summary { cursor: pointer; padding: 0.3rem 0; } code { background: #f4f4f4; }
+@media print { nav { display: none; } .wide { overflow: visible; } }
+"""
+
+
+def page(title: str, sections: Mapping[str, str]) -> str:
+    """A whole page: a heading and a link for each section, whose bodies are HTML."""
+    names = {name: f"s{i}" for i, name in enumerate(sections)}
+    links = " ".join(f'<a href="#{at}">{escape(name)}</a>' for name, at in names.items())
+    bodies = "\n".join(
+        f'<section><h2 id="{names[name]}">{escape(name)}</h2>\n{body}\n</section>'
+        for name, body in sections.items()
+    )
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head>\n"
+        f"<body><h1>{escape(title)}</h1>\n<nav>{links}</nav>\n{bodies}\n</body></html>\n"
+    )
+
+
+def tables(rows: Sequence[Mapping[str, Any]], notes: Mapping[str, str]) -> str:
+    """Rows as tables; neighbours of one study with the same columns share one."""
+    parts: list[str] = []
+    for study, keys, own in blocks_of(rows):
+        if study is not None:
+            note = f'<p class="note">{escape(notes[study])}</p>' if study in notes else ""
+            parts.append(f"<h4>{escape(str(study))}</h4>{note}")
+        head = "".join(f"<th>{escape(key.replace('_', ' '))}</th>" for key in keys)
+        lines = "".join(f"<tr>{''.join(_cell(row[key]) for key in keys)}</tr>" for row in own)
+        parts.append(f'<div class="wide"><table><tr>{head}</tr>{lines}</table></div>')
+    return "\n".join(parts)
+
+
+def _cell(value: object) -> str:
+    text = cell(value)
+    mark = f' class="{text}"' if text in ("yes", "no") else ""
+    return f"<td{mark}>{escape(text)}</td>"
+
+
+def picture(data: bytes, kind: str, text: str) -> str:
+    """A picture within the file: ``kind`` is ``png`` or ``svg+xml``, ``text`` what it shows."""
+    code = base64.b64encode(data).decode()
+    return f'<img alt="{escape(text)}" src="data:image/{kind};base64,{code}">'
+
+
+def folded(title: str, body: str) -> str:
+    """A part that opens at a click."""
+    return f"<details><summary>{escape(title)}</summary>\n{body}\n</details>"

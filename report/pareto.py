@@ -1,0 +1,93 @@
+"""Error against microseconds: one panel a question, peers as points of their own."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+#: Okabe and Ito's colours, which colour-blind readers tell apart: ours, peers.
+OURS, PEER = "#0072B2", "#D55E00"
+
+
+@dataclass(frozen=True)
+class Point:
+    """One method: its cost [us] and its error, in the panel's unit."""
+
+    label: str
+    cost: float
+    error: float
+    peer: bool = False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Points that answer one question, with the names of both axes."""
+
+    title: str
+    cost: str
+    error: str
+    points: tuple[Point, ...]
+
+
+def front(points: Sequence[Point]) -> list[Point]:
+    """The points that no other beats in cost and error both, by cost."""
+    best: list[Point] = []
+    for point in sorted(points, key=lambda p: (p.cost, p.error)):
+        if not best or point.error < best[-1].error:
+            best.append(point)
+    return best
+
+
+def svg(panel: Panel) -> str:
+    """The panel as an SVG picture, readable at half of a page's width."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    labels = list(dict.fromkeys(p.label for p in sorted(panel.points, key=lambda p: p.cost)))
+    with plt.rc_context({"font.size": 10, "svg.hashsalt": panel.title}):
+        height = 3.4 + 0.19 * ((len(labels) + 1) // 2)
+        figure, axes = plt.subplots(figsize=(5.6, height), layout="constrained")
+        _draw(panel, labels, figure, axes)
+        out = io.StringIO()
+        figure.savefig(out, format="svg", metadata={"Date": None})
+        plt.close(figure)
+    return out.getvalue()
+
+
+def _draw(panel: Panel, labels: list[str], figure: Any, axes: Any) -> None:
+    """Points numbered by label; the numbers are explained below the axes."""
+    for number, label in enumerate(labels, 1):
+        own = [point for point in panel.points if point.label == label]
+        colour, marker = (PEER, "s") if own[0].peer else (OURS, "o")
+        at = [p.cost for p in own], [p.error for p in own]
+        axes.plot(*at, marker, color=colour, ms=6, label=f"{number}  {label}")
+        for point in own:
+            shown = str(number)
+            place = (point.cost, point.error)
+            axes.annotate(shown, place, (4, 4), textcoords="offset points", fontsize=9)
+    best = front(panel.points)
+    axes.plot([p.cost for p in best], [p.error for p in best], "-", color="0.7", lw=1, zorder=0)
+    _scale(panel, axes)
+    axes.set(title=panel.title, xlabel=panel.cost, ylabel=panel.error)
+    axes.grid(alpha=0.25)
+    figure.legend(loc="outside lower left", ncols=2, fontsize=8, frameon=False)
+
+
+def _scale(panel: Panel, axes: Any) -> None:
+    """Logarithmic in cost, and in error where it spans more than a factor of 20."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axes.set_xscale("log")
+    costs = [p.cost for p in panel.points]
+    if max(costs) < 1e3 * min(costs):
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_locator(NullLocator())
+    above = [p.error for p in panel.points if p.error > 0]
+    if above and max(above) > 20 * min(above):
+        axes.set_yscale("symlog", linthresh=min(above))
+    axes.margins(x=0.1, y=0.12)

@@ -1,0 +1,38 @@
+"""``tauguard report``: the studies and the hard cases in one HTML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+def command(
+    out: Path,
+    quick: bool = False,
+    seed: int = 0,
+    study: tuple[str, ...] = (),
+) -> None:
+    """Run the studies that the folder does not hold yet, and bind them into `index.html`.
+
+    A run that was broken off goes on where it stopped. The page opens offline.
+
+    Args:
+        out: the folder of the page and of each study's figures (JSON) and chart.
+        quick: shorter runs, each 60 s or less on 2 cores (full ones take up to 30 minutes each).
+        seed: of every random input.
+        study: these studies only (default: all that `tauguard bench list` names).
+    """
+    from tauguard.benchmarks import STUDIES
+    from tauguard.benchmarks.bound import bind
+    from tauguard.benchmarks.collect import collect
+    from tauguard.hard_cases import adapters, load_cases, run
+    from tauguard.report import write_json
+
+    unknown = set(study) - STUDIES.keys()
+    if unknown:
+        raise ValueError(f"no study {min(unknown)!r}: there are {', '.join(STUDIES)}")
+    failed = collect(out, study or tuple(STUDIES), quick=quick, seed=seed)
+    cases = run(load_cases(), adapters())
+    write_json(out / "hard-cases.json", {"name": "hard-cases", "rows": cases})
+    print(f"report: {bind(out, cases, failed)}")
+    if failed:
+        raise SystemExit(1)
