@@ -48,10 +48,8 @@ def command(
     fitted = time.perf_counter()
     detections = [detector.detect(trace) for trace in judged]
     detected = time.perf_counter()
-    matchings = [
-        match_detection(detection, trace, detector.settle)
-        for detection, trace in zip(detections, judged, strict=True)
-    ]
+    pairs = zip(detections, judged, strict=True)
+    matchings = [match_detection(found, trace, detector.settle) for found, trace in pairs]
     summary: dict[str, Any] = {
         "seed": seed,
         "simulated_seconds": plan.seconds,
