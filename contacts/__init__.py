@@ -1,6 +1,5 @@
 """Plug-in contact checkers, their comparison and the guarded stepper."""
 
-from tauguard.contacts.balance import Balance
 from tauguard.contacts.checker import (
     KINDS,
     Checker,
@@ -14,7 +13,7 @@ from tauguard.contacts.checker import (
 )
 from tauguard.contacts.cloth_checker import ClothChecker
 from tauguard.contacts.compare import compare
-from tauguard.contacts.guarded import Cut, GuardedStepper, StepReport
+from tauguard.contacts.guard import Balance, Cut, GuardedStepper, StepReport
 from tauguard.contacts.mujoco_checker import MujocoChecker, contacts_of
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
 from tauguard.contacts.report import Disagreement, Outcome, Report, Score

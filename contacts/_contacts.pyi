@@ -39,27 +39,32 @@ class Scene:
         skip: NDArray[np.uint8],
     ) -> Answer: ...
 
-class Travel:
-    def bound(
+class Judge:
+    def __init__(
         self,
-        geom: Ints,
-        flex: Ints,
-        point: Doubles,
         xpos_t0: Doubles,
         xmat_t0: Doubles,
         xpos_t1: Doubles,
         xmat_t1: Doubles,
         x_t0: Doubles,
         x_t1: Doubles,
-    ) -> Doubles: ...
+    ) -> None: ...
+    def add(
+        self,
+        core: int,
+        size: Doubles,
+        radius: float,
+        body: int,
+        pos: Doubles,
+        mat: Doubles,
+        vertices: Doubles,
+    ) -> int: ...
+    def pair(self, a: Ints, b: Ints) -> None: ...
+    def flex_pair(
+        self, a: Ints, radii: Doubles, elements: Ints, skip: NDArray[np.uint8]
+    ) -> None: ...
+    def judge(self) -> tuple[Ints, Doubles] | None: ...
 
-def travel(
-    body_of_geom: Ints,
-    inner: Doubles,
-    vertex_begin: Ints,
-    vertex_end: Ints,
-    flex_radius: Doubles,
-) -> Travel: ...
 def carried(xpos: Doubles, xmat: Doubles, body: Ints, local: Doubles) -> Doubles: ...
 def all_finite(a: Doubles, b: Doubles, c: Doubles) -> bool: ...
 def simplices(

@@ -24,20 +24,6 @@ void grow(Box* box, const Box& other) {
     box->lo[k] = std::min(box->lo[k], other.lo[k]), box->hi[k] = std::max(box->hi[k], other.hi[k]);
 }
 
-// The box of both ends holds the chord of every point's way; the arc leaves its chord by at most
-// rho (1 - cos(angle / 2)). The last term covers rounding.
-Box swept(Mover m, const RigidMotion& motion) {
-  if (m.half_space()) return {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
-  m.move_to(0);
-  Box box = box_at(m);
-  m.move_to(1);
-  grow(&box, box_at(m));
-  const double sine = std::sin(0.25 * std::min(motion.speed, 2 * M_PI));
-  const double bulge = 2 * m.reach() * sine * sine + 64 * unit_roundoff * m.magnitude();
-  for (int k = 0; k < 3; ++k) box.lo[k] -= bulge, box.hi[k] += bulge;
-  return box;
-}
-
 Box widened(Box box, double by) {
   for (int k = 0; k < 3; ++k) box.lo[k] -= by, box.hi[k] += by;
   return box;
@@ -61,6 +47,20 @@ rigid::MovingBody vertices_of(const Shape& s, const Frame& in_body, const RigidM
 }
 
 }  // namespace
+
+// The box of both ends holds the chord of every point's way; the arc leaves its chord by at most
+// rho (1 - cos(angle / 2)). The last term covers rounding.
+Box swept(Mover m, const RigidMotion& motion) {
+  if (m.half_space()) return {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+  m.move_to(0);
+  Box box = box_at(m);
+  m.move_to(1);
+  grow(&box, box_at(m));
+  const double sine = std::sin(0.25 * std::min(motion.speed, 2 * M_PI));
+  const double bulge = 2 * m.reach() * sine * sine + 64 * unit_roundoff * m.magnitude();
+  for (int k = 0; k < 3; ++k) box.lo[k] -= bulge, box.hi[k] += bulge;
+  return box;
+}
 
 void Geoms::add(Shape shape, int body, const Frame& in_body) {
   shapes_.push_back(std::move(shape));

@@ -29,6 +29,9 @@ struct Box {
   }
 };
 
+// Holds all of a moving shape on its way; `motion` is its body's.
+Box swept(Mover mover, const RigidMotion& motion);
+
 // Where the bodies are at both ends of a step: (nbody, 3) and (nbody, 9).
 struct Poses {
   const double *xpos_t0, *xmat_t0, *xpos_t1, *xmat_t1;

@@ -31,7 +31,7 @@ class Stiffening:
         An explicit contact pair is changed itself; otherwise a flex, or the first geom, gets the
         parameters and a priority above its partner's, so that no averaging softens them.
         """
-        place = self._place(pair)
+        place = self.place(pair)
         users = self._users.setdefault(place, set())
         if pair in users:
             return False
@@ -41,14 +41,14 @@ class Stiffening:
             self._saved[place] = tuple(np.copy(array[place[1]]) for array in arrays)
         arrays[0][place[1]], arrays[1][place[1]] = SOLREF, SOLIMP
         if len(arrays) > 2:
-            others = [p for p in pair if p != place]
+            others = [p for p in pair if p != place] or [place]
             highest = max(int(self._arrays(p)[2][p[1]]) for p in others)
             arrays[2][place[1]] = max(int(arrays[2][place[1]]), highest + 1)
         return True
 
     def restore(self, pair: Pair) -> bool:
         """Undo :meth:`stiffen`, once no other pair needs it; False if it was not stiff."""
-        place = self._place(pair)
+        place = self.place(pair)
         users = self._users.get(place, set())
         if pair not in users:
             return False
@@ -62,7 +62,7 @@ class Stiffening:
         """Those that are stiff."""
         return tuple(sorted({pair for users in self._users.values() for pair in users}))
 
-    def _place(self, pair: Pair) -> tuple[str, int]:
+    def place(self, pair: Pair) -> tuple[str, int]:
         """What carries the parameters of a contact of ``pair``."""
         if pair[0][0] == pair[1][0] == "geom":
             wanted = {pair[0][1], pair[1][1]}

@@ -32,11 +32,7 @@ class Books:
     def __init__(self, model: Any) -> None:
         """Make an MjData to work in, and the sheets' stiffness."""
         self._model, self._data = model, mujoco.MjData(model)
-        self._sheets = [
-            _Sheet(model, f)
-            for f in range(model.nflex)
-            if model.flex_dim[f] == 2 and model.flex_stiffnessadr[f] >= 0
-        ]
+        self._sheets = sheets_of(model)
 
     def between(self, first: Array, last: Array) -> Balance:
         """From one state (``mjSTATE_INTEGRATION``) to another."""
@@ -55,7 +51,16 @@ class Books:
         return np.array([*data.energy, stretch]), data.subtree_linvel[0] * model.body_subtreemass[0]
 
 
-class _Sheet:
+def sheets_of(model: Any) -> list[Sheet]:
+    """The elastic flexes of triangles."""
+    return [
+        Sheet(model, flex)
+        for flex in range(model.nflex)
+        if model.flex_dim[flex] == 2 and model.flex_stiffnessadr[flex] >= 0
+    ]
+
+
+class Sheet:
     """The stretch energy of one elastic flex of triangles (St. Venant-Kirchhoff).
 
     With e the change of an element's three squared edge lengths and K its stiffness, the energy is

@@ -1,0 +1,103 @@
+"""Cores: a geom less a layer of its surface, as shapes of the native kernel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
+
+from tauguard.contacts._contacts import Judge
+from tauguard.contacts.geoms import CONVEX, hull_vertices
+
+Array = NDArray[np.float64]
+_NONE = np.zeros((0, 3))
+
+
+class Cores:
+    """The shapes of a model's geoms at any depth, added to a native judge once each.
+
+    Args:
+        model: MjModel.
+        kinds: The kind of each geom.
+        judge: Where shapes are added.
+    """
+
+    def __init__(self, model: Any, kinds: list[str], judge: Judge) -> None:
+        """Nothing is added yet."""
+        self._model, self._kinds, self._judge = model, kinds, judge
+        self._hulls: dict[int, _Hull] = {}
+        self._added: dict[tuple[int, float], int] = {}
+
+    def radius(self, geom: int) -> float:
+        """Half the least thickness of a geom [m]; 0 for a plane, whose surface is its middle."""
+        size, kind = self._model.geom_size[geom], self._kinds[geom]
+        if kind in ("sphere", "capsule"):
+            return float(size[0])
+        if kind == "cylinder":
+            return float(size[:2].min())
+        if kind in ("box", "ellipsoid"):
+            return float(size.min())
+        return self._hull(geom).radius if kind == "mesh" else 0.0
+
+    def add(self, geom: int, layer: float) -> int:
+        """The number of the shape of ``geom`` less a layer [m], which is below its radius."""
+        key = (geom, layer)
+        if key not in self._added:
+            self._added[key] = self._new(geom, layer)
+        return self._added[key]
+
+    def _new(self, geom: int, layer: float) -> int:
+        model, kind = self._model, self._kinds[geom]
+        size, vertices, radius = model.geom_size[geom].astype(np.float64), _NONE, 0.0
+        if kind in ("sphere", "capsule"):
+            radius = float(size[0]) - layer
+        elif kind in ("cylinder", "box", "ellipsoid"):
+            size = np.maximum(size - layer, 0)
+        elif kind == "mesh":
+            vertices = self._hull(geom).core(layer)
+        mat = np.zeros(9)
+        mujoco.mju_quat2Mat(mat, model.geom_quat[geom])
+        place = np.ascontiguousarray(model.geom_pos[geom], dtype=np.float64)
+        body = int(model.geom_bodyid[geom])
+        return self._judge.add(CONVEX.index(kind), size, radius, body, place, mat, vertices)
+
+    def _hull(self, geom: int) -> _Hull:
+        mesh = int(self._model.geom_dataid[geom])
+        if mesh not in self._hulls:
+            self._hulls[mesh] = _Hull(hull_vertices(self._model, geom))
+        return self._hulls[mesh]
+
+
+class _Hull:
+    """The convex hull of points, and its faces pushed inwards."""
+
+    def __init__(self, vertices: Array) -> None:
+        self._vertices = np.ascontiguousarray(vertices)
+        self._faces, self._middle, self.radius = None, vertices.mean(axis=0), 0.0
+        try:
+            self._faces = np.unique(ConvexHull(vertices).equations, axis=0)
+        except QhullError:
+            return  # flat: its middle is all of it
+        # The largest ball inside: n.x + r <= -d for every face.
+        n, d = self._faces[:, :3], self._faces[:, 3]
+        ball = linprog([0, 0, 0, -1], np.c_[n, np.ones(len(n))], -d, bounds=[(None, None)] * 4)
+        if ball.success and ball.x[3] > 0:
+            self._middle, self.radius = ball.x[:3], float(ball.x[3])
+
+    def core(self, layer: float) -> Array:
+        """Its corners, less a layer."""
+        if layer <= 0 or self._faces is None:
+            return self._vertices
+        moved = self._faces + np.array([0, 0, 0, layer])
+        try:
+            corners = HalfspaceIntersection(moved, self._middle).intersections
+            corners = corners[np.isfinite(corners).all(axis=1)]
+        except QhullError:
+            corners = _NONE
+        if len(corners) < 4:  # a hair of a body: towards the middle instead
+            corners = self._middle + (1 - layer / self.radius) * (self._vertices - self._middle)
+        return np.ascontiguousarray(np.unique(corners, axis=0))

@@ -1,0 +1,43 @@
+"""What one guarded step did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from tauguard.contacts.guard.balance import Balance
+from tauguard.contacts.guard.stiffening import Pair
+
+
+@dataclass(frozen=True)
+class Cut:
+    """One attempt at a piece of a step that was taken back."""
+
+    time: float  #: at which the next attempt ends [s]
+    pair: Pair  #: that would have passed through, become too deep, or parted unseen
+    stiffened: bool  #: its contact parameters were changed, until the pair parts
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What one guarded step did."""
+
+    steps: int  #: calls of ``mj_step``, those that were taken back included
+    contacts: int  #: that MuJoCo listed, the most in any piece of the step that stood
+    cuts: tuple[Cut, ...] = ()
+    restored: tuple[Pair, ...] = ()  #: pairs whose contact parameters are as before again
+    passed: tuple[Pair, ...] = ()  #: pairs that may have passed through: the work ran out
+    arrested: tuple[Pair, ...] = ()  #: pairs that were held by stopping one against the other
+    energy_added: float = 0.0  #: that constraint forces gave in redone pieces, without losses [J]
+    _balance: Callable[[], Balance] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether the work ran out: a pair may have passed through (:attr:`passed` names it)."""
+        return bool(self.passed)
+
+    @cached_property
+    def balance(self) -> Balance | None:
+        """Energy and momentum from the first redone piece on; ``None`` if the step stood whole."""
+        return None if self._balance is None else self._balance()

@@ -1,0 +1,185 @@
+#include "verdict.hpp"
+
+#include <algorithm>
+
+namespace tauguard::contacts {
+namespace {
+
+// Shapes nearer than this share of their size count as touching at the start: above what
+// first_touch takes for a touch, so that a pair that parts from there is no hit.
+constexpr double resting = 1e-9;
+
+bool apart_at(Mover& a, Mover& b, double t) {
+  a.move_to(t), b.move_to(t);
+  const double radii = a.radius() + b.radius();
+  const double needed = radii + resting * (a.reach() + b.reach() + radii) +
+                        512 * unit_roundoff * (a.magnitude() + b.magnitude());
+  const Distance d = distance_of(a, b, Vec{}, needed);
+  return !d.overlap && d.lower > needed;
+}
+
+// `a_at(level)` and `b_at(level)` make the movers of a pair.
+template <class MakeA, class MakeB>
+bool judged(const MakeA& a_at, const MakeB& b_at, int levels, Hit* hit) {
+  const auto touch = [&](int level) {
+    Mover a = a_at(level), b = b_at(level);
+    return first_touch(a, b, 0, 0);
+  };
+  const auto apart = [&](int level, double t) {
+    Mover a = a_at(level), b = b_at(level);
+    return apart_at(a, b, t);
+  };
+  int start = 0;
+  while (start < levels && !apart(start, 0)) ++start;
+  if (start == levels) return false;
+  const int trigger = std::max(start, 1);
+  hit->level = hit->deepest = trigger;
+  if (!touch(trigger).hit) {
+    if (start > 0 || !apart(0, 1)) return false;
+    const Touch brushed = touch(0);
+    if (!brushed.hit) return false;
+    hit->level = hit->deepest = 0, hit->t = brushed.t;
+    return true;
+  }
+  for (int level = levels - 1; level > trigger && hit->deepest == trigger; --level)
+    if (touch(level).hit) hit->deepest = level;
+  hit->t = start == 0 ? touch(0).t : 0;
+  if (!(hit->t >= 0)) hit->t = 0;
+  return true;
+}
+
+void include(Box* box, const double* p) {
+  for (int k = 0; k < 3; ++k)
+    box->lo[k] = std::min(box->lo[k], p[k]), box->hi[k] = std::max(box->hi[k], p[k]);
+}
+
+}  // namespace
+
+int Verdict::add(Shape shape, int body, const Frame& in_body) {
+  const double extent = norm(in_body.at) + shape.extent() + shape.radius;
+  entries_.push_back({std::move(shape), in_body, body, extent});
+  whole_.push_back(0), boxes_.emplace_back();
+  if (std::find(bodies_.begin(), bodies_.end(), body) == bodies_.end()) bodies_.push_back(body);
+  const std::size_t n = static_cast<std::size_t>(body) + 1;
+  if (n > still_.size()) {
+    const double none[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    still_.resize(n, 0), fresh_.resize(n, 1), last_.resize(24 * n, NAN);
+    motions_.resize(n, RigidMotion(none, none + 1, none + 1));
+  }
+  return static_cast<int>(entries_.size()) - 1;
+}
+
+void Verdict::add_pair(std::vector<std::int32_t> a, std::vector<std::int32_t> b) {
+  whole_[a[0]] = whole_[b[0]] = 1;
+  pairs_.push_back({std::move(a), std::move(b)});
+}
+
+void Verdict::add_flex_pair(std::vector<std::int32_t> a, std::vector<double> radii,
+                            std::vector<std::int32_t> elements, int corners,
+                            std::vector<std::uint8_t> skip) {
+  whole_[a[0]] = 1;
+  flex_pairs_.push_back(
+      {std::move(a), std::move(radii), std::move(elements), corners, std::move(skip)});
+}
+
+Mover Verdict::mover(int entry, const Vec& origin) const {
+  const Entry& e = entries_[entry];
+  return Mover(e.shape, e.in_body, motions_[e.body], origin);
+}
+
+// How far a point of the shape goes at most against something that goes by `drift`.
+double Verdict::travel(int entry, const Vec& drift) const {
+  const Entry& e = entries_[entry];
+  const RigidMotion& motion = motions_[e.body];
+  if (motion.speed == 0) return norm(motion.linear - drift);
+  return norm(motion.linear - drift) + motion.speed * e.extent;
+}
+
+void Verdict::update(const Poses& p) {
+  for (const int b : bodies_) {
+    double now[24];
+    std::copy_n(p.xpos_t0 + 3 * b, 3, now), std::copy_n(p.xmat_t0 + 9 * b, 9, now + 3);
+    std::copy_n(p.xpos_t1 + 3 * b, 3, now + 12), std::copy_n(p.xmat_t1 + 9 * b, 9, now + 15);
+    fresh_[b] = !std::equal(now, now + 24, last_.begin() + 24 * b);
+    if (!fresh_[b]) continue;
+    std::copy_n(now, 24, last_.begin() + 24 * b);
+    still_[b] = std::equal(now, now + 12, now + 12);
+    motions_[b] = motion_between(now, now + 3, now + 12, now + 15);
+  }
+  for (std::size_t e = 0; e < entries_.size(); ++e)
+    if (whole_[e] && fresh_[entries_[e].body])
+      boxes_[e] = swept(mover(static_cast<int>(e), Vec{}), motions_[entries_[e].body]);
+}
+
+void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) const {
+  const Pair& pair = pairs_[number];
+  const Entry &a = entries_[pair.a[0]], &b = entries_[pair.b[0]];
+  if (still_[a.body] && still_[b.body]) return;
+  if (!boxes_[pair.a[0]].meets(boxes_[pair.b[0]])) return;
+  const bool plane = a.shape.core == Core::half_space;
+  const Vec origin = motions_[plane ? b.body : a.body].x0;
+  Hit hit{static_cast<std::int32_t>(number), -1, 0, 0, 0, 0};
+  if (!judged([&](int level) { return mover(pair.a[level], origin); },
+              [&](int level) { return mover(pair.b[level], origin); },
+              static_cast<int>(pair.a.size()), &hit))
+    return;
+  const Vec drift = plane ? Vec{} : motions_[a.body].linear;
+  hit.way = travel(pair.b[0], drift);
+  if (!plane && motions_[a.body].speed != 0) hit.way += travel(pair.a[0], drift);
+  hits->push_back(hit);
+}
+
+void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x_t1,
+                         std::vector<Hit>* hits) const {
+  constexpr std::size_t block = 32;  // simplices that share a box
+  const FlexPair& pair = flex_pairs_[number];
+  const std::size_t count = pair.skip.size();
+  const Box& near = boxes_[pair.a[0]];
+  const double radius = pair.radii[0] * (1 + 4 * unit_roundoff);
+  const auto box_of = [&](std::size_t begin, std::size_t end) {
+    Box box{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (std::size_t i = pair.corners * begin; i < pair.corners * end; ++i)
+      include(&box, x_t0 + 3 * pair.elements[i]), include(&box, x_t1 + 3 * pair.elements[i]);
+    for (int k = 0; k < 3; ++k) box.lo[k] -= radius, box.hi[k] += radius;
+    return box;
+  };
+  const Vec& drift = motions_[entries_[pair.a[0]].body].linear;
+  for (std::size_t begin = 0; begin < count; begin += block) {
+    const std::size_t end = std::min(count, begin + block);
+    if (!near.meets(box_of(begin, end))) continue;
+    for (std::size_t e = begin; e < end; ++e) {
+      if (pair.skip[e] || !near.meets(box_of(e, e + 1))) continue;
+      const double *start[4], *stop[4];
+      for (int i = 0; i < pair.corners; ++i) {
+        start[i] = x_t0 + 3 * pair.elements[pair.corners * e + i];
+        stop[i] = x_t1 + 3 * pair.elements[pair.corners * e + i];
+      }
+      const Vec origin = {start[0][0], start[0][1], start[0][2]};
+      Hit hit{static_cast<std::int32_t>(pairs_.size() + number), static_cast<std::int32_t>(e), 0, 0,
+              0, 0};
+      if (!judged([&](int level) { return mover(pair.a[level], origin); },
+                  [&](int level) {
+                    return Mover(start, stop, pair.corners, pair.radii[level], origin);
+                  },
+                  static_cast<int>(pair.a.size()), &hit))
+        continue;
+      for (int i = 0; i < pair.corners; ++i) {
+        Vec d{};
+        for (int k = 0; k < 3; ++k) d[k] = stop[i][k] - start[i][k] - drift[k];
+        hit.way = std::max(hit.way, norm(d));
+      }
+      const RigidMotion& motion = motions_[entries_[pair.a[0]].body];
+      if (motion.speed != 0) hit.way += travel(pair.a[0], drift);
+      hits->push_back(hit);
+    }
+  }
+}
+
+void Verdict::judge(const Poses& poses, const double* x_t0, const double* x_t1,
+                    std::vector<Hit>* hits) {
+  update(poses);
+  for (std::size_t i = 0; i < pairs_.size(); ++i) judge_rigid(i, hits);
+  for (std::size_t i = 0; i < flex_pairs_.size(); ++i) judge_flex(i, x_t0, x_t1, hits);
+}
+
+}  // namespace tauguard::contacts

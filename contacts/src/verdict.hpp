@@ -1,0 +1,71 @@
+// Which pairs pass through one another on their way through a step, by their cores.
+//
+// A core is a shape less a layer of its surface. Levels go from the whole shape (0) to all but its
+// middle (the last). A pair is judged at the shallowest level at which it is apart at the start; as
+// long as its last cores never meet, no place of one partner has passed through the other.
+#pragma once
+
+#include "sweep.hpp"
+
+namespace tauguard::contacts {
+
+struct Hit {
+  std::int32_t pair;     // rigid pairs first, then those with a flex
+  std::int32_t feature;  // the simplex of a flex, -1 for geoms
+  std::int32_t level;    // 0: touched and parted again; otherwise the level whose cores met
+  std::int32_t deepest;  // the deepest level that met
+  double t;              // when the whole shapes first touch; 0 where they do at the start
+  double way;            // no two points of the pair approach each other further in the step [m]
+};
+
+class Verdict {
+ public:
+  // A shape at some level, on a body; returns its number.
+  int add(Shape shape, int body, const Frame& in_body);
+  // Both partners' shapes, level by level.
+  void add_pair(std::vector<std::int32_t> a, std::vector<std::int32_t> b);
+  // A geom's shapes and the flex's radii, level by level; elements (count, corners) of all vertices.
+  // `skip` leaves out a simplex.
+  void add_flex_pair(std::vector<std::int32_t> a, std::vector<double> radii,
+                     std::vector<std::int32_t> elements, int corners,
+                     std::vector<std::uint8_t> skip);
+
+  void judge(const Poses& poses, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
+
+ private:
+  struct Entry {
+    Shape shape;
+    Frame in_body;
+    int body;
+    double extent;
+  };
+  struct Pair {
+    std::vector<std::int32_t> a, b;
+  };
+  struct FlexPair {
+    std::vector<std::int32_t> a;
+    std::vector<double> radii;
+    std::vector<std::int32_t> elements;
+    int corners;
+    std::vector<std::uint8_t> skip;
+  };
+
+  void update(const Poses& poses);
+  Mover mover(int entry, const Vec& origin) const;
+  double travel(int entry, const Vec& drift) const;
+  void judge_rigid(std::size_t pair, std::vector<Hit>* hits) const;
+  void judge_flex(std::size_t pair, const double* x_t0, const double* x_t1,
+                  std::vector<Hit>* hits) const;
+
+  std::vector<Entry> entries_;
+  std::vector<Pair> pairs_;
+  std::vector<FlexPair> flex_pairs_;
+  std::vector<char> whole_;           // by entry: a shape of level 0
+  std::vector<Box> boxes_;            // by entry, of those
+  std::vector<int> bodies_;           // those that have shapes
+  std::vector<RigidMotion> motions_;  // by body
+  std::vector<char> still_, fresh_;   // by body: unmoved in this step; boxes are out of date
+  std::vector<double> last_;          // 24 a body: both poses of the last step
+};
+
+}  // namespace tauguard::contacts
