@@ -70,13 +70,6 @@ class Account:
         """Enter a piece that stands."""
         self.balance += entry.gain
 
-    def clamp(self, entry: Entry) -> Entry:
-        """Slow all motion down until the account is not overdrawn; the piece as it is then."""
-        excess = self.balance + entry.gain - self.allowed
-        left = max(entry.kinetic - excess, 0.0)
-        self._data.qvel *= np.sqrt(left / entry.kinetic) if entry.kinetic > 0 else 0.0
-        return Entry(entry.gain - (entry.kinetic - left), left)
-
     def _kinetic(self, data: Any, velocity: Array) -> float:
         momentum = np.zeros_like(velocity)
         mujoco.mj_mulM(self._model, data, momentum, velocity)

@@ -26,6 +26,11 @@ BEYOND = 1e-5
 ROOM = 1.25
 #: A step is never cut into pieces shorter than this share of it.
 SMALLEST = 1 / 64
+#: Shares of its way that a piece with too much energy goes instead, until it has not.
+SLOWER = (0.7, 0.5, 0.25, 0.1, 0.0)
+#: Pieces down to this share of a step are tried before a pair that is held may become deeper
+#: without passing through: of two geoms, and of a flex.
+DEEPER = {"geom": 1 / 8, "flex": 1 / 2}
 
 
 class GuardedStepper:
@@ -213,18 +218,14 @@ class _Redo:
             hits = g._unseen(g._verdict.judge())
             entry = g._entry(velocity, length)
             rich = g._account.overdrawn(entry)
-            if not hits and not rich:
+            fails = not self._bearable(hits, length)
+            if not fails and not rich:
                 break
-            last = length <= SMALLEST * self.whole or self.steps >= g.most
-            if last:
-                if hits and self._last_resort(qpos, length, hits):
-                    entry = g._entry(velocity, length)
-                    rich = g._account.overdrawn(entry)
-                if rich:
-                    entry = g._account.clamp(entry)
+            if length <= SMALLEST * self.whole or self.steps >= g.most:
+                entry = self._last_resort(velocity, qpos, length, hits, entry)
                 break
             self._restore(g._saved)
-            if hits:
+            if fails:
                 length = self._shorter(hits, length, self.whole)
             elif self.push:
                 self.push = 0.0
@@ -235,19 +236,40 @@ class _Redo:
         self.added += max(entry.gain, 0.0)
         return length
 
-    def _last_resort(self, qpos: Array, length: float, hits: list[Hit]) -> bool:
-        """A piece as short as may be still has hits: what passes through is stopped, if any."""
-        g = self.g
-        through = [hit for hit in hits if hit.passed]
-        if not through:
-            return False
+    def _bearable(self, hits: list[Hit], length: float) -> bool:
+        """Whether nothing passes through, and nothing becomes deeper but what shorter may not help."""
+        return all(
+            not hit.passed
+            and hit.pair in self.speeds
+            and length <= DEEPER[hit.pair[0][0]] * self.whole * 1.000001
+            for hit in hits
+        )
+
+    def _last_resort(
+        self, velocity: Array, qpos: Array, length: float, hits: list[Hit], entry: Entry
+    ) -> Entry:
+        """The work ran out: stop what passes through, then slow down what has too much energy."""
+        g, data = self.g, self.g.data
 
         def judge() -> list[Hit]:
             return [hit for hit in g._verdict.judge() if hit.passed]
 
-        stopped = arrest(g.model, g.data, qpos, length, through, judge)
-        self.arrested |= {hit.pair for hit in stopped}
-        return True
+        through = [hit for hit in hits if hit.passed]
+        if through:
+            stopped = arrest(g.model, data, qpos, length, through, judge)
+            self.arrested |= {hit.pair for hit in stopped}
+            entry = g._entry(velocity, length)
+        whole = data.qvel.copy()
+        for share in SLOWER:
+            if not g._account.overdrawn(entry):
+                break
+            self.arrested |= set(self.speeds)
+            data.qpos[:], data.qvel[:] = qpos, share * whole
+            mujoco.mj_integratePos(g.model, data.qpos, data.qvel, length)
+            if share and judge():
+                continue
+            entry = g._entry(velocity, length)
+        return entry
 
     def _shorter(self, hits: list[Hit], length: float, whole: float) -> float:
         """How long the next attempt is; its pairs join those that are held."""

@@ -155,8 +155,12 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
         stop[i] = x_t1 + 3 * pair.elements[pair.corners * e + i];
       }
       const Vec origin = {start[0][0], start[0][1], start[0][2]};
-      Hit hit{static_cast<std::int32_t>(pairs_.size() + number), static_cast<std::int32_t>(e), 0, 0,
-              0, 0};
+      Hit hit{static_cast<std::int32_t>(pairs_.size() + number),
+              static_cast<std::int32_t>(e),
+              0,
+              0,
+              0,
+              0};
       if (!judged([&](int level) { return mover(pair.a[level], origin); },
                   [&](int level) {
                     return Mover(start, stop, pair.corners, pair.radii[level], origin);

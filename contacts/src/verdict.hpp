@@ -24,8 +24,8 @@ class Verdict {
   int add(Shape shape, int body, const Frame& in_body);
   // Both partners' shapes, level by level.
   void add_pair(std::vector<std::int32_t> a, std::vector<std::int32_t> b);
-  // A geom's shapes and the flex's radii, level by level; elements (count, corners) of all vertices.
-  // `skip` leaves out a simplex.
+  // A geom's shapes and the flex's radii, level by level; elements (count, corners) of all
+  // vertices. `skip` leaves out a simplex.
   void add_flex_pair(std::vector<std::int32_t> a, std::vector<double> radii,
                      std::vector<std::int32_t> elements, int corners,
                      std::vector<std::uint8_t> skip);
