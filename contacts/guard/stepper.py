@@ -26,6 +26,10 @@ BEYOND = 1e-5
 ROOM = 1.25
 #: A step is never cut into pieces shorter than this share of it.
 SMALLEST = 1 / 64
+#: Energy is watched for so many steps that stand after one that was redone.
+WATCHED = 10
+#: Whether pairs have parted is looked up at least every so many steps.
+LOOK = 16
 #: Shares of its way that a piece with too much energy goes instead, until it has not.
 SLOWER = (0.7, 0.5, 0.25, 0.1, 0.0)
 #: Pieces down to this share of a step are tried before a pair that is held may become deeper
@@ -80,6 +84,8 @@ class GuardedStepper:
         self._books: Books | None = None
         self._stiff = stiff
         self._guarded: set[Pair] = set()
+        self._quiet: dict[int, StepReport] = {}  # by the number of contacts
+        self._watched, self._since, self._contacts = 0, 0, 0
         self._kind = mujoco.mjtState.mjSTATE_INTEGRATION
         self._first = np.empty(mujoco.mj_stateSize(model, self._kind))
         self._saved = np.empty_like(self._first)
@@ -98,24 +104,39 @@ class GuardedStepper:
         """Advance by one ``model.opt.timestep``."""
         model, data = self.model, self.data
         mujoco.mj_getState(model, data, self._first, self._kind)
-        velocity = data.qvel.copy() if self._guarded else None
+        velocity = data.qvel.copy() if self._watched else None
         mujoco.mj_step(model, data)
         hits = self._verdict.judge()
         if hits:
             hits = self._unseen(hits)
         if not hits and (velocity is None or self._solvent(velocity)):
-            return StepReport(1, data.ncon, restored=self._release())
+            return self._stands(data.ncon)
+        self._watched = WATCHED
         whole = float(model.opt.timestep)
         try:
-            return _Redo(self, hits, whole).run()
+            return _Redo(self, hits, whole).run(fresh=velocity is None)
         finally:
             self.model.opt.timestep = whole
+
+    def _stands(self, contacts: int) -> StepReport:
+        """The report of a step that stands as ``mj_step`` made it."""
+        self._watched = max(self._watched - 1, 0)
+        if self._guarded:
+            self._since += 1
+            if contacts != self._contacts or self._since >= LOOK:
+                self._since, self._contacts = 0, contacts
+                if restored := self._release():
+                    return StepReport(1, contacts, restored=restored)
+        if contacts not in self._quiet:
+            self._quiet[contacts] = StepReport(1, contacts)
+        return self._quiet[contacts]
 
     def close(self) -> None:
         """Put every contact parameter back."""
         for pair in self._stiffening.pairs():
             self._stiffening.restore(pair)
         self._guarded.clear()
+        self._watched = 0
 
     def __enter__(self) -> GuardedStepper:
         """Itself; leaving the block calls :meth:`close`."""
@@ -177,11 +198,12 @@ class _Redo:
         self.hits = hits
         self.end = 0.0
 
-    def run(self) -> StepReport:
+    def run(self, fresh: bool) -> StepReport:
+        """The whole step; ``fresh`` opens the account of energy anew."""
         g, data = self.g, self.g.data
-        first, guarded = g._first.copy(), bool(g._guarded)
+        first = g._first.copy()
         self._restore(first)
-        if not guarded:
+        if fresh:
             g._account.open(data.qvel)
         self.end = data.time + self.whole
         if not self.hits:  # only pushed out too fast
