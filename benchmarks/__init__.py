@@ -50,7 +50,7 @@ STUDIES: dict[str, Study] = {
     ),
     "guard": Study(
         "contacts.guard",
-        "fast things against thin ones: fixed steps, MuJoCo's modes, guarded steps",
+        "guarded steps on scenes drawn at random, beside MuJoCo's modes and fine fixed steps",
     ),
     "cloth": Study(
         "cloth.study",

@@ -1,231 +1,194 @@
-"""Fast things against thin things: fixed steps, MuJoCo's own modes and guarded steps.
+"""Guarded steps on scenes drawn at random, beside plain steps, MuJoCo's own modes and fine steps.
 
-Studies. ``ball_cloth``: a ball (10 mm, 20 g) into stretched cloth, over starts spread across one
-step's travel and three impact points. ``sphere_plate``: a rigid sphere into a plate of 2 mm.
-``overhead``: what the guard costs where there is nothing to guard. *Generated*: MuJoCo made a
-contact. *Held*: the ball's centre never crossed the mid-surface. The error is that of the ball's
-velocity some time after the touch, against the same contacts at a fine fixed step; a run that is
-not held is in it, for it is the answer that a user would get.
+Studies. ``thrown``: families of scenes (:mod:`tauguard.benchmarks.contacts.thrown`), each scene at
+one timestep of 1, 2 or 5 ms, by every method, judged from outside
+(:mod:`tauguard.benchmarks.contacts.referee`). ``overhead``: scenes in which nothing is to be
+guarded. Which scenes come follows from the seed alone; none of them was chosen.
 """
 
 from __future__ import annotations
 
-import itertools
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.benchmarks.contacts.referee import Referee
+from tauguard.benchmarks.contacts.thrown import FAMILIES, Thrown, scenes
 from tauguard.benchmarks.harness import answer
-from tauguard.contacts import GuardedStepper, State
-from tauguard.contacts.scenes import ContactScene, arm_boxes, arm_cloth, ball_cloth, sphere_plate
-from tauguard.contacts.scenes.impacts import BALL_GAP, IMPACT_POINTS
+from tauguard.contacts import GuardedStepper
+from tauguard.contacts.scenes import arm_boxes, arm_cloth
+from tauguard.contacts.scenes.impacts import MODES
 from tauguard.report import Row, rate
 
-Array = NDArray[np.float64]
+#: Scenes of each family: in a full run, in a quick one.
+COUNTS = {
+    "plate": (550, 40),
+    "pair": (150, 20),
+    "chain": (100, 8),
+    "cup": (50, 3),
+    "arm": (100, 8),
+    "cloth": (100, 5),
+}
+#: Fixed steps that are tried, with stiff contacts [s].
+FIXED = (5e-4, 2e-4, 1e-4, 5e-5)
+#: With steps below that the referee looks only this often [s].
+LOOK = 2e-4
+#: Energy that counts as added: more than this times what there was.
+ADDED = 1.02
 
-#: How long after the first touch a run goes on [s].
-AFTER = 0.04
-#: Timesteps that guarded steps and MuJoCo's own modes are tried at [s].
-COARSE = (1e-3, 2e-3, 5e-3)
-#: Finer fixed steps, down to what holds everything [s].
-FINE = (5e-4, 2e-4, 1e-4, 5e-5)
-#: Pieces of a step while a guarded pair touches, in the rows ``guarded, fine``.
-PIECES = 10
-#: Starts across one step's travel: in a quick run, with fine steps, otherwise.
-OFFSETS_QUICK, OFFSETS_FINE, OFFSETS = 3, 4, 20
-
-_IMPACT = (
-    "generated: MuJoCo made a contact; held: the body never crossed the mid-surface. rebound: its "
-    "velocity after the touch [m/s], reference: at a fine fixed step, error: between both. saves: "
-    "time of the largest fixed step that holds every run (first_fixed_ms), over ms."
-)
-#: What the columns of each table mean.
 NOTES = {
-    "ball_cloth": _IMPACT,
-    "sphere_plate": _IMPACT,
+    "thrown": "held: nothing passed through; silent: it did, and no report said so; arrested: "
+    "scenes in which partners had to be stopped; energy: the most there was over what there was at "
+    f"first, and in how many scenes it was above {ADDED:g}; over plain: time over that of plain "
+    "steps of the same scene; over fixed: over that of the largest fixed step (stiff contacts) from "
+    "which on all finer ones hold that scene, fixed_ms; unknown: scenes that none holds; error: of "
+    "the first body's velocity at the end against the finest fixed step, over its speed. Medians.",
     "overhead": "a step of a scene in which nothing is to be guarded, plain and guarded.",
 }
 
 
 @dataclass(frozen=True)
-class Run:
-    """One run of one scene."""
+class Played:
+    """One scene by one method."""
 
-    generated: bool
     held: bool
-    velocity: float  #: of the ball along z at the end [m/s]
-    steps: int  #: calls of ``mj_step``, taken-back ones included
-    ms: float  #: of the processor, for stepping alone
-    cuts: int
-    exhausted: int
+    exhausted: bool
+    arrested: bool
+    energy: float
+    seconds: float  #: of the processor, for stepping alone
+    calls: float  #: of ``mj_step`` for each step
+    velocity: Any  #: of the first body at the end, shape (3,) [m/s]
 
 
 def run(quick: bool, seed: int) -> list[Row]:
-    """Rows of the three studies; nothing is random, so ``seed`` changes nothing."""
+    """Rows of both studies and of what they say together."""
     rows: list[Row] = []
-    speeds = (5.0, 50.0) if quick else (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-    for stiff, speed in itertools.product((True,) if quick else (True, False), speeds):
-        rows += _cloth_rows(speed, stiff, quick)
-    for stiff, speed in itertools.product((True, False), speeds):
-        rows += _plate_rows(speed, stiff, quick)
-    rows += _overhead_rows(quick)
-    return rows + _summary(rows)
+    for family, counts in COUNTS.items():
+        rows += _family_rows(family, seed, counts[quick], quick)
+    return [*rows, *_overhead_rows(quick), *_summary(rows)]
 
 
-def _cloth_rows(speed: float, stiff: bool, quick: bool) -> list[Row]:
-    """One row a method and timestep."""
-    fine = FINE[:2] if quick else FINE
-    methods = [("plain", dt) for dt in (*fine, *COARSE)]
-    methods += [(mode, dt) for mode in ("speculative", "ipc") for dt in COARSE if not quick]
-    methods += [(mode, dt) for mode in ("guarded", "guarded, fine") for dt in COARSE]
-    reference = np.mean(
-        [
-            one(
-                ball_cloth(speed, 0.0, impact, stiff), speed, 0.0, 5e-5 if quick else 1e-5, 0
-            ).velocity
-            for impact in IMPACT_POINTS
-        ]
-    )
-
-    def scenes(mode: str, timestep: float) -> Iterable[tuple[ContactScene, float]]:
-        count = OFFSETS_QUICK if quick else OFFSETS_FINE if timestep < COARSE[0] else OFFSETS
-        for impact, k in itertools.product(IMPACT_POINTS, range(count)):
-            offset = k / count * speed * timestep
-            yield ball_cloth(speed, offset, impact, stiff, mode), offset
-
-    return with_ratio(
-        [
-            _row("ball_cloth", method, dt, speed, stiff, float(reference), scenes)
-            for method, dt in methods
-        ]
-    )
-
-
-def _plate_rows(speed: float, stiff: bool, quick: bool) -> list[Row]:
-    methods = [("plain", dt) for dt in (1e-4, *COARSE)]
-    methods += [(mode, dt) for mode in ("speculative", "guarded") for dt in COARSE]
-    fine = one(sphere_plate(speed, 0.0, stiff), speed, 0.0, 1e-5, 0).velocity
-
-    def scenes(mode: str, timestep: float) -> Iterable[tuple[ContactScene, float]]:
-        for k in range(OFFSETS_QUICK if quick else OFFSETS):
-            offset = k / (OFFSETS_QUICK if quick else OFFSETS) * speed * timestep
-            yield sphere_plate(speed, offset, stiff, mode), offset
-
-    return with_ratio(
-        [_row("sphere_plate", m, dt, speed, stiff, fine, scenes) for m, dt in methods]
-    )
-
-
-def _row(
-    study: str,
-    method: str,
-    timestep: float,
-    speed: float,
-    stiff: bool,
-    reference: float,
-    scenes: Callable[[str, float], Iterable[tuple[ContactScene, float]]],
-) -> Row:
-    guarded = {"guarded": 1, "guarded, fine": PIECES}.get(method, 0)
-    runs = [
-        one(scene, speed, offset, timestep, guarded)
-        for scene, offset in scenes("plain" if guarded else method, timestep)
-    ]
-    off = [abs(r.velocity - reference) for r in runs]
-    return {
-        "study": study,
-        "contact": "stiff" if stiff else "soft",
-        "speed": speed,
-        "method": method,
-        "timestep_ms": 1e3 * timestep,
-        "generated": rate(sum(r.generated for r in runs), len(runs)),
-        "held": rate(sum(r.held for r in runs), len(runs)),
-        "rebound": float(np.median([r.velocity for r in runs])),
-        "reference": reference,
-        "error": {"median": float(np.median(off)), "low": min(off), "high": max(off)},
-        "steps": float(np.mean([r.steps for r in runs])),
-        "cuts": float(np.mean([r.cuts for r in runs])),
-        "exhausted": sum(r.exhausted for r in runs),
-        "ms": {
-            "median": float(np.median([r.ms for r in runs])),
-            "low": min(r.ms for r in runs),
-            "high": max(r.ms for r in runs),
-        },
-    }
-
-
-def with_ratio(rows: list[Row]) -> list[Row]:
-    """Adds the cost of the largest fixed step that holds every run, over each row's own cost."""
-    holding = [r for r in rows if r["method"] == "plain" and r["held"]["value"] == 1.0]
-    # A coarse step may hold by luck where a finer one does not: all finer ones must hold, too.
-    plain = sorted((r for r in rows if r["method"] == "plain"), key=lambda r: r["timestep_ms"])
-    first = None
-    for row in plain:
-        if row not in holding:
-            break
-        first = row
-    for row in rows:
-        row["first_fixed_ms"] = None if first is None else first["timestep_ms"]
-        row["first_fixed_error"] = None if first is None else first["error"]["median"]
-        row["saves"] = None if first is None else first["ms"]["median"] / row["ms"]["median"]
-    return rows
-
-
-def one(scene: ContactScene, speed: float, offset: float, timestep: float, guarded: int) -> Run:
-    """Run ``scene`` until :data:`AFTER` the touch; ``guarded``: pieces, 0 for plain steps."""
-    model, data = scene.start(timestep)
-    scratch = mujoco.MjData(model)
-    guard = GuardedStepper(model, data, fine=guarded) if guarded else None
-    dof = int(model.body("ball").dofadr[0]) + 2
-    at = side(model, data, scratch)
-    generated, held, steps, cuts, exhausted, spent = False, True, 0, 0, 0, 0.0
-    for _ in range(round(((BALL_GAP + offset) / speed + AFTER) / timestep)):
+def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> Played:
+    """Play ``scene`` to its end: ``method`` is ``guarded`` or one of MuJoCo's modes."""
+    model, data = scene.start(timestep, MODES.get(method, 0), stiff)
+    referee = Referee(scene, model, data)
+    guard = GuardedStepper(model, data) if method == "guarded" else None
+    every = max(1, round(LOOK / timestep))
+    steps = round(scene.seconds / timestep) + 1
+    spent, calls, exhausted, arrested = 0.0, 0, False, False
+    for k in range(steps):
         begin = time.process_time()
         if guard is None:
             mujoco.mj_step(model, data)
-            steps, generated = steps + 1, generated or data.ncon > 0
         else:
             report = guard.step()
-            steps, cuts = steps + report.steps, cuts + len(report.cuts)
-            exhausted += report.exhausted
-            generated |= report.contacts > 0
+            calls += report.steps
+            exhausted |= report.exhausted
+            arrested |= bool(report.arrested)
         spent += time.process_time() - begin
-        held &= side(model, data, scratch) == at
-    velocity = float(data.qvel[dof])
-    return Run(generated, generated and held, velocity, steps, 1e3 * spent, cuts, exhausted)
+        if k % every == every - 1 or k == steps - 1:
+            referee.look()
+            if not np.isfinite(referee.energy):
+                break
+    name = next(iter(scene.skeletons))
+    velocity = np.zeros(6)
+    mujoco.mj_objectVelocity(
+        model, data, mujoco.mjtObj.mjOBJ_GEOM, model.geom(name).id, velocity, 0
+    )
+    held = not referee.passed
+    return Played(held, exhausted, arrested, referee.energy, spent, calls / steps, velocity[3:])
 
 
-def side(model: Any, data: Any, scratch: Any) -> float:
-    """On which side of the cloth, or of the plate's middle, the ball's centre is: 1 or -1.
+def _family_rows(family: str, seed: int, count: int, quick: bool) -> list[Row]:
+    """One row a method and timestep, and one of all timesteps."""
+    methods = ["plain", "speculative", "guarded"]
+    if family == "cloth":
+        methods.insert(2, "ipc")
+    fixed = FIXED[1:3] if quick else FIXED
+    table: list[dict[str, Any]] = []
+    for scene in scenes(family, seed, count):
+        runs = {method: played(scene, method, scene.timestep) for method in methods}
+        fine = [played(scene, "plain", step, stiff=True) for step in fixed]
+        table.append({"scene": scene, "runs": runs, "fine": fine, "first": _first(fine)})
+    groups = [*sorted({line["scene"].timestep for line in table}), None]
+    return [
+        _row(family, seed, method, group, fixed, table) for method in methods for group in groups
+    ]
 
-    For a cloth the sign of the solid angle under which the centre sees it: within (0, 4 pi) on one
-    side, also in a pocket, and less by 4 pi on the other.
-    """
-    if not model.nflex:
-        return float(np.sign(data.qpos[2]))
-    state = State.of(model, data, scratch)
-    corners = state.flexvert_xpos[model.flex_elem.reshape(-1, 3)]
-    a, b, c = (corners - state.geom_xpos[model.geom("ball").id]).transpose(1, 2, 0)
-    la, lb, lc = (np.sqrt((x * x).sum(axis=0)) for x in (a, b, c))
-    top = (a * np.cross(b, c, axis=0)).sum(axis=0)
-    bottom = la * lb * lc + (a * b).sum(0) * lc + (b * c).sum(0) * la + (c * a).sum(0) * lb
-    return float(np.sign(np.arctan2(top, bottom).sum()))
+
+def _first(fine: list[Played]) -> int | None:
+    """Which of the fixed steps, coarse to fine, is the first that holds with all finer ones."""
+    first = None
+    for k in reversed(range(len(fine))):
+        if not fine[k].held:
+            break
+        first = k
+    return first
+
+
+def _row(
+    family: str,
+    seed: int,
+    method: str,
+    timestep: float | None,
+    fixed: tuple[float, ...],
+    table: list[dict[str, Any]],
+) -> Row:
+    lines = [t for t in table if timestep is None or t["scene"].timestep == timestep]
+    runs: list[Played] = [t["runs"][method] for t in lines]
+    known = [t for t in lines if t["first"] is not None]
+    lost = [r for r in runs if not r.held]
+    return {
+        "study": "thrown",
+        "family": family,
+        "seeds": f"{seed}, 0 to {len(table) - 1}",
+        "method": method,
+        "timestep_ms": "all" if timestep is None else 1e3 * timestep,
+        "held": rate(len(runs) - len(lost), len(runs)),
+        "silent": sum(not r.exhausted for r in lost),
+        "exhausted": sum(r.exhausted for r in runs),
+        "arrested": sum(r.arrested for r in runs),
+        "energy": max(r.energy for r in runs),
+        "energy_above": sum(r.energy > ADDED for r in runs),
+        "calls": float(np.mean([r.calls for r in runs])) if method == "guarded" else None,
+        "over_plain": _median(
+            t["runs"][method].seconds / t["runs"]["plain"].seconds for t in lines
+        ),
+        "over_fixed": _median(
+            t["runs"][method].seconds / t["fine"][t["first"]].seconds for t in known
+        ),
+        "fixed_ms": _median(1e3 * fixed[t["first"]] for t in known),
+        "unknown": len(lines) - len(known),
+        "error": _median(_error(t, method) for t in known if np.any(t["scene"].qvel)),
+    }
+
+
+def _error(line: dict[str, Any], method: str) -> float:
+    """Of the first body's velocity at the end, over the fastest speed at the start."""
+    speed = float(np.abs(line["scene"].qvel[:3]).max())
+    apart = line["runs"][method].velocity - line["fine"][-1].velocity
+    return float(np.linalg.norm(apart)) / max(speed, 1e-9)
+
+
+def _median(values: Iterable[float]) -> float | None:
+    found = list(values)
+    return float(np.median(found)) if found else None
 
 
 def _overhead_rows(quick: bool) -> list[Row]:
     """Plain and guarded steps of scenes in which nothing is missed, in turn."""
     rows = []
     steps = 60 if quick else 300
-    scenes = [arm_boxes(), arm_cloth(15)] if quick else [arm_boxes(), arm_cloth(15), arm_cloth(40)]
-    for scene in scenes:
+    for scene in (
+        [arm_boxes(), arm_cloth(15)] if quick else [arm_boxes(), arm_cloth(15), arm_cloth(40)]
+    ):
         times: dict[str, list[float]] = {"plain": [], "guarded": []}
         states = {name: scene.start(2e-3) for name in times}
-        guard = GuardedStepper(*states["guarded"])
-        cuts = 0
+        guard, cuts = GuardedStepper(*states["guarded"]), 0
         for _ in range(steps):
             for name, (model, data) in states.items():
                 if scene.control is not None:
@@ -251,7 +214,7 @@ def _overhead_rows(quick: bool) -> list[Row]:
                 "dofs": scene.model.nv,
                 "plain_us": plain,
                 "guarded_us": guarded,
-                "overhead_share": guarded["median"] / plain["median"] - 1,
+                "over_plain": guarded["median"] / plain["median"],
                 "cuts": cuts,
                 "same_bits": same,
             }
@@ -261,74 +224,54 @@ def _overhead_rows(quick: bool) -> list[Row]:
 
 def _summary(rows: list[Row]) -> list[Row]:
     """What the tables say, beside what was asked."""
-    balls = [r for r in rows if r["study"] == "ball_cloth"]
+    whole = [r for r in rows if r["timestep_ms"] == "all"]
     out = []
-    for study in ("ball_cloth", "sphere_plate"):
-        mine = [r for r in rows if r["study"] == study and r["method"].startswith("guarded")]
-        for kind in ("generated", "held"):
-            text, share = _share(mine, kind)
-            out.append(answer(f"{study}, guarded at 1, 2, 5 ms: {kind}", "1.000", text, share == 1))
-        cut_short = sum(r["exhausted"] for r in mine)
-        out.append(answer(f"{study}, guarded: out of work", "0", str(cut_short), cut_short == 0))
-    for contact, mode in itertools.product(("stiff", "soft"), ("plain", "speculative", "ipc")):
-        mine = [r for r in balls if (r["contact"], r["method"]) == (contact, mode)]
-        mine = [r for r in mine if r["timestep_ms"] >= 1e3 * COARSE[0]]
-        if mine:
-            text = ", ".join(f"{kind} {_share(mine, kind)[0]}" for kind in ("generated", "held"))
-            out.append(answer(f"ball_cloth, {mode}, {contact} contact", "share", text))
-    for method, timestep in itertools.product(("guarded", "guarded, fine"), COARSE):
-        mine = [r for r in balls if (r["contact"], r["method"]) == ("stiff", method)]
-        mine = [r for r in mine if r["timestep_ms"] == 1e3 * timestep and r["saves"] is not None]
-        text = "; ".join(
-            f"{r['speed']:g} m/s {r['saves']:.2g} x, {r['error']['median'] / r['speed']:.2g}"
-            f" ({r['first_fixed_ms']:g} ms: {r['first_fixed_error'] / r['speed']:.2g})"
-            for r in mine
+    for method in ("plain", "speculative", "ipc", "guarded"):
+        mine = [r for r in whole if r["method"] == method]
+        runs = sum(r["held"]["n"] for r in mine)
+        held = sum(round(r["held"]["value"] * r["held"]["n"]) for r in mine)
+        guarded = method == "guarded"
+        met = held == runs if guarded else None
+        out.append(
+            answer(f"{method}: held", "all" if guarded else "figure", f"{held} of {runs}", met)
         )
-        what = f"{method}, {1e3 * timestep:g} ms: cheaper than the first fixed step, error / speed"
-        out.append(answer(what, "figure", text))
-    same = [r for r in rows if r["study"] == "overhead"]
-    kept = all(r["same_bits"] for r in same)
-    text = ", ".join(f"{r['scene']} ({r['dofs']}) {r['overhead_share']:.2f}" for r in same)
-    out.append(answer("same bits where nothing is cut", "yes", "yes" if kept else "no", kept))
-    return [*out, answer("guard's own time over mj_step's (degrees of freedom)", "figure", text)]
+    mine = [r for r in whole if r["method"] == "guarded"]
+    for key, asked in (("silent", 0), ("exhausted", 0)):
+        count = sum(r[key] for r in mine)
+        out.append(answer(f"guarded: {key}", "0", str(count), count == asked))
+    for key, bar in (("energy_above", None), ("over_plain", 3.0), ("over_fixed", 1.0)):
+        text = ", ".join(f"{r['family']} {r[key]:.3g}" for r in mine if r[key] is not None)
+        met = None if bar is None else all(r[key] is None or r[key] <= bar for r in mine)
+        out.append(answer(f"guarded: {key}", "figure" if bar is None else f"<= {bar:g}", text, met))
+    return out
 
 
-def _share(rows: list[Row], kind: str) -> tuple[str, float]:
-    """Of all runs of these rows: ``700 of 720 (0.972)``."""
-    runs = sum(r[kind]["n"] for r in rows)
-    count = sum(round(r[kind]["value"] * r[kind]["n"]) for r in rows)
-    return f"{count} of {runs} ({count / runs:.3f})", count / runs
+def shown(rows: list[Row]) -> list[Row]:
+    """The rows of all timesteps together, and those of the guard at each."""
+    return [
+        r
+        for r in rows
+        if r["study"] != "thrown" or r["timestep_ms"] == "all" or r["method"] == "guarded"
+    ]
 
 
 def draw(rows: list[Row], figure: Any) -> None:
-    """Error of the rebound over cost, a panel a speed; hollow where a run was not held."""
-    rows = [r for r in rows if r["study"] == "ball_cloth" and r["contact"] == "stiff"]
-    speeds = sorted({r["speed"] for r in rows})[-4:]
-    axes = figure.subplots(1, len(speeds), sharey=True, squeeze=False)[0]
-    looks = {"plain": ("0.35", "o"), "speculative": ("tab:orange", "s"), "ipc": ("tab:green", "^")}
-    looks |= {"guarded": ("tab:blue", "D"), "guarded, fine": ("tab:purple", "v")}
-    for axis, speed in zip(axes, speeds, strict=True):
-        for method, (color, marker) in looks.items():
-            chosen = [r for r in rows if r["speed"] == speed and r["method"] == method]
-            chosen.sort(key=lambda r: r["timestep_ms"])
-            if not chosen:
-                continue
-            x = [r["ms"]["median"] for r in chosen]
-            y = [max(r["error"]["median"] / speed, 1e-4) for r in chosen]
-            if method not in ("speculative", "ipc"):
-                axis.plot(x, y, color=color, lw=0.7, zorder=1)
-            full = [color if r["held"]["value"] == 1.0 else "white" for r in chosen]
-            axis.scatter(x, y, c=full, edgecolors=color, marker=marker, label=method, zorder=2)
-            if method in ("speculative", "ipc"):
-                continue
-            above = 3 if method == "plain" else -10
-            for row, x0, y0 in zip(chosen, x, y, strict=True):
-                text = f"{row['timestep_ms']:g}"
-                shift = {"xytext": (4, above), "textcoords": "offset points"}
-                axis.annotate(text, (x0, y0), **shift, color=color, fontsize=7)
-        axis.set(xscale="log", yscale="log", title=f"{speed:g} m/s", xlabel="ms per run")
-        axis.grid(alpha=0.3)
-    axes[0].set_ylabel("rebound error / speed")
-    handles, labels = axes[0].get_legend_handles_labels()
-    title = "ball into cloth, stiff contact; labels: timestep in ms; hollow: not every run held"
-    figure.legend(handles, labels, title=title, loc="outside upper center", ncols=len(labels))
+    """Share that is held, and time over the first fixed step that holds, a group a family."""
+    whole = [r for r in rows if r["study"] == "thrown" and r["timestep_ms"] == "all"]
+    families = [f for f in FAMILIES if any(r["family"] == f for r in whole)]
+    looks = {"plain": "0.6", "speculative": "tab:orange", "ipc": "tab:green", "guarded": "tab:blue"}
+    top, bottom = figure.subplots(2, 1, sharex=True)
+    for k, (method, color) in enumerate(looks.items()):
+        mine = [r for r in whole if r["method"] == method]
+        x = [families.index(r["family"]) + 0.2 * k - 0.3 for r in mine]
+        top.bar(x, [100 * r["held"]["value"] for r in mine], 0.18, color=color, label=method)
+        known = [(a, r["over_fixed"]) for a, r in zip(x, mine, strict=True) if r["over_fixed"]]
+        bottom.bar([a for a, _ in known], [b for _, b in known], 0.18, color=color)
+    top.set(ylabel="held [%]", ylim=(0, 105))
+    bottom.set(ylabel="time over the first fixed step that holds", yscale="log")
+    bottom.axhline(1.0, color="0.3", lw=0.8)
+    bottom.set_xticks(range(len(families)), families)
+    top.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.18), frameon=False)
+    for axis in (top, bottom):
+        axis.grid(axis="y", alpha=0.3)
+        axis.set_axisbelow(True)

@@ -68,6 +68,7 @@ class Sheet:
     """
 
     def __init__(self, model: Any, flex: int) -> None:
+        """Copy the elements' edges and stiffness."""
         elements, edges = int(model.flex_elemnum[flex]), int(model.flex_edgeadr[flex])
         begin, place = int(model.flex_elemedgeadr[flex]), int(model.flex_stiffnessadr[flex])
         own = model.flex_elemedge[begin : begin + 3 * elements].reshape(-1, 3) + edges

@@ -73,7 +73,7 @@ class Cores:
 
 
 class _Hull:
-    """The convex hull of points, and its faces pushed inwards."""
+    """The convex hull of points around a mesh's centre, and its faces pushed inwards."""
 
     def __init__(self, vertices: Array) -> None:
         self._vertices = np.ascontiguousarray(vertices)
@@ -100,4 +100,6 @@ class _Hull:
             corners = _NONE
         if len(corners) < 4:  # a hair of a body: towards the middle instead
             corners = self._middle + (1 - layer / self.radius) * (self._vertices - self._middle)
-        return np.ascontiguousarray(np.unique(corners, axis=0))
+        # The mesh's own centre belongs to every core, though a thinner end may lie deeper.
+        about_centre = (1 - layer / self.radius) * self._vertices
+        return np.ascontiguousarray(np.unique(np.concatenate([corners, about_centre]), axis=0))

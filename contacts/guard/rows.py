@@ -101,7 +101,11 @@ class Rows:
         chosen &= contact.efc_address >= 0
         if not chosen.any():
             return
-        first, dim, distance = contact.efc_address[chosen], contact.dim[chosen], contact.dist[chosen]
+        first, dim, distance = (
+            contact.efc_address[chosen],
+            contact.dim[chosen],
+            contact.dist[chosen],
+        )
         speed = np.where(distance > 0, -distance / length, np.maximum(-distance * push, 0.0))
         pyramids = self._model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
         count = np.where(dim == 1, 1, 2 * (dim - 1)) if pyramids else np.ones_like(dim)
@@ -109,7 +113,9 @@ class Rows:
         rows -= np.repeat(np.cumsum(count) - count, count)
         now = data.efc_vel
         # Both edges of a pyramid's first direction have the normal speed in their middle.
-        normal = np.where(count > 1, 0.5 * (now[first] + now[first + np.minimum(count, 2) - 1]), now[first])
+        normal = np.where(
+            count > 1, 0.5 * (now[first] + now[first + np.minimum(count, 2) - 1]), now[first]
+        )
         # Friction acts where they touch; across a gap only what goes along the normal is stopped.
         slip = now[rows] - np.repeat(normal, count)
         aim = np.repeat(speed, count) + np.where(np.repeat(distance, count) > 0, slip, 0.0)

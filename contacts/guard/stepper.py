@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
@@ -42,8 +43,8 @@ class GuardedStepper:
 
     A step is first tried as it is and stands, with the bits of ``mj_step``, unless the verdict
     (:class:`~tauguard.contacts.guard.verdict.Verdict`) finds a pair that becomes too deep or parts
-    again unseen. Then the state is restored, the pair made stiff until it parts, and the step redone
-    in pieces with the approach stopped by the solver
+    again unseen. Then the state is restored, the pair made stiff until it parts, and the step
+    redone in pieces with the approach stopped by the solver
     (:class:`~tauguard.contacts.guard.rows.Rows`): up to the touch, and from there on. A piece that
     still fails is halved; where that does not help, the partners are stopped against one another
     (:func:`~tauguard.contacts.guard.arrest.arrest`).
@@ -106,15 +107,18 @@ class GuardedStepper:
         mujoco.mj_getState(model, data, self._first, self._kind)
         velocity = data.qvel.copy() if self._watched else None
         mujoco.mj_step(model, data)
-        hits = self._verdict.judge()
+        hits, lost = self._verdict.judge(), ()
         if hits:
-            hits = self._unseen(hits)
+            lost = tuple(hit.pair for hit in hits if hit.lost)
+            hits = self._unseen([hit for hit in hits if not hit.lost])
         if not hits and (velocity is None or self._solvent(velocity)):
-            return self._stands(data.ncon)
+            return (
+                replace(self._stands(data.ncon), passed=lost) if lost else self._stands(data.ncon)
+            )
         self._watched = WATCHED
         whole = float(model.opt.timestep)
         try:
-            return _Redo(self, hits, whole).run(fresh=velocity is None)
+            return _Redo(self, hits, lost, whole).run(fresh=velocity is None)
         finally:
             self.model.opt.timestep = whole
 
@@ -172,7 +176,9 @@ class GuardedStepper:
     def _listed(self) -> set[Pair]:
         """Pairs that MuJoCo lists a contact of."""
         contact = self.data.contact
-        rows = {*zip(map(tuple, contact.geom.tolist()), map(tuple, contact.flex.tolist()), strict=True)}
+        rows = {
+            *zip(map(tuple, contact.geom.tolist()), map(tuple, contact.flex.tolist()), strict=True)
+        }
         return {_pair(geom, flex) for geom, flex in rows}
 
     def _release(self) -> tuple[Pair, ...]:
@@ -187,11 +193,13 @@ class GuardedStepper:
 class _Redo:
     """One step of a guard that did not stand, in pieces."""
 
-    def __init__(self, guard: GuardedStepper, hits: list[Hit], whole: float) -> None:
+    def __init__(
+        self, guard: GuardedStepper, hits: list[Hit], lost: tuple[Pair, ...], whole: float
+    ) -> None:
         self.g, self.whole = guard, whole
         self.steps, self.contacts = 1, 0
         self.cuts: list[Cut] = []
-        self.passed: set[Pair] = set()
+        self.passed = set(lost)
         self.arrested: set[Pair] = set()
         self.speeds: dict[Pair, float] = {}
         self.added, self.push = 0.0, PUSH / whole
@@ -237,7 +245,9 @@ class _Redo:
             margins = {p: ROOM * v * length + BEYOND for p, v in self.speeds.items()}
             g._rows.step(length, margins, self.push)
             self.steps += 1
-            hits = g._unseen(g._verdict.judge())
+            found = g._verdict.judge()
+            self.passed |= {hit.pair for hit in found if hit.lost}
+            hits = g._unseen([hit for hit in found if not hit.lost])
             entry = g._entry(velocity, length)
             rich = g._account.overdrawn(entry)
             fails = not self._bearable(hits, length)
@@ -259,7 +269,7 @@ class _Redo:
         return length
 
     def _bearable(self, hits: list[Hit], length: float) -> bool:
-        """Whether nothing passes through, and nothing becomes deeper but what shorter may not help."""
+        """Whether nothing passes through, nor becomes deeper unless a shorter piece was tried."""
         return all(
             not hit.passed
             and hit.pair in self.speeds

@@ -40,6 +40,7 @@ class Hit:
 
     pair: Pair
     passed: bool  #: its last cores met: the pair would have passed through itself
+    lost: bool  #: they met at the start already, and had been apart: it is followed no longer
     brushed: bool  #: it touched and parted again within the step, no cores met
     time: float  #: when it first touches, as a share of the step; 0 if it did at the start
     way: float  #: no two of its points approach each other further in the step [m]
@@ -123,6 +124,7 @@ class Verdict:
                 Hit(
                     self.pairs[number],
                     bool((ids[rows, 3] == last).any()),
+                    bool((ids[rows, 3] > last).any()),
                     bool((ids[rows, 2] == 0).all()),
                     float(values[rows, 0].min()),
                     float(values[rows, 1].max()),
@@ -183,14 +185,23 @@ class _Sheets:
         frame = self._mesh.find(x_t0, x_t1)
         faces, edges = self._mesh.faces, self._mesh.edges
         parts: dict[Pair, list[Any]] = {}
-        rows = [(int(v), faces[f]) for v, f in frame.vf] + [(edges[e], edges[g]) for e, g in frame.ee]
+        rows = [(int(v), faces[f]) for v, f in frame.vf] + [
+            (edges[e], edges[g]) for e, g in frame.ee
+        ]
         for one, other in rows:
             corners = np.concatenate([np.atleast_1d(one), other])
             first, second = sorted((int(self._flex[corners[0]]), int(self._flex[corners[-1]])))
             parts.setdefault((("flex", first), ("flex", second)), []).append(corners)
         travel = float(np.linalg.norm(x_t1 - x_t0, axis=1).max()) if parts else 0.0
         return [
-            Hit(pair, True, False, 0.0, 2 * travel, np.unique(np.concatenate(found)).astype(np.int32))
+            Hit(
+                pair,
+                True,
+                False,
+                0.0,
+                2 * travel,
+                np.unique(np.concatenate(found)).astype(np.int32),
+            )
             for pair, found in parts.items()
         ]
 

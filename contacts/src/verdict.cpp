@@ -18,24 +18,30 @@ bool apart_at(Mover& a, Mover& b, double t) {
   return !d.overlap && d.lower > needed;
 }
 
+// What is known of a pair from earlier steps: nothing, that some cores were apart, or none.
+enum : char { unknown, apart, sunk };
+
 // `a_at(level)` and `b_at(level)` make the movers of a pair.
 template <class MakeA, class MakeB>
-bool judged(const MakeA& a_at, const MakeB& b_at, int levels, Hit* hit) {
+bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* hit) {
   const auto touch = [&](int level) {
     Mover a = a_at(level), b = b_at(level);
     return first_touch(a, b, 0, 0);
   };
-  const auto apart = [&](int level, double t) {
+  const auto separate = [&](int level, double t) {
     Mover a = a_at(level), b = b_at(level);
     return apart_at(a, b, t);
   };
   int start = 0;
-  while (start < levels && !apart(start, 0)) ++start;
-  if (start == levels) return false;
+  while (start < levels && !separate(start, 0)) ++start;
+  const bool lost = start == levels && *known == apart;
+  *known = start == levels ? sunk : apart;
+  if (lost) hit->level = hit->deepest = levels;
+  if (start == levels) return lost;
   const int trigger = std::max(start, 1);
   hit->level = hit->deepest = trigger;
   if (!touch(trigger).hit) {
-    if (start > 0 || !apart(0, 1)) return false;
+    if (start > 0 || !separate(0, 1)) return false;
     const Touch brushed = touch(0);
     if (!brushed.hit) return false;
     hit->level = hit->deepest = 0, hit->t = brushed.t;
@@ -71,15 +77,16 @@ int Verdict::add(Shape shape, int body, const Frame& in_body) {
 
 void Verdict::add_pair(std::vector<std::int32_t> a, std::vector<std::int32_t> b) {
   whole_[a[0]] = whole_[b[0]] = 1;
-  pairs_.push_back({std::move(a), std::move(b)});
+  pairs_.push_back({std::move(a), std::move(b), unknown});
 }
 
 void Verdict::add_flex_pair(std::vector<std::int32_t> a, std::vector<double> radii,
                             std::vector<std::int32_t> elements, int corners,
                             std::vector<std::uint8_t> skip) {
   whole_[a[0]] = 1;
-  flex_pairs_.push_back(
-      {std::move(a), std::move(radii), std::move(elements), corners, std::move(skip)});
+  std::vector<char> known(skip.size(), unknown);
+  flex_pairs_.push_back({std::move(a), std::move(radii), std::move(elements), corners,
+                         std::move(skip), std::move(known)});
 }
 
 Mover Verdict::mover(int entry, const Vec& origin) const {
@@ -111,17 +118,17 @@ void Verdict::update(const Poses& p) {
       boxes_[e] = swept(mover(static_cast<int>(e), Vec{}), motions_[entries_[e].body]);
 }
 
-void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) const {
-  const Pair& pair = pairs_[number];
+void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
+  Pair& pair = pairs_[number];
   const Entry &a = entries_[pair.a[0]], &b = entries_[pair.b[0]];
   if (still_[a.body] && still_[b.body]) return;
-  if (!boxes_[pair.a[0]].meets(boxes_[pair.b[0]])) return;
+  if (!boxes_[pair.a[0]].meets(boxes_[pair.b[0]])) return void(pair.known = apart);
   const bool plane = a.shape.core == Core::half_space;
   const Vec origin = motions_[plane ? b.body : a.body].x0;
   Hit hit{static_cast<std::int32_t>(number), -1, 0, 0, 0, 0};
   if (!judged([&](int level) { return mover(pair.a[level], origin); },
               [&](int level) { return mover(pair.b[level], origin); },
-              static_cast<int>(pair.a.size()), &hit))
+              static_cast<int>(pair.a.size()), &pair.known, &hit))
     return;
   const Vec drift = plane ? Vec{} : motions_[a.body].linear;
   hit.way = travel(pair.b[0], drift);
@@ -130,9 +137,9 @@ void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) const {
 }
 
 void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x_t1,
-                         std::vector<Hit>* hits) const {
+                         std::vector<Hit>* hits) {
   constexpr std::size_t block = 32;  // simplices that share a box
-  const FlexPair& pair = flex_pairs_[number];
+  FlexPair& pair = flex_pairs_[number];
   const std::size_t count = pair.skip.size();
   const Box& near = boxes_[pair.a[0]];
   const double radius = pair.radii[0] * (1 + 4 * unit_roundoff);
@@ -165,7 +172,7 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
                   [&](int level) {
                     return Mover(start, stop, pair.corners, pair.radii[level], origin);
                   },
-                  static_cast<int>(pair.a.size()), &hit))
+                  static_cast<int>(pair.a.size()), &pair.known[e], &hit))
         continue;
       for (int i = 0; i < pair.corners; ++i) {
         Vec d{};

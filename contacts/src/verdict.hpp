@@ -13,7 +13,8 @@ struct Hit {
   std::int32_t pair;     // rigid pairs first, then those with a flex
   std::int32_t feature;  // the simplex of a flex, -1 for geoms
   std::int32_t level;    // 0: touched and parted again; otherwise the level whose cores met
-  std::int32_t deepest;  // the deepest level that met
+  std::int32_t deepest;  // the deepest level that met; the number of levels: all cores meet at the
+                         // start, and did not at that of the step before
   double t;              // when the whole shapes first touch; 0 where they do at the start
   double way;            // no two points of the pair approach each other further in the step [m]
 };
@@ -41,6 +42,7 @@ class Verdict {
   };
   struct Pair {
     std::vector<std::int32_t> a, b;
+    char known;  // from the steps before
   };
   struct FlexPair {
     std::vector<std::int32_t> a;
@@ -48,14 +50,14 @@ class Verdict {
     std::vector<std::int32_t> elements;
     int corners;
     std::vector<std::uint8_t> skip;
+    std::vector<char> known;  // by simplex
   };
 
   void update(const Poses& poses);
   Mover mover(int entry, const Vec& origin) const;
   double travel(int entry, const Vec& drift) const;
-  void judge_rigid(std::size_t pair, std::vector<Hit>* hits) const;
-  void judge_flex(std::size_t pair, const double* x_t0, const double* x_t1,
-                  std::vector<Hit>* hits) const;
+  void judge_rigid(std::size_t pair, std::vector<Hit>* hits);
+  void judge_flex(std::size_t pair, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
 
   std::vector<Entry> entries_;
   std::vector<Pair> pairs_;

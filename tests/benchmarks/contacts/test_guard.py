@@ -1,60 +1,70 @@
-"""The guard's study: what it calls held, and which fixed step it compares with."""
+"""The guard's study: scenes come from the seed alone; the referee, where the truth is clear."""
 
 import mujoco
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from tauguard.benchmarks.contacts import guard
-from tauguard.contacts.scenes import ball_cloth, sphere_plate
+from tauguard.benchmarks.contacts.referee import Referee
+from tauguard.benchmarks.contacts.thrown import FAMILIES, scenes
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_same_seed_draws_the_same_scene_and_another_one_does_not(family):
+    one, same = (next(scenes(family, 3, 1)) for _ in range(2))
+    other = next(scenes(family, 4, 1))
+    np.testing.assert_array_equal(one.qvel, same.qvel)
+    np.testing.assert_array_equal(one.qpos, same.qpos)
+    assert one.qvel.shape != other.qvel.shape or not np.array_equal(one.qvel, other.qvel)
+
+
+@pytest.mark.parametrize("family", ["plate", "chain", "cloth"])
+def test_the_referee_sees_what_flies_through_with_contacts_off_and_nothing_that_turns_back(family):
+    for scene in scenes(family, 1, 3):
+        for back in (False, True):
+            model, data = scene.start(scene.timestep)
+            model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+            referee = Referee(scene, model, data)
+            if back:
+                data.qvel[:] *= -1
+            for _ in range(round(scene.seconds / scene.timestep) + 1):
+                mujoco.mj_step(model, data)
+                referee.look()
+            assert referee.passed is not back
+
+
+def test_the_referee_counts_energy():
+    scene = next(scenes("pair", 1, 1))
+    model, data = scene.start(1e-3)
+    referee = Referee(scene, model, data)
+    data.qvel[:] *= 2
+    mujoco.mj_step(model, data)
+    referee.look()
+    assert referee.energy == pytest.approx(4, rel=0.01)
 
 
 def test_plain_steps_lose_what_guarded_steps_hold():
-    for build in (ball_cloth, sphere_plate):
-        plain = guard.one(build(50.0, 0.1), 50.0, 0.1, 5e-3, 0)
-        guarded = guard.one(build(50.0, 0.1), 50.0, 0.1, 5e-3, 1)
-        assert not plain.held
-        assert not plain.generated
-        assert plain.velocity == pytest.approx(-50)
-        assert guarded.held
-        assert guarded.generated
-        assert guarded.velocity > -1
-        assert guarded.cuts > 0 == guarded.exhausted
-
-
-def test_the_side_turns_where_the_centre_crosses_the_sheet():
-    model, data = ball_cloth().start()
-    scratch = mujoco.MjData(model)
-    sides = {}
-    for height in (0.1, 1e-4, -1e-4, -0.1):
-        data.qpos[-5] = height
-        sides[height] = guard.side(model, data, scratch)
-    assert sides[0.1] == sides[1e-4] == -sides[-1e-4] == -sides[-0.1] != 0
-
-
-def row(method, timestep, held, ms):
-    return {
-        "study": "ball_cloth",
-        "contact": "stiff",
-        "speed": 1.0,
-        "method": method,
-        "timestep_ms": timestep,
-        "held": {"value": held},
-        "ms": {"median": ms},
-        "error": {"median": 0.1},
-    }
+    lost = 0
+    for scene in scenes("plate", 5, 12):
+        lost += not guard.played(scene, "plain", scene.timestep).held
+        mine = guard.played(scene, "guarded", scene.timestep)
+        assert mine.held
+        assert mine.energy < guard.ADDED
+    assert lost > 2
 
 
 def test_a_step_that_holds_by_luck_is_not_the_first_that_holds():
-    rows = [row("plain", 5, 1.0, 1), row("plain", 2, 0.5, 2), row("plain", 1, 1.0, 4)]
-    rows += [row("plain", 0.5, 1.0, 8), row("guarded", 5, 1.0, 2)]
-    guard.with_ratio(rows)
-    assert {r["first_fixed_ms"] for r in rows} == {1}
-    assert rows[-1]["saves"] == 2
+    def play(held):
+        return guard.Played(held, False, False, 1.0, 1.0, 1.0, np.zeros(3))
+
+    assert guard._first([play(True), play(False), play(True), play(True)]) == 2
+    assert guard._first([play(True), play(False)]) is None
+
+
+def test_the_study_draws_what_it_has():
+    rows = guard._family_rows("plate", 0, 2, quick=True)
+    assert {r["method"] for r in rows} == {"plain", "speculative", "guarded"}
     figure = Figure()
     guard.draw(rows, figure)
-    assert len(figure.axes) == 1
-
-
-def test_nothing_to_compare_with_where_no_fixed_step_holds():
-    rows = guard.with_ratio([row("plain", 1, 0.9, 1), row("guarded", 1, 1.0, 1)])
-    assert rows[1]["saves"] is None
+    assert len(figure.axes) == 2
