@@ -44,7 +44,7 @@ NOTES = {
     "thrown": "held: nothing passed through; silent: it did, and no report said so; arrested: "
     "scenes in which partners had to be stopped; energy: the most there was over what there was at "
     f"first, and in how many scenes it was above {ADDED:g}; over plain: time over that of plain "
-    "steps of the same scene; over fixed: over that of the largest fixed step (stiff contacts) from "
+    "steps of the same scene; over fixed: over the largest fixed step (stiff contacts) from "
     "which on all finer ones hold that scene, fixed_ms; unknown: scenes that none holds; error: of "
     "the first body's velocity at the end against the finest fixed step, over its speed. Medians.",
     "overhead": "a step of a scene in which nothing is to be guarded, plain and guarded.",
