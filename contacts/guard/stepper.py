@@ -107,7 +107,8 @@ class GuardedStepper:
         mujoco.mj_getState(model, data, self._first, self._kind)
         velocity = data.qvel.copy() if self._watched else None
         mujoco.mj_step(model, data)
-        hits, lost = self._verdict.judge(), ()
+        hits = self._verdict.judge()
+        lost: tuple[Pair, ...] = ()
         if hits:
             lost = tuple(hit.pair for hit in hits if hit.lost)
             hits = self._unseen([hit for hit in hits if not hit.lost])
@@ -315,10 +316,10 @@ class _Redo:
                 share = min(share, hit.time + BEYOND / max(hit.way, BEYOND))
         if not fresh and hits:
             share = 0.5
-        for hit in hits:
-            g._guarded.add(hit.pair)
-            stiffened = g._stiff and g._stiffening.stiffen(hit.pair)
-            self.cuts.append(Cut(g.data.time + share * length, hit.pair, stiffened))
+        for pair in dict.fromkeys(hit.pair for hit in hits):
+            g._guarded.add(pair)
+            stiffened = g._stiff and g._stiffening.stiffen(pair)
+            self.cuts.append(Cut(g.data.time + share * length, pair, stiffened))
         return max(share * length, min(length, SMALLEST * whole * 0.5))
 
     def _restore(self, state: Array) -> None:

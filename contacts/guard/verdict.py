@@ -179,31 +179,21 @@ class _Sheets:
             self._mesh, self._flex = MeshCCD(elements, groups=Groups(ids, meets)), ids
 
     def crossings(self, x_t0: Array, x_t1: Array) -> list[Hit]:
-        """Hits of every two flexes whose triangles cross in the step."""
+        """A hit for every vertex and face, and every two edges, that cross in the step."""
         if self._mesh is None:
             return []
         frame = self._mesh.find(x_t0, x_t1)
         faces, edges = self._mesh.faces, self._mesh.edges
-        parts: dict[Pair, list[Any]] = {}
-        rows = [(int(v), faces[f]) for v, f in frame.vf] + [
-            (edges[e], edges[g]) for e, g in frame.ee
-        ]
-        for one, other in rows:
-            corners = np.concatenate([np.atleast_1d(one), other])
-            first, second = sorted((int(self._flex[corners[0]]), int(self._flex[corners[-1]])))
-            parts.setdefault((("flex", first), ("flex", second)), []).append(corners)
-        travel = float(np.linalg.norm(x_t1 - x_t0, axis=1).max()) if parts else 0.0
-        return [
-            Hit(
-                pair,
-                True,
-                False,
-                0.0,
-                2 * travel,
-                np.unique(np.concatenate(found)).astype(np.int32),
-            )
-            for pair, found in parts.items()
-        ]
+        rows = [(np.array([v]), faces[f]) for v, f in frame.vf]
+        rows += [(edges[e], edges[g]) for e, g in frame.ee]
+        if not rows:
+            return []
+        travel = 2 * float(np.linalg.norm(x_t1 - x_t0, axis=1).max())
+        return [self._hit(np.concatenate(row).astype(np.int32), travel) for row in rows]
+
+    def _hit(self, corners: NDArray[np.int32], travel: float) -> Hit:
+        first, second = sorted((int(self._flex[corners[0]]), int(self._flex[corners[-1]])))
+        return Hit((("flex", first), ("flex", second)), True, False, False, 0.0, travel, corners)
 
 
 def _elements(model: Any, flex: int) -> NDArray[np.int32]:
