@@ -38,7 +38,7 @@ class SrqSvr(Windowed):
     C: float = 1.0
     epsilon: float = 0.02
     distance: float = 2.0  #: median distance after scaling; 0 leaves the windows as they are
-    vectors: int = 0  #: support vectors that are kept, at most; 0 keeps all
+    vectors: int = 400  #: support vectors that are kept, at most; 0 keeps all
     name: ClassVar[str] = "srq-svr"
     mining_gap: ClassVar[float] = 0.1
     stream_of_seeds: ClassVar[int] = 1
@@ -79,6 +79,7 @@ class PlainSrqSvr(SrqSvr):
 
     mined: int = 0
     distance: float = 3.0
+    vectors: int = 0
     front: FrontEndSettings = field(
         default_factory=lambda: FrontEndSettings(adapt=False, settle=0.5, calibrate=False)
     )
