@@ -149,7 +149,7 @@ def croissant(folder: Path, configuration: Configuration, summary: dict[str, Spl
         for path, (digest, size, _) in shards.items()
     ]
     records = [
-        _records(split, [p for p, (_, _, s) in shards.items() if s == split], configuration)
+        _records(split, configuration)
         for split in summary
         if any(s == split for _, _, s in shards.values())
     ]
@@ -168,15 +168,12 @@ def croissant(folder: Path, configuration: Configuration, summary: dict[str, Spl
     return json.dumps(content, indent=1) + "\n"
 
 
-def _records(
-    split: str, paths: list[str], configuration: Configuration
-) -> tuple[dict[str, Any], dict[str, Any]]:
+def _records(split: str, configuration: Configuration) -> tuple[dict[str, Any], dict[str, Any]]:
     """The set of a split's files, and what a row of them holds."""
     files = {
         "@type": "cr:FileSet",
         "@id": f"{split}-files",
         "name": f"{split}-files",
-        "containedIn": [{"@id": path} for path in paths],
         "encodingFormat": "application/x-parquet",
         "includes": f"data/{split}-*.parquet",
     }
@@ -215,6 +212,8 @@ CONTEXT = {
     "conformsTo": "dct:conformsTo",
     "data": {"@id": "cr:data", "@type": "@json"},
     "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    "equivalentProperty": "cr:equivalentProperty",
+    "samplingRate": "cr:samplingRate",
     "examples": {"@id": "cr:examples", "@type": "@json"},
     "extract": "cr:extract",
     "field": "cr:field",

@@ -1,0 +1,1 @@
+"""Datasets for other libraries: what they read, from what is there."""

@@ -1,0 +1,253 @@
+"""LeRobotDataset v3.0, written with pyarrow alone (LeRobot's own pins exclude ours).
+
+Layout: https://huggingface.co/docs/lerobot/lerobot-dataset-v3. A dataset that is put on the hub
+must carry the git tag ``v3.0``, or LeRobot's loader refuses it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from tauguard.traces import Trace
+from tauguard.traces.whole_file import whole_file, write_whole
+
+Array = NDArray[Any]
+
+VERSION = "v3.0"
+TASK = "move between random poses; collisions are labelled"
+#: Rows of a data file: about LeRobot's 100 MB at six joints.
+ROWS_A_FILE = 1_000_000
+CHUNK = 1000
+
+
+def write_lerobot(traces: Iterable[Trace], folder: Path, rate: int, robot: str) -> int:
+    """Write traces with truth as one LeRobot dataset; returns how many there were.
+
+    Args:
+        traces: one an episode, all of equally many joints.
+        folder: a new or empty one.
+        rate: of their rows [Hz].
+        robot: what LeRobot calls the robot type.
+
+    Raises:
+        ValueError: the folder is not empty, no traces, or traces without truth.
+        OSError: it cannot be written.
+    """
+    if folder.exists() and any(folder.iterdir()):
+        raise ValueError(f"{folder}: not empty; name a new folder")
+    for name in ("meta/episodes/chunk-000", "data"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    episodes: list[dict[str, Any]] = []
+    total: dict[str, Moments] = {}
+    names: tuple[str, ...] = ()
+    for number, group in enumerate(_files(traces)):
+        where = {"chunk": number // CHUNK, "file": number % CHUNK}
+        _write_file(folder, where, group, episodes, total)
+        names = group[0].joint_names
+    if not episodes:
+        raise ValueError("no episodes to export")
+    _write_meta(folder, episodes, total, rate, robot, features(names))
+    return len(episodes)
+
+
+def features(names: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    """LeRobot's description of the columns."""
+
+    def wide(*signals: str) -> dict[str, Any]:
+        every = [f"{signal}.{joint}" for signal in signals for joint in names]
+        return {"dtype": "float32", "shape": [len(every)], "names": every}
+
+    one = {"shape": [1], "names": None}
+    return {
+        "observation.state": wide("q", "qd", "current"),
+        "action": wide("q_des", "qd_des"),
+        "truth.tau_ext": wide("tau_ext"),
+        "truth.contact_force": {"dtype": "float32", "shape": [3], "names": ["x", "y", "z"]},
+        "truth.contact_link": {"dtype": "int64", **one},
+        "truth.collision": {"dtype": "int64", **one},
+        "timestamp": {"dtype": "float32", **one},
+        "frame_index": {"dtype": "int64", **one},
+        "episode_index": {"dtype": "int64", **one},
+        "index": {"dtype": "int64", **one},
+        "task_index": {"dtype": "int64", **one},
+    }
+
+
+def columns_of(trace: Trace, episode: int, first: int) -> dict[str, Array]:
+    """A trace as LeRobot's columns; ``first`` is its first row in the dataset."""
+    truth = trace.truth
+    if truth is None or trace.q_des is None or trace.qd_des is None:
+        raise ValueError("a trace without truth or references cannot be exported to LeRobot")
+    rows = len(trace.t)
+    busy = np.zeros(rows, bool)
+    for one in truth.collisions:
+        busy |= (trace.t >= one.onset) & (trace.t <= one.end)
+    found: dict[str, Array] = {
+        "observation.state": np.hstack([trace.q, trace.qd, trace.current]),
+        "action": np.hstack([trace.q_des, trace.qd_des]),
+        "truth.tau_ext": truth.tau_ext,
+        "truth.contact_force": truth.contact_vector,
+        "truth.contact_link": truth.contact_link,
+        "truth.collision": busy,
+        "timestamp": trace.t - trace.t[0],
+        "frame_index": np.arange(rows),
+        "episode_index": np.full(rows, episode),
+        "index": first + np.arange(rows),
+        "task_index": np.zeros(rows),
+    }
+    kinds = features(trace.joint_names)
+    return {name: x.astype(kinds[name]["dtype"]) for name, x in found.items()}
+
+
+class Moments:
+    """Smallest, largest, mean and standard deviation of columns, added up by parts."""
+
+    def __init__(self, values: Array) -> None:
+        """Of rows (T,) or (T, c)."""
+        wide = values.reshape(len(values), -1).astype(np.float64)
+        self.count = len(wide)
+        self.low, self.high, self.mean = wide.min(axis=0), wide.max(axis=0), wide.mean(axis=0)
+        self.spread = ((wide - self.mean) ** 2).sum(axis=0)
+
+    def add(self, other: Moments) -> None:
+        """Take the rows of another part in."""
+        count = self.count + other.count
+        apart = other.mean - self.mean
+        self.spread = self.spread + other.spread + apart**2 * self.count * other.count / count
+        self.mean = self.mean + apart * other.count / count
+        self.low, self.high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
+        self.count = count
+
+    def values(self) -> dict[str, list[float]]:
+        """As LeRobot names them."""
+        return {
+            "min": self.low.tolist(),
+            "max": self.high.tolist(),
+            "mean": self.mean.tolist(),
+            "std": np.sqrt(self.spread / self.count).tolist(),
+            "count": [self.count],
+        }
+
+
+def _files(traces: Iterable[Trace]) -> Iterator[list[Trace]]:
+    group: list[Trace] = []
+    for trace in traces:
+        if group and sum(len(t.t) for t in group) + len(trace.t) > ROWS_A_FILE:
+            yield group
+            group = []
+        group.append(trace)
+    if group:
+        yield group
+
+
+def _write_file(
+    folder: Path,
+    where: dict[str, int],
+    group: list[Trace],
+    episodes: list[dict[str, Any]],
+    total: dict[str, Moments],
+) -> None:
+    path = folder / "data" / f"chunk-{where['chunk']:03d}" / f"file-{where['file']:03d}.parquet"
+    path.parent.mkdir(exist_ok=True)
+    first = episodes[-1]["dataset_to_index"] if episodes else 0
+    tables = []
+    for trace in group:
+        columns = columns_of(trace, len(episodes), first)
+        own = {name: Moments(x) for name, x in columns.items()}
+        for name, one in own.items():
+            if name in total:
+                total[name].add(one)
+            else:
+                total[name] = Moments(columns[name])
+        episodes.append(_episode(len(episodes), first, len(trace.t), where, own))
+        first += len(trace.t)
+        tables.append(pa.table({name: _column(x) for name, x in columns.items()}))
+    with whole_file(path) as stream:
+        pq.write_table(pa.concat_tables(tables), stream, compression="zstd")
+
+
+def _column(values: Array) -> pa.Array:
+    if values.ndim == 1:
+        return pa.array(values)
+    flat = pa.array(np.ascontiguousarray(values).ravel())
+    return pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
+
+
+def _episode(
+    number: int, first: int, rows: int, where: dict[str, int], own: dict[str, Moments]
+) -> dict[str, Any]:
+    line: dict[str, Any] = {
+        "episode_index": number,
+        "tasks": [TASK],
+        "length": rows,
+        "data/chunk_index": where["chunk"],
+        "data/file_index": where["file"],
+        "dataset_from_index": first,
+        "dataset_to_index": first + rows,
+        "meta/episodes/chunk_index": 0,
+        "meta/episodes/file_index": 0,
+    }
+    for name, moments in own.items():
+        line |= {f"stats/{name}/{key}": value for key, value in moments.values().items()}
+    return line
+
+
+def _write_meta(
+    folder: Path,
+    episodes: list[dict[str, Any]],
+    total: dict[str, Moments],
+    rate: int,
+    robot: str,
+    described: dict[str, dict[str, Any]],
+) -> None:
+    with whole_file(folder / "meta/episodes/chunk-000/file-000.parquet") as stream:
+        pq.write_table(pa.Table.from_pylist(episodes), stream, compression="zstd")
+    with whole_file(folder / "meta/tasks.parquet") as stream:
+        pq.write_table(_tasks(), stream)
+    stats = {name: one.values() for name, one in total.items()}
+    write_whole(folder / "meta/stats.json", json.dumps(stats, indent=1) + "\n")
+    info = {
+        "codebase_version": VERSION,
+        "robot_type": robot,
+        "total_episodes": len(episodes),
+        "total_frames": episodes[-1]["dataset_to_index"],
+        "total_tasks": 1,
+        "chunks_size": CHUNK,
+        "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
+        "fps": rate,
+        "splits": {"train": f"0:{len(episodes)}"},
+        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+        "video_path": None,
+        "features": described,
+    }
+    write_whole(folder / "meta/info.json", json.dumps(info, indent=1) + "\n")
+
+
+def _tasks() -> pa.Table:
+    """The one task, as the data frame with the task as its index that LeRobot reads."""
+    index = "__index_level_0__"
+    columns: list[dict[str, Any]] = [
+        {"name": "task_index", "field_name": "task_index", "pandas_type": "int64"},
+        {"name": None, "field_name": index, "pandas_type": "unicode"},
+    ]
+    kinds = ("int64", "object")
+    pandas = {
+        "index_columns": [index],
+        "column_indexes": [],
+        "columns": [
+            {**column, "numpy_type": kind, "metadata": None}
+            for column, kind in zip(columns, kinds, strict=True)
+        ],
+        "pandas_version": "2.0.0",
+    }
+    table = pa.table({"task_index": pa.array([0], pa.int64()), index: pa.array([TASK])})
+    return table.replace_schema_metadata({"pandas": json.dumps(pandas)})

@@ -1,0 +1,85 @@
+"""Minari datasets (extra ``export``): what a policy or a detector would see, a step a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from tauguard.traces import Trace
+
+
+def write_minari(traces: Iterable[Trace], name: str, rate: int) -> int:
+    """Write traces with truth as a Minari dataset into Minari's own folder of datasets.
+
+    The observation is (q, qd, current), the action the references (q_des, qd_des), the reward 0;
+    ``infos`` has the truth: ``tau_ext``, ``contact_force`` (x, y, z) and ``contact_link``. An
+    episode is one trace; it is truncated at its end.
+
+    Args:
+        traces: one an episode, all of equally many joints.
+        name: Minari's id, ``namespace/name-v0``.
+        rate: of their rows [Hz], put into the description.
+
+    Returns:
+        How many episodes there were.
+
+    Raises:
+        ValueError: Minari is not installed, there is such a dataset already, no traces, or traces
+            without truth.
+    """
+    try:
+        import minari
+    except ImportError:
+        raise ValueError("Minari is not there: install tauguard with the extra `export`") from None
+    from gymnasium.spaces import Box
+
+    if name in minari.list_local_datasets():
+        raise ValueError(f"{name}: Minari has a dataset of that name; name another version")
+    dataset: Any = None
+    count = 0
+    for trace in traces:
+        buffer = _buffer(trace, count)
+        if dataset is None:
+            n = len(trace.joint_names)
+            dataset = minari.create_dataset_from_buffers(
+                name,
+                [buffer],
+                observation_space=Box(-np.inf, np.inf, (3 * n,), np.float32),
+                action_space=Box(-np.inf, np.inf, (2 * n,), np.float32),
+                algorithm_name="tauguard",
+                description=f"Simulated arm motion with labelled collisions, {rate} Hz.",
+            )
+        else:
+            dataset.update_dataset_from_buffer([buffer])
+        count += 1
+    if not count:
+        raise ValueError("no episodes to export")
+    return count
+
+
+def _buffer(trace: Trace, number: int) -> Any:
+    """One episode; Minari wants one observation, and one row of infos, more than actions."""
+    from minari.data_collector import EpisodeBuffer
+
+    truth = trace.truth
+    if truth is None or trace.q_des is None or trace.qd_des is None:
+        raise ValueError("a trace without truth or references cannot be exported to Minari")
+    seen = np.hstack([trace.q, trace.qd, trace.current]).astype(np.float32)
+    wanted = np.hstack([trace.q_des, trace.qd_des]).astype(np.float32)
+    steps = len(seen) - 1
+    return EpisodeBuffer(
+        id=number,
+        seed=int(trace.meta["seed"]) % 2**31 if "seed" in trace.meta else None,
+        observations=seen,
+        actions=wanted[:-1],
+        rewards=np.zeros(steps),
+        terminations=np.zeros(steps, bool),
+        truncations=np.arange(steps) == steps - 1,
+        infos={
+            "tau_ext": truth.tau_ext.astype(np.float32),
+            "contact_force": truth.contact_vector.astype(np.float32),
+            "contact_link": truth.contact_link,
+        },
+    )

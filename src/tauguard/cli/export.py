@@ -1,0 +1,45 @@
+"""``tauguard export``: a generated dataset in the format of another library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+def command(
+    folder: Annotated[Path, tyro.conf.Positional],
+    out: str,
+    to: Literal["lerobot", "minari"] = "lerobot",
+    splits: tuple[str, ...] = (),
+    arm: str | None = None,
+) -> None:
+    """Write a dataset, or some of its splits, for LeRobot or Minari.
+
+    pandas, polars, DuckDB and scikit-learn need no export: they read data/*.parquet as it is.
+
+    Args:
+        folder: of a dataset that `tauguard generate` made.
+        out: for LeRobot a new folder; for Minari a dataset id such as tauguard/collisions-v0, which
+            goes where Minari keeps its datasets.
+        to: "lerobot" (LeRobotDataset v3.0) or "minari" (extra `export`).
+        splits: which ones (default: all).
+        arm: only this arm's episodes.
+    """
+    from tauguard.datasets.dataset_folder import configuration_in
+    from tauguard.datasets.reader import arms_of, read
+
+    configuration = configuration_in(folder)
+    traces = read(folder, splits or None, arm)
+    if to == "minari":
+        from tauguard.datasets.exports.minari import write_minari
+
+        count = write_minari(traces, out, configuration.rate)
+        print(f"{out}: {count} episodes, for minari.load_dataset({out!r})")
+        return
+    from tauguard.datasets.exports.lerobot import VERSION, write_lerobot
+
+    robots = (arm,) if arm else arms_of(folder, splits or None)
+    count = write_lerobot(traces, Path(out), configuration.rate, "+".join(robots))
+    print(f"{out}: {count} episodes as LeRobotDataset {VERSION}; on the hub, tag it {VERSION}")
