@@ -21,7 +21,7 @@ class CollisionPlan:
         kind: "strike" (a moving obstacle), "clamp" (a fixed one) or "pulse" (a wrench pulse).
         time: when it should begin [s].
         link: 1-based link to strike.
-        severity: wanted peak |tau_ext| over joints 1-4 (low, high) [N m]; the strength is searched
+        severity: wanted peak of abs(tau_ext), joints 1-4 (low, high) [N m]; the strength is sought
             until the achieved peak lies there.
         strength: first guess: strike speed [m/s], clamp depth [m, from 0.03 m], pulse force [N].
         duration: of a pulse or of a clamp [s]; a strike lasts as long as it lasts.

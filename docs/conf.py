@@ -1,0 +1,28 @@
+"""The documentation site: `uv run --extra docs sphinx-build docs build/site`, then open it."""
+
+import importlib.metadata
+
+project = "tauguard"
+author = "the tauguard authors"
+release = importlib.metadata.version("tauguard")
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+source_suffix = {".md": "markdown"}
+myst_heading_anchors = 3
+# Pages link to files of the repository, too, which are no pages of the site.
+suppress_warnings = ["myst.xref_missing"]
+
+autodoc_default_options = {"members": True, "imported-members": True}
+autodoc_typehints = "description"
+autodoc_member_order = "bysource"
+napoleon_google_docstring = True
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"tauguard {release}"
+html_show_sourcelink = False
+html_sidebars = {"**": []}
+html_theme_options = {
+    "header_links_before_dropdown": 4,
+    "show_toc_level": 2,
+    "secondary_sidebar_items": ["page-toc"],
+}
