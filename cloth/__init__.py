@@ -2,7 +2,7 @@
 
 from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
-from tauguard.cloth.impacts import METHODS, Impacts, edge_edge, vertex_face
+from tauguard.cloth.impacts import METHODS, Impacts, edge_edge, point_edge, point_point, vertex_face
 from tauguard.cloth.mesh import VOLUMES, MeshCCD
 
 __all__ = [
@@ -14,5 +14,7 @@ __all__ = [
     "Impacts",
     "MeshCCD",
     "edge_edge",
+    "point_edge",
+    "point_point",
     "vertex_face",
 ]

@@ -48,6 +48,11 @@ class Frame:
         ee: Colliding edges (rows of ``MeshCCD.edges``), smaller first, shape (K, 2), sorted.
         vf_impacts: Of ``vf``, row by row; all are hits.
         ee_impacts: Of ``ee``, row by row.
+        pe: Colliding loose points and loose edges (rows of ``MeshCCD.edges``), shape (P, 2),
+            sorted. Other vertices meet edges as ends of edges or corners of faces.
+        pp: Colliding loose points, smaller first, shape (Q, 2), sorted.
+        pe_impacts: Of ``pe``; weights are of the point and the edge's ends, shape (P, 3).
+        pp_impacts: Of ``pp``; weights are ones, shape (Q, 2).
         stats: How the answer was reached.
     """
 
@@ -55,4 +60,13 @@ class Frame:
     ee: NDArray[np.int32]
     vf_impacts: Impacts
     ee_impacts: Impacts
+    pe: NDArray[np.int32]
+    pp: NDArray[np.int32]
+    pe_impacts: Impacts
+    pp_impacts: Impacts
     stats: FrameStats
+
+    def first_time(self) -> float:
+        """When the first collision is, in [0, 1] of the step; inf where there is none."""
+        kinds = self.vf_impacts, self.ee_impacts, self.pe_impacts, self.pp_impacts
+        return min(float(impacts.toi.min(initial=np.inf)) for impacts in kinds)

@@ -43,18 +43,18 @@ class Groups(Rebuilt):
         object.__setattr__(self, "ids", frozen_indices("ids", ids, (None,), len(table)))
         object.__setattr__(self, "meets", table)
 
-    def check_faces(self, faces: NDArray[np.int32]) -> None:
-        """Raise a ``ValueError`` for the first face outside ``ids`` or of more than one group."""
-        if faces.size and int(faces.max()) >= len(self.ids):
-            row = int(np.argmax((faces >= len(self.ids)).any(axis=1)))
+    def check(self, name: str, rows: NDArray[np.int32]) -> None:
+        """Raise a ``ValueError`` for the first row outside ``ids`` or of more than one group."""
+        if rows.size and int(rows.max()) >= len(self.ids):
+            row = int(np.argmax((rows >= len(self.ids)).any(axis=1)))
             raise ValueError(
-                f"faces: row {row} is {faces[row].tolist()}, groups has {len(self.ids)} ids"
+                f"{name}: row {row} is {rows[row].tolist()}, groups has {len(self.ids)} ids"
             )
-        of_face = self.ids[faces]
-        mixed = (of_face != of_face[:, :1]).any(axis=1)
+        of_row = self.ids[rows]
+        mixed = (of_row != of_row[:, :1]).any(axis=1)
         if mixed.any():
             row = int(np.argmax(mixed))
-            raise ValueError(f"faces: row {row} has vertices of groups {of_face[row].tolist()}")
+            raise ValueError(f"{name}: row {row} has vertices of groups {of_row[row].tolist()}")
 
 
 def _table(meets: ArrayLike) -> NDArray[np.bool_]:

@@ -1,5 +1,7 @@
 """Single queries: does a moving vertex meet a moving face, do two moving edges meet?
 
+Points meet edges and points likewise, which are faces without area to the same kernels.
+
 ab2pf answers for the doubles given: contact at some time of the step, in exact arithmetic, is a
 hit, nothing else is, and ``toi`` is at most 1e-9 of the step before the first such time. What a
 query can cost is bounded: three cuts of its cubic into at most three pieces of one root, 40 Newton
@@ -47,7 +49,8 @@ class Impacts:
             nor the direction between them at a ``min_distance``. Zeros where they have none (a
             face without area, parallel edges), NaN where there is no hit. Shape (N, 3).
         weights: Of the four vertices of a row: (1, w, w, w) of the vertex and the face's vertices,
-            or (1 - s, s, 1 - t, t) of the two edges' ends. Shape (N, 4).
+            or (1 - s, s, 1 - t, t) of the two edges' ends. Shape (N, 4); (N, 3) of a point and an
+            edge's ends, (N, 2) of two points.
 
     Where coordinates are beyond 1e75 or all below 1e-60, normal and weights can be zero or NaN.
     """
@@ -82,6 +85,56 @@ def edge_edge(
 ) -> Impacts:
     """First contact of two edges (two ends each, four rows a query); see :func:`vertex_face`."""
     return _solve(False, x_t0, x_t1, method, min_distance)
+
+
+def point_edge(
+    x_t0: ArrayLike, x_t1: ArrayLike, method: str = "ab2pf", min_distance: float = 0.0
+) -> Impacts:
+    """First contact of a point with an edge, all moving linearly; as exact as the others.
+
+    Args:
+        x_t0: Positions at the start of the step [any unit]: point, both ends. Shape (N, 3, 3).
+        x_t1: At its end. Shape (N, 3, 3).
+        method: "ab2pf" or "exact"; the comparators know no such query.
+        min_distance: Counts as contact, in the unit of the positions; conservative there.
+
+    Returns:
+        Impacts with weights of the point and the ends, shape (N, 3), and zeros for normals.
+
+    Raises:
+        ValueError: as :func:`vertex_face`, or another method.
+    """
+    found = _solve_loose([0, 1, 2, 2], x_t0, x_t1, method, min_distance)
+    weights = np.concatenate(
+        [found.weights[:, :2], found.weights[:, 2:].sum(axis=1, keepdims=True)], axis=1
+    )
+    return Impacts(found.hit, found.toi, found.point, found.normal, weights)
+
+
+def point_point(
+    x_t0: ArrayLike, x_t1: ArrayLike, method: str = "ab2pf", min_distance: float = 0.0
+) -> Impacts:
+    """First contact of two points, shape (N, 2, 3); see :func:`point_edge`. Weights are ones."""
+    found = _solve_loose([0, 1, 1, 1], x_t0, x_t1, method, min_distance)
+    ones = np.where(found.hit[:, None], 1.0, np.nan).repeat(2, axis=1)
+    return Impacts(found.hit, found.toi, found.point, found.normal, ones)
+
+
+def check_loose(method: str) -> None:
+    """Raise a ``ValueError`` for a method without queries of points."""
+    if method not in ("ab2pf", "exact"):
+        raise ValueError(f"method {method!r} has no queries of points: ab2pf and exact have")
+
+
+def _solve_loose(
+    corners: list[int], x_t0: ArrayLike, x_t1: ArrayLike, method: str, min_distance: float
+) -> Impacts:
+    method_number(method)
+    check_loose(method)
+    n = max(corners) + 1
+    start = finite("x_t0", x_t0, (None, n, 3))
+    end = finite("x_t1", x_t1, (None, n, 3))
+    return _solve(True, start[:, corners], end[:, corners], method, min_distance)
 
 
 def method_number(method: str) -> int:

@@ -19,7 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.cloth import _mesh
 from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
-from tauguard.cloth.impacts import Impacts, checked_distance, method_number
+from tauguard.cloth.impacts import Impacts, check_loose, checked_distance, method_number
+from tauguard.cloth.loose import Loose
+from tauguard.cloth.topology import Topology
 from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 
 #: Bounding volumes by name: k, and whether they move with the step or sweep it.
@@ -39,17 +41,21 @@ class MeshCCD:
     """Every collision of a deforming mesh with itself (or between its parts) in each step.
 
     Args:
-        faces: Shape (F, 3), three different vertices each. Only vertices that a face uses take
-            part.
+        faces: Shape (F, 3), three different vertices each; may be empty. Only vertices that a face,
+            an edge or a point uses take part.
         method: How the narrow phase decides: one of :data:`tauguard.cloth.METHODS`.
         threads: 0 means all processors. Results do not depend on it.
         groups: Which parts meet; ``None``: everything meets everything, itself included.
         volume: One of :data:`VOLUMES`. Any of them finds the same collisions; they differ in cost.
+        edges: Edges of no face (rods, wires), shape (L, 2); those that a face has change nothing.
+        points: Vertices of no face or edge that take part (particles), shape (P,). Methods other
+            than ab2pf and exact have no queries of points.
 
     Attributes:
         faces: Rows of vertices, an own copy, read-only; ``Frame.vf`` counts them. Shape (F, 3).
-        edges: Their edges, each once, smaller vertex first, read-only; ``Frame.ee`` counts them.
-            Shape (E, 2).
+        edges: Edges of faces and those given, each once, smaller vertex first, read-only;
+            ``Frame.ee`` counts them. Shape (E, 2).
+        points: Those given that no face or edge has. Shape (P,).
         groups: As given.
         method, threads, volume: As given, ``threads`` with 0 as the number of processors.
         broad_stats: Counts and seconds of the last :meth:`candidates`; empty before.
@@ -74,6 +80,8 @@ class MeshCCD:
         threads: int = 1,
         groups: Groups | None = None,
         volume: str = "moving_k_dop14",
+        edges: ArrayLike = (),
+        points: ArrayLike = (),
     ) -> None:
         """Check the faces and number the edges; the hierarchy waits for positions."""
         method_number(method)  # raises where there is none
@@ -81,9 +89,10 @@ class MeshCCD:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
         k, moving = VOLUMES[volume]
         self._method, self._volume, self._threads = method, volume, thread_count(threads)
-        faces = _checked_faces(faces, groups)
-        self._mesh = _mesh.Mesh(faces, *_group_arrays(groups), k, moving, self._threads)
-        self._topology = _Topology(faces, frozen(self._mesh.edges()), groups)
+        faces, loose = _checked_parts(faces, edges, points, groups, method)
+        rows = np.concatenate([faces, loose.rows()])
+        self._mesh = _mesh.Mesh(rows, *_group_arrays(groups), k, moving, self._threads)
+        self._topology = Topology(faces, loose, frozen(self._mesh.edges()), groups)
         self.broad_stats: dict[str, Any] = {}
 
     @property
@@ -95,6 +104,11 @@ class MeshCCD:
     def edges(self) -> NDArray[np.int32]:
         """Rows of vertices, shape (E, 2)."""
         return self._topology.edges
+
+    @property
+    def points(self) -> NDArray[np.int32]:
+        """Loose points, shape (P,)."""
+        return self._topology.loose.points
 
     @property
     def groups(self) -> Groups | None:
@@ -146,12 +160,12 @@ class MeshCCD:
             _checked_flag(fresh),
             _checked_limit(limit),
         )
+        topology = self._topology
         answer = Frame(
-            vf["pairs"],
-            ee["pairs"],
-            _impacts(vf),
-            _impacts(ee),
-            FrameStats(
+            **topology.parts(vf["pairs"], _impacts(vf)),
+            ee=ee["pairs"],
+            ee_impacts=_impacts(ee),
+            stats=FrameStats(
                 vf["counts"], ee["counts"], stats["seconds"], stats["builds"], stats["bytes"]
             ),
         )
@@ -190,9 +204,56 @@ class MeshCCD:
             _checked_flag(fresh),
             _checked_limit(limit),
         )
-        return vf, ee
+        return vf[vf[:, 1] < len(self.faces)], ee
 
-    def update_topology(self, faces: ArrayLike, groups: Groups | None = None) -> dict[str, Any]:
+    def safe_step(
+        self,
+        x_t0: ArrayLike,
+        x_t1: ArrayLike,
+        min_distance: float = 0.0,
+        fraction: float = 0.9,
+        limit: int = MOST_COLLISIONS,
+    ) -> float:
+        """A share ``s`` of the step with no contact on the way, for a solver to scale its step by.
+
+        The step from ``x_t0`` to ``x_t0 + s * (x_t1 - x_t0)``, computed so in doubles, is asked
+        again until nothing meets in it: its rounding is covered, and the next step starts apart.
+
+        Args:
+            x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
+            x_t1: Positions at its end. Shape (V, 3).
+            min_distance: To be kept, in the unit of the positions.
+            fraction: Of the way to the first contact, above 0 and below 1.
+            limit: As in :meth:`find`.
+
+        Returns:
+            1.0 where nothing meets in the whole step; 0.0 where something touches at its start or
+            no positive step is found.
+
+        Raises:
+            ValueError: as :meth:`find`, or a ``fraction`` outside (0, 1).
+        """
+        if not 0 < float(fraction) < 1:
+            raise ValueError(f"fraction: {fraction!r:.40}, expected a number above 0 and below 1")
+        start, end = self._checked_step(x_t0, x_t1)
+        share, reach = 1.0, end
+        while share > 0:
+            first = self.find(start, reach, min_distance, limit=limit).first_time()
+            if first > 1:
+                return share
+            share *= fraction * first
+            reach = start + share * (end - start)
+            if np.array_equal(reach, start):
+                break
+        return 0.0
+
+    def update_topology(
+        self,
+        faces: ArrayLike,
+        groups: Groups | None = None,
+        edges: ArrayLike | None = None,
+        points: ArrayLike | None = None,
+    ) -> dict[str, Any]:
         """Go on with other faces: some gone, some new, some split (cutting, tearing).
 
         Features that stay keep their places in the hierarchy, new ones settle near features that
@@ -203,18 +264,25 @@ class MeshCCD:
         Args:
             faces: Shape (F', 3), the whole new list; rows that were there before count as kept.
             groups: For the new vertices; ``None`` keeps the present ones.
+            edges: Loose edges; ``None`` keeps the present ones.
+            points: Loose points; ``None`` keeps the present ones.
 
         Returns:
-            ``{"vertices", "edges", "faces"}``: (removed, added); ``"rebuilt"``: how many of the
+            ``{"vertices", "edges", "faces"}``: (removed, added), where loose edges and points count
+            as faces, too; ``"rebuilt"``: how many of the
             three trees had no room left and are built anew in the next frame.
 
         Raises:
             ValueError: as the constructor.
         """
-        groups = self.groups if groups is None else groups
-        checked = _checked_faces(faces, groups)
-        change = self._mesh.update_topology(checked, *_group_arrays(groups))
-        self._topology = _Topology(checked, frozen(change.pop("edge_rows")), groups)
+        before = self._topology
+        groups = before.groups if groups is None else groups
+        edges = before.loose.edges if edges is None else edges
+        points = before.loose.points if points is None else points
+        checked, loose = _checked_parts(faces, edges, points, groups, self.method)
+        rows = np.concatenate([checked, loose.rows()])
+        change = self._mesh.update_topology(rows, *_group_arrays(groups))
+        self._topology = Topology(checked, loose, frozen(change.pop("edge_rows")), groups)
         return change
 
     def _checked_step(
@@ -224,35 +292,6 @@ class MeshCCD:
         end = finite("x_t1", x_t1, (None, 3))
         self._topology.check(len(start), len(end))
         return start, end
-
-
-class _Topology:
-    """Faces, edges and groups that belong together, and how many vertices a frame has."""
-
-    def __init__(
-        self, faces: NDArray[np.int32], edges: NDArray[np.int32], groups: Groups | None
-    ) -> None:
-        self.faces, self.edges, self.groups = faces, edges, groups
-        self._rows = int(faces.max()) + 1 if faces.size else 0
-        self._vertices: int | None = None
-
-    def check(self, start: int, end: int) -> None:
-        """Raise a ``ValueError`` for numbers of vertices that do not fit."""
-        if start != end:
-            raise ValueError(f"x_t1: {end} vertices, but x_t0 has {start}")
-        if self._vertices is not None and start != self._vertices:
-            raise ValueError(
-                f"x_t0: {start} vertices, but the frames before had {self._vertices}; "
-                "update_topology comes first where the mesh changes"
-            )
-        if self.groups is not None and start != len(self.groups.ids):
-            raise ValueError(f"x_t0: {start} vertices, but groups has {len(self.groups.ids)}")
-        if start < self._rows:
-            row = int(np.argmax((self.faces >= start).any(axis=1)))
-            raise ValueError(
-                f"faces: row {row} is {self.faces[row].tolist()}, but x_t0 has {start} vertices"
-            )
-        self._vertices = start
 
 
 def _checked_flag(fresh: bool) -> bool:
@@ -277,6 +316,16 @@ def _group_arrays(groups: Groups | None) -> tuple[NDArray[np.int32], NDArray[np.
     return _NO_GROUPS if groups is None else (groups.ids, groups.meets.astype(np.uint8))
 
 
+def _checked_parts(
+    faces: ArrayLike, edges: ArrayLike, points: ArrayLike, groups: Groups | None, method: str
+) -> tuple[NDArray[np.int32], Loose]:
+    checked = _checked_faces(faces, groups)
+    loose = Loose.of(checked, edges, points, groups)
+    if loose.points.size:
+        check_loose(method)
+    return checked, loose
+
+
 def _checked_faces(faces: ArrayLike, groups: Groups | None) -> NDArray[np.int32]:
     if groups is not None and not isinstance(groups, Groups):
         raise ValueError(
@@ -293,5 +342,5 @@ def _checked_faces(faces: ArrayLike, groups: Groups | None) -> NDArray[np.int32]
         row = int(np.argmax(repeats))
         raise ValueError(f"faces: row {row} is {checked[row].tolist()}: it repeats a vertex")
     if groups is not None:
-        groups.check_faces(checked)
+        groups.check("faces", checked)
     return checked

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,7 +74,10 @@ def load_recording(folder: str | Path, pattern: str = "*") -> Recording:
 
 
 def read_mesh(path: str | Path) -> tuple[Points, NDArray[np.int32]]:
-    """Vertices, shape (V, 3), and faces, shape (F, 3), in the file's order, nothing merged."""
+    """Vertices, shape (V, 3), and faces, shape (F, 3), in the file's order, nothing merged.
+
+    Warns where vertices belong to no face.
+    """
     import trimesh
 
     path = Path(path)
@@ -91,6 +95,13 @@ def read_mesh(path: str | Path) -> tuple[Points, NDArray[np.int32]]:
         raise ValueError(f"{path}: cannot be read as a triangle mesh ({error})") from error
     if faces.ndim != 2 or faces.shape[1:] != (3,) or len(faces) == 0:
         raise ValueError(f"{path}: has no triangles")
+    unused = len(vertices) - len(np.unique(faces))
+    if unused:
+        warnings.warn(
+            f"{path}: {unused} of {len(vertices)} vertices belong to no face; MeshCCD asks about "
+            "them only where points= or edges= names them",
+            stacklevel=2,
+        )
     return vertices, faces
 
 

@@ -21,10 +21,20 @@ struct CandidateBlock {
                 kept_apart = 0;  // left out: sharing a vertex; of groups that do not meet
 };
 
+// Loose edges and points among the faces (topology.hpp): from which face on, and which vertices are
+// loose points. Those alone meet them, and each two points once.
+struct Loose {
+  std::int32_t first;
+  const std::uint8_t* point;
+  bool meet(std::int32_t vertex, std::int32_t face, std::int32_t a, std::int32_t b) const {
+    return face < first || (point[vertex] && (a != b || vertex < a));
+  }
+};
+
 // Appends the candidates of one leaf pair: features whose own volumes overlap, share no vertex and
 // may meet. Edges come smaller number first; vertices and faces come vertex first. `out` must not
 // be full.
 void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
-                     const Groups& groups, CandidateBlock& out);
+                     const Groups& groups, const Loose& loose, CandidateBlock& out);
 
 }  // namespace tauguard::cloth

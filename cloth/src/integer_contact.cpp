@@ -113,18 +113,34 @@ class Hull {
     for (int i = 0; i < corners_; ++i) {
       int k = 0;
       while (k < 3 && side(i, k).zero()) ++k;
-      if (k == 3) return silent;  // on a line
-      const auto roots = roots_of(side(i, k));
-      std::copy_n(roots.all.begin(), roots.count, times.begin() + count);
-      count += roots.count;
-      complete = complete && roots.complete;
+      const Form<2>* moving[2] = {k < 3 ? &side(i, k) : raised(i), k < 3 ? nullptr : raised(i + 1)};
+      for (const Form<2>* form : moving) {
+        if (!form) continue;
+        const auto roots = roots_of(*form);
+        std::copy_n(roots.all.begin(), roots.count, times.begin() + count);
+        count += roots.count;
+        complete = complete && roots.complete;
+      }
     }
     std::sort(times.begin(), times.begin() + count,
               [](const auto& a, const auto& b) { return a.lo < b.lo; });
     return first_of(times.data(), count, complete);
   }
 
+  // A corner's first coordinate that is not zero throughout, as a form of degree 2; null: none.
+  const Form<2>* raised(int i) {
+    i %= corners_;
+    for (const Form<1>& x : corner_[i]) {
+      if (x.zero()) continue;
+      const FixedInt<4> a(x.c[0]), b(x.c[1]);
+      raised_[i].c = {a, a + b, b};
+      return &raised_[i];
+    }
+    return nullptr;
+  }
+
   int corners_;
+  std::array<Form<2>, 4> raised_;
   std::array<Vector, 4> corner_;
   std::array<std::array<std::optional<Form<2>>, 3>, 4> sides_{};
   bool open_ = false;

@@ -30,6 +30,23 @@ constexpr double never = std::numeric_limits<double>::infinity();
 
 Vec3 at(const Ends& x, std::int32_t v, double t) { return mix(x(false, v), x(true, v), t); }
 
+// Weights of a face without area: of the point on its longest edge that is next to `a`.
+void on_longest_edge(Vec3 a, Vec3 b, Vec3 c, Vec3 d, double* w) {
+  const Vec3 ends[3][2] = {{b, c}, {b, d}, {c, d}};
+  constexpr int weight[3][2] = {{1, 2}, {1, 3}, {2, 3}};
+  int longest = 0;
+  const auto length = [&](int i) { return largest(ends[i][1] - ends[i][0]); };
+  for (int i = 1; i < 3; ++i)
+    if (length(i) > length(longest)) longest = i;
+  const Vec3 from = ends[longest][0];
+  const double size = length(longest), scale = size > 0 ? 1 / size : 0;
+  const Vec3 e = scale * (ends[longest][1] - from);
+  const double ee = dot(e, e), s = ee > 0 ? dot(scale * (a - from), e) / ee : 0;
+  w[1] = w[2] = w[3] = 0;
+  w[weight[longest][1]] = std::clamp(s, 0.0, 1.0);
+  w[weight[longest][0]] = 1 - w[weight[longest][1]];
+}
+
 // Where, along which normal and with which weights the two features meet at time t.
 template <bool vf>
 void describe(const Ends& x, const std::int32_t* row, double t, ImpactArrays out, std::size_t i) {
@@ -46,6 +63,7 @@ void describe(const Ends& x, const std::int32_t* row, double t, ImpactArrays out
     w[2] = std::clamp(v1, 0.0, 1.0);
     w[3] = std::clamp(v2, 0.0, 1.0 - w[2]);
     w[1] = 1 - w[2] - w[3];
+    if (!(nn > 0)) on_longest_edge(a, b, c, d, w);
   } else {
     const double s = nn > 0 ? std::clamp(dot(cross(p, r), n) / nn, 0.0, 1.0) : 0;
     const double e = nn > 0 ? std::clamp(dot(cross(p, q), n) / nn, 0.0, 1.0) : 0;

@@ -39,11 +39,14 @@ void Topology::set(std::vector<std::int32_t> face_vertices) {
   std::vector<std::int32_t> f(faces.vertices.size());  // by their place among the vertices in use
   std::transform(faces.vertices.begin(), faces.vertices.end(), f.begin(),
                  [&](std::int32_t v) { return numbers.place(v); });
+  triangles = 0;
+  while (3 * triangles < f.size() && f[3 * triangles + 1] != f[3 * triangles + 2]) ++triangles;
   // Buckets by the smaller vertex, then each bucket by the larger.
   std::vector<std::size_t> begin(count + 1, 0);
   const auto each_edge = [&](auto&& visit) {
     for (std::size_t i = 0; i < f.size(); i += 3)
-      for (int k = 0; k < 3; ++k) visit(std::minmax(f[i + k], f[i + (k + 1) % 3]));
+      for (int k = 0; k < 3; ++k)
+        if (f[i + k] != f[i + (k + 1) % 3]) visit(std::minmax(f[i + k], f[i + (k + 1) % 3]));
   };
   each_edge([&](auto e) { ++begin[e.first + 1]; });
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
@@ -62,6 +65,17 @@ void Topology::set(std::vector<std::int32_t> face_vertices) {
       edges.vertices.push_back(vertices.vertices[*e]);
     }
   }
+}
+
+std::vector<std::uint8_t> loose_points(const Topology& topology, std::size_t n) {
+  if (topology.triangles == topology.faces.size()) return {};
+  std::vector<std::uint8_t> loose(n, 0);
+  for (std::size_t i = topology.triangles; i < topology.faces.size(); ++i) {
+    const std::int32_t* row = topology.faces.of(i);
+    loose[row[0]] = row[0] == row[1];
+  }
+  for (const auto v : topology.edges.vertices) loose[v] = 0;
+  return loose;
 }
 
 std::vector<std::int32_t> match_sorted(const Features& before, const Features& after) {
