@@ -31,7 +31,8 @@ Form<2> cross(const Vector& a, const Vector& b, int k) {
 class Hull {
  public:
   // The vertices' coordinates as [axis][vertex][end].
-  Hull(bool vf, const FixedInt<2> (&x)[3][4][2]) : corners_(vf ? 3 : 4) {
+  // wire: a face that is an edge or a point, with its last two vertices the same.
+  Hull(bool vf, bool wire, const FixedInt<2> (&x)[3][4][2]) : corners_(wire ? 2 : vf ? 3 : 4) {
     constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}},
                   of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
     for (int i = 0; i < corners_; ++i) {
@@ -152,7 +153,7 @@ double integer_contact(bool vf, const Ends& ends, const std::int32_t* row) {
   FixedInt<2> x[3][4][2];
   for (int k = 0; k < 3; ++k)
     if (!on_axis(ends, row, k, x[k])) return std::numeric_limits<double>::quiet_NaN();
-  return Hull(vf, x).first_contact();
+  return Hull(vf, vf && row[2] == row[3], x).first_contact();
 }
 
 }  // namespace tauguard::cloth
