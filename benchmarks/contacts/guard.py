@@ -26,12 +26,12 @@ from tauguard.report import Row, rate
 
 #: Scenes of each family: in a full run, in a quick one.
 COUNTS = {
-    "plate": (550, 40),
-    "pair": (150, 20),
-    "chain": (100, 8),
-    "cup": (50, 3),
-    "arm": (100, 8),
-    "cloth": (100, 5),
+    "plate": (650, 24),
+    "pair": (160, 12),
+    "chain": (100, 4),
+    "cup": (30, 1),
+    "arm": (100, 4),
+    "cloth": (60, 2),
 }
 #: Fixed steps that are tried, with stiff contacts [s].
 FIXED = (5e-4, 2e-4, 1e-4, 5e-5)
