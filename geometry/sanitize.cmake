@@ -1,0 +1,16 @@
+# -DTAUGUARD_SANITIZE=address (with undefined) or thread: what native targets are built with.
+set(TAUGUARD_SANITIZE "" CACHE STRING "address (and undefined behaviour) or thread; empty: none")
+
+function(tauguard_sanitize target)
+  if(TAUGUARD_SANITIZE STREQUAL "address")
+    set(flags -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
+  elseif(TAUGUARD_SANITIZE STREQUAL "thread")
+    set(flags -fsanitize=thread)
+  elseif(TAUGUARD_SANITIZE)
+    message(FATAL_ERROR "TAUGUARD_SANITIZE: ${TAUGUARD_SANITIZE}, expected address or thread")
+  else()
+    return()
+  endif()
+  target_compile_options(${target} PRIVATE ${flags})
+  target_link_options(${target} PRIVATE ${flags})
+endfunction()
