@@ -34,8 +34,7 @@ ALLOWED = {
     "datasets": {"envs", "contacts", "traces", "models", "detectors"},
     "replay": {"traces", "models"},
     "report": set(),
-    # The environments study trains its detector by the command line's rules.
-    "benchmarks": PRODUCT | {"report", "cli", "hard_cases"},
+    "benchmarks": PRODUCT | {"report", "hard_cases"},
     "hard_cases": PRODUCT,
     "cli": PRODUCT | {"report", "benchmarks", "hard_cases"},
 }
