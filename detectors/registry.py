@@ -12,6 +12,7 @@ from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.velocity import SensorNoise
+from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.front_end import FrontEnd
 from tauguard.detectors.features.scaling import Scaling
@@ -77,6 +78,7 @@ FILE_TYPES: dict[str, type] = {
         Scaling,
         SensorNoise,
         SpeedLevels,
+        UsualInput,
         WindowShape,
     )
 }

@@ -14,6 +14,7 @@ from tauguard.detectors.detector import FittedDetector, same_rate
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
 from tauguard.detectors.estimation.observer import PLAIN_GAIN
 from tauguard.detectors.evaluation.events import find_alarms
+from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.thresholds.confirmation import (
     CONFIRMATION,
@@ -43,6 +44,7 @@ class CollisionAlarm(Frozen):
     threshold: float  #: of the normalised score
     confirmation: float = CONFIRMATION  #: t_c [s]
     levels: SpeedLevels | None = None  #: None: the score is compared as it is
+    inputs: UsualInput | None = None  #: what its samples look like; None: not known
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from tauguard.detectors.detector import Detector, FittedDetector
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
@@ -59,7 +60,8 @@ def train(
         ValueError: traces that do not fit or lack what the method needs.
     """
     own, rest = held_out(traces)
-    return with_rate(detector.fit(own, arm), rest, per_hour)
+    alarm = with_rate(detector.fit(own, arm), rest, per_hour)
+    return replace(alarm, inputs=UsualInput.of(traces))
 
 
 def with_rate(

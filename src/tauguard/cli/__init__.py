@@ -23,6 +23,8 @@ COMMANDS = {
     "train": "a detector from labelled recordings",
     "evaluate": "a detector's figures on labelled recordings",
     "watch": "an environment live in the rerun viewer",
+    "listen": "a detector beside a running robot, read-only: free, collision or fault",
+    "play-ur": "play a log as a UR controller would send it, to test against",
     "replay": "turn an MCAP recording into an .rrd for the rerun viewer",
     "report": "the studies and the hard cases in one HTML file",
     "hard-cases": "named cases with exact answers, for our kernels and anybody's",

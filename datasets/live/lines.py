@@ -1,0 +1,78 @@
+"""Samples from lines of text: what any other program can pipe in."""
+
+from __future__ import annotations
+
+import selectors
+import time
+from collections.abc import Sequence
+from typing import TextIO
+
+import numpy as np
+
+from tauguard.datasets.live.sample import Closing, Sample, SourceClosed
+
+
+class LineSource(Closing):
+    """One sample a line: the time, then all q, all qd and all currents, separated by commas.
+
+    Args:
+        stream: to read, such as ``sys.stdin``; it is read from its file descriptor.
+        joint_names: what the joints are called, in the order of the columns.
+        rate: samples a second that will come.
+    """
+
+    def __init__(self, stream: TextIO, joint_names: Sequence[str], rate: float) -> None:
+        """Nothing is read before the first :meth:`read`."""
+        self._names, self._rate = tuple(joint_names), rate
+        self.events: list[str] = []
+        self._file, self._pending, self._lines = stream, b"", 0
+        self._ready = selectors.DefaultSelector()
+        self._ready.register(stream, selectors.EVENT_READ)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """As given."""
+        return self._names
+
+    @property
+    def rate(self) -> float:
+        """As given."""
+        return self._rate
+
+    def read(self, timeout: float) -> Sample | None:
+        """The sample of the next line, or None if none came within ``timeout`` seconds.
+
+        Raises:
+            SourceClosed: the stream has ended.
+            ValueError: a line with another number of columns, or with something else than numbers.
+        """
+        deadline = time.monotonic() + timeout
+        while b"\n" not in self._pending:
+            if not self._ready.select(max(0.0, deadline - time.monotonic())):
+                return None
+            data = self._file.buffer.raw.read(65536)  # type: ignore[attr-defined]
+            if not data:
+                raise SourceClosed("the input has ended")
+            self._pending += data
+        arrived = time.monotonic_ns()
+        line, _, self._pending = self._pending.partition(b"\n")
+        self._lines += 1
+        return self._sample(line, arrived)
+
+    def _sample(self, line: bytes, arrived: int) -> Sample:
+        n = len(self._names)
+        try:
+            values = np.array([float(cell) for cell in line.split(b",")])
+        except ValueError:
+            values = np.empty(0)
+        if len(values) != 1 + 3 * n:
+            raise ValueError(
+                f"line {self._lines}: expected {1 + 3 * n} numbers (t, {n} q, {n} qd, {n} "
+                f"currents) separated by commas, got {line[:60]!r}"
+            )
+        q, qd, current = np.split(values[1:], 3)
+        return Sample(float(values[0]), q, qd, current, arrived)
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._ready.close()

@@ -1,0 +1,157 @@
+"""The loop from sample to answer, and what is kept of it."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.datasets.live.sample import LiveSource, Sample, SourceClosed
+from tauguard.detectors.faults.inputs import SPAN
+from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer, Monitor
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: Latencies are counted in bins of a microsecond, up to so many; longer ones are in the last.
+BINS = 100_000
+#: A source that gives nothing for so long is said to be silent [s]: a fault without a sample.
+SILENT = 0.1
+
+
+@dataclass
+class Span:
+    """A stretch of collision or fault, by the robot's clock."""
+
+    state: str  #: "collision" or "fault"
+    start: float  #: [s]
+    end: float  #: [s]
+    reason: str = ""  #: of a fault, its first
+
+
+@dataclass
+class Heard:
+    """What was heard so far; its size does not grow with time unless samples are kept."""
+
+    joint_names: tuple[str, ...]
+    keep: bool = False  #: keep every sample that could be believed, for a recording
+    samples: int = 0  #: that came, believed or not
+    first: float = np.nan  #: robot's time of the first sample [s]
+    last: float = np.nan  #: and of the last one
+    spans: list[Span] = field(default_factory=list)
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(BINS, np.int64))
+    """Samples by their latency from packet to answer, in microseconds."""
+    slowest: int = 0  #: [ns]
+    rows: list[Sample] = field(default_factory=list)
+    scores: list[float] = field(default_factory=list)
+    alarms: list[bool] = field(default_factory=list)
+    ended: str = ""  #: why it ended
+    _open: dict[str, Span] = field(default_factory=dict)
+
+    def add(self, sample: Sample, answer: Answer, latency: int) -> None:
+        """One sample with its answer."""
+        self.samples += 1
+        self.counts[min(latency // 1000, BINS - 1)] += 1
+        self.slowest = max(self.slowest, latency)
+        t = sample.t
+        if not answer.reason:
+            self.first = t if np.isnan(self.first) else self.first
+            self.last = t
+            if self.keep and (not self.rows or t > self.rows[-1].t):
+                self.rows.append(sample)
+                self.scores.append(answer.score)
+                self.alarms.append(answer.alarm)
+        if answer.state == FAULT:
+            self._take_back(t)
+        self._mark(COLLISION, answer.alarm, t, "")
+        self._mark(FAULT, bool(answer.reason), t, answer.reason)
+
+    def _mark(self, state: str, up: bool, t: float, reason: str) -> None:
+        """Open, prolong or close the span of one state."""
+        span = self._open.get(state)
+        if up and span is None:
+            span = self._open[state] = Span(state, t, t, reason)
+            self.spans.append(span)
+        elif up and span is not None:
+            span.end = t if np.isfinite(t) else span.end
+        elif span is not None:
+            del self._open[state]
+
+    def _take_back(self, t: float) -> None:
+        """A collision that began just before a fault was the fault's own."""
+        span = self._open.get(COLLISION)
+        if span is not None and not t - span.start > SPAN:
+            self.spans.remove(span)
+            del self._open[COLLISION]
+
+    def silent(self, seconds: float) -> None:
+        """Nothing came for ``seconds``."""
+        self._mark(FAULT, True, self.last, f"silent: no sample for {seconds:.1f} s")
+
+    def trace(self) -> Trace:
+        """The believed samples as a trace."""
+        rows = self.rows
+        return Trace(
+            self.joint_names,
+            np.array([r.t for r in rows]),
+            np.array([r.q for r in rows]),
+            np.array([r.qd for r in rows]),
+            np.array([r.current for r in rows]),
+        )
+
+    def quantiles(self) -> dict[str, float]:
+        """Latency from packet to answer [us]: median, p99, p99.9, p99.99 and the largest."""
+        if not self.samples:
+            return {}
+        levels = {"median": 0.5, "p99": 0.99, "p99_9": 0.999, "p99_99": 0.9999}
+        below = np.cumsum(self.counts) / self.samples
+        found = {name: float(np.searchsorted(below, q) + 1) for name, q in levels.items()}
+        return found | {"max": self.slowest * 1e-3}
+
+
+def listen(
+    source: LiveSource,
+    monitor: Monitor,
+    seconds: float = np.inf,
+    report: Callable[[Sample, Answer], None] | None = None,
+    keep: bool = False,
+) -> Heard:
+    """Ask the monitor about every sample until the source ends, the time is up, or Ctrl-C.
+
+    Args:
+        source: read, never commanded.
+        monitor: made for its joints and rate.
+        seconds: by this machine's clock.
+        report: called after every answer; it must return at once (the latency does not count it).
+        keep: keep the samples, for :meth:`Heard.trace`.
+    """
+    heard = Heard(source.joint_names, keep)
+    end = time.monotonic() + seconds
+    last = time.monotonic()
+    collecting = gc.isenabled()
+    gc.disable()  # a collection would come between a packet and its answer
+    try:
+        while (now := time.monotonic()) < end:
+            sample = source.read(min(SILENT, end - now))
+            if sample is None:
+                if time.monotonic() - last > SILENT:
+                    heard.silent(time.monotonic() - last)
+                continue
+            answer = monitor.step(sample.t, sample.q, sample.qd, sample.current)
+            heard.add(sample, answer, time.monotonic_ns() - sample.arrived)
+            last = time.monotonic()
+            if report is not None:
+                report(sample, answer)
+        heard.ended = f"{seconds:g} s are over"
+    except SourceClosed as closed:
+        heard.ended = str(closed)
+    except KeyboardInterrupt:
+        heard.ended = "ended by hand"
+    finally:
+        if collecting:
+            gc.enable()
+    return heard

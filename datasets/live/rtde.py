@@ -1,0 +1,119 @@
+"""Universal Robots' Real-Time Data Exchange (RTDE): packets to bytes and back.
+
+The protocol is published by Universal Robots ("Real-Time Data Exchange (RTDE) Guide"): over TCP
+port 30004, every packet is its size (uint16, the header's 3 bytes included), its type (uint8) and
+a payload; all numbers are big-endian. Protocol version 2 is spoken here.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+PORT = 30004
+VERSION = 2
+HEADER = struct.Struct(">HB")
+
+REQUEST_PROTOCOL_VERSION = ord("V")
+GET_URCONTROL_VERSION = ord("v")
+TEXT_MESSAGE = ord("M")
+DATA_PACKAGE = ord("U")
+SETUP_OUTPUTS = ord("O")
+SETUP_INPUTS = ord("I")
+START = ord("S")
+PAUSE = ord("P")
+
+#: RTDE's type names and the struct format of one value.
+FORMATS = {
+    "BOOL": "?",
+    "UINT8": "B",
+    "UINT32": "I",
+    "UINT64": "Q",
+    "INT32": "i",
+    "DOUBLE": "d",
+    "VECTOR3D": "3d",
+    "VECTOR6D": "6d",
+    "VECTOR6INT32": "6i",
+    "VECTOR6UINT32": "6I",
+}
+
+
+@dataclass(frozen=True)
+class Packet:
+    """One packet: its type and what follows the header."""
+
+    kind: int
+    payload: bytes
+
+
+def packet(kind: int, payload: bytes = b"") -> bytes:
+    """A packet as it goes over the wire.
+
+    Raises:
+        ValueError: the payload does not fit the 16 bits of the size.
+    """
+    size = HEADER.size + len(payload)
+    if size > 0xFFFF:
+        raise ValueError(f"an RTDE packet of {size} bytes: at most 65535")
+    return HEADER.pack(size, kind) + payload
+
+
+class PacketReader:
+    """Packets out of a stream of bytes that comes in pieces of any size."""
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._bytes = bytearray()
+
+    def feed(self, data: bytes) -> None:
+        """Take in what came from the socket."""
+        self._bytes += data
+
+    def next(self) -> Packet | None:
+        """The next whole packet, None while there is none.
+
+        Raises:
+            ValueError: a size smaller than the header: the other side does not speak RTDE.
+        """
+        if len(self._bytes) < HEADER.size:
+            return None
+        size, kind = HEADER.unpack_from(self._bytes)
+        if size < HEADER.size:
+            raise ValueError(f"a packet of {size} bytes: this is not RTDE")
+        if len(self._bytes) < size:
+            return None
+        payload = bytes(self._bytes[HEADER.size : size])
+        del self._bytes[:size]
+        return Packet(kind, payload)
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What one data packet holds: the variables' types in the order that was asked."""
+
+    number: int
+    types: tuple[str, ...]
+
+    @property
+    def layout(self) -> struct.Struct:
+        """Of the packet's payload: the recipe's number, then all values."""
+        return struct.Struct(">B" + "".join(FORMATS[kind] for kind in self.types))
+
+    def pack(self, values: Sequence[float]) -> bytes:
+        """A data packet of ``values``, one number an element, in order."""
+        return packet(DATA_PACKAGE, self.layout.pack(self.number, *values))
+
+
+def text_message(source: str, message: str, level: int) -> bytes:
+    """A text message; level 0 is an exception, 1 an error, 2 a warning, 3 an information."""
+    parts = (message.encode()[:255], source.encode()[:255])
+    return packet(
+        TEXT_MESSAGE, b"".join(bytes([len(part)]) + part for part in parts) + bytes([level])
+    )
+
+
+def read_text(payload: bytes) -> str:
+    """The message of a text packet; empty if it is cut off."""
+    length = payload[0] if payload else 0
+    return payload[1 : 1 + length].decode("utf-8", "replace")

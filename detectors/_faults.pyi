@@ -1,0 +1,23 @@
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+class Check:
+    def __init__(
+        self,
+        dt: float,
+        longest: float,
+        speed: float,
+        repeats: int,
+        window: int,
+        share: float,
+        current: Array,
+        step: Array,
+        drift: Array,
+        stuck: Counts,
+        /,
+    ) -> None: ...
+    def step(self, t: float, q: Array, qd: Array, current: Array, /) -> tuple[int, int, float]: ...
+    def reset(self) -> None: ...

@@ -1,0 +1,5 @@
+"""Faults of the samples themselves, told from collisions: see :mod:`.inputs`."""
+
+from tauguard.detectors.faults.inputs import FAULTS, FaultCheck, UsualInput
+
+__all__ = ["FAULTS", "FaultCheck", "UsualInput"]

@@ -1,0 +1,164 @@
+"""Whether a sample can be believed: what is usual of an arm's samples, and what is not.
+
+Nothing here asks for a model of the arm. A frozen bus, a stuck encoder or a missing packet shows in
+the samples; a wrong gain or a swapped pair of currents does not, and looks like a contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors._faults import Check
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+#: No arm's joint turns faster [rad/s]; degrees per second do.
+FASTEST = 20.0
+#: Seconds over which velocities are summed to be held against the change of position.
+SPAN = 20e-3
+#: Share of a joint's travel that position and velocity may differ by: filters lag, time jitters.
+SHARE = 0.2
+#: What is allowed beyond that share, over the most that training shows.
+MARGIN = 3.0
+#: Resolution that any encoder is allowed [rad]: training at rest may show none.
+RESOLUTION = 2e-4
+
+#: By the number that the native check answers: a name, and a text with the joint and the value.
+FAULTS: dict[int, tuple[str, str]] = {
+    1: ("not-finite", "the position of {joint} is {value:g}"),
+    2: ("not-finite", "the velocity of {joint} is {value:g}"),
+    3: ("not-finite", "the current of {joint} is {value:g}"),
+    4: ("not-finite", "the time is {value:g}"),
+    5: ("time", "the time stamp repeats"),
+    6: ("time", "the time goes back by {back:.3g} s"),
+    7: ("gap", "nothing for {ms:.3g} ms"),
+    8: ("rate", "samples come every {ms:.3g} ms, trained at {dt:.3g} ms"),
+    9: ("range", "the velocity of {joint} is {value:.3g} rad/s"),
+    10: ("range", "the current of {joint} is {value:.3g} A, far beyond training's largest"),
+    11: ("frozen", "no signal has changed for {value:.0f} samples"),
+    12: ("position", "the position of {joint} is off its velocity by {value:.2g} rad"),
+    13: ("stuck", "the current of {joint} stays at {value:.3g} A: saturated or stuck"),
+}
+
+
+@dataclass(frozen=True)
+class UsualInput:
+    """What is usual of one arm's samples, from collision-free or struck motion alike."""
+
+    joint_names: tuple[str, ...]
+    dt: float  #: sample interval [s]
+    longest: float  #: longest interval that is not a gap [s]
+    repeats: int  #: samples in a row in which no signal changes
+    window: int  #: samples over which velocities are summed
+    current: Array  #: largest believable ``|current|`` [A], shape (n,)
+    step: Array  #: ``|change of q less qd dt|`` over one sample beyond SHARE [rad], shape (n,)
+    drift: Array  #: the same over ``window`` samples [rad], shape (n,)
+    stuck: Counts  #: samples in a row with one joint's current unchanged, shape (n,)
+
+    @classmethod
+    def of(cls, traces: Sequence[Trace]) -> UsualInput:
+        """What the samples of these traces show.
+
+        Raises:
+            ValueError: no traces, or of fewer than two samples.
+        """
+        if not traces or any(len(trace.t) < 2 for trace in traces):
+            raise ValueError("no traces, or one of fewer than 2 samples: nothing to learn from")
+        dt = float(np.median([trace.dt for trace in traces]))
+        window = max(2, round(SPAN / dt))
+        return cls(
+            traces[0].joint_names,
+            dt,
+            max(2.5 * dt, 1.25 * max(float(np.diff(trace.t).max()) for trace in traces)),
+            # At least two, so that one packet that comes twice is not called frozen.
+            2 + max(_longest_run(np.asarray(_same(trace).all(axis=1))) for trace in traces),
+            window,
+            np.max([3 * np.abs(trace.current).max(axis=0) + 1 for trace in traces], axis=0),
+            MARGIN * np.max([_beyond(trace, 1) for trace in traces], axis=0) + RESOLUTION,
+            MARGIN * np.max([_beyond(trace, window) for trace in traces], axis=0) + RESOLUTION,
+            np.max([_stuck(trace) for trace in traces], axis=0),
+        )
+
+
+def _beyond(trace: Trace, window: int) -> Array:
+    """Most that position and velocity differ by over ``window`` samples, less SHARE, (n,)."""
+    travel = np.diff(trace.t)[:, None] * (trace.qd[1:] + trace.qd[:-1]) / 2
+    error = np.diff(trace.q, axis=0) - travel
+    return np.asarray(
+        (np.abs(_sums(error, window)) - SHARE * np.abs(_sums(travel, window))).max(axis=0).clip(0)
+    )
+
+
+def _sums(values: Array, window: int) -> Array:
+    """Sums over ``window`` rows, and over what there is at the beginning, shape (T - 1, n)."""
+    total = np.cumsum(values, axis=0)
+    total[window:] -= total[:-window].copy()
+    return np.asarray(total)
+
+
+def _same(trace: Trace) -> NDArray[np.bool_]:
+    """Which signals are those of the sample before, shape (T - 1, 3 n)."""
+    signals = np.concatenate([trace.q, trace.qd, trace.current], axis=1)
+    return np.asarray(signals[1:] == signals[:-1])
+
+
+def _stuck(trace: Trace) -> Counts:
+    """Longest run of an unchanged current a joint, doubled, plus 3, shape (n,)."""
+    same = trace.current[1:] == trace.current[:-1]
+    return np.array([2 * _longest_run(column) + 3 for column in same.T], dtype=np.int64)
+
+
+def _longest_run(mask: NDArray[np.bool_]) -> int:
+    """Length of the longest run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+class FaultCheck:
+    """Asks of one sample after another whether it can be believed."""
+
+    def __init__(self, usual: UsualInput) -> None:
+        """Begin before the first sample."""
+        self.usual = usual
+        self._check = Check(
+            usual.dt,
+            usual.longest,
+            FASTEST,
+            usual.repeats,
+            usual.window,
+            SHARE,
+            usual.current,
+            usual.step,
+            usual.drift,
+            usual.stuck,
+        )
+
+    def reset(self) -> None:
+        """Forget the samples so far."""
+        self._check.reset()
+
+    def step(self, t: float, q: Array, qd: Array, current: Array) -> str | None:
+        """None, or what is wrong with this sample: ``"frozen: no signal has changed ..."``.
+
+        Args:
+            t: its time [s].
+            q: [rad], float64, shape (n,).
+            qd: [rad/s], shape (n,).
+            current: [A], shape (n,).
+
+        Raises:
+            ValueError: another number of joints.
+        """
+        number, joint, value = self._check.step(t, q, qd, current)
+        if not number:
+            return None
+        name, text = FAULTS[number]
+        who = self.usual.joint_names[joint] if joint >= 0 else ""
+        ms, dt = 1e3 * value, 1e3 * self.usual.dt
+        return f"{name}: " + text.format(joint=who, value=value, ms=ms, dt=dt, back=-value)

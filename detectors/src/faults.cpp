@@ -1,0 +1,67 @@
+// tauguard.detectors._faults: faults that a stream of samples shows by itself.
+#include "faults.hpp"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/tuple.h>
+
+#include <tuple>
+
+#include "bindings.hpp"
+
+namespace tauguard::detectors {
+namespace {
+
+std::vector<double> values(const In1& x) { return {x.data(), x.data() + x.shape(0)}; }
+
+class Check {
+ public:
+  Check(double dt, double longest, double speed, std::int64_t repeats, std::int64_t window,
+        double share, In1 current, In1 step, In1 drift, Ids stuck)
+      : n_(current.shape(0)),
+        check_(usual(dt, longest, speed, repeats, window, share, current, step, drift, stuck)) {}
+
+  std::tuple<int, int, double> step(double t, In1 q, In1 qd, In1 current) {
+    require(q.shape(0) == n_ && qd.shape(0) == n_ && current.shape(0) == n_,
+            "q, qd, current: expected one entry a joint");
+    const Verdict v = check_.step(t, q.data(), qd.data(), current.data());
+    return {static_cast<int>(v.fault), v.joint, v.value};
+  }
+
+  void reset() { check_.reset(); }
+
+ private:
+  static Usual usual(double dt, double longest, double speed, std::int64_t repeats,
+                     std::int64_t window, double share, const In1& current, const In1& step,
+                     const In1& drift, const Ids& stuck) {
+    const std::size_t n = current.shape(0);
+    require(dt > 0 && longest > 0 && window > 0 && repeats > 0,
+            "dt, longest, window, repeats: expected above 0");
+    require(step.shape(0) == n && drift.shape(0) == n && stuck.shape(0) == n,
+            "current, step, drift, stuck: expected one entry a joint");
+    return {dt,
+            longest,
+            speed,
+            repeats,
+            window,
+            values(current),
+            share,
+            values(step),
+            values(drift),
+            {stuck.data(), stuck.data() + n}};
+  }
+
+  std::size_t n_;
+  FaultCheck check_;
+};
+
+}  // namespace
+}  // namespace tauguard::detectors
+
+NB_MODULE(_faults, m) {
+  using namespace tauguard::detectors;
+  nb::class_<Check>(m, "Check")
+      .def(nb::init<double, double, double, std::int64_t, std::int64_t, double, In1, In1, In1,
+                    Ids>())
+      .def("step", &Check::step)
+      .def("reset", &Check::reset);
+}

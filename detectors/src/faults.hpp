@@ -1,0 +1,178 @@
+// Faults of a stream of samples that the samples themselves show: no model of the arm is asked.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace tauguard::detectors {
+
+enum class Fault : std::int32_t {
+  none,
+  position_not_finite,
+  velocity_not_finite,
+  current_not_finite,
+  time_not_finite,
+  time_stands_still,
+  time_goes_back,
+  gap,
+  rate,
+  velocity_absurd,
+  current_absurd,
+  frozen,
+  position_against_velocity,
+  current_stuck,
+};
+
+// What is usual of one arm's samples; all arrays hold one entry a joint.
+struct Usual {
+  double dt = 0;                    // sample interval [s]
+  double longest = 0;               // longest interval that is not a gap [s]
+  double speed = 0;                 // no joint turns faster [rad/s]
+  std::int64_t repeats = 0;         // samples in a row in which no signal changes
+  std::int64_t window = 0;          // samples over which velocities are summed
+  std::vector<double> current;      // largest |current| [A]
+  double share = 0;                 // of the travel that position and velocity may differ by
+  std::vector<double> step;         // |change of q less qd dt| beyond that, over one sample [rad]
+  std::vector<double> drift;        // the same summed over `window` samples [rad]
+  std::vector<std::int64_t> stuck;  // samples in a row with one joint's current unchanged
+};
+
+struct Verdict {
+  Fault fault = Fault::none;
+  std::int32_t joint = -1;  // 0-based, -1 for the sample as a whole
+  double value = 0;         // in the fault's own unit
+};
+
+// Looks at one sample after another; bounded work, nothing allocated after construction.
+class FaultCheck {
+ public:
+  explicit FaultCheck(Usual usual)
+      : usual_(std::move(usual)),
+        n_(usual_.current.size()),
+        last_(3 * n_),
+        errors_(static_cast<std::size_t>(usual_.window) * n_),
+        travels_(errors_.size()),
+        sums_(n_),
+        travelled_(n_),
+        unchanged_(n_) {}
+
+  void reset() {
+    begun_ = false;
+    repeats_ = filled_ = 0;
+    slow_ = 0;
+    std::fill(errors_.begin(), errors_.end(), 0.0);
+    std::fill(travels_.begin(), travels_.end(), 0.0);
+    std::fill(sums_.begin(), sums_.end(), 0.0);
+    std::fill(travelled_.begin(), travelled_.end(), 0.0);
+    std::fill(unchanged_.begin(), unchanged_.end(), 0);
+  }
+
+  Verdict step(double t, const double* q, const double* qd, const double* current) {
+    if (const Verdict bad = values(t, q, qd, current); bad.fault != Fault::none) return bad;
+    if (!begun_) {
+      remember(t, q, qd, current);
+      begun_ = true;
+      return {};
+    }
+    const double dt = t - time_;
+    if (dt < 0) {
+      // A late packet, or a clock that begins anew: either way nothing before it counts.
+      reset();
+      remember(t, q, qd, current);
+      begun_ = true;
+      return {Fault::time_goes_back, -1, dt};
+    }
+    if (dt == 0) return {Fault::time_stands_still, -1, 0};
+    const Verdict found = differences(dt, q, qd, current);
+    remember(t, q, qd, current);
+    return found;
+  }
+
+ private:
+  // What a single sample shows.
+  Verdict values(double t, const double* q, const double* qd, const double* current) const {
+    if (!std::isfinite(t)) return {Fault::time_not_finite, -1, t};
+    for (std::size_t j = 0; j < n_; ++j) {
+      const auto joint = static_cast<std::int32_t>(j);
+      if (!std::isfinite(q[j])) return {Fault::position_not_finite, joint, q[j]};
+      if (!std::isfinite(qd[j])) return {Fault::velocity_not_finite, joint, qd[j]};
+      if (!std::isfinite(current[j])) return {Fault::current_not_finite, joint, current[j]};
+      if (std::fabs(qd[j]) > usual_.speed) return {Fault::velocity_absurd, joint, qd[j]};
+      if (std::fabs(current[j]) > usual_.current[j])
+        return {Fault::current_absurd, joint, current[j]};
+    }
+    return {};
+  }
+
+  // What it shows beside those before it.
+  Verdict differences(double dt, const double* q, const double* qd, const double* current) {
+    Verdict found;
+    const auto say = [&](Fault fault, std::int32_t joint, double value) {
+      if (found.fault == Fault::none) found = {fault, joint, value};
+    };
+    if (dt > usual_.longest) {
+      // Nothing can be summed over a gap: begin again after it.
+      reset();
+      begun_ = true;
+      return {Fault::gap, -1, dt};
+    }
+    // An average over some 10 intervals: a wrong rate, not one late sample.
+    slow_ += (dt / usual_.dt - 1 - slow_) / 10;
+    if (slow_ > 0.5 || slow_ < -0.3) say(Fault::rate, -1, dt);
+    const double* lq = last_.data();
+    const double* lqd = lq + n_;
+    const double* lc = lqd + n_;
+    const bool same = std::equal(q, q + n_, lq) && std::equal(qd, qd + n_, lqd) &&
+                      std::equal(current, current + n_, lc);
+    repeats_ = same ? repeats_ + 1 : 0;
+    if (repeats_ > usual_.repeats) say(Fault::frozen, -1, static_cast<double>(repeats_));
+    const std::size_t row = static_cast<std::size_t>(filled_ % usual_.window) * n_;
+    for (std::size_t j = 0; j < n_; ++j) {
+      const auto joint = static_cast<std::int32_t>(j);
+      const double travel = dt * (qd[j] + lqd[j]) / 2, error = q[j] - lq[j] - travel;
+      sums_[j] += error - errors_[row + j];
+      travelled_[j] += travel - travels_[row + j];
+      errors_[row + j] = error;
+      travels_[row + j] = travel;
+      if (std::fabs(error) > usual_.step[j] + usual_.share * std::fabs(travel))
+        say(Fault::position_against_velocity, joint, error);
+      if (std::fabs(sums_[j]) > usual_.drift[j] + usual_.share * std::fabs(travelled_[j]))
+        say(Fault::position_against_velocity, joint, sums_[j]);
+      unchanged_[j] = current[j] == lc[j] ? unchanged_[j] + 1 : 0;
+      if (unchanged_[j] > usual_.stuck[j]) say(Fault::current_stuck, joint, current[j]);
+    }
+    // Sums of differences gather rounding: begin them anew once a round of the window.
+    if (++filled_ % usual_.window == 0) sum_anew();
+    return found;
+  }
+
+  void sum_anew() {
+    for (std::size_t j = 0; j < n_; ++j) {
+      sums_[j] = travelled_[j] = 0;
+      for (std::size_t k = j; k < errors_.size(); k += n_) {
+        sums_[j] += errors_[k];
+        travelled_[j] += travels_[k];
+      }
+    }
+  }
+
+  void remember(double t, const double* q, const double* qd, const double* current) {
+    time_ = t;
+    std::copy(q, q + n_, last_.begin());
+    std::copy(qd, qd + n_, last_.begin() + static_cast<std::ptrdiff_t>(n_));
+    std::copy(current, current + n_, last_.begin() + static_cast<std::ptrdiff_t>(2 * n_));
+  }
+
+  Usual usual_;
+  std::size_t n_;
+  bool begun_ = false;
+  double time_ = 0, slow_ = 0;
+  std::int64_t repeats_ = 0, filled_ = 0;
+  std::vector<double> last_, errors_, travels_, sums_, travelled_;
+  std::vector<std::int64_t> unchanged_;
+};
+
+}  // namespace tauguard::detectors

@@ -1,0 +1,47 @@
+"""``tauguard play-ur LOG``: a robot to test against, on this machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+def command(
+    log: Annotated[Path, tyro.conf.Positional],
+    /,
+    columns: str | None = None,
+    port: int = 30004,
+    fault: tuple[str, ...] = (),
+) -> None:
+    """Play a log as a UR controller would send it: RTDE on 127.0.0.1, in real time.
+
+    The clock begins with the first client; the command ends with the log. It is no robot: inputs
+    are refused, and nothing moves.
+
+    Args:
+        log: CSV or MCAP of an arm with six joints.
+        columns: of CSV files, see `tauguard detect`.
+        port: to serve; 0 takes one that is free and prints it.
+        fault: NAME@SECONDS or NAME@SECONDS+DURATION, several if asked: frozen, stale, encoder,
+            missing, late, repeated, rate, jump, bias, saturated, swapped, sign, nan.
+    """
+    from tauguard.datasets.live.packets import Fault, Packets
+    from tauguard.datasets.live.ur_server import HOST, UrServer
+    from tauguard.datasets.logs import read_log
+
+    faults = [Fault.parse(text) for text in fault]
+    trace = read_log(log, columns).trace
+    packets = Packets.of(trace)
+    for one in faults:
+        packets = one.apply(packets)
+    with UrServer(packets, port) as server:
+        print(
+            f"{log}: {trace.t[-1] - trace.t[0]:.1f} s at {1 / trace.dt:.0f} Hz on "
+            f"{HOST}:{server.port}, from the first client on (Ctrl-C ends)",
+            flush=True,
+        )
+        while not server.wait(0.2):
+            pass
+        print(f"the log is over: {server.sent} packets sent")

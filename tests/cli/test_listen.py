@@ -1,0 +1,124 @@
+"""``tauguard listen`` beside a played robot: the same alarms as ``detect``, faults named."""
+
+import json
+import threading
+
+import numpy as np
+import pytest
+
+from tauguard.cli.listen import check_source
+from tauguard.datasets.live import PlayedSource, SourceClosed, UrServer, UrSource
+from tauguard.datasets.live.listening import listen
+from tauguard.datasets.live.packets import Fault, Packets
+from tauguard.datasets.plans import free_episodes, struck_episodes
+from tauguard.detectors import ArmModel, RobotNumbers, make_detector, train
+from tauguard.detectors.faults.monitor import Monitor
+from tauguard.envs import simulate
+from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
+from tauguard.traces.trace import Trace
+
+ARM = Mismatch(seed=3)
+
+
+def every_fourth(trace):
+    """At 250 Hz: what a busy machine can be asked to play in real time."""
+    return Trace(trace.joint_names, trace.t[::4], trace.q[::4], trace.qd[::4], trace.current[::4])
+
+
+@pytest.fixture(scope="module")
+def alarm():
+    episodes = free_episodes(5, 3, 12.0, (30.0, 60.0), (0.0,), ARM)
+    traces = [every_fourth(simulate(episode)) for episode in episodes]
+    robot = RobotNumbers.from_pin(pin_model(cura6.arm_xml()))
+    arm = ArmModel(robot, np.array(cura6_drive().gain))
+    return train(make_detector("residual-thresholds"), traces, arm, 5.0)
+
+
+@pytest.fixture(scope="module")
+def struck():
+    whole = every_fourth(simulate(struck_episodes(8, 1, 3, (40.0,), (0.0,), ARM)[0]))
+    keep = whole.t < whole.t[0] + 9
+    return Trace(
+        whole.joint_names, whole.t[keep], whole.q[keep], whole.qd[keep], whole.current[keep]
+    )
+
+
+class Handed(PlayedSource):
+    """The samples of a log as fast as they are asked for."""
+
+    def __init__(self, trace):
+        super().__init__(trace, pace=1e9)
+
+
+def test_the_same_alarms_as_on_the_file(alarm, struck):
+    heard = listen(Handed(struck), Monitor(alarm, alarm.inputs), keep=True)
+    found = alarm.detect(struck)
+    assert heard.samples == len(struck.t)
+    assert heard.ended == "the log is over"
+    assert np.array(heard.scores).tobytes() == found.score.tobytes()
+    assert heard.alarms == found.alarm.tolist()
+    assert np.array_equal(heard.trace().current, struck.current)
+
+
+def test_over_rtde_nothing_is_lost(alarm, struck):
+    with (
+        UrServer(Packets.of(struck), 0) as server,
+        UrSource("127.0.0.1", server.port, 250.0, reconnect=0) as source,
+    ):
+        check_source(source, alarm, "model")
+        heard = listen(source, Monitor(alarm, alarm.inputs), keep=True)
+        assert source.events == []
+    assert heard.samples == len(struck.t)
+    assert np.array(heard.scores).tobytes() == alarm.detect(struck).score.tobytes()
+    quantiles = heard.quantiles()
+    assert 0 < quantiles["median"] <= quantiles["p99"] <= quantiles["p99_99"]
+
+
+def test_a_silent_robot_is_a_fault(alarm, struck):
+    class Silent(Handed):
+        def read(self, timeout):
+            if self._next < 1000:
+                return super().read(timeout)
+            if self._next < 1003:
+                self._next += 1
+                threading.Event().wait(timeout)
+                return None
+            raise SourceClosed("gone")
+
+    heard = listen(Silent(struck), Monitor(alarm, alarm.inputs))
+    assert [span.state for span in heard.spans if span.reason][-1] == "fault"
+    assert heard.spans[-1].reason.startswith("silent: no sample for")
+
+
+def test_a_frozen_robot_is_a_fault_and_no_collision(alarm, struck):
+    packets = Fault("frozen", 4.0, 0.5).apply(Packets.of(struck))
+    frozen = Trace(struck.joint_names, packets.t, packets.q, packets.qd, packets.current)
+    heard = listen(Handed(frozen), Monitor(alarm, alarm.inputs))
+    faults = [span for span in heard.spans if span.state == "fault"]
+    assert 4.0 <= faults[0].start - struck.t[0] <= 4.02
+    assert not any(
+        span.state == "collision" and 4.0 < span.start - struck.t[0] < 4.5 for span in heard.spans
+    )
+
+
+def test_its_size_does_not_grow_with_time(alarm, struck):
+    heard = listen(Handed(struck), Monitor(alarm, alarm.inputs))
+    assert heard.rows == []
+    assert heard.counts.sum() == heard.samples
+
+
+@pytest.mark.parametrize(("joints", "rate", "said"), [(5, 250, "5 joints"), (6, 125, "trained at")])
+def test_another_robot_is_refused_before_anything_is_watched(alarm, joints, rate, said):
+    t = np.arange(0, 1, 1 / rate)
+    names = tuple(f"j{i}" for i in range(joints))
+    still = Trace(names, t, *(np.zeros((len(t), joints)) for _ in range(3)))
+    with pytest.raises(ValueError, match=said):
+        check_source(PlayedSource(still), alarm, "model")
+
+
+def test_the_summary_is_json(alarm, struck):
+    from tauguard.cli.listen import summary
+
+    result = summary(listen(Handed(struck), Monitor(alarm, alarm.inputs)), [], alarm)
+    assert json.loads(json.dumps(result))["samples"] == len(struck.t)
+    assert set(result["latency_us"]) == {"median", "p99", "p99_9", "p99_99", "max"}

@@ -1,0 +1,107 @@
+"""Free, collision or fault: what a trained detector says of streams with faults in them."""
+
+import numpy as np
+import pytest
+
+from tauguard.datasets.live.packets import Fault, Packets
+from tauguard.detectors.faults.monitor import COLLISION, FAULT, Monitor
+
+#: Faults that the samples show by themselves. The others look like a contact: see docs/live.md.
+SEEN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan")
+
+
+@pytest.fixture(scope="module")
+def struck(unseen):
+    return unseen[1]
+
+
+@pytest.fixture(scope="module")
+def quiet(struck):
+    """A moment in motion without a collision in the second before and the three after it."""
+    times = np.arange(struck.t[0] + 4, struck.t[-1] - 8, 0.1)
+    near = [
+        all(c.end < t - 1 or c.onset > t + 3 for c in struck.truth.collisions)
+        and np.abs(struck.qd[np.abs(struck.t - t) < 0.1]).max(axis=1).min() > 0.1
+        for t in times
+    ]
+    return float(times[np.flatnonzero(near)[0]])
+
+
+def part(packets, start, end):
+    """The packets that are due in these seconds."""
+    return packets.rows(np.flatnonzero((packets.due >= start) & (packets.due < end)))
+
+
+def answers(alarm, packets):
+    monitor = Monitor(alarm, alarm.inputs)
+    return [
+        monitor.step(float(t), q, qd, i)
+        for t, q, qd, i in zip(packets.t, packets.q, packets.qd, packets.current, strict=True)
+    ]
+
+
+def test_without_a_fault_it_says_what_the_detector_says(alarm, struck):
+    said = answers(alarm, Packets.of(struck))
+    found = alarm.detect(struck)
+    assert [a.alarm for a in said] == found.alarm.tolist()
+    assert np.array([a.score for a in said]).tobytes() == found.score.tobytes()
+    assert not any(a.reason for a in said)
+
+
+@pytest.mark.parametrize("name", SEEN)
+def test_a_fault_is_seen_within_20_ms_and_costs_no_false_alarm(alarm, struck, quiet, name):
+    start = quiet - struck.t[0]
+    whole = Fault(name, start, 0.5).apply(Packets.of(struck))
+    packets = part(whole, start - 3.5, start + 4)
+    said = answers(alarm, packets)
+    after = packets.due >= start
+    first = next(k for k in np.flatnonzero(after) if said[k].state == FAULT)
+    seen = packets.due[first] - (start + 0.5 if name == "missing" else start)
+    assert seen <= 20e-3 + 1e-9
+    assert not any(a.reason for a, late in zip(said, after, strict=True) if not late)
+    # It recovers, and what comes in between is no collision; what came in the milliseconds before
+    # the fault could be seen is taken back with it.
+    around = after & (packets.due < start + 3)
+    assert not any(said[k].alarm for k in np.flatnonzero(around) if k >= first)
+    assert said[-1].state != FAULT
+
+
+def test_collisions_after_the_recovery_are_found(alarm, struck, quiet):
+    start = quiet - struck.t[0]
+    packets = Fault("frozen", start, 0.2).apply(Packets.of(struck))
+    said = answers(alarm, packets)
+    ready = start + 0.2 + alarm.settle
+    whole = alarm.detect(struck).alarms
+    late = [a for a in whole if a.start - struck.t[0] > ready + 0.5]
+    up = np.array([a.alarm for a in said])
+    found = [up[(packets.t >= a.start - 0.02) & (packets.t <= a.end + 0.02)].any() for a in late]
+    assert len(late) >= 2
+    assert np.mean(found) >= 0.75
+
+
+def test_one_bad_sample_blinds_for_a_window_only(alarm, struck, quiet):
+    start = quiet - struck.t[0]
+    packets = part(Fault("nan", start, 0.9e-3).apply(Packets.of(struck)), start - 3.5, start + 0.5)
+    bad = [k for k, a in enumerate(answers(alarm, packets)) if a.state == FAULT]
+    assert 1 <= len(bad) <= 102
+    assert packets.due[bad[-1]] - packets.due[bad[0]] <= 0.1 + 1e-9
+
+
+def test_a_fault_does_not_hide_the_collision_before_it(alarm, struck):
+    found = next(a for a in alarm.detect(struck).alarms if a.end - a.start > 0.06)
+    start = found.start - struck.t[0] + 0.05
+    packets = part(Fault("nan", start, 0.3).apply(Packets.of(struck)), 0, start + 0.4)
+    said = answers(alarm, packets)
+    inside = np.flatnonzero((packets.t >= found.start + 0.06) & (packets.t < found.start + 0.3))
+    assert {said[k].state for k in inside} == {COLLISION}
+    assert all("not-finite" in said[k].reason for k in inside)
+
+
+def test_a_clock_that_begins_anew_does_not_blind_it(alarm, struck, quiet):
+    begin = int(np.searchsorted(struck.t, quiet))
+    packets = Packets.of(struck)
+    t = packets.t.copy()
+    t[begin:] -= t[begin]
+    said = answers(alarm, Packets(packets.due, t, packets.q, packets.qd, packets.current))
+    assert said[begin].state == FAULT
+    assert said[-1].state != FAULT
