@@ -9,7 +9,7 @@ class Mesh:
         self, other: Mesh, poses: NDArray[np.float64], out: NDArray[np.int32], threads: int
     ) -> None: ...
     def contacts(
-        self, other: Mesh, poses: NDArray[np.float64], threads: int
+        self, other: Mesh, poses: NDArray[np.float64], limit: int, threads: int
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]: ...
     def time_of_impact(
         self,

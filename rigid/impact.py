@@ -8,10 +8,11 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid_mesh
 from tauguard.rigid.mesh import MeshTree
 from tauguard.rigid.motion import Motion
-from tauguard.rigid.queries import native, rows, thread_count
+from tauguard.rigid.queries import native, rows
 from tauguard.rigid.results import Impacts
 from tauguard.rigid.shapes import Bodies, Polygons
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tauguard.geometry import finite, indices
+from tauguard.geometry import finite, frozen_finite, frozen_indices, thread_count
 from tauguard.rigid import _rigid_mesh
 from tauguard.rigid.motion import Motion, poses
-from tauguard.rigid.queries import thread_count
 
 if TYPE_CHECKING:
     from tauguard.rigid.impact import MeshImpacts
@@ -84,8 +83,8 @@ class MeshTree:
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, volume: Volume = "obb") -> None:
         """Build the tree; the class says what is expected."""
-        points = finite("vertices", vertices, (None, 3))
-        triangles = indices("faces", faces, (None, 3), len(points))
+        points = frozen_finite("vertices", vertices, (None, 3))
+        triangles = frozen_indices("faces", faces, (None, 3), len(points))
         if len(triangles) == 0:
             raise ValueError("faces: empty; a mesh needs at least one triangle")
         if len(triangles) > 2**28 - 1:
@@ -94,8 +93,27 @@ class MeshTree:
             raise ValueError("vertices: a coordinate beyond 1e30; scale the mesh down")
         if volume not in get_args(Volume):
             raise ValueError(f"volume: {volume!r}, expected one of {', '.join(get_args(Volume))}")
-        self.vertices, self.faces, self.volume = points, triangles, volume
+        self._vertices, self._faces, self._volume = points, triangles, volume
         self._mesh = _rigid_mesh.Mesh(points, triangles, volume)
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """The tree's own copy, read-only. Shape (V, 3), m."""
+        return self._vertices
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """The tree's own copy, read-only. Shape (F, 3)."""
+        return self._faces
+
+    @property
+    def volume(self) -> Volume:
+        """The bounding volume of the nodes."""
+        return self._volume
+
+    def __reduce__(self) -> tuple[type[MeshTree], tuple[Any, ...]]:
+        """A copy builds its own tree."""
+        return type(self), (self._vertices, self._faces, self._volume)
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -128,14 +146,21 @@ class MeshTree:
         self._mesh.overlap(other._mesh, batch, faces, thread_count(threads))
         return MeshOverlap(faces[:, 0] >= 0, faces)
 
-    def contacts(self, other: MeshTree, pose: ArrayLike, threads: int = 1) -> MeshContacts:
+    def contacts(
+        self, other: MeshTree, pose: ArrayLike, threads: int = 1, limit: int = 10_000_000
+    ) -> MeshContacts:
         """All pairs of triangles that meet, with points, normals and depths; see :meth:`overlap`.
 
         Asking the other way round (the inverse pose) gives the same contacts with the normals
         turned about, and moving both meshes together moves the contacts with them, to rounding.
+        More than ``limit`` pairs over all poses are a ``ValueError``: coincident meshes have them.
         """
         self._check(other)
-        rows, values = self._mesh.contacts(other._mesh, poses("pose", pose), thread_count(threads))
+        if isinstance(limit, bool) or not isinstance(limit, int) or not 0 < limit < 2**62:
+            raise ValueError(f"limit: {limit!r:.40}, expected a positive integer")
+        rows, values = self._mesh.contacts(
+            other._mesh, poses("pose", pose), limit, thread_count(threads)
+        )
         return MeshContacts(
             np.ascontiguousarray(rows[:, 0]),
             np.ascontiguousarray(rows[:, 1:]),
@@ -168,7 +193,7 @@ class MeshTree:
         Raises:
             ValueError: a bad pose or displacement (named with its row), lengths that do not match.
         """
-        start, move = poses("pose", pose), np.asarray(displacement, dtype=np.float64)
+        start, move = poses("pose", pose), np.asarray(displacement)
         if move.ndim == 2 and len(start) == 1:
             start = np.repeat(start, len(move), axis=0)
         if move.shape not in ((3,), (len(start), 3)):

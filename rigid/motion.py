@@ -7,8 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tauguard.geometry import finite
+from tauguard.geometry import Rebuilt, frozen_finite
 from tauguard.rigid.shapes import ORTHONORMAL_TOLERANCE
+
+#: Rotation over a step beyond which a motion is refused [rad]: every radian of it costs time, and
+#: the rounding of the angle grows with it.
+MOST_TURN = 1e4
 
 
 def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
@@ -18,8 +22,8 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
         ValueError: another shape, an entry that is not finite, a bottom row other than 0 0 0 1, or
             a rotation further than 1e-6 from a proper orthonormal one; the message names the row.
     """
-    raw = np.asarray(value, dtype=np.float64)
-    batch = finite(name, raw[None] if raw.ndim == 2 else raw, (None, 4, 4))
+    raw = np.asarray(value)
+    batch = frozen_finite(name, raw[None] if raw.ndim == 2 else raw, (None, 4, 4))
     bottom = (batch[:, 3] != (0.0, 0.0, 0.0, 1.0)).any(axis=1)
     if bottom.any():
         row = int(np.argmax(bottom))
@@ -38,7 +42,7 @@ def poses(name: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Rebuilt):
     """Constant linear and angular velocity over a step, t in [0, 1].
 
     A body's point y moves as ``x(t) = x0 + t linear + exp(t [angular]x) R0 y`` with ``R0, x0`` the
@@ -51,7 +55,7 @@ class Motion:
 
     Raises:
         ValueError: wrong shapes or lengths, an entry that is not finite, a rotation further than
-            1e-6 from orthonormal (named with its row).
+            1e-6 from orthonormal, or more than 10,000 rad about an axis (named with its row).
     """
 
     pose_t0: NDArray[np.float64]
@@ -62,9 +66,16 @@ class Motion:
         pose = poses("pose_t0", self.pose_t0)
         object.__setattr__(self, "pose_t0", pose)
         for name in ("linear", "angular"):
-            value = np.asarray(getattr(self, name), dtype=np.float64)
-            value = np.broadcast_to(value, (len(pose), 3)) if value.ndim == 1 else value
-            object.__setattr__(self, name, finite(name, value, (len(pose), 3)))
+            value = np.asarray(getattr(self, name))
+            value = np.broadcast_to(value, (len(pose), 3)) if value.shape == (3,) else value
+            object.__setattr__(self, name, frozen_finite(name, value, (len(pose), 3)))
+        fast = np.abs(self.angular).max(axis=1, initial=0) > MOST_TURN
+        if fast.any():
+            row = int(np.argmax(fast))
+            raise ValueError(
+                f"angular: {self.angular[row]} in row {row}, at most {MOST_TURN:g} rad a step can "
+                "be followed; cut the step"
+            )
 
     def __len__(self) -> int:
         return len(self.pose_t0)

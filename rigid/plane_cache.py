@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from threading import Lock
+
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid
-from tauguard.rigid.queries import find_witness, native, rows, thread_count
+from tauguard.rigid.queries import find_witness, native, rows
 from tauguard.rigid.results import Overlap
 from tauguard.rigid.shapes import Bodies
 
@@ -16,18 +19,20 @@ class PlaneCache:
 
     A pair that was apart keeps the normal of its separating plane; while that still separates, it
     is the whole query. Answers are those of :func:`tauguard.rigid.overlap`, whatever is cached.
+    Calls from several threads wait for each other.
 
     Args:
         count: The number of pairs N, the same in every frame.
 
     Raises:
-        ValueError: a negative count.
+        ValueError: a count that is no integer of 0 or more.
     """
 
     def __init__(self, count: int) -> None:
         """Start without planes; see the class."""
-        if count < 0:
-            raise ValueError(f"count: {count}, expected 0 or more")
+        if not isinstance(count, int | np.integer) or isinstance(count, bool) or count < 0:
+            raise ValueError(f"count: {count!r:.40}, expected an integer of 0 or more")
+        self._lock = Lock()
         self._normals: NDArray[np.float64] = np.zeros((count, 3))
         #: How many rows of the last frame their cached plane answered.
         self.answered = 0
@@ -43,8 +48,9 @@ class PlaneCache:
         if count != len(self._normals):
             raise ValueError(f"a, b: {count} pairs, expected {len(self._normals)}")
         hit = np.empty(count, dtype=np.uint8)
-        self.answered = _rigid.overlap_cached(
-            *native(a), *native(b), thread_count(threads), self._normals, hit
-        )
+        with self._lock:
+            self.answered = _rigid.overlap_cached(
+                *native(a), *native(b), thread_count(threads), self._normals, hit
+            )
         found = hit.view(np.bool_)
         return Overlap(found, lambda: find_witness(a, b, found, threads))

@@ -8,7 +8,6 @@ and hand what they cannot tell to exact arithmetic.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal, get_args
@@ -16,7 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tauguard.geometry import finite
+from tauguard.geometry import frozen_finite, thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.results import Impacts, Overlap, Witness
 from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
@@ -112,7 +111,7 @@ def sweep(
     if method not in get_args(SweepMethod):
         raise ValueError(f"method: {method!r}, expected one of {', '.join(get_args(SweepMethod))}")
     given = np.asarray(displacement)
-    moves = finite("displacement", given[None] if given.ndim == 1 else given, (None, 3))
+    moves = frozen_finite("displacement", given[None] if given.ndim == 1 else given, (None, 3))
     if len(moves) not in (1, count):
         raise ValueError(f"displacement: {len(moves)} rows, expected {count} or 1")
     hit, out, _ = native_sweep(a, b, moves, method, threads)
@@ -175,14 +174,3 @@ def rows(a: Bodies, b: Bodies) -> int:
     if len(a) != len(b) and 1 not in (len(a), len(b)):
         raise ValueError(f"b: {len(b)} bodies against {len(a)}; expected the same number, or 1")
     return max(len(a), len(b)) if len(a) and len(b) else 0
-
-
-def thread_count(threads: int) -> int:
-    """``threads`` with 0 as all processors.
-
-    Raises:
-        ValueError: negative.
-    """
-    if threads < 0:
-        raise ValueError(f"threads: {threads}, expected 0 (all processors) or more")
-    return threads or os.cpu_count() or 1

@@ -2,6 +2,9 @@
 
 A batch holds N bodies of one kind. Degenerate bodies are legal: a flat tetrahedron, a box without
 thickness, a single point. Lengths are in any one unit, the same for both sides of a query.
+
+A batch keeps its own copy of its arrays, which nobody can change: what was checked is what the
+kernels read.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.geometry import finite
+from tauguard.geometry import Rebuilt, frozen, frozen_finite, sealed
 from tauguard.rigid import _rigid
 
 #: How far an entry of R^T R may be from the identity; beyond it R is refused as not a rotation.
@@ -20,7 +23,7 @@ ORTHONORMAL_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Tetrahedra:
+class Tetrahedra(Rebuilt):
     """The convex hulls of four points each, in any order and orientation.
 
     Args:
@@ -33,7 +36,7 @@ class Tetrahedra:
     vertices: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", finite("vertices", self.vertices, (None, 4, 3)))
+        object.__setattr__(self, "vertices", frozen_finite("vertices", self.vertices, (None, 4, 3)))
 
     def __len__(self) -> int:
         return len(self.vertices)
@@ -45,7 +48,7 @@ class Tetrahedra:
 
 
 @dataclass(frozen=True, eq=False)
-class Boxes:
+class Boxes(Rebuilt):
     """The sets ``center + rotation @ diag(half_extents) @ u``, ``|u| <= 1`` per coordinate.
 
     The set is that of the doubles as given: a rotation that is orthonormal to rounding only spans a
@@ -68,9 +71,9 @@ class Boxes:
     skew: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        center = finite("center", self.center, (None, 3))
-        half_extents = finite("half_extents", self.half_extents, (len(center), 3))
-        rotation = finite("rotation", self.rotation, (len(center), 3, 3))
+        center = frozen_finite("center", self.center, (None, 3))
+        half_extents = frozen_finite("half_extents", self.half_extents, (len(center), 3))
+        rotation = frozen_finite("rotation", self.rotation, (len(center), 3, 3))
         if (half_extents < 0).any():
             row, axis = np.argwhere(half_extents < 0)[0]
             raise ValueError(
@@ -96,7 +99,7 @@ class Boxes:
         out = np.empty((len(self), 15))
         out[:, :3], out[:, 3:6] = self.center, self.half_extents
         out[:, 6:] = self.rotation.reshape(len(self), 9)
-        return out
+        return sealed(out)
 
     @cached_property
     def blocks(self) -> NDArray[np.float64]:
@@ -106,11 +109,11 @@ class Boxes:
         """
         out = np.empty((-(-len(self) // 8), 72))
         _rigid.pack_boxes(self.packed, out)
-        return out
+        return sealed(out)
 
 
 @dataclass(frozen=True, eq=False)
-class Parallelepipeds:
+class Parallelepipeds(Rebuilt):
     """The sets ``origin + s @ edges``, ``0 <= s <= 1`` per coordinate.
 
     Args:
@@ -125,8 +128,10 @@ class Parallelepipeds:
     edges: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "origin", finite("origin", self.origin, (None, 3)))
-        object.__setattr__(self, "edges", finite("edges", self.edges, (len(self.origin), 3, 3)))
+        object.__setattr__(self, "origin", frozen_finite("origin", self.origin, (None, 3)))
+        object.__setattr__(
+            self, "edges", frozen_finite("edges", self.edges, (len(self.origin), 3, 3))
+        )
 
     def __len__(self) -> int:
         return len(self.origin)
@@ -134,11 +139,12 @@ class Parallelepipeds:
     @cached_property
     def packed(self) -> NDArray[np.float64]:
         """Origin and the three edges of a body in one row. Shape (N, 12)."""
-        return np.concatenate([self.origin, self.edges.reshape(len(self), 9)], axis=1)
+        out = np.concatenate([self.origin, self.edges.reshape(len(self), 9)], axis=1)
+        return sealed(out)
 
 
 @dataclass(frozen=True, eq=False)
-class Hulls:
+class Hulls(Rebuilt):
     """The convex hulls of any number of points each.
 
     Body n owns ``vertices[offsets[n]:offsets[n + 1]]``.
@@ -156,7 +162,7 @@ class Hulls:
     offsets: NDArray[np.int64]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", finite("vertices", self.vertices, (None, 3)))
+        object.__setattr__(self, "vertices", frozen_finite("vertices", self.vertices, (None, 3)))
         object.__setattr__(self, "offsets", _partition(self.offsets, len(self.vertices)))
 
     def __len__(self) -> int:
@@ -169,7 +175,7 @@ class Hulls:
 
 
 @dataclass(frozen=True, eq=False)
-class Polygons:
+class Polygons(Rebuilt):
     """Convex polygons in the plane: the hulls of any number of points each, in any order.
 
     They meet other polygons only. Arguments and errors as for :class:`Hulls`, vertices of shape
@@ -180,7 +186,7 @@ class Polygons:
     offsets: NDArray[np.int64]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", finite("vertices", self.vertices, (None, 2)))
+        object.__setattr__(self, "vertices", frozen_finite("vertices", self.vertices, (None, 2)))
         object.__setattr__(self, "offsets", _partition(self.offsets, len(self.vertices)))
 
     def __len__(self) -> int:
@@ -193,20 +199,22 @@ class Polygons:
 
 
 def _partition(given: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    offsets = np.asarray(given)
-    if offsets.ndim != 1 or len(offsets) == 0 or not np.issubdtype(offsets.dtype, np.integer):
+    array = np.asarray(given)
+    if array.ndim != 1 or len(array) == 0 or not np.issubdtype(array.dtype, np.integer):
         raise ValueError(
-            f"offsets: shape {offsets.shape} of {offsets.dtype}, expected (N + 1,) integers"
+            f"offsets: shape {array.shape} of {array.dtype}, expected (N + 1,) integers"
         )
+    offsets = frozen(array.astype(np.int64))  # beyond int64 an entry turns negative: refused below
     if offsets[0] != 0 or offsets[-1] != count:
         raise ValueError(f"offsets: run from {offsets[0]} to {offsets[-1]}, expected 0 to {count}")
-    if (np.diff(offsets) <= 0).any():
-        row = int(np.argmax(np.diff(offsets) <= 0))
+    empty = offsets[1:] <= offsets[:-1]
+    if empty.any():
+        row = int(np.argmax(empty))
         raise ValueError(
             f"offsets: hull {row} is empty (offsets {offsets[row]} and {offsets[row + 1]}); "
             "expected strictly increasing offsets"
         )
-    return np.ascontiguousarray(offsets, dtype=np.int64)
+    return offsets
 
 
 Bodies = Tetrahedra | Boxes | Parallelepipeds | Hulls | Polygons

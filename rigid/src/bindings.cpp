@@ -1,6 +1,9 @@
 // tauguard.rigid._rigid: overlap and time of impact of convex bodies and of meshes.
-#include <nanobind/nanobind.h>
+#include "tauguard/geometry/interrupt_binding.hpp"
 
 void bind_convex(nanobind::module_& m);
 
-NB_MODULE(_rigid, m) { bind_convex(m); }
+NB_MODULE(_rigid, m) {
+  tauguard::geometry::bind_interrupts();
+  bind_convex(m);
+}

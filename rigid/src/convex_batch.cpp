@@ -6,7 +6,7 @@
 #include "convex_boxes.hpp"
 #include "convex_overlap.hpp"
 #include "convex_resolve.hpp"
-#include "tauguard/geometry/thread_pool.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {
 
@@ -103,9 +103,8 @@ std::size_t overlap_boxes(const Bodies& a, const void* blocks_a, const Bodies& b
   if (use_avx2()) run = run_avx2;
 #endif
   std::atomic<std::size_t> left{0};
-  geometry::ThreadPool::shared().parallel_for(
-      (n + 7) / 8, threads, 512,
-      [&](auto begin, auto end, auto) { left += run(batch, begin, end); });
+  geometry::interruptible_for((n + 7) / 8, threads, 512,
+                              [&](auto begin, auto end, auto) { left += run(batch, begin, end); });
   return left;
 }
 

@@ -6,7 +6,7 @@
 #include "convex_overlap.hpp"
 #include "convex_resolve.hpp"
 #include "convex_slab.hpp"
-#include "tauguard/geometry/thread_pool.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {
 
@@ -112,7 +112,7 @@ std::size_t overlap_cached(const Bodies& a, const Bodies& b, std::size_t n, int 
                            double* normals, std::uint8_t* hit) {
   const RowMethod rest = row_method(a.kind, b.kind);
   std::atomic<std::size_t> answered{0};
-  geometry::ThreadPool::shared().parallel_for(n, threads, 1024, [&](auto begin, auto end, auto) {
+  geometry::interruptible_for(n, threads, 1024, [&](auto begin, auto end, auto) {
     std::size_t mine = 0;
     for (auto i = begin; i < end; ++i) {
       double* normal = normals + 3 * i;

@@ -7,7 +7,7 @@
 #include "convex_resolve.hpp"
 #include "convex_sat.hpp"
 #include "convex_sat_textbook.hpp"
-#include "tauguard/geometry/thread_pool.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {
 
@@ -127,7 +127,7 @@ std::size_t overlap(const Bodies& a, const Bodies& b, std::size_t n, Method meth
                     std::uint8_t* hit) {
   const Runner run = choose(a.kind, b.kind, method);
   std::atomic<std::size_t> left{0};
-  geometry::ThreadPool::shared().parallel_for(n, threads, grain, [&](auto begin, auto end, auto) {
+  geometry::interruptible_for(n, threads, grain, [&](auto begin, auto end, auto) {
     left += run(Chunk{a, b, begin, end, hit});
   });
   return left;
@@ -142,7 +142,7 @@ RowMethod row_method(Kind a, Kind b) {
 
 void witnesses(const Bodies& a, const Bodies& b, std::size_t n, int threads,
                const std::uint8_t* hit, double* out) {
-  geometry::ThreadPool::shared().parallel_for(n, threads, 64, [&](auto begin, auto end, auto) {
+  geometry::interruptible_for(n, threads, 64, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i)
       find_witness(a, b, i, hit[i] ? common : separated, out + 7 * i);
   });

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "tauguard/geometry/interrupt.hpp"
 #include "tauguard/rigid/bodies.hpp"
 
 namespace tauguard::rigid {
@@ -34,6 +35,7 @@ class HullSimplex {
   Answer solve(int limit = 1 << 30) {
     start();
     for (int step = 0; step < limit; ++step) {
+      geometry::poll_interrupt();
       factor();
       if (sign_of(determinant_) == 0)
         return Answer::gave_up;  // rounding only: exact bases are regular
@@ -138,9 +140,11 @@ class HullSimplex {
     for (const auto& x : pa) grow(scale, x);
     for (const auto& x : pb) grow(scale, x);
     if (first) {
-      for (i = 0; i < pa.size(); ++i)
+      for (i = 0; i < pa.size(); ++i) {
+        geometry::poll_interrupt();
         for (j = 0; j < pb.size(); ++j)
           if (exceeds(pa[i], pb[j], scale)) return true;
+      }
       return false;
     }
     i = j = 0;

@@ -7,7 +7,7 @@
 #include "convex_overlap.hpp"
 #include "convex_resolve.hpp"
 #include "convex_slab.hpp"
-#include "tauguard/geometry/thread_pool.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {
 
@@ -179,7 +179,7 @@ std::size_t sweep(const Bodies& a, const Bodies& b, const double* d, std::size_t
                   int threads, bool points, std::uint8_t* hit, double* out) {
   const Runner run = choose(a.kind, b.kind, method);
   std::atomic<std::size_t> left{0};
-  geometry::ThreadPool::shared().parallel_for(n, threads, 256, [&](auto begin, auto end, auto) {
+  geometry::interruptible_for(n, threads, 256, [&](auto begin, auto end, auto) {
     left += run(Chunk{a, b, d, begin, end, hit, out, points});
   });
   return left;

@@ -14,13 +14,17 @@
 #include <algorithm>
 
 #include "nearest.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {
 namespace {
 
 constexpr double unit_roundoff = 0x1p-53;
-// A guard against creeping along a resting gap; the time reached is still never late.
-constexpr int most_steps = 20000;
+// A guard against creeping along a resting gap; the time reached is still never late. Bodies that
+// pass close by each other take a few steps a radian, so the turning of both counts.
+constexpr int most_steps = 20000, steps_a_radian = 64;
+// Over less than this [rad] a whole turn is not worth looking at.
+constexpr double little_turn = 4;
 
 struct Axis {
   Vec n{}, rate{};
@@ -143,6 +147,36 @@ double safe_step(const Lower& g, double at_zero, double limit) {
   return value >= 0 ? h : h * (at_zero / (at_zero - value)) * (1 - 4 * unit_roundoff);
 }
 
+// How far the step goes for which the bodies stay apart along one fixed direction whatever their
+// angles are; `axis` becomes that direction. Bodies that turn fast and pass by each other are kept
+// apart by it in a few steps, where their true surfaces would take one for each radian.
+double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* axis) {
+  const Vec between = b.centre - a.centre, drift = b.linear() - a.linear();
+  const auto across = [](const Vec& v, const Vec& n) { return v - dot(v, n) * n; };
+  const Vec tried[] = {axis->n,
+                       between,
+                       a.axis(),
+                       b.axis(),
+                       across(between, a.axis()),
+                       across(between, b.axis()),
+                       across(axis->n, a.axis()),
+                       across(axis->n, b.axis())};
+  double longest = 0;
+  for (const Vec& v : tried) {
+    const double length = norm(v);
+    if (!(length > 0)) continue;
+    for (const double sign : {1.0, -1.0}) {
+      const Vec n = (sign / length) * v;
+      const double gap = dot(n, between) + b.spun(n)[0] - a.spun(n)[1] - 2 * margin;
+      if (!(gap > 0)) continue;
+      const double closing = -dot(n, drift) + 4 * unit_roundoff * norm(drift);
+      const double h = closing > 0 ? gap / closing * (1 - 4 * unit_roundoff) : INFINITY;
+      if (h > longest) longest = h, *axis = {n, {}, gap};
+    }
+  }
+  return longest;
+}
+
 // The direction of contact: the best axis now, or the last certain one turned by `h` where that
 // separates the bodies as well. It does so to second order in h, and flat bodies in one plane leave
 // no other: a normal of that plane separates them by nothing, too.
@@ -165,9 +199,12 @@ Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
   double t = start, before = start;
   Axis last;  // of time `before`, certainly separating: at contact itself rounding may leave no
               // direction
-  for (int step = 0; step < most_steps; ++step) {
+  const double turning = (a.angular_speed() + b.angular_speed()) * (end - start);
+  const double limit = most_steps + steps_a_radian * std::min(turning, 1e6);
+  for (int step = 0; step < limit; ++step) {
+    geometry::poll_interrupt();
     a.move_to(t), b.move_to(t);
-    const Axis axis = best_axis(a, b, 2 * margin);
+    Axis axis = best_axis(a, b, 2 * margin);
     const auto touch = [&] {
       return Impact{t, true, contact_normal(a, b, last, t - before, axis)};
     };
@@ -176,7 +213,12 @@ Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
     const double turn = norm(axis.rate), left = end - t,
                  horizon = turn * left > 1 ? 1 / turn : left;
     const Lower lower(a, b, axis, horizon, margin);
-    const double h = safe_step(lower, axis.separation - margin, horizon);
+    double h = safe_step(lower, axis.separation - margin, horizon);
+    if (h < left && turning > little_turn) {
+      Axis fixed = axis;
+      const double longer = spun_step(a, b, margin, &fixed);
+      if (longer > h) h = longer, axis = fixed;
+    }
     if (h >= left) return {end, false, axis.n};
     last = axis, before = t;
     if (t + h <= t) return touch();

@@ -6,11 +6,12 @@
 
 #include "mesh_impact.hpp"
 #include "mesh_query.hpp"
-#include "tauguard/geometry/thread_pool.hpp"
+#include "tauguard/geometry/interrupt_binding.hpp"
 
 namespace nb = nanobind;
 using namespace tauguard::rigid;
-using tauguard::geometry::ThreadPool;
+using tauguard::geometry::interruptible_for;
+using tauguard::geometry::LongCall;
 
 using Vertices = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Faces = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
@@ -39,17 +40,18 @@ auto owned(std::vector<T>&& values, std::array<std::size_t, N> shape) {
 }
 
 // All contacts of every pose: (pose row, face of a, face of b) and (point, normal, depth) a row.
-nb::tuple contacts(const Mesh& a, const Mesh& b, Poses poses, int threads) {
+nb::tuple contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit, int threads) {
   std::vector<std::int32_t> rows;
   std::vector<double> values;
   {
-    nb::gil_scoped_release release;
+    const LongCall call;
     const std::size_t n = poses.shape(0);
     std::vector<std::vector<Contact>> found(n);
-    ThreadPool::shared().parallel_for(n, threads, 4, [&](auto begin, auto end, auto) {
+    ContactBudget budget(limit);
+    interruptible_for(n, threads, 4, [&](auto begin, auto end, auto) {
       Scratch scratch;
       for (auto i = begin; i < end; ++i)
-        all_contacts(a, b, Pose(poses.data() + 16 * i), scratch, found[i]);
+        all_contacts(a, b, Pose(poses.data() + 16 * i), scratch, budget, found[i]);
     });
     for (std::size_t i = 0; i < n; ++i)
       for (const Contact& c : found[i]) {
@@ -87,10 +89,10 @@ void store(const FirstTouch& t, double* out) {
 void impact_of_bodies(int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b,
                       Offsets offsets_b, Poses pose_a, Vectors linear_a, Vectors angular_a,
                       Poses pose_b, Vectors linear_b, Vectors angular_b, Touches out, int threads) {
-  nb::gil_scoped_release release;
+  const LongCall call;
   const Bodies x = view(kind_a, a, offsets_a), y = view(kind_b, b, offsets_b);
   const Motions mx{pose_a, linear_a, angular_a}, my{pose_b, linear_b, angular_b};
-  ThreadPool::shared().parallel_for(out.shape(0), threads, 16, [&](auto begin, auto end, auto) {
+  interruptible_for(out.shape(0), threads, 16, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i)
       store(bodies_impact(x, y, i, mx[i], my[i]), out.data() + 7 * i);
   });
@@ -99,9 +101,9 @@ void impact_of_bodies(int kind_a, Packed a, Offsets offsets_a, int kind_b, Packe
 void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear_a,
                       Vectors angular_a, Poses pose_b, Vectors linear_b, Vectors angular_b,
                       Touches out, Pairs faces, int threads) {
-  nb::gil_scoped_release release;
+  const LongCall call;
   const Motions mx{pose_a, linear_a, angular_a}, my{pose_b, linear_b, angular_b};
-  ThreadPool::shared().parallel_for(out.shape(0), threads, 1, [&](auto begin, auto end, auto) {
+  interruptible_for(out.shape(0), threads, 1, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i) {
       FacePair pair;
       store(meshes_impact(a, b, mx[i], my[i], &pair), out.data() + 7 * i);
@@ -115,25 +117,25 @@ void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear
 void bind_volumes(nb::module_& m);
 
 NB_MODULE(_rigid_mesh, m) {
+  tauguard::geometry::bind_interrupts();
   bind_volumes(m);
   nb::class_<Mesh>(m, "Mesh")
       .def("__init__",
            [](Mesh* self, Vertices vertices, Faces faces, const std::string& volume) {
-             nb::gil_scoped_release release;
+             const LongCall call;
              new (self) Mesh(vertices.data(), faces.data(), faces.shape(0), kind_of(volume));
            })
       .def("overlap",
            [](const Mesh& a, const Mesh& b, Poses poses, Pairs out, int threads) {
-             nb::gil_scoped_release release;
-             ThreadPool::shared().parallel_for(
-                 poses.shape(0), threads, 8, [&](auto begin, auto end, auto) {
-                   Scratch scratch;
-                   for (auto i = begin; i < end; ++i) {
-                     const FacePair p = first_overlap(a, b, Pose(poses.data() + 16 * i), scratch);
-                     out.data()[2 * i] = p.a;
-                     out.data()[2 * i + 1] = p.b;
-                   }
-                 });
+             const LongCall call;
+             interruptible_for(poses.shape(0), threads, 8, [&](auto begin, auto end, auto) {
+               Scratch scratch;
+               for (auto i = begin; i < end; ++i) {
+                 const FacePair p = first_overlap(a, b, Pose(poses.data() + 16 * i), scratch);
+                 out.data()[2 * i] = p.a;
+                 out.data()[2 * i + 1] = p.b;
+               }
+             });
            })
       .def("contacts", &contacts)
       .def("time_of_impact", &impact_of_meshes);
@@ -142,7 +144,7 @@ NB_MODULE(_rigid_mesh, m) {
   m.def("triangles_overlap",
         [](nb::ndarray<const double, nb::shape<-1, 2, 3, 3>, nb::c_contig, nb::device::cpu> pairs,
            nb::ndarray<bool, nb::shape<-1>, nb::c_contig, nb::device::cpu> out) {
-          nb::gil_scoped_release release;
+          const LongCall call;
           const tauguard::geometry::RoundToNearest guard;
           for (std::size_t i = 0; i < pairs.shape(0); ++i) {
             const auto* t = reinterpret_cast<const Triangle*>(pairs.data() + 18 * i);

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "mesh_tree.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {
 namespace {
@@ -124,6 +125,7 @@ std::int32_t Tree::build(Range all) {
 // Reorders items [begin, end) around a plane and returns the first item behind it; both sides
 // non-empty.
 std::int32_t Tree::split(Range r) {
+  geometry::poll_interrupt();
   FloatBox middles;
   for (auto i = r.begin; i < r.end; ++i) {
     const Four m = four(items_[i].lo) + four(items_[i].hi);

@@ -5,6 +5,7 @@
 #include "convex_contact.hpp"
 #include "mesh_swept.hpp"
 #include "nearest.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {
 namespace {
@@ -99,6 +100,7 @@ class MeshImpact {
 
   void piece(double begin, double length) {
     if (begin > found_.t) return;
+    geometry::poll_interrupt();
     const double both = (a_.radius + b_.radius) * more, gap = apart(begin + 0.5 * length);
     const double slack = fine_ * (both + gap) + shift_;
     if (gap > (both + 0.5 * length * speed_ + slack) * more) return;
@@ -159,6 +161,7 @@ class MeshImpact {
     float enter[width];
     ObbNode scratch;
     while (!stack_.empty()) {
+      geometry::poll_interrupt();
       const Open top = stack_.back();
       stack_.pop_back();
       const float leave = left();

@@ -117,9 +117,10 @@ Contact describe(const Triangle& a, const Triangle& b) {
 }  // namespace
 
 void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch,
-                  std::vector<Contact>& out) {
+                  ContactBudget& budget, std::vector<Contact>& out) {
   const auto first = static_cast<std::ptrdiff_t>(out.size());
   each_overlap(a, b, pose, scratch, [&](int i, int j, const Triangle& moved) {
+    budget.take();
     Contact c = describe(a.tree.triangles[i], moved);
     c.a = a.tree.id[i], c.b = b.tree.id[j];
     out.push_back(c);

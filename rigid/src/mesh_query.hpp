@@ -1,7 +1,9 @@
 // A mesh with its tree and bounding volumes, and the queries on two of them.
 #pragma once
 
+#include <atomic>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "mesh_obb.hpp"
@@ -65,7 +67,21 @@ struct Contact {
   std::int32_t a, b;  // rows of the faces
   double point[3], normal[3], depth;
 };
+// What all threads of a query may list together; beyond it `std::length_error`.
+class ContactBudget {
+ public:
+  explicit ContactBudget(std::size_t most) : most_(most) {}
+  void take() {
+    if (taken_.fetch_add(1, std::memory_order_relaxed) >= most_)
+      throw std::length_error("limit: more than " + std::to_string(most_) +
+                              " pairs of faces meet; raise limit, or ask fewer poses at once");
+  }
+
+ private:
+  const std::size_t most_;
+  std::atomic<std::size_t> taken_{0};
+};
 void all_contacts(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch,
-                  std::vector<Contact>& out);
+                  ContactBudget& budget, std::vector<Contact>& out);
 
 }  // namespace tauguard::rigid

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mesh_boxes.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {
 
@@ -43,6 +44,7 @@ bool traverse(const Tree& a, const Tree& b, const Bounds& bounds, std::vector<Sl
   stack.push_back({{-1, 0}, {-1, 0}});
   float key[width];
   while (!stack.empty()) {
+    geometry::poll_interrupt();
     const SlotPair pair = stack.back();
     stack.pop_back();
     const Child ca = pair.a.child(a), cb = pair.b.child(b);

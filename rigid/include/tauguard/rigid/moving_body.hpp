@@ -88,9 +88,21 @@ class MovingBody {
     return motion_.speed * motion_.speed * sweep_ * (norm(across) + drift + 0x1p-40) *
            (1 + 0x1p-40);
   }
+  // Least and largest projection on the unit n, from the centre, over a full turn of the body.
+  std::array<double, 2> spun(const Vec& n) const {
+    const double across = norm(n - dot(n, motion_.axis) * motion_.axis) + 0x1p-40;
+    double low = INFINITY, high = -INFINITY;
+    for (const Swing& v : vertices_) {
+      const double middle = dot(n, v.along), reach = across * norm(v.swing) * (1 + 0x1p-40);
+      low = std::min(low, middle - reach), high = std::max(high, middle + reach);
+    }
+    return {low, high};
+  }
   // Bound on the speed of any vertex about the centre.
   double turning_speed() const { return motion_.speed * sweep_ * (1 + 0x1p-40); }
   Vec angular() const { return motion_.speed * motion_.axis; }
+  const Vec& axis() const { return motion_.axis; }  // unit, zero where nothing turns
+  double angular_speed() const { return motion_.speed; }
   // Largest magnitude that enters a position; the angle counts because its rounding turns the body.
   double magnitude() const {
     return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_;
