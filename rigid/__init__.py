@@ -1,15 +1,19 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
+from tauguard.rigid.gap import Gaps, distance
 from tauguard.rigid.impact import MeshImpacts, time_of_impact
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion
 from tauguard.rigid.plane_cache import PlaneCache
 from tauguard.rigid.queries import overlap, sweep
 from tauguard.rigid.results import Impacts, Overlap, Witness
+from tauguard.rigid.rounded import Capsules, Rounded, Spheres
 from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
 
 __all__ = [
     "Boxes",
+    "Capsules",
+    "Gaps",
     "Hulls",
     "Impacts",
     "MeshContacts",
@@ -21,8 +25,11 @@ __all__ = [
     "Parallelepipeds",
     "PlaneCache",
     "Polygons",
+    "Rounded",
+    "Spheres",
     "Tetrahedra",
     "Witness",
+    "distance",
     "overlap",
     "sweep",
     "time_of_impact",

@@ -41,6 +41,18 @@ def time_of_impact(
     out: NDArray[np.float64],
     threads: int,
 ) -> None: ...
+def gaps(
+    kind_a: int,
+    a: NDArray[np.float64],
+    offsets_a: NDArray[np.int64],
+    radius_a: NDArray[np.float64],
+    kind_b: int,
+    b: NDArray[np.float64],
+    offsets_b: NDArray[np.int64],
+    radius_b: NDArray[np.float64],
+    out: NDArray[np.float64],
+    threads: int,
+) -> None: ...
 def triangles_overlap(pairs: NDArray[np.float64], out: NDArray[np.bool_]) -> None: ...
 
 class _Volumes:

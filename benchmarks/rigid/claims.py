@@ -17,6 +17,7 @@ def claims(rows: list[Row], quick: bool, volume: str = "obb") -> list[Row]:
         *convex_ratios(rows),
         *mesh_ratios(rows, volume),
         *impacts(rows),
+        *distances(rows),
     ]
     for row in found:
         if row["met"] is False and row["of"] == "time":
@@ -157,3 +158,14 @@ def impacts(rows: list[Row]) -> list[Row]:
             at_most(f"{name}: us a hit", 20, [row["us_hit"]["median"]]),
         ]
     return found
+
+
+def distances(rows: list[Row]) -> list[Row]:
+    """The sign and the length of every distance."""
+    found = of(rows, "distance")
+    wrong = [row["wrong_sign"]["value"] for row in found]
+    errors = [row["error"] for row in found if row["error"] is not None]
+    return [
+        claim("distance: wrong signs", "error", 0, wrong),
+        claim("distance: error as a share of the extent", "error", 3e-14, errors),
+    ]

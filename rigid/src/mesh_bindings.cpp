@@ -114,10 +114,12 @@ void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear
 
 }  // namespace
 
+void bind_gaps(nb::module_& m);
 void bind_volumes(nb::module_& m);
 
 NB_MODULE(_rigid_mesh, m) {
   tauguard::geometry::bind_interrupts();
+  bind_gaps(m);
   bind_volumes(m);
   nb::class_<Mesh>(m, "Mesh")
       .def("__init__",

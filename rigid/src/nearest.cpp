@@ -51,11 +51,11 @@ class Simplex {
   bool holds(const Vec& w) const {
     return std::any_of(c_, c_ + m_, [&](const Corner& c) { return c.w == w; });
   }
-  // A point of both sets where they meet, the middle of the nearest points elsewhere.
-  Vec middle() const {
-    Vec sum{};
-    for (int i = 0; i < m_; ++i) sum = sum + 0.5 * c_[i].weight * (c_[i].a + c_[i].b);
-    return sum;
+  // The nearest points of both sets.
+  std::array<Vec, 2> points() const {
+    Vec a{}, b{};
+    for (int i = 0; i < m_; ++i) a = a + c_[i].weight * c_[i].a, b = b + c_[i].weight * c_[i].b;
+    return {a, b};
   }
   // Takes b - a in and keeps the face nearest to the origin among those that hold it; false, and no
   // change to what was kept, where that is no nearer.
@@ -138,7 +138,12 @@ bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, 
 }
 
 Vec middle_point(const std::vector<Vec>& a, const std::vector<Vec>& b) {
-  return descend(a, b, [](const Vec&) {}).middle();
+  const auto [x, y] = nearest_points(a, b);
+  return 0.5 * (x + y);
+}
+
+std::array<Vec, 2> nearest_points(const std::vector<Vec>& a, const std::vector<Vec>& b) {
+  return descend(a, b, [](const Vec&) {}).points();
 }
 
 }  // namespace tauguard::rigid

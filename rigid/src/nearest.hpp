@@ -13,4 +13,7 @@ bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, 
 // A point of both hulls where they meet; the middle of their nearest points where they are apart.
 Vec middle_point(const std::vector<Vec>& a, const std::vector<Vec>& b);
 
+// The nearest points of both hulls, of a and of b; one common point where they meet.
+std::array<Vec, 2> nearest_points(const std::vector<Vec>& a, const std::vector<Vec>& b);
+
 }  // namespace tauguard::rigid

@@ -1,0 +1,124 @@
+"""Batches of rounded bodies: a convex core grown by a ball."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.geometry import Rebuilt, frozen_finite, sealed
+from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Tetrahedra
+
+#: Coordinates and radii beyond this are refused: their products would overflow.
+MOST_COORDINATE = 1e100
+
+
+def _radius(value: ArrayLike, count: int) -> NDArray[np.float64]:
+    given = np.asarray(value)
+    radius = frozen_finite(
+        "radius", np.broadcast_to(given, (count,)) if given.ndim == 0 else given, (count,)
+    )
+    if (radius < 0).any():
+        row = int(np.argmax(radius < 0))
+        raise ValueError(f"radius: {radius[row]} in row {row}; expected 0 or more")
+    return radius
+
+
+@dataclass(frozen=True, eq=False)
+class Rounded(Rebuilt):
+    """Convex bodies grown by a ball: every point within ``radius`` of the core.
+
+    A rounded box of outer half extents h is ``Rounded(Boxes(center, h - r, rotation), r)``.
+
+    Args:
+        core: N bodies.
+        radius: Zero or more. Shape (N,), or one number for all.
+
+    Raises:
+        ValueError: a core that is no batch of bodies in space, wrong lengths, an entry that is not
+            finite, a negative radius (named with its row).
+    """
+
+    core: Tetrahedra | Boxes | Parallelepipeds | Hulls
+    radius: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.core, Tetrahedra | Boxes | Parallelepipeds | Hulls):
+            raise ValueError(f"core: {type(self.core).__name__}, expected convex bodies in space")
+        object.__setattr__(self, "radius", _radius(self.radius, len(self.core)))
+
+    def __len__(self) -> int:
+        return len(self.core)
+
+
+@dataclass(frozen=True, eq=False)
+class Spheres(Rebuilt):
+    """Balls.
+
+    Args:
+        center: Shape (N, 3).
+        radius: Zero or more. Shape (N,), or one number for all.
+
+    Raises:
+        ValueError: as for :class:`Rounded`.
+    """
+
+    center: NDArray[np.float64]
+    radius: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", frozen_finite("center", self.center, (None, 3)))
+        object.__setattr__(self, "radius", _radius(self.radius, len(self.center)))
+
+    def __len__(self) -> int:
+        return len(self.center)
+
+    @cached_property
+    def core(self) -> Hulls:
+        """The centres as hulls of one point."""
+        return Hulls(self.center, np.arange(len(self) + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Capsules(Rebuilt):
+    """Segments grown by a ball; a segment without length is a sphere.
+
+    Args:
+        start: One end of the segment. Shape (N, 3).
+        end: The other. Shape (N, 3).
+        radius: Zero or more. Shape (N,), or one number for all.
+
+    Raises:
+        ValueError: as for :class:`Rounded`.
+    """
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    radius: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", frozen_finite("start", self.start, (None, 3)))
+        object.__setattr__(self, "end", frozen_finite("end", self.end, (len(self.start), 3)))
+        object.__setattr__(self, "radius", _radius(self.radius, len(self.start)))
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    @cached_property
+    def core(self) -> Hulls:
+        """The segments as hulls of two points."""
+        points = sealed(np.stack([self.start, self.end], axis=1).reshape(-1, 3))
+        return Hulls(points, 2 * np.arange(len(self) + 1))
+
+
+Solid = Bodies | Rounded | Spheres | Capsules
+_SHARP = np.zeros(1)
+
+
+def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
+    """The core of a batch and its radii, one zero where it has none."""
+    if isinstance(solid, Rounded | Spheres | Capsules):
+        return solid.core, solid.radius
+    return solid, _SHARP

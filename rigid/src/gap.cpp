@@ -1,0 +1,188 @@
+#include "gap.hpp"
+
+#include <algorithm>
+
+#include "convex_contact.hpp"
+#include "exact_gap.hpp"
+#include "nearest.hpp"
+
+namespace tauguard::rigid {
+namespace {
+
+// What a certified answer of double precision may be off, as a share of the size; closer to contact
+// than `near` of it the exact way is taken, so that the sign is never in question.
+constexpr double certain = 0x1p-46, near = 1e-10;
+// Beyond these sizes products of four lengths leave the range of a double.
+constexpr double least_size = 1e-40, most_size = 1e40;
+
+// Vertices relative to `origin`; a difference of two doubles is off by one rounding of itself.
+Points<double> local_points(const Bodies& bodies, std::size_t row, const Vec& origin) {
+  const double* p = bodies.row(row);
+  if (bodies.kind == Kind::boxes || bodies.kind == Kind::parallelepipeds) {
+    const Zonotope z = zonotope_of(bodies.kind, p);
+    Points<double> out(8);
+    for (int corner = 0; corner < 8; ++corner)
+      for (int k = 0; k < 3; ++k) {
+        double x = (z.origin[k] - origin[k]) + z.shift[k];
+        for (int axis = 0; axis < 3; ++axis)
+          x += (corner >> axis & 1) ? z.g[axis][k] : -z.g[axis][k];
+        out[corner][k] = x;
+      }
+    return out;
+  }
+  Points<double> out = vertices_of<double>(bodies, row);
+  for (auto& v : out) v = v - origin;
+  return out;
+}
+
+double size_of(const Points<double>& a, const Points<double>& b) {
+  double size = 0;
+  for (const auto* points : {&a, &b})
+    for (const auto& p : *points)
+      for (const double x : p) size = std::max(size, std::isfinite(x) ? std::fabs(x) : HUGE_VAL);
+  return size;
+}
+
+double top(const Points<double>& points, const Vec& n) {
+  double m = -INFINITY;
+  for (const auto& p : points) m = std::max(m, dot(n, p));
+  return m;
+}
+double bottom(const Points<double>& points, const Vec& n) { return -top(points, -1.0 * n); }
+
+Gap apart(const Vec& point_a, const Vec& point_b) {
+  const Vec between = point_b - point_a;
+  const double distance = norm(between);
+  return {distance, point_a, point_b, (1 / distance) * between};
+}
+
+// Bodies in each other come apart by `depth` along n: where they touch then.
+Gap together(const Points<double>& a, const Points<double>& b, const Vec& n, double depth,
+             double size) {
+  Points<double> moved = b;
+  for (auto& p : moved) p = p + depth * n;
+  Vec point;
+  contact_point(a, moved, n.data(), 1e-11 * size, point.data());
+  return {-depth, point, point - depth * n, n};
+}
+
+bool certified_apart(const Points<double>& a, const Points<double>& b, double size, Gap* out) {
+  const auto [point_a, point_b] = nearest_points(a, b);
+  *out = apart(point_a, point_b);
+  if (!(out->distance > near * size)) return false;
+  return out->distance - (bottom(b, out->normal) - top(a, out->normal)) <= certain * size;
+}
+
+bool certified_together(const Points<double>& a, const Points<double>& b, double size, Gap* out) {
+  NearestFacet<double> search(a, b);
+  if (search.solve(2000) != NearestFacet<double>::Answer::facet) return false;
+  const double length = norm(search.normal), depth = search.offset / length;
+  if (!(depth > near * size)) return false;
+  const Vec n = (-1 / length) * search.normal;
+  const double way = top(a, n) - bottom(b, n);  // certainly enough to come free
+  if (!(way - depth <= certain * size)) return false;
+  *out = together(a, b, n, way, size);
+  return true;
+}
+
+// The largest binary exponent among the components; 0 for a zero vector.
+std::int64_t exponent(const Vector<Dyadic>& x) {
+  std::int64_t e = std::numeric_limits<std::int64_t>::min();
+  for (const Dyadic& c : x)
+    if (!c.is_zero()) e = std::max(e, c.floor_log2());
+  return e;
+}
+Vec scaled(const Vector<Dyadic>& x, std::int64_t e) {
+  return {x[0].scaled(-e).to_double(), x[1].scaled(-e).to_double(), x[2].scaled(-e).to_double()};
+}
+double power(double x, std::int64_t e) {
+  return std::ldexp(x, static_cast<int>(std::clamp<std::int64_t>(e, -5000, 5000)));
+}
+
+struct ExactGap {
+  Gap gap;
+  int sign;  // of the distance less both radii
+};
+
+ExactGap exact_apart(const ExactNearest<Dyadic>& nearest, const Points<double>& a,
+                     const Dyadic& radii) {
+  const std::int64_t e = exponent(nearest.numerator), d = nearest.denominator.floor_log2();
+  const Vec v = scaled(nearest.numerator, e);
+  const double length = norm(v), denominator = nearest.denominator.scaled(-d).to_double();
+  Vec point{};
+  for (std::size_t k = 0; k < nearest.pairs.size(); ++k)
+    point =
+        point + (nearest.weights[k].scaled(-d).to_double() / denominator) * a[nearest.pairs[k][0]];
+  const Vec n = (1 / length) * v;
+  const double distance = power(length / denominator, e - d);
+  const Dyadic reach = radii * nearest.denominator;
+  return {{distance, point, point + distance * n, n},
+          (inner(nearest.numerator, nearest.numerator) - reach * reach).sign()};
+}
+
+ExactGap exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y, const Points<double>& a,
+                        const Points<double>& b, const Dyadic& radii, double size) {
+  NearestFacet<Dyadic> search(x, y);
+  const auto answer = search.solve(1 << 30);
+  const int sign = radii.is_zero() ? 0 : -1;
+  if (is_zero(search.normal)) search.normal = {Dyadic(), Dyadic(), Dyadic(1.0)};
+  const std::int64_t e = exponent(search.normal);
+  const Vec normal = scaled(search.normal, e);
+  const double length = norm(normal);
+  const Vec n = (-1 / length) * normal;
+  if (answer == NearestFacet<Dyadic>::Answer::flat) {
+    const Vec point = middle_point(a, b);
+    return {{0.0, point, point, n}, sign};
+  }
+  if (search.offset.is_zero()) return {together(a, b, n, 0.0, size), sign};
+  const std::int64_t o = search.offset.floor_log2();
+  const double depth = power(search.offset.scaled(-o).to_double() / length, o - e);
+  return {together(a, b, n, depth, size), -1};
+}
+
+ExactGap exact_gap(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
+                   const Points<double>& a, const Points<double>& b, const Dyadic& radii,
+                   double size) {
+  const auto x = vertices_of<Dyadic>(bodies_a, row), y = vertices_of<Dyadic>(bodies_b, row);
+  const ExactNearest<Dyadic> nearest(x, y);
+  if (!is_zero(nearest.numerator)) return exact_apart(nearest, a, radii);
+  return exact_together(x, y, a, b, radii, size);
+}
+
+// Grown by balls; `sign`, where it is known, is the distance's.
+Gap grown(Gap g, double radius_a, double radius_b, int sign, bool known) {
+  g.point_a = g.point_a + radius_a * g.normal;
+  g.point_b = g.point_b - radius_b * g.normal;
+  g.distance -= radius_a + radius_b;
+  if (known && sign == 0) g.distance = 0;
+  if (known && sign > 0) g.distance = std::max(g.distance, std::numeric_limits<double>::min());
+  if (known && sign < 0) g.distance = std::min(g.distance, -std::numeric_limits<double>::min());
+  return g;
+}
+
+}  // namespace
+
+Gap gap_of(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, double radius_a,
+           double radius_b) {
+  const double* p = bodies_a.row(row);
+  const Vec origin = {p[0], p[1], p[2]};
+  const auto a = local_points(bodies_a, row, origin), b = local_points(bodies_b, row, origin);
+  const double size = size_of(a, b), radii = radius_a + radius_b;
+  Gap g;
+  bool known = false;
+  int sign = 0;
+  const bool ranged = size > least_size && size < most_size;
+  const bool quick =
+      ranged && (certified_apart(a, b, size, &g) || certified_together(a, b, size, &g));
+  if (!quick || (radii > 0 && std::fabs(g.distance - radii) <= near * (size + radii))) {
+    const auto exact =
+        exact_gap(bodies_a, bodies_b, row, a, b, Dyadic(radius_a) + Dyadic(radius_b), size);
+    if (!quick) g = exact.gap;
+    sign = exact.sign, known = true;
+  }
+  g = grown(g, radius_a, radius_b, sign, known);
+  g.point_a = g.point_a + origin, g.point_b = g.point_b + origin;
+  return g;
+}
+
+}  // namespace tauguard::rigid
