@@ -90,7 +90,7 @@ def squared_depth(pa: Vectors, ea: Vectors, pb: Vectors, eb: Vectors) -> Fractio
     normals = [n for n in (cross(u, v) for u, v in combinations(edges, 2)) if any(n)]
     if not normals or not any(dot(normals[0], e) for e in edges):
         return Fraction(0)
-    best = None
+    best: Fraction | None = None
     for n in normals:
         a, b = [dot(n, p) for p in pa], [dot(n, p) for p in pb]
         way = min(max(a) - min(b), max(b) - min(a))
