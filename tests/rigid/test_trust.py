@@ -190,6 +190,8 @@ LONG_CALLS = {
     "time of impact": "time_of_impact(needle, ring, REST, spin, threads={threads})",
 }
 SCRIPT = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
 import numpy as np
 from tauguard.rigid import *
 from tauguard.rigid.queries import native_overlap
