@@ -62,7 +62,7 @@ STUDIES: dict[str, Study] = {
     ),
     "real_arm": Study(
         "real_arm.study",
-        "logs of a real UR10e: residuals, false alarms, smallest contacts, beside a peer",
+        "logs of real arms: pushes found, delays and false alarms, beside three simple rules",
     ),
     "detection": Study(
         "detection.study",

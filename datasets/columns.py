@@ -26,8 +26,9 @@ class ColumnMap:
 
     t: Column  #: time
     q: tuple[Column, ...]  #: joint positions
-    qd: tuple[Column, ...]  #: joint velocities
-    current: tuple[Column, ...]  #: motor currents [A]
+    qd: tuple[Column, ...] = ()  #: joint velocities; none: positions are differentiated
+    current: tuple[Column, ...] = ()  #: motor currents [A]
+    torque: tuple[Column, ...] = ()  #: joint torques [N m], instead of currents
     q_des: tuple[Column, ...] = ()  #: commanded positions
     qd_des: tuple[Column, ...] = ()  #: commanded velocities
     qdd_des: tuple[Column, ...] = ()  #: commanded accelerations
@@ -55,20 +56,21 @@ class ColumnMap:
                 raise ValueError(f"columns.{name}: {len(group)} columns for {joints} joints")
         if not isinstance(self.current_scale, float | int) and len(self.current_scale) != joints:
             raise ValueError(f"columns.current_scale: one number or {joints}")
+        if bool(self.current) == bool(self.torque):
+            raise ValueError("columns: give either current [A] or torque [N m]")
         unknown = self.repair - {"repeat", "tail", "nan"}
         if unknown:
             raise ValueError(f"columns.repair: {sorted(unknown)}; known: repeat, tail, nan")
 
     def groups(self) -> dict[str, tuple[Column, ...]]:
         """The columns of the signals that have any, by the trace's field."""
-        names = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
-        optional = ("q_des", "qd_des", "qdd_des")
-        return {n: getattr(self, n) for n in names if n not in optional or getattr(self, n)}
+        names = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")
+        return {n: getattr(self, n) for n in names if n == "q" or getattr(self, n)}
 
 
-def numbered(prefix: str, joints: int = 6) -> tuple[str, ...]:
-    """``prefix0``, ``prefix1``, ..."""
-    return tuple(f"{prefix}{i}" for i in range(joints))
+def numbered(prefix: str, joints: int = 6, first: int = 0) -> tuple[str, ...]:
+    """``prefix0``, ``prefix1``, ... from ``first`` on."""
+    return tuple(f"{prefix}{i}" for i in range(first, first + joints))
 
 
 PRESETS = {
@@ -89,6 +91,24 @@ PRESETS = {
         q=numbered("actual_q_"),
         qd=numbered("actual_qd_"),
         current=numbered("actual_current_"),
+        joint_names=UR_JOINTS,
+        repair=frozenset({"repeat", "tail"}),
+    ),
+    # A UR5's log of Kufieta 2014 as shared files: t, q1..6, qd1..6, i1..6 and more.
+    "ur5": ColumnMap(
+        t="t",
+        q=numbered("q", first=1),
+        qd=numbered("qd", first=1),
+        current=numbered("i", first=1),
+        joint_names=UR_JOINTS,
+        repair=frozenset({"repeat", "tail"}),
+    ),
+    # A UR3's: t, q1..6, qd1..6, tau1..6 [N m].
+    "ur3": ColumnMap(
+        t="t",
+        q=numbered("q", first=1),
+        qd=numbered("qd", first=1),
+        torque=numbered("tau", first=1),
         joint_names=UR_JOINTS,
         repair=frozenset({"repeat", "tail"}),
     ),

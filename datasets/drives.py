@@ -51,4 +51,7 @@ UR10E = DriveNumbers(
     viscous=(21.3, 20.2, 10.4, 3.6, 2.5, 3.0),
     coulomb=(12.5, 13.3, 5.0, 2.0, 2.7, 2.3),
 )
-DRIVES = {"ur10e": UR10E}
+# The ratio of a UR5 controller's own target torques to its target currents, by least squares over
+# its logs. The last joint's is not identifiable; it has the drive of the one before.
+UR5 = DriveNumbers(gain=(12.0, 10.6, 11.1, 9.9, 10.3, 10.3))
+DRIVES = {"ur10e": UR10E, "ur5": UR5}

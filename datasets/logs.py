@@ -34,6 +34,7 @@ def read_log(
     Args:
         path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
             system whose ``JointState`` messages hold the motor currents in ``effort``.
+            Where they are joint torques, ``meta["effort"]`` of the trace is to say "torque".
         columns: for CSV, a map or the name of a preset (see ``PRESETS``); without one the header
             line must be that of a preset.
         joint_names: what the joints are called, in the order of the columns (default: the map's
@@ -113,13 +114,38 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
     signals: dict[str, Any] = {
         name: np.ascontiguousarray(value[keep]) for name, value in parts.items()
     }
-    signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
+    meta = {"log": path.name}
+    if columns.torque:
+        meta["effort"] = "torque"
+    else:
+        signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
+    efforts = signals.pop("torque", None)
     if columns.degrees:
         signals |= {n: np.deg2rad(v) for n, v in signals.items() if n != "current"}
+    if efforts is not None:
+        signals["current"] = efforts
+    if "qd" not in signals:
+        signals["qd"] = differentiated(t[keep], signals["q"])
+        notes.append(DIFFERENTIATED)
     names = named(joint_names or columns.joint_names, len(columns.q))
-    trace = Trace(joint_names=names, t=t[keep], meta={"log": path.name}, **signals)
+    trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
     kept = lines[keep]
     return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")))
+
+
+#: What is said of a log without velocities.
+DIFFERENTIATED = (
+    "no velocities: positions are differentiated over three samples, which comes 1.5 samples late "
+    "and raises noise; bounds get larger by what that costs"
+)
+
+
+def differentiated(t: Array, q: Array) -> Array:
+    """Velocities of positions, causal: the change over the last three samples, shape (T, n)."""
+    rows = np.arange(len(t))
+    before = np.maximum(rows - 3, 0)
+    span = np.maximum(t[rows] - t[before], 1e-9)[:, None]
+    return np.asarray((q[rows] - q[before]) / span)
 
 
 def named(names: Sequence[str], joints: int) -> tuple[str, ...]:

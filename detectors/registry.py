@@ -11,9 +11,11 @@ from tauguard.detectors.detector import Detector
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.estimation.slow_errors import LoadDeviation
 from tauguard.detectors.estimation.velocity import SensorNoise
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.features.envelope import Envelope
+from tauguard.detectors.features.free_bound import Bound
 from tauguard.detectors.features.front_end import FrontEnd
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.features.windows import WindowShape
@@ -26,6 +28,7 @@ from tauguard.detectors.methods.current_network import (
 from tauguard.detectors.methods.current_threshold import CurrentThreshold, FittedCurrentThreshold
 from tauguard.detectors.methods.cusum import Cusum, FittedCusum
 from tauguard.detectors.methods.forest import Forest
+from tauguard.detectors.methods.free_motion import FittedFreeMotion
 from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.methods.network import Network
 from tauguard.detectors.methods.one_class import OneClass
@@ -60,11 +63,13 @@ FILE_TYPES: dict[str, type] = {
     kind.__qualname__: kind
     for kind in (
         ArmModel,
+        Bound,
         CollisionAlarm,
         Envelope,
         FittedCurrentNetwork,
         FittedCurrentThreshold,
         FittedCusum,
+        FittedFreeMotion,
         FittedThresholds,
         FittedWindowed,
         Forest,
@@ -72,6 +77,7 @@ FILE_TYPES: dict[str, type] = {
         FrontEnd,
         Inputs,
         KernelMachine,
+        LoadDeviation,
         Network,
         OneOutput,
         RobotNumbers,

@@ -23,7 +23,7 @@ def write_robot_file(
     Args:
         source: URDF or MJCF of an arm.
         target: where to write, in the same format.
-        joints: names, in the order of ``inertial``.
+        joints: names, in the order of ``inertial``; all other joints are made fixed.
         inertial: of all that moves with each joint, in the joint's frame: mass, first moment (3),
             Ixx Ixy Iyy Ixz Iyz Izz about its origin [kg, kg m, kg m^2], shape (n, 10).
         note: any text; :func:`read_note` finds it again.
@@ -81,6 +81,13 @@ def _urdf(root: ElementTree.Element, joints: tuple[str, ...], inertial: Array, n
         by_name[joint.get("name")] = joint
         children.setdefault(_end(joint, "parent"), []).append(joint)
 
+    for name, joint in by_name.items():
+        if name not in joints and joint.get("type") != "fixed":
+            joint.set("type", "fixed")
+            for part in ("axis", "limit", "mimic", "dynamics", "safety_controller"):
+                for element in joint.findall(part):
+                    joint.remove(element)
+
     def strip(link: str | None) -> None:
         for element in links[link].findall("inertial"):
             links[link].remove(element)
@@ -121,6 +128,10 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
         spec = mujoco.MjSpec.from_file(str(source))
     except ValueError as error:
         raise ValueError(f"{source}: {' '.join(str(error).split())}") from None
+    held = [joint for joint in spec.joints if joint.name not in joints]
+    if held:  # what acts on them goes, too
+        for element in (*spec.keys, *spec.actuators, *spec.tendons, *spec.equalities, *held):
+            spec.delete(element)
     for name, numbers in zip(joints, inertial, strict=True):
         joint = spec.joint(name)
         if joint is None:

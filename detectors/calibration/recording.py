@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ Array = NDArray[np.float64]
 
 #: An axis slower than this in every sample of a log does not move in it [rad/s].
 MOVING = 0.01
+#: No part of a log that is cut is shorter [s].
+SHORTEST = 8.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,11 @@ class Recording:
 
     trace: Trace
     load: Load | None = Load()  #: None: something unknown was carried
+
+
+def moves(trace: Trace) -> bool:
+    """Whether any joint ever moves."""
+    return bool((np.abs(trace.qd) > MOVING).any())
 
 
 def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
@@ -82,3 +90,26 @@ def known_load(recording: Recording) -> Array:
     x, y, z = load.centre or (0.0, 0.0, 0.0)
     spread = y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y
     return load.mass * np.array([1.0, x, y, z, *spread])
+
+
+def pieces(recordings: Sequence[Recording], count: int) -> list[Recording]:
+    """Recordings, cut so that there are ``count`` of them or more.
+
+    The longest are halved first, none below 8 s.
+    """
+    parts = list(recordings)
+    while len(parts) < count:
+        k = int(np.argmax([r.trace.t[-1] - r.trace.t[0] for r in parts]))
+        trace = parts[k].trace
+        if trace.t[-1] - trace.t[0] < 2 * SHORTEST:
+            break
+        middle = len(trace.t) // 2
+        halves = [cut(trace, slice(None, middle)), cut(trace, slice(middle, None))]
+        parts[k : k + 1] = [Recording(half, parts[k].load) for half in halves]
+    return parts
+
+
+def cut(trace: Trace, rows: slice) -> Trace:
+    """Some successive rows of a log, without its truth."""
+    q, qd, current = trace.q[rows], trace.qd[rows], trace.current[rows]
+    return Trace(trace.joint_names, trace.t[rows], q, qd, current, meta=trace.meta)

@@ -41,7 +41,7 @@ def filtered(
     gain: Array,
     model: FrictionModel,
     rate: float,
-    rest: float,
+    rest: float = 0.5,
     load: Array | None = None,
 ) -> Filtered:
     """Everything that the regression needs of a recording at these gains.

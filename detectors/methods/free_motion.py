@@ -1,363 +1,254 @@
 """A detector that learns from collision-free motion alone.
 
-Estimator (friction, momentum observer, payload and slow offsets tracked), then per joint the
-residual that is left over its allowance: what collision-free motion leaves at that speed and
-acceleration, apart for joints that stand still. Static friction is indeterminate there: the torque
-of a joint at rest wanders with the others' motion, which the tracked offset follows.
+Momentum observer at 30/s, slow errors (load, friction) tracked while joints move, and each joint's
+bound (:mod:`~tauguard.detectors.features.free_bound`). The score is the largest ratio of a joint's
+signal to its bound; 1 is the threshold.
 
-Allowances come from residuals of logs that the calibration in use did not see: every training log
-is judged by a calibration from the others, as new logs will be. The allowances at rest and in
-motion are scaled to half of the false alarms to accept each. The tail of the ratios of residual to
-allowance is taken to be that of all joints together: one joint's share of some minutes says too
-little of what it does once in hours. The score is the root of the sum of the squares of the joints'
-ratios, and a last factor makes 1 its threshold: friction errs in one joint at a time, a push at a
-link loads several. A joint that no log shows at rest, or in motion, has the allowance of the other
-regime there.
+The bounds are prior knowledge in units of each joint's friction. The logs move them: a joint's two
+factors, at rest and in motion, follow the largest ratios that logs reach under a calibration that
+has not seen them, weighed against :data:`PRIOR_BLOCKS` blocks of the prior. A regime that the logs
+do not show keeps the prior.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from tauguard.detectors.calibration.identification import REAL_FRICTION, Beliefs, identify
-from tauguard.detectors.calibration.recording import Recording
+from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
+from tauguard.detectors.calibration.recording import Load, Recording, known_load, moves, pieces
 from tauguard.detectors.calibration.regression import filtered
-from tauguard.detectors.calibration.resampling import coarser, rows_known, samples_each
 from tauguard.detectors.detector import check_joints
-from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
-from tauguard.detectors.evaluation.events import MERGE_GAP, find_alarms
-from tauguard.detectors.features.allowance import (
-    AT_REST,
-    IN_MOTION,
-    Allowance,
-    acceleration,
-    peaks,
-    terms,
-    torque_change,
-)
-from tauguard.detectors.features.standstill import still
-from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
-from tauguard.detectors.thresholds.rates import followed, sustained
-from tauguard.traces.trace import Bools, Detection, Trace
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.estimation.observer import intervals
+from tauguard.detectors.estimation.slow_errors import UNKNOWN_LOAD, LoadDeviation
+from tauguard.detectors.features.free_bound import Bound
+from tauguard.detectors.features.free_stream import FreeStream
+from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.thresholds.alarm import CollisionAlarm
+from tauguard.detectors.thresholds.confirmation import confirmation_samples
+from tauguard.detectors.thresholds.rates import block_maxima, sustained
+from tauguard.traces.trace import Bools, Trace
 
 Array = NDArray[np.float64]
 
-#: Travel after which a joint that stood still counts as moving [rad].
-RELEASE = 5e-3
-#: A joint's threshold over its largest training peak is at least this.
-HEADROOM = 1.2
-#: Share of the peaks that the tail is taken from.
-TAIL = 0.02
+#: Confirmation of an alarm [s].
+CONFIRMATION = 0.04
+#: Length of the blocks whose peaks the factors follow [s], and how many of them the prior is worth.
+BLOCK, PRIOR_BLOCKS = 0.5, 60
+#: A factor over the second largest peak, and its range.
+HEADROOM, LEAST, MOST = 1.35, 0.8, 3.0
+#: Calibrations that leave logs out, at most.
+FOLDS = 5
+#: Rate of the filter that the calibration looks through [1/s].
+CALIBRATION_RATE = 20.0
 
 
-@dataclass(frozen=True)
-class FreeMotionSettings:
-    """What can be chosen; the defaults are for real arms at 100 Hz and above."""
-
-    observer_gain: float = 40.0  #: [1/s]
-    calibration_rate: float = 20.0  #: of the filter that the calibration looks through [1/s]
-    confirmation: float = 0.05  #: t_c [s]
-    settle: float = 4.0  #: at the beginning, never an alarm: until motion has shown the load [s]
-    false_alarms_per_hour: float = 1.0  #: to accept when the allowances are scaled
-    spike: bool = True
-    """Take the median of three successive currents, or of five where it jumps: a controller's kick,
-    as at a commanded stop, says nothing about contact. It costs one sample of delay or two."""
-    unknowns: Unknowns = field(
-        default_factory=lambda: Unknowns(
-            payload=3.0, moment=0.3, offset=0.3, fast=5.0, slow=300.0, clip=10.0
-        )
-    )
-    """What is tracked; a load that nobody told is more than the training logs show. Loads and the
-    friction of gears that warm up change over minutes: what is followed as fast as a hand pushes
-    explains the push away. What is followed so slowly has to heed large innovations: a load that a
-    standing arm got wrong would otherwise stay, since what contradicts it counts less."""
-    beliefs: Beliefs = field(default_factory=Beliefs)  #: of the calibration
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Judged:
-    """What the detector sees of a trace; rows are samples."""
+    """What a detector saw of a trace; rows are samples."""
 
-    left: Array  #: residual that the tracked unknowns do not explain [N m], shape (T, n)
-    terms: Array  #: of the allowances, shape (T, n, TERMS)
-    rest: Bools  #: which joints stand still, shape (T, n)
+    t: Array  #: [s], shape (T,)
+    ratio: Array  #: of each joint's signal to its bound, shape (T, n)
+    bound: Array  #: [N m], shape (T, n)
+    residual: Array  #: without slow errors [N m], shape (T, n)
+    rest: Bools  #: which joints are at rest, shape (T, n)
 
 
-@dataclass
-class FreeMotionDetector:
-    """Calibration and allowances from logs in which nothing touched the arm."""
+@dataclass(frozen=True, eq=False)
+class FittedFreeMotion(Frozen):
+    """A calibrated arm and the bounds of its collision-free motion."""
 
-    settings: FreeMotionSettings = field(default_factory=FreeMotionSettings)
+    arm: ArmModel
+    dt: float  #: of the slowest training log [s]
+    bound: Bound
+    load: LoadDeviation  #: how uncertain the carried load is
+    seconds: float  #: of collision-free motion that the bounds rest on
+    alarms: int
+    """In the training logs, each under a calibration from others; their bounds have seen them."""
     name: str = "free-motion"
-    model: ArmModel | None = None
-    resting: Allowance | None = None
-    moving: Allowance | None = None
-    dt: float = 0.0  #: sample interval of the training logs [s]
-    seconds: float = 0.0  #: of motion that the allowances rest on
-    left_out: list[int] = field(default_factory=list)
-    """Alarms in each training log under the calibration from the others; not a test, since the
-    allowances have seen its residual."""
+    settle: float = 0.5  #: [s]
 
-    threshold = 1.0  #: of the score
-
-    @property
-    def settle(self) -> float:
-        """Seconds at the beginning of a trace whose scores mean nothing yet."""
-        return self.settings.settle
-
-    @property
-    def arm(self) -> ArmModel:
-        """The calibrated arm."""
-        return self._fitted()[0]
-
-    def _fitted(self) -> tuple[ArmModel, Allowance, Allowance]:
-        if self.model is None or self.resting is None or self.moving is None:
-            raise ValueError("this detector is not fitted: call fit or load first")
-        return self.model, self.resting, self.moving
-
-    # -- training ---------------------------------------------------------------------------------
-
-    def fit(self, traces: Sequence[Trace | Recording], robot: ArmModel) -> FreeMotionDetector:
-        """Calibrate, then learn allowances from left-out logs.
-
-        Args:
-            traces: collision-free logs, three or more; plain traces count as without a load. The
-                slowest sample rate among them becomes that of all.
-            robot: nominal numbers and drive gains, whose scale holds.
-
-        Raises:
-            ValueError: fewer than three logs, or other joints.
-        """
-        recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
-        if len(recordings) < 3:
-            raise ValueError(
-                f"{len(recordings)} log{'s' * (len(recordings) != 1)}: give three or more, "
-                "to leave each out once (a long one can be cut)"
-            )
-        check_joints([r.trace for r in recordings], robot)
-        self.dt = max(r.trace.dt for r in recordings)
-        recordings = [
-            replace(r, trace=coarser(r.trace, samples_each(r.trace, self.dt))) for r in recordings
-        ]
-        bare = replace(robot.friction or REAL_FRICTION, weights=np.empty((0, 0)))
-        rate, beliefs = self.settings.calibration_rate, self.settings.beliefs
-        numbers, drive = robot.robot, robot.drive_gain
-        data = [filtered(r, numbers, drive, bare, rate, beliefs.rest) for r in recordings]
-
-        def without(k: int) -> ArmModel:
-            use = [i for i in range(len(recordings)) if i != k]
-            return identify(
-                robot,
-                [recordings[i] for i in use],
-                friction=bare,
-                beliefs=beliefs,
-                rate=rate,
-                data=[data[i] for i in use],
-            ).arm
-
-        self.model = without(-1)
-        assert self.model.friction is not None
-        turns = tqdm(recordings, desc="leave out", unit="log", disable=None, leave=False)
-        judged = [self._judged(without(k), r.trace) for k, r in enumerate(turns)]
-        self._learn(judged, self.model.friction.coulomb())
-        self.left_out = [self._alarms(part) for part in judged]
-        return self
-
-    def _learn(self, judged: Sequence[Judged], coulomb: Array) -> None:
-        """Allowances of left-out residuals, scaled to the false alarms to accept."""
-        first, rows = self._first(), self._gap()
-        self.seconds = sum(len(part.left) - first for part in judged) * self.dt
-        columns = np.concatenate([part.terms[first:] for part in judged])
-        bounds, shown = [], []
-        for resting, which in ((True, AT_REST), (False, IN_MOTION)):
-            level = np.concatenate([self._level(part, resting)[first:] for part in judged])
-            allowance = Allowance.fit(level, columns, rows, which)
-            factors = self._factors(level / allowance.scale(columns), rows)
-            bounds.append(allowance.times(factors))
-            shown.append(level.max(axis=0) > 0)
-        at_rest = bounds[0].where(shown[0], bounds[1]).at_least(coulomb)
-        moving = bounds[1].where(shown[1], bounds[0]).at_least(coulomb)
-        room = np.full(len(coulomb), self._room(judged, at_rest, moving))
-        self.resting, self.moving = at_rest.times(room), moving.times(room)
-
-    def _room(self, judged: Sequence[Judged], at_rest: Allowance, moving: Allowance) -> float:
-        """At least 1: for alarms that several joints, or rest and motion, make together."""
-        first, samples, rows = self._first(), self._samples(), self._gap()
-        scores = [combined(self._ratio(part, at_rest, moving))[first:] for part in judged]
-        levels = [sustained(score, samples) for score in scores]
-        found = np.sort(np.concatenate([level[peaks(level, rows)] for level in levels]))[::-1]
-        if not len(found):
-            return 1.0
-        allowed = 2 * self._allowed()
-        level = max(1.0, _exceeded(found, allowed))
-        return level if allowed >= 1 else max(level, HEADROOM * float(found[0]))
-
-    def _first(self) -> int:
-        """The first sample that may be an alarm."""
-        return int(np.ceil(self.settings.settle / self.dt))
-
-    def _gap(self) -> int:
-        """Samples that have one peak: alarms so near to each other are one."""
-        return max(1, round(MERGE_GAP / self.dt))
-
-    def _allowed(self) -> float:
-        """False alarms at rest, or in motion, to accept in the training logs."""
-        return self.settings.false_alarms_per_hour / 2 * self.seconds / 3600
-
-    def _level(self, judged: Judged, resting: bool) -> Array:
-        """What an alarm of each joint would need, 0 in the other regime, shape (T, n)."""
-        size = np.where(judged.rest == resting, np.abs(judged.left), 0.0)
-        return np.column_stack([sustained(own, self._samples()) for own in size.T])
-
-    def _factors(self, ratio: Array, rows: int) -> Array:
-        """What each joint's allowance is to be multiplied by, shape (n,)."""
-        own = [np.sort(column[peaks(column, rows)])[::-1] for column in ratio.T]
-        pooled = np.sort(np.concatenate(own))[::-1]
-        if not len(pooled):
-            return np.ones(len(own))
-        allowed = self._allowed()
-        common = _exceeded(pooled, allowed)
-        if allowed >= 1:
-            return np.full(len(own), common)
-        return np.array([max(common, HEADROOM * float(z[0])) if len(z) else common for z in own])
-
-    # -- detection --------------------------------------------------------------------------------
-
-    def _samples(self) -> int:
-        return confirmation_samples(self.settings.confirmation, self.dt)
-
-    def _judged(self, model: ArmModel, trace: Trace) -> Judged:
-        t, q, qd, current = trace.t, trace.q, trace.qd, trace.current
-        shaken = acceleration(t, qd)  # of this sample, though the residual is of one before
-        if self.settings.spike:
-            q, qd, current = delayed(q), delayed(qd), without_kicks(current, self._jump(model))
-        gain = self.settings.observer_gain
-        found = Estimator(model, gain, self.dt, self.settings.unknowns).run(t, q, qd, current)
-        change = torque_change(model.robot, t, q, qd, gain)
-        rest = resting(q, qd, self.dt)
-        return Judged(found.unexplained, terms(qd, shaken, change, rest, self.dt), rest)
-
-    @staticmethod
-    def _jump(model: ArmModel) -> Array:
-        """What is called a jump of the current [A], shape (n,): twice the Coulomb friction."""
-        n = model.robot.joints
-        level = model.friction.coulomb() if model.friction else np.full(n, np.inf)
-        jump: Array = 2 * level / np.abs(model.drive_gain)
-        return jump
-
-    def _checked(self, trace: Trace) -> Judged:
-        """At every sample of the trace, whose rate may be higher than training's."""
-        model = self._fitted()[0]
-        if len(trace.joint_names) != model.robot.joints:
-            raise ValueError(
-                f"the trace has {len(trace.joint_names)} joints, this detector "
-                f"{model.robot.joints}: {', '.join(model.robot.joint_names)}"
-            )
-        count, length = samples_each(trace, self.dt), len(trace.t)
-        if length // count < 2:
-            raise ValueError(f"the trace has {length} samples: expected {2 * count} or more")
-        seen = self._judged(model, coarser(trace, count))
-        rows = rows_known(count, length, len(seen.left))
-        return Judged(seen.left[rows], seen.terms[rows], seen.rest[rows])
-
-    def ratios(self, trace: Trace) -> Array:
-        """Each joint's residual over its allowance, shape (T, n).
-
-        Raises:
-            ValueError: not fitted, other joints or a lower sample rate than the training's.
-        """
-        return self._ratio(self._checked(trace), *self._fitted()[1:])
-
-    def rests(self, trace: Trace) -> Bools:
-        """Which joints are at rest at each sample, shape (T, n)."""
-        return self._checked(trace).rest
-
-    @staticmethod
-    def _ratio(judged: Judged, at_rest: Allowance, moving: Allowance) -> Array:
-        bound = np.where(judged.rest, at_rest.scale(judged.terms), moving.scale(judged.terms))
-        ratio: Array = np.abs(judged.left) / bound
-        return ratio
-
-    def _alarms(self, judged: Judged) -> int:
-        _, at_rest, moving = self._fitted()
-        above = combined(self._ratio(judged, at_rest, moving)) > self.threshold
-        t = np.arange(len(above)) * self.dt
-        alarm = confirmed(above & (t >= self.settings.settle), self._samples())
-        return len(find_alarms(t, alarm))
+    def carrying(self, load: Load) -> FittedFreeMotion:
+        """The same detector of the arm with a load in its gripper; ``Load()`` for none."""
+        known = known_load(Recording(None, load))  # type: ignore[arg-type]
+        moment = 0.1 * load.mass if load.mass and load.centre is None else 0.0
+        inertial = self.arm.robot.inertial.copy()
+        inertial[-1] += known
+        arm = replace(self.arm, robot=self.arm.robot.with_inertial(inertial))
+        deviation = LoadDeviation(0.02 * load.mass, moment)
+        return replace(self, arm=arm, load=deviation)
 
     def scores(self, trace: Trace) -> Array:
-        """All joints' ratios of residual to allowance together, shape (T,)."""
-        return combined(self.ratios(trace))
+        """The largest ratio of a joint's signal to its bound, shape (T,)."""
+        scores: Array = self.judge(trace).ratio.max(axis=1)
+        return scores
 
-    def detect(self, trace: Trace) -> Detection:
-        """Judge a trace; no alarm within the first ``settle`` seconds."""
-        judged = self._checked(trace)
-        score = combined(self._ratio(judged, *self._fitted()[1:]))
-        settled = trace.t - trace.t[0] >= self.settings.settle
-        samples = confirmation_samples(self.settings.confirmation, min(self.dt, trace.dt))
-        alarm = confirmed((score > self.threshold) & settled, samples)
-        alarms = find_alarms(trace.t, alarm)
-        return Detection(self.name, trace.t, judged.left, score, self.threshold, alarm, alarms)
+    def stream(self) -> FreeStream:
+        """The same scores sample by sample."""
+        return FreeStream(self.arm, self.bound, self.load, self.dt)
+
+    def judge(self, trace: Trace) -> Judged:
+        """Ratios, bounds and residuals of a trace.
+
+        Raises:
+            ValueError: other joints than the arm's.
+        """
+        joints = self.arm.robot.joints
+        if len(trace.joint_names) != joints:
+            raise ValueError(
+                f"the trace has {len(trace.joint_names)} joints, this detector {joints}"
+            )
+        stream, steps = self.stream(), intervals(trace.t, len(trace.t))
+        ratio, bound, residual = (np.empty_like(trace.q) for _ in range(3))
+        rest = np.empty(trace.q.shape, dtype=np.bool_)
+        dt = trace.dt
+        for k in range(len(trace.t)):
+            stream.step(trace.q[k], trace.qd[k], trace.current[k], float(steps[k - 1]) if k else dt)
+            ratio[k], bound[k] = stream.ratio, stream.regimes.bound
+            residual[k], rest[k] = stream.residual, stream.regimes.rest
+        return Judged(trace.t, ratio, bound, residual, rest)
 
 
-def resting(q: Array, qd: Array, dt: float) -> Bools:
-    """Which joints are at rest at each sample, shape (T, n).
+def carrying(alarm: CollisionAlarm, load: Load) -> CollisionAlarm:
+    """The same alarm for an arm with a load in its gripper.
 
-    A joint comes to rest when it has stood still for a while (see
-    :mod:`~tauguard.detectors.features.standstill`) and leaves it by ``RELEASE`` of travel: the
-    twitch of a joint that is shaken by the others is no motion.
+    Raises:
+        ValueError: a detector of another kind: it takes no load.
     """
-    stopped = still(qd, dt)
-    out = np.empty_like(stopped)
-    for j in range(q.shape[1]):
-        at_rest, anchor = True, float(q[0, j])
-        stops, angles = stopped[:, j].tolist(), q[:, j].tolist()
-        for k, (stop, angle) in enumerate(zip(stops, angles, strict=True)):
-            if at_rest:
-                at_rest = abs(angle - anchor) <= RELEASE
-            elif stop:
-                at_rest, anchor = True, angle
-            out[k, j] = at_rest
+    if not isinstance(alarm.detector, FittedFreeMotion):
+        raise ValueError(f"{alarm.detector.name}: takes no load; only free-motion detectors do")
+    return replace(alarm, detector=alarm.detector.carrying(load))
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """Settings of the free-motion detector: there are none to choose."""
+
+    name: str = "free-motion"
+
+    def fit(self, traces: Sequence[Trace | Recording], arm: ArmModel) -> FittedFreeMotion:
+        """Calibrate, then let left-out logs move the prior bounds.
+
+        Args:
+            traces: collision-free, 20 s of motion or more in all; plain traces count as without a
+                load. Long ones are cut, so that each part can be left out once.
+            arm: nominal numbers and drive gains, whose scale holds.
+
+        Raises:
+            ValueError: too little motion, or other joints.
+        """
+        recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
+        check_joints([r.trace for r in recordings], arm)
+        parts = pieces(recordings, FOLDS)
+        bare = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
+        moving = [r for r in parts if moves(r.trace)]
+        standing = [r for r in parts if not moves(r.trace)]
+        data = [filtered(r, arm.robot, arm.drive_gain, bare, CALIBRATION_RATE) for r in moving]
+
+        def calibrated(use: Sequence[int]) -> ArmModel:
+            own, known = [moving[i] for i in use], [data[i] for i in use]
+            return identify(arm, own, friction=bare, rate=CALIBRATION_RATE, data=known).arm
+
+        everything = range(len(moving))
+        whole = calibrated(everything)
+        prior = _prior(whole, max(r.trace.dt for r in recordings))
+        judged = [_judged(prior, r) for r in standing]
+        folds = [everything[k::FOLDS] for k in range(min(FOLDS, len(moving)))]
+        for fold in tqdm(folds, desc="leave out", unit="part", disable=None, leave=False):
+            others = [i for i in everything if i not in fold]
+            try:
+                model = calibrated(others)
+            except ValueError:  # too little motion is left without the fold
+                model = whole
+            judged += [_judged(replace(prior, arm=model), moving[i]) for i in fold]
+        return _moved(prior, judged)
+
+
+def friction_level(arm: ArmModel) -> Array:
+    """What a joint's bounds are measured in [N m], shape (n,).
+
+    Coulomb friction, or 1.5 times the error in motion where that is more; small joints leave more
+    of their friction than large ones, and a quarter of the (logarithmic) way to the largest is
+    added.
+    """
+    coulomb = arm.friction.coulomb() if arm.friction else np.zeros(arm.robot.joints)
+    level = np.maximum(np.maximum(coulomb, 1.5 * np.asarray(arm.noise)), 1e-3)
+    level = np.maximum(level, 0.02 * level.max())
+    scaled: Array = level**0.75 * level.max() ** 0.25
+    return scaled
+
+
+def _prior(arm: ArmModel, dt: float) -> FittedFreeMotion:
+    one = np.ones(arm.robot.joints)
+    level = friction_level(arm)
+    bound = Bound(level, 0.02 * level, one, one)
+    return FittedFreeMotion(arm, dt, bound, UNKNOWN_LOAD, 0.0, 0)
+
+
+def _judged(prior: FittedFreeMotion, recording: Recording) -> Judged:
+    known = prior if recording.load is None else prior.carrying(recording.load)
+    return known.judge(recording.trace)
+
+
+def _moved(prior: FittedFreeMotion, judged: Sequence[Judged]) -> FittedFreeMotion:
+    """The prior with each joint's noise and factors from left-out logs."""
+    noise = _noise(judged, prior.bound.noise)
+    factors = [_factors(judged, at_rest) for at_rest in (True, False)]
+    bound = replace(prior.bound, noise=noise, resting=factors[0], moving=factors[1])
+    seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
+    alarms = sum(_alarms(part, bound, prior.bound) for part in judged)
+    return replace(prior, bound=bound, seconds=seconds, alarms=alarms)
+
+
+def _held(part: Judged, ratio: Array) -> Array:
+    """What each joint's ratio holds for the time of a confirmation, shape (T, n)."""
+    dt = float(np.median(np.diff(part.t)))
+    samples = confirmation_samples(CONFIRMATION, dt)
+    held = np.column_stack([sustained(column, samples) for column in ratio.T])
+    held[part.t - part.t[0] < 0.5] = 0.0
+    return held
+
+
+def _factors(judged: Sequence[Judged], at_rest: bool) -> Array:
+    """Each joint's factor, shape (n,), of the bound at rest or in motion."""
+    found = []
+    for part in judged:
+        rows = max(1, round(BLOCK / float(np.median(np.diff(part.t)))))
+        held = _held(part, np.where(part.rest == at_rest, part.ratio, 0.0))
+        found.append(np.column_stack([block_maxima(column, rows)[0] for column in held.T]))
+    peaks = np.concatenate(found)
+    out = np.ones(peaks.shape[1])
+    for j, own in enumerate(peaks.T):
+        shown = np.sort(own[own > 0])[::-1]
+        if len(shown):
+            seen = HEADROOM * float(shown[min(1, len(shown) - 1)])
+            weighed = (PRIOR_BLOCKS + len(shown) * seen) / (PRIOR_BLOCKS + len(shown))
+            out[j] = np.clip(weighed, LEAST, MOST)
     return out
 
 
-def _exceeded(ordered: Array, allowed: float) -> float:
-    """The level that so many of some peaks, in descending order, are expected to exceed."""
-    return followed(ordered, allowed, max(10, round(TAIL * len(ordered))))
+def _noise(judged: Sequence[Judged], prior: Array) -> Array:
+    """Deviation of a standing joint's residual [N m], shape (n,); ``prior`` where none stands."""
+    changes = []
+    for part in judged:
+        dt = float(np.median(np.diff(part.t)))
+        step, settled = max(1, round(0.05 / dt)), max(1, round(1.0 / dt))
+        still = sustained(part.rest.all(axis=1).astype(float), settled) > 0
+        changes.append((part.residual[step:] - part.residual[:-step])[still[step:]])
+    all_of = np.concatenate(changes)
+    if len(all_of) < 100:
+        return prior
+    noise: Array = np.median(np.abs(all_of), axis=0) / 0.6745 / np.sqrt(2)
+    return np.maximum(noise, 1e-3 * prior)
 
 
-def combined(ratio: Array) -> Array:
-    """The root of the sum of the squares over the joints, shape (T,), of ``ratio``, (T, n)."""
-    return np.asarray(np.sqrt((ratio**2).sum(axis=1)))
-
-
-def delayed(x: Array) -> Array:
-    """The sample before, shape (T, n); the first one twice."""
-    return np.ascontiguousarray(np.concatenate([x[:1], x[:-1]]))
-
-
-def median_of(count: int, x: Array) -> Array:
-    """Running median of the last ``count`` samples (odd), shape (T, n); the first counts often."""
-    parts = [x]
-    for _ in range(count - 1):
-        parts.append(delayed(parts[-1]))
-    return np.ascontiguousarray(np.median(np.stack(parts), axis=0))
-
-
-def without_kicks(x: Array, jump: Array) -> Array:
-    """Median of the last three samples, or of five where they differ by more than ``jump``.
-
-    Args:
-        x: shape (T, n).
-        jump: shape (n,).
-
-    Returns:
-        Shape (T, n): x one sample late, two where it jumps.
-    """
-    three, five = median_of(3, x), median_of(5, x)
-    return np.where(np.abs(three - five) > jump, five, three)
+def _alarms(part: Judged, bound: Bound, prior: Bound) -> int:
+    """Alarms of a left-out part under the factors that were learned."""
+    factor = np.where(part.rest, bound.resting, bound.moving)
+    held = _held(part, part.ratio / np.minimum(factor, 1.0)).max(axis=1) > 1
+    return int(np.count_nonzero(held[1:] & ~held[:-1]))

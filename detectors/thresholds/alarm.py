@@ -98,7 +98,10 @@ class CollisionAlarm(Frozen):
             ValueError: another number of joints or another sample rate.
         """
         score = self.scores(trace)
-        alarm = confirmed((score > self.threshold) & self._settled(trace), self.samples)
+        samples = self.samples
+        if not same_rate(trace.dt, self.detector.dt):  # a detector that takes other rates
+            samples = confirmation_samples(self.confirmation, trace.dt)
+        alarm = confirmed((score > self.threshold) & self._settled(trace), samples)
         return Detection(
             detector=self.detector.name,
             t=trace.t,

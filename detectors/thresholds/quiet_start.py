@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from tauguard.detectors.calibration.plausible import drive_torque, plausible
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.observer import observe
 from tauguard.detectors.evaluation.events import find_alarms
-from tauguard.detectors.methods.free_motion import FreeMotionDetector
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
 from tauguard.traces.trace import Array, Bools, Detection, Trace
@@ -20,6 +19,8 @@ GAIN = 20.0  # [1/s] of the observer: what 100 Hz and a real arm's friction allo
 CONFIRMATION = 0.05  # [s]
 FACTOR = 1.5  # threshold over the largest residual of the quiet seconds
 STRANGE = 0.2  # share of a log in alarm that says that the log is another arm's
+SERIES = 0.2  # [s]: alarms of a trained detector that are nearer to each other are one
+BEFORE = 0.2  # [s] before an alarm from which residuals count as changed
 SETTLING = 3.0  # time constants of the observer that are not looked at
 
 
@@ -123,47 +124,33 @@ def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
     """Look for collisions with a trained detector.
 
     Raises:
-        ValueError: another number of joints or another sample rate than it was trained at.
+        ValueError: another number of joints or another sample rate than it was trained at, a log
+            that ends before the detector has settled, or torques that its motion does not explain.
     """
-    noise = np.asarray(alarm.detector.arm.noise)
-    return Watch(alarm.detect(trace), noise, float(trace.t[0] + alarm.settle), ())
-
-
-def watch_free(detector: FreeMotionDetector, trace: Trace) -> Watch:
-    """Look for collisions with a detector that was trained on collision-free motion.
-
-    Raises:
-        ValueError: another number of joints or another sample rate than it was trained at, or a
-            log that ends before the detector has settled, or torques that its motion does not
-            explain.
-    """
-    detection = detector.detect(trace)
-    assert detector.moving is not None
-    note = (
-        f"trained on {detector.seconds:.0f} s of collision-free motion for "
-        f"{detector.settings.false_alarms_per_hour:g} false alarms per hour"
-    )
-    settled = float(trace.t[0] + detector.settle)
+    settled = float(trace.t[0] + alarm.settle)
     if not trace.t[-1] > settled:
         raise ValueError(
             f"the log lasts {trace.t[-1] - trace.t[0]:.2f} s: this detector watches from "
-            f"{detector.settle:g} s on"
+            f"{alarm.settle:g} s on"
         )
-    robot, tau, rows = detector.arm.robot, drive_torque(detector.arm, trace), trace.t >= settled
-    residual = observe(robot, trace.t, trace.q, trace.qd, tau, GAIN)
-    notes = [note, *plausible(robot, trace, tau, residual, rows, GAIN)]
+    arm, rows = alarm.detector.arm, trace.t >= settled
+    tau = drive_torque(arm, trace)
+    residual = observe(arm.robot, trace.t, trace.q, trace.qd, tau, GAIN)
+    notes = list(plausible(arm.robot, trace, tau, residual, rows, GAIN))
+    detection = replace(alarm.detect(trace), residual=residual)
+    detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
     if detection.alarm[rows].mean() > STRANGE:
         notes.append(
             "alarms fill much of this log: it carries a load that no training log carried, it is "
             "held all the time, or this is not the arm, the joints' order, the sign or the unit of "
             "the currents that the detector was trained on"
         )
-    return Watch(detection, detector.moving.weights[:, 0], settled, tuple(notes))
+    return Watch(detection, np.asarray(arm.noise), settled, tuple(notes))
 
 
 def loudest_joint(found: Watch, start: float, end: float) -> int:
-    """Index of the joint whose residual is highest over its threshold in an alarm."""
+    """Index of the joint whose residual changes most in an alarm, over its threshold."""
     detection = found.detection
-    rows = (detection.t >= start) & (detection.t <= end)
-    ratio = np.abs(detection.residual[rows]) / found.thresholds
-    return int(np.argmax(ratio.max(axis=0)))
+    rows = (detection.t >= start - BEFORE) & (detection.t <= end)
+    change = detection.residual[rows] - detection.residual[rows][0]
+    return int(np.argmax((np.abs(change) / found.thresholds).max(axis=0)))

@@ -91,10 +91,10 @@ def test_strange_currents_are_refused(folder, calibrated, capsys, scale, order):
 
 def test_a_model_refuses_strange_currents_too(folder, calibrated, capsys):
     logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
-    model = str(folder / "model.json")
+    model = str(folder / "model.skops")
     robot = flags(folder, calibrated.name)
     main(["train", "--free", *logs, *robot, "--model", model])
-    assert "its residual may be" in capsys.readouterr().out
+    assert "at the tool:" in capsys.readouterr().out
     log = written(folder, "milli.csv", record(8), 1000.0)
     assert "milliamperes?" in fails(capsys, "detect", log, *robot, "--model", model)
     log = written(folder, "right.csv", record(8))
@@ -104,7 +104,7 @@ def test_a_model_refuses_strange_currents_too(folder, calibrated, capsys):
 
 def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
     logs = [written(folder, f"held{seed}.csv", held_joint(seed)) for seed in range(3)]
-    model = str(folder / "held.json")
+    model = str(folder / "held.skops")
     robot = flags(folder, calibrated.name)
     main(["train", "--free", *logs, *robot, "--model", model])
     assert "note: c moves in none of the logs" in capsys.readouterr().out
@@ -151,11 +151,11 @@ def test_an_untold_load_names_its_log(folder, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--traces", "x", "--sensitivity"), "--sensitivity: with --free only"),
+        (("--traces", "x", "--torque"), "--torque: with --free only"),
         (("--traces", "x", "--robot", "r", "--gains", "1"), "--robot, --gains: with --free only"),
         (("--traces", "x", "--calibration", "x"), "--calibration x: is --traces"),
         (("--free", "x", "--robot", "r", "--confidence", "0.9"), "go with --traces only"),
-        (("--free", "x", "--robot", "r", "--model", "m.skops"), "ends in .json"),
+        (("--free", "x", "--robot", "r", "--false-alarms-per-hour", "2"), "with --traces only"),
     ],
 )
 def test_flags_of_the_other_training(capsys, arguments, message):
@@ -164,7 +164,7 @@ def test_flags_of_the_other_training(capsys, arguments, message):
 
 @pytest.mark.parametrize(
     ("fields", "message"),
-    [({"t": 0}, "q, qd, current missing; its fields are t,"), ({"x": 0}, "unknown x; its")],
+    [({"t": 0}, "q missing; its fields are t,"), ({"x": 0}, "unknown x; its")],
 )
 def test_maps_that_are_no_maps(tmp_path, fields, message):
     path = tmp_path / "map.json"
@@ -183,3 +183,59 @@ def test_where_the_scale_comes_from_is_said(folder):
     with pytest.raises(ValueError, match="6 numbers for 3 joints"):
         real_logs.start(numbers, recordings, "ur10e", (), "auto")
     assert load_arm(folder / "arm.xml") is None
+
+
+def tabled(folder, name, trace, effort, scale=1.0, velocities=True):
+    """A log as CSV with a header, and its column map."""
+    joints = range(1, trace.q.shape[1] + 1)
+    groups = {"q": trace.q, "qd": trace.qd if velocities else None, effort: trace.current * scale}
+    groups = {key: value for key, value in groups.items() if value is not None}
+    fields = {key: [f"{key}{j}" for j in joints] for key in groups}
+    header = ",".join(["t", *(name for group in fields.values() for name in group)])
+    table = np.column_stack([trace.t, *groups.values()])
+    np.savetxt(folder / name, table, delimiter=",", header=header, comments="", fmt="%.9g")
+    (folder / f"{effort}.json").write_text(json.dumps({"t": "t", **fields}))
+    return str(folder / name), str(folder / f"{effort}.json")
+
+
+def test_torques_need_no_gains_and_velocities_may_lack(tmp_path, capsys):
+    (tmp_path / "arm.xml").write_text(XML)
+    logs = [
+        tabled(tmp_path, f"log{k}.csv", record(k), "torque", GAIN, velocities=False)
+        for k in range(3)
+    ]
+    common = ["--robot", str(tmp_path / "arm.xml"), "--columns", logs[0][1]]
+    model, card = str(tmp_path / "model.skops"), tmp_path / "card.png"
+    files = [log for log, _ in logs]
+    main(["train", "--free", *files[:2], *common, "--model", model, "--card", str(card)])
+    out = capsys.readouterr().out
+    assert "no velocities: positions are differentiated" in out
+    assert "setCollisionBehavior" in out
+    assert "replace no safety function" in out
+    assert card.stat().st_size > 10_000
+    main(["detect", files[2], *common, "--model", model, "--payload", "0"])
+    assert "0 alarms in 24" in capsys.readouterr().out
+    line = fails(capsys, "train", "--free", *files, *common, "--gains", *GAINS)
+    assert "--gains: the logs hold joint torques" in line
+    amperes, columns = tabled(tmp_path, "amperes.csv", record(5), "current")
+    line = fails(
+        capsys, "detect", amperes, "--robot", common[1], "--columns", columns, "--model", model
+    )
+    assert "of the torque is not explained" in line
+
+
+def test_joints_that_the_log_lacks_are_held(tmp_path, capsys):
+    finger = """<body pos=".3 0 .05"><joint name="finger" type="slide" axis="0 1 0"/>
+<geom type="box" size=".01 .01 .03" mass=".05"/></body>"""
+    whole = XML.replace("</body></body></body>", finger + "</body></body></body>")
+    (tmp_path / "arm.xml").write_text(whole)
+    logs = [tabled(tmp_path, f"log{k}.csv", record(k), "torque", GAIN) for k in range(2)]
+    out = tmp_path / "arm.calibrated.xml"
+    common = ["--columns", logs[0][1], "--robot"]
+    files = [log for log, _ in logs]
+    main(["calibrate", *files, *common, str(tmp_path / "arm.xml"), "--out", str(out)])
+    assert "the log lacks finger of arm.xml: held fixed at 0" in capsys.readouterr().out
+    model = str(tmp_path / "model.skops")
+    main(["train", "--free", *files, *common, str(out), "--model", model])
+    main(["detect", files[0], *common, str(out), "--model", model])
+    assert "0 alarms" in capsys.readouterr().out

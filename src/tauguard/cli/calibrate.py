@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from tauguard.detectors.calibration.identification import Identified
 
 SOURCES = {
+    "torques": "the logs' torques",
     "gains": "the gains that were given",
     "preset": "the gains of the preset",
     "payload": "the known payload",
@@ -27,6 +28,7 @@ def command(
     gains: tuple[float, ...] = (),
     payload: tuple[str, ...] = (),
     scale: Literal["auto", "gains", "payload", "masses"] = "auto",
+    torque: bool = False,
     json: Path | None = None,
 ) -> None:
     """Identify friction, inertia and drive gains from logs in which nothing touched the arm.
@@ -39,15 +41,18 @@ def command(
         logs: CSV or MCAP files, or a folder of them; 40 s of motion are good, 65 s are plenty.
         robot: URDF or MJCF file of the arm alone.
         out: the calibrated robot file (default: beside ROBOT, with .calibrated in its name).
-        columns: of CSV files: a preset (ur10e, ur_rtde) or a JSON file (see `tauguard detect`).
+        columns: of CSV files: a preset (ur10e, ur_rtde, ur5, ur3) or a JSON file (see `tauguard
+            detect`).
         gains: N m per ampere, one a joint.
         payload: loads that were carried, as LOG=KG, LOG=KG,X,Y,Z (centre in the last link's frame,
             m) or LOG=unknown; LOG is a file's name, with or without .csv. Other logs are taken as
             without a load.
         scale: what fixes the scale of the torques.
+        torque: the logs hold joint torques in N m where they would hold currents, as ROS 2 efforts
+            may; a column map says so by its field "torque".
         json: write the figures here as JSON.
     """
-    from tauguard.cli.real_logs import doubts, loaded, read_logs, robot_numbers, start
+    from tauguard.cli.real_logs import doubts, loaded, read_logs, start
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import left_out
     from tauguard.detectors.calibration.identification import identify
@@ -55,11 +60,10 @@ def command(
 
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
-    numbers = robot_numbers(robot)
-    traces = read_logs(logs, columns, numbers)
+    traces, numbers = read_logs(logs, columns, robot, torque)
     recordings = loaded(traces, payload)
     arm, source = start(numbers, recordings, columns, gains, scale)
-    chosen = "gains" if source == "preset" else source
+    chosen = "gains" if source in ("preset", "torques") else source
     found = identify(arm, recordings, scale=chosen)
     held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
     for note in doubts(found.arm, traces, recordings, held):
@@ -95,7 +99,7 @@ def report(result: dict[str, Any], found: Identified) -> None:
     from tauguard.report import table
 
     print(f"scale of the torques: from {SOURCES[result['scale']]}")
-    held = "preset" if result["scale"] == "preset" else "given"
+    held = result["scale"] if result["scale"] in ("preset", "torques") else "given"
     rows = []
     for k, name in enumerate(result["joints"]):
         spread = result["gain_relative_sd"][k]

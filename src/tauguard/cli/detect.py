@@ -58,6 +58,8 @@ def command(
     robot: Path,
     columns: str | None = None,
     model: Path | None = None,
+    payload: str | None = None,
+    torque: bool = False,
     plain: Annotated[Plain, tyro.conf.arg(name="")] = Plain(),
     out: Path | None = None,
     json: Path | None = None,
@@ -72,28 +74,34 @@ def command(
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
         robot: URDF or MJCF file of the arm alone.
-        columns: of a CSV file: a preset (ur10e, ur_rtde) or a JSON file with the fields of
-            tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], ...}; numbers
-            instead of names count columns from 0.
+        columns: of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3) or a JSON file with the fields
+            of tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], "torque":
+            ["tau1", "tau2"]}; numbers instead of names count columns from 0.
         model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
+        payload: what the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m), for
+            a model of `train --free`; 0 for nothing. Without it a load is found from the motion,
+            and until then only hard contacts are.
+        torque: the log holds joint torques in N m, see `tauguard calibrate`.
         plain: what goes without a model.
         out: folder for events.json, detect.mcap and detect.rrd.
         json: write the figures here as JSON.
     """
-    from tauguard.cli.real_logs import read_matched, robot_numbers
+    from tauguard.cli.real_logs import read_one
     from tauguard.report import write_json
 
     if out is not None and out.exists() and not out.is_dir():
         raise ValueError(f"--out {out}: is a file; expected a folder")
     if model is not None and plain.given():
         raise ValueError(f"{', '.join(plain.given())}: not beside --model, which brings its own")
+    if model is None and payload is not None:
+        raise ValueError("--payload goes with --model only")
     said: Sequence[Diagnosis] = ()
+    trace = read_one(log, columns, torque)
     if model is not None:
-        trace = read_matched(log, columns, robot_numbers(robot))
-        detector, found = watched(model, trace)
+        trace, detector, found = watched(model, trace, payload)
         said, notes = explained(detector, trace, found, robot)
     else:
-        trace, found, notes = plainly(log, robot, columns, plain)
+        trace, found, notes = plainly(log, trace, robot, columns, plain)
     for note in (*found.notes, *notes):
         print(f"note: {note}")
     result = summary(log, trace, found, said)
@@ -104,29 +112,33 @@ def command(
         leave(out, trace, found, result, robot)
 
 
-def watched(model: Path, trace: Trace) -> tuple[Any, Watch]:
-    """The detector of a model file, of any kind that ``tauguard train`` writes, and what it saw."""
+def watched(model: Path, trace: Trace, payload: str | None) -> tuple[Trace, Any, Watch]:
+    """The log in the joints of a trained detector, the detector, and what it saw."""
+    from tauguard.cli.real_logs import carried, is_torque, matched
     from tauguard.detectors import load_model
-    from tauguard.detectors.methods.free_motion_file import is_free_motion, load_free_motion
-    from tauguard.detectors.thresholds.quiet_start import watch_free, watch_with
+    from tauguard.detectors.methods.free_motion import carrying
+    from tauguard.detectors.thresholds.quiet_start import watch_with
 
-    if is_free_motion(model):
-        free = load_free_motion(model)
-        return free, watch_free(free, trace)
     alarm = load_model(model)
-    return alarm.detector, watch_with(alarm, trace)
+    if payload is not None:
+        alarm = carrying(alarm, carried(payload))
+    arm = alarm.detector.arm
+    trace = matched(trace, arm.robot.joint_names)
+    if is_torque(trace) and not (arm.drive_gain == 1).all():
+        raise ValueError(f"the log holds torques, {model} was trained on currents")
+    return trace, alarm.detector, watch_with(alarm, trace)
 
 
 def plainly(
-    log: Path, robot: Path, columns: str | None, plain: Plain
+    log: Path, trace: Trace, robot: Path, columns: str | None, plain: Plain
 ) -> tuple[Trace, Watch, tuple[str, ...]]:
     """The log, what a detector that nobody trained saw in it, and where its numbers come from."""
-    from tauguard.cli.real_logs import read_matched, robot_numbers, watched_arm
+    from tauguard.cli.real_logs import matched, watched_arm
     from tauguard.detectors.calibration.plausible import drive_torque
     from tauguard.detectors.thresholds.quiet_start import watch
 
-    trace = read_matched(log, columns, robot_numbers(robot))
-    arm, source = watched_arm(robot, columns, plain.gains, plain.viscous, plain.coulomb)
+    arm, source = watched_arm(robot, columns, plain.gains, plain.viscous, plain.coulomb, trace)
+    trace = matched(trace, arm.robot.joint_names)
     try:
         found = watch(
             trace,

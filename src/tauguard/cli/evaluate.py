@@ -38,14 +38,11 @@ def command(
     from tauguard.cli.folder import labelled
     from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.detectors import figures, load_model
-    from tauguard.detectors.methods.free_motion_file import is_free_motion
     from tauguard.detectors.registry import make_detector
     from tauguard.report import machine, versions, write_json
 
     if (traces is None) == (data is None):
         raise ValueError("give --traces (a folder of recordings) or --data (a dataset)")
-    if is_free_motion(model):
-        raise ValueError(f"{model}: a real arm's detector (train --free); use `tauguard detect`")
     if detector is not None:
         make_detector(detector)  # allows the file to hold its classes
     alarm = load_model(model)

@@ -18,12 +18,37 @@ if TYPE_CHECKING:
 HEAVIEST = 100.0
 
 
-def robot_numbers(robot: Path) -> RobotNumbers:
-    """The numbers of a robot file."""
+def robot_numbers(robot: Path, given: tuple[str, ...] | None = None) -> RobotNumbers:
+    """The numbers of a robot file, joints that a log lacks held fixed at zero, and said so.
+
+    Args:
+        robot: URDF or MJCF.
+        given: joints of the log, in any order, or ``joint_1``, ... (default: all of the robot's).
+
+    Raises:
+        ValueError: joints that the robot does not have.
+    """
+    import pinocchio as pin
+
     from tauguard.detectors import RobotNumbers
     from tauguard.models import pin_model
 
-    return RobotNumbers.from_pin(pin_model(robot))
+    model = pin_model(robot)
+    names = tuple(str(name) for name in model.names)[1:]
+    if given is None or len(given) >= len(names):
+        return RobotNumbers.from_pin(model)
+    kept = names[: len(given)] if given == unnamed(len(given)) else given
+    if not set(kept) <= set(names):
+        raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
+    lacking = [name for name in names if name not in kept]
+    print(f"note: the log lacks {', '.join(lacking)} of {robot.name}: held fixed at 0")
+    held = [model.getJointId(name) for name in lacking]
+    return RobotNumbers.from_pin(pin.buildReducedModel(model, held, pin.neutral(model)))
+
+
+def unnamed(count: int) -> tuple[str, ...]:
+    """What joints are called that have no name: ``joint_1``, ..."""
+    return tuple(f"joint_{i}" for i in range(1, count + 1))
 
 
 # -- logs -----------------------------------------------------------------------------------------
@@ -50,7 +75,7 @@ def column_map(columns: str | None) -> ColumnMap | str | None:
         raise ValueError(f"{columns}: expected an object; {fields_are}")
     if strange := sorted(set(fields) - set(known)):
         raise ValueError(f"{columns}: unknown {', '.join(strange)}; {fields_are}")
-    if missing := [name for name in ("t", "q", "qd", "current") if name not in fields]:
+    if missing := [name for name in ("t", "q") if name not in fields]:
         raise ValueError(f"{columns}: {', '.join(missing)} missing; {fields_are}")
     fields = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
     if "repair" in fields:
@@ -61,14 +86,27 @@ def column_map(columns: str | None) -> ColumnMap | str | None:
         raise ValueError(f"{columns}: {error}") from error
 
 
-def read_matched(log: Path, columns: str | None, robot: RobotNumbers) -> Trace:
-    """One log, joints in the robot's order; prints a line for each repair."""
+def read_one(log: Path, columns: str | None, torque: bool = False) -> Trace:
+    """One log, joints as they are in it; prints a line for each repair.
+
+    Args:
+        log: CSV or MCAP.
+        columns: preset or JSON file.
+        torque: whether its currents, or efforts, are joint torques [N m].
+    """
     from tauguard.datasets import read_log
 
     read = read_log(log, column_map(columns))
     for note in read.notes:
         print(f"note: {log.name}: {note}")
-    return matched(read.trace, robot.joint_names)
+    if not torque:
+        return read.trace
+    return dataclasses.replace(read.trace, meta={**read.trace.meta, "effort": "torque"})
+
+
+def is_torque(trace: Trace) -> bool:
+    """Whether a log holds joint torques instead of currents."""
+    return trace.meta.get("effort") == "torque"
 
 
 def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
@@ -83,7 +121,7 @@ def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
             f"the log has {len(given)} joints ({', '.join(given)}), "
             f"the robot {len(names)} ({', '.join(names)})"
         )
-    if given == tuple(f"joint_{i}" for i in range(1, len(given) + 1)) or given == names:
+    if given == unnamed(len(given)) or given == names:
         return dataclasses.replace(trace, joint_names=names)
     if set(given) != set(names):
         raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
@@ -115,25 +153,30 @@ def log_files(logs: Sequence[Path]) -> list[Path]:
     return files
 
 
-def read_logs(logs: Sequence[Path], columns: str | None, robot: RobotNumbers) -> dict[str, Trace]:
-    """Traces to learn from, by file name.
+def read_logs(
+    logs: Sequence[Path], columns: str | None, robot: Path, torque: bool = False
+) -> tuple[dict[str, Trace], RobotNumbers]:
+    """Traces to learn from, by file name, and the robot's numbers for the joints in them.
 
     Raises:
-        ValueError: a current that is saturated, besides what reading raises.
+        ValueError: a current that is saturated, logs with currents beside logs with torques,
+            besides what reading raises.
     """
     from tauguard.datasets.log_checks import saturated
 
-    traces = {}
-    for path in log_files(logs):
-        trace = read_matched(path, columns, robot)
+    traces = {path.name: read_one(path, columns, torque) for path in log_files(logs)}
+    numbers = robot_numbers(robot, next(iter(traces.values())).joint_names)
+    traces = {name: matched(trace, numbers.joint_names) for name, trace in traces.items()}
+    for log, trace in traces.items():
         for name, row, count, peak in saturated(trace):
             raise ValueError(
-                f"{path}: the current of {name} stays at {peak:g} A for {count} samples, "
+                f"{log}: the current of {name} stays at {peak:g} A for {count} samples, "
                 f"{trace.t[row] - trace.t[0]:.2f} s after the beginning: saturated, "
                 "which says nothing of the torque; leave this log out or cut it there"
             )
-        traces[path.name] = trace
-    return traces
+    if len({is_torque(trace) for trace in traces.values()}) > 1:
+        raise ValueError("some logs hold currents, others torques: give those of one kind")
+    return traces, numbers
 
 
 # -- loads and gains ------------------------------------------------------------------------------
@@ -181,6 +224,18 @@ def _load(text: str, value: str) -> Load | None:
         )
     centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
     return Load(parts[0], centre)
+
+
+def carried(text: str) -> Load:
+    """A load told to ``detect``.
+
+    Raises:
+        ValueError: not KG or KG,X,Y,Z.
+    """
+    load = _load(text, text)
+    if load is None:
+        raise ValueError("--payload unknown: leave it out instead")
+    return load
 
 
 def doubts(
@@ -252,6 +307,10 @@ def start(
     from tauguard.detectors import ArmModel
     from tauguard.detectors.calibration.assessment import start_gains
 
+    if is_torque(recordings[0].trace):
+        if gains:
+            raise ValueError("--gains: the logs hold joint torques, which need none")
+        return ArmModel(numbers, np.ones(numbers.joints)), "torques"
     preset = DRIVES.get(columns or "")
     known = any(r.load is not None and r.load.mass > 0 for r in recordings)
     if scale == "auto":
@@ -274,6 +333,7 @@ def watched_arm(
     gains: tuple[float, ...],
     viscous: tuple[float, ...],
     coulomb: tuple[float, ...],
+    trace: Trace,
 ) -> tuple[ArmModel, str]:
     """The arm of a log that no model is given for, and where its gains and friction come from.
 
@@ -294,8 +354,10 @@ def watched_arm(
                 "--gains, --viscous and --coulomb, or give the robot's own file"
             )
         return calibrated, f"the calibration in {robot.name}"
-    numbers = robot_numbers(robot)
+    numbers = robot_numbers(robot, trace.joint_names)
     preset, source = DRIVES.get(columns or ""), "the flags"
+    if is_torque(trace) and not gains:
+        gains, source = (1.0,) * numbers.joints, "the log's torques"
     if not gains and preset is None:
         raise ValueError(f"--gains: give {numbers.joints} numbers, N m of joint torque per ampere")
     if not gains and preset is not None:

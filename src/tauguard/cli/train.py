@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tauguard.detectors.methods.free_motion import FreeMotionDetector
+    from tauguard.detectors.methods.free_motion import FittedFreeMotion
     from tauguard.traces import Trace
 
 
@@ -22,7 +22,8 @@ def command(
     columns: str | None = None,
     gains: tuple[float, ...] = (),
     payload: tuple[str, ...] = (),
-    sensitivity: bool = False,
+    torque: bool = False,
+    card: Path | None = None,
     arm: str | None = None,
 ) -> None:
     """Train a detector and write its model file.
@@ -30,19 +31,18 @@ def command(
     With --traces: on labelled recordings, some with collisions; a third of the collision-free ones
     is kept for the threshold. With --calibration the threshold is guaranteed instead: no more than
     the false alarms per hour that you name, on motion like that.
-    With --free and --robot: a detector of a real arm from logs in which nothing touched it; three
-    or more, with dwells and with moves of single joints among them, or those raise alarms later.
+    With --free and --robot: a detector of a real arm from logs in which nothing touched it, 30 s or
+    more in all. A card says what it can find, and which regimes the logs do not show.
 
     Args:
         traces: folder of MCAP recordings with truth (`tauguard simulate` writes such), or a
             dataset (`tauguard generate`), whose first split it is trained on.
-        model: the model file; one that is there is replaced if it is named (default: model.skops,
-            or model.json with --free).
+        model: the model file; one that is there is replaced if it is named (default: model.skops).
         detector: with --traces, one of tauguard.detectors.DETECTORS, or module:Class of your own.
         calibration: folder of collision-free recordings that are not in --traces. Those with
             labelled collisions are refused; collisions without a label raise the threshold.
         false_alarms_per_hour: what the threshold aims at on motion like the training's
-            (default: 10, or 1 with --free), or guarantees with --calibration.
+            (default: 10), or guarantees with --calibration.
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder; a contact in them raises the
             bounds, so that others like it are missed later.
@@ -50,12 +50,13 @@ def command(
         columns: of CSV files, see `tauguard detect`.
         gains: N m per ampere, one a joint (known for calibrated robot files and for ur10e).
         payload: what the logs carried, see `tauguard calibrate`.
-        sensitivity: with --free, also print the smallest added blow that is found, for each joint.
+        torque: with --free, the logs hold joint torques in N m, see `tauguard calibrate`.
+        card: with --free, draw the card here (PNG).
         arm: of a dataset with several arms, the one that the detector is for.
     """
     if (traces is None) == (not free):
         raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
-    target = _target(model, "model.json" if free else "model.skops")
+    target = _target(model)
     if free and (calibration or confidence is not None or detector != "srq-svr"):
         raise ValueError("--detector, --calibration and --confidence go with --traces only")
     if calibration is None and confidence is not None:
@@ -66,7 +67,8 @@ def command(
             "--columns": columns,
             "--gains": gains,
             "--payload": payload,
-            "--sensitivity": sensitivity,
+            "--torque": torque,
+            "--card": card,
         }
         if given := [name for name, value in own.items() if value]:
             raise ValueError(f"{', '.join(given)}: with --free only, not with --traces")
@@ -74,17 +76,18 @@ def command(
         sure = 0.95 if confidence is None else confidence
         labelled_motion(traces, target, detector, calibration, rate, sure, arm)
         return
-    if target.suffix == ".skops":
-        raise ValueError(f"--model {target}: --free writes JSON; give a name that ends in .json")
     if robot is None:
         raise ValueError("--free needs --robot")
-    rate = 1.0 if false_alarms_per_hour is None else false_alarms_per_hour
-    free_motion(free, robot, target, rate, columns, gains, payload, sensitivity)
+    if false_alarms_per_hour is not None:
+        raise ValueError(
+            "--false-alarms-per-hour: with --traces only; the card of --free says how many"
+        )
+    free_motion(free, robot, target, columns, gains, payload, torque, card)
 
 
-def _target(model: Path | None, default: str) -> Path:
+def _target(model: Path | None) -> Path:
     """The file to write, in a folder that there is; one that was not named is not replaced."""
-    target = model or Path(default)
+    target = model or Path("model.skops")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{target}: the folder {target.parent} does not exist")
     if model is None and target.exists():
@@ -136,92 +139,55 @@ def free_motion(
     free: tuple[Path, ...],
     robot: Path,
     model: Path,
-    rate: float,
     columns: str | None,
     gains: tuple[float, ...],
     payload: tuple[str, ...],
-    sensitivity: bool,
+    torque: bool,
+    card: Path | None,
 ) -> None:
     """Train on collision-free logs."""
-    from tauguard.cli.real_logs import doubts, loaded, read_logs, robot_numbers, start
+    from tauguard.cli.real_logs import doubts, is_torque, loaded, read_logs, start
+    from tauguard.detectors import CollisionAlarm, save_model
     from tauguard.detectors.calibration.arm_file import load_arm
-    from tauguard.detectors.calibration.assessment import left_out
-    from tauguard.detectors.methods.free_motion import FreeMotionDetector, FreeMotionSettings
-    from tauguard.detectors.methods.free_motion_file import save_free_motion
+    from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
 
-    numbers = robot_numbers(robot)
-    traces = read_logs(free, columns, numbers)
+    traces, numbers = read_logs(free, columns, robot, torque)
     recordings = loaded(traces, payload)
     arm = load_arm(robot)
     if arm is None or gains:
         arm, _ = start(numbers, recordings, columns, gains, "gains")
-    settings = FreeMotionSettings(false_alarms_per_hour=rate)
-    detector = FreeMotionDetector(settings).fit(recordings, arm)
-    held = left_out(arm, recordings)
-    unseen = never_moved(list(traces.values()))
-    for note in (*doubts(detector.arm, traces, recordings, held), *unseen):
+    elif is_torque(recordings[0].trace) and not (arm.drive_gain == 1).all():
+        raise ValueError(f"{robot.name} was calibrated on currents, the logs hold torques")
+    detector = FreeMotion().fit(recordings, arm)
+    unmoved = never_moved(list(traces.values()))
+    for note in (*doubts(detector.arm, traces, recordings, ()), *unmoved):
         print(f"note: {note}")
-    save_free_motion(detector, model)
-    report(detector, model, len(traces))
-    if sensitivity:
-        blows(detector, list(traces.values()))
+    save_model(CollisionAlarm(detector, 1.0, CONFIRMATION), model)
+    print(f"{model}: trained on {len(traces)} collision-free logs, {detector.seconds:.0f} s")
+    show_card(detector, list(traces.values()), card)
 
 
 def never_moved(traces: list[Trace]) -> list[str]:
     """A note on each joint that all logs show standing still only."""
-    from tauguard.detectors.methods.free_motion import resting
+    from tauguard.detectors.calibration.recording import MOVING
 
-    still = [resting(t.q, t.qd, t.dt).all(axis=0) for t in traces]
+    joints = range(len(traces[0].joint_names))
+    fastest = [max(abs(trace.qd[:, j]).max() for trace in traces) for j in joints]
     return [
         f"{name} moves in none of the logs: its friction is not known, and moving it may raise an "
         "alarm; add a log in which it moves"
-        for name, rests in zip(traces[0].joint_names, zip(*still, strict=True), strict=True)
-        if all(rests)
+        for name, speed in zip(traces[0].joint_names, fastest, strict=True)
+        if speed <= MOVING
     ]
 
 
-def report(detector: FreeMotionDetector, model: Path, logs: int) -> None:
-    """What was learned."""
-    assert detector.resting is not None
-    assert detector.moving is not None
-    print(
-        f"{model}: trained on {logs} collision-free logs, {detector.seconds:.0f} s; "
-        f"{sum(detector.left_out)} alarms in them, each under a calibration from the others"
-    )
-    names = detector.arm.robot.joint_names
-    pairs = zip(names, detector.moving.weights, detector.resting.weights, strict=True)
-    for name, moving, rest in pairs:
-        print(f"  {name}: its residual may be {moving[0]:.1f} N m in motion, {rest[0]:.1f} at rest")
-    print(
-        "  more with speed and acceleration, less where several joints have some at once; a "
-        "contact has to add more than is free: --sensitivity"
-    )
+def show_card(detector: FittedFreeMotion, traces: list[Trace], target: Path | None) -> None:
+    """Print what the detector can find, and draw it."""
+    from tauguard.cli.threshold_card import draw, text
+    from tauguard.detectors.evaluation.threshold_card import threshold_card
 
-
-def blows(detector: FreeMotionDetector, traces: list[Trace]) -> None:
-    """The smallest semi-real blow on each joint that is found in 95 % of trials."""
-    import numpy as np
-
-    from tauguard.detectors.evaluation.semi_real import moments, smallest_found
-
-    quiet = [t for t in traces if not detector.detect(t).alarms]
-    for joint, name in enumerate(detector.arm.robot.joint_names):
-        found: list[float] = []
-        for k, trace in enumerate(quiet):
-            starts = moments(~detector.rests(trace)[:, joint], trace.t, 4, k)
-            gain = detector.arm.drive_gain
-            found += list(
-                smallest_found(lambda t: detector.detect(t).alarm, trace, gain, joint, starts)
-            )
-        if found:
-            peak = float(np.quantile(found, 0.95, method="higher"))
-            if not np.isfinite(peak):
-                print(
-                    f"  {name}: WARNING: no blow tried is found in 95 % of {len(found)} trials; "
-                    "was a load not told (--payload)?"
-                )
-                continue
-            print(
-                f"  {name}: a semi-real blow of 0.1 s in motion is found from {peak:.1f} N m on "
-                f"(95 % of {len(found)} trials)"
-            )
+    found = threshold_card(detector, traces)
+    print(text(found))
+    if target is not None:
+        draw(target, found)
+        print(f"{target}: drawn")

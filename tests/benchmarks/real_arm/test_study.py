@@ -1,55 +1,56 @@
-"""The study of a real arm judges only what it did not train on."""
+"""The study of real arms counts alarms and pushes as it says."""
 
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.real_arm import study as real_arm
-from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.benchmarks.real_arm import arms, study
+from tauguard.traces import Trace
+
+
+def trace(seconds=10.0, dt=0.01):
+    t = 5.0 + np.arange(0, seconds, dt)
+    nothing = np.zeros((len(t), 2))
+    return Trace(("a", "b"), t, nothing, nothing, nothing)
 
 
 def test_says_so_where_there_are_no_logs(tmp_path, monkeypatch):
     monkeypatch.setenv("TAUGUARD_DATA", str(tmp_path))
-    (row,) = real_arm.run(quick=True, seed=0)
+    (row,) = study.run(quick=True, seed=0)
     assert "TAUGUARD_DATA" in row["log"]
 
 
-def test_every_deal_judges_each_log_once():
-    names = [f"log {k}" for k in range(9)] + ["joint 1", "joint 2"]
-    moving = {name: Recording(None, Load()) for name in names}
-    data = real_arm.Data(None, moving, {})
-    dealt = list(real_arm.splits(data, 4, seed=3))
-    assert dealt[0] == ("free only", ["joint 1", "joint 2"])
-    for deal in range(1, 5):
-        own = [logs for name, logs in dealt if name.startswith(f"{deal}.")]
-        assert len(own) == 4
-        assert sorted(name for logs in own for name in logs) == sorted(moving)
-    assert len({tuple(logs) for _, logs in dealt}) == len(dealt)
+def test_a_push_is_found_from_just_before_its_start_to_its_peak():
+    log = trace()
+    up = np.zeros(len(log.t), dtype=bool)
+    for start in (1.9, 3.3, 6.0):
+        up[round(start / 0.01) : round(start / 0.01) + 10] = True
+    known = (arms.Push(2.0, 2.3, True), arms.Push(3.0, 3.2, False), arms.Push(5.8, 6.1, False))
+    tally = study.Tally()
+    study.find(tally, lambda _: up, log, known, np.random.default_rng(0))
+    assert tally.delays[True] == pytest.approx([-0.1])
+    assert tally.delays[False] == pytest.approx([np.inf, 0.2])
+    # Three alarms in 10 s; spans of 0.45, 0.35 and 0.45 s.
+    assert tally.chance[True] == pytest.approx(3 * 0.45 / 10, abs=0.06)
+    assert tally.chance[False] == pytest.approx(3 * 0.8 / 10, abs=0.12)
 
 
-def test_totals_are_bounded_by_the_exact_interval():
-    def row(split, seconds, alarms):
-        zero = {"joint-seconds at rest": 0.0, "peer seconds": 10.0, "peer alarms": 1}
-        return {"split": split, "seconds": seconds, "alarms": alarms} | zero
-
-    rows = [row("1.1 of 2", 1800.0, 0), row("1.2 of 2", 1800.0, 0), row("2.1 of 1", 3600.0, 2)]
-    none, two = real_arm._totals(rows)
-    # Exact Poisson interval: no alarm in an hour bounds the rate at -ln(0.025), two at 7.22.
-    assert none["per hour at most"] == pytest.approx(-np.log(0.025))
-    assert two["per hour at most"] == pytest.approx(7.2247, abs=1e-3)
+def test_false_alarms_are_bounded_by_the_exact_interval():
+    tally = study.Tally()
+    up = np.zeros(1000, dtype=bool)
+    study.count(tally, "ours", lambda _: up, trace())
+    assert tally.alarms == 0
+    (row,) = study._rows("arm", "ours", tally)
+    # Exact Poisson interval: no alarm in an hour bounds the rate at -ln(0.025).
+    assert row["at most"] == pytest.approx(-np.log(0.025) * 3600 / tally.seconds)
 
 
 @pytest.mark.data
-def test_residuals_on_logs_left_out(data_dir, monkeypatch):
+def test_pushes_of_the_force_sensor(data_dir, monkeypatch):
     monkeypatch.setenv("TAUGUARD_DATA", str(data_dir))
-    folder = real_arm.available()
-    if folder is None:
-        pytest.skip("no ur10e folder in the real data")
-    data = real_arm.load(folder)
-    logs = dict(list(data.excitation.items())[-3:])
-    data = real_arm.Data(data.arm, logs, {})
-    rows = {row["parameters"]: row for row in real_arm.residual_rows(data) if "all" in row["log"]}
-    ours, book = (
-        [rows[k][f"j{j} N m"] for j in range(1, 7)] for k in ("from the other logs", "published")
-    )
-    assert (np.array(ours) < [1.6, 1.9, 0.8, 0.3, 0.3, 0.25]).all()
-    assert (np.array(ours) < 0.5 * np.array(book)).all()
+    ur5 = next((arm for arm in arms.available() if arm.name == "ur5"), None)
+    if ur5 is None:
+        pytest.skip("no ur5 folder in the real data")
+    found = arms.pushes(ur5, "no10_standing_force")
+    assert len(found) == 8
+    assert not any(push.moving for push in found)
+    assert found[0].start == pytest.approx(4.82, abs=0.01)

@@ -4,7 +4,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tauguard.benchmarks.real_arm.pushes import Tried, push_rows
 from tauguard.detectors.evaluation.semi_real import Push, add_torque, push_torque
 from tauguard.models import pin_model
 from tests.detectors.synthetic_arm import GAIN, XML, nominal, record
@@ -32,20 +31,3 @@ def test_push_is_the_force_through_the_jacobian():
 def test_push_without_duration_is_refused():
     with pytest.raises(ValueError, match="more than 0 s"):
         push_torque(nominal(), record(2, seconds=12.0), Push(1.0, 0.0, (1.0, 0.0, 0.0)))
-
-
-def test_rows_count_by_band_and_state():
-    tried = [
-        Tried(True, 25.0, 9.0, 0.1, np.nan),
-        Tried(True, 30.0, 9.0, np.inf, np.inf),
-        Tried(True, 70.0, 9.0, 0.3, 0.5),
-        Tried(False, 70.0, 9.0, 0.2, np.nan),
-    ]
-    rows = {(row["arm"], row["N at the flange"]): row for row in push_rows(tried)}
-    low = rows["in motion", "20-40"]
-    assert (low["found"]["value"], low["pushes"], low["peer pushes"]) == (0.5, 2, 1)
-    assert low["delay ms (median)"] == pytest.approx(100)
-    assert low["peer delay ms (median)"] is None
-    assert rows["in motion", "20-80"]["pushes"] == 3
-    assert rows["standing", "60-80"]["found"]["value"] == 1.0
-    assert ("standing", "20-40") not in rows

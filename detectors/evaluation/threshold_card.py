@@ -1,0 +1,164 @@
+"""What a free-motion detector finds: smallest torques and forces, false alarms, blind regimes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
+from tauguard.detectors.evaluation.metrics import poisson_rate
+from tauguard.detectors.features.free_bound import START, STOP
+from tauguard.detectors.methods.free_motion import FittedFreeMotion
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: A regime that all logs together show for less is not known [s].
+SEEN = 3.0
+#: An upper threshold, from which on a robot is to stop, over the lower one of contact.
+UPPER = 1.5
+#: Poses and directions of the force at the tool.
+POSES, DIRECTIONS = 24, 100
+
+
+@dataclass(frozen=True, eq=False)
+class ThresholdCard:
+    """Estimates; they replace no safety function."""
+
+    joints: tuple[str, ...]
+    standing: Array  #: torque that is found on a joint that has long been at rest [N m], (n,)
+    stopped: Array  #: on one that has just stopped [N m], (n,)
+    moving: Array  #: on one in motion, median over the logs [N m], (n,)
+    starting: Array  #: on one that starts [N m], (n,)
+    tool: dict[str, tuple[float, float]]
+    """Force at the last link's origin [N], standing and moving: found in half of all poses and
+    directions, and in 95 % of those in which any force reaches a joint."""
+    seconds: float  #: of collision-free motion
+    alarms: int  #: in left-out logs; the factors have seen them
+    false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %)
+    unseen: dict[str, tuple[str, ...]]  #: joints by regime that the logs do not show
+
+    @property
+    def franka(self) -> dict[str, list[float]]:
+        """In the form of ``setCollisionBehavior``: torques of the joints [N m], forces [N]."""
+        force = self.tool["moving"][0]
+        lower = {
+            "torque_thresholds_acceleration": self.starting.tolist(),
+            "torque_thresholds_nominal": self.moving.tolist(),
+            "force_thresholds_acceleration": [1.5 * force] * 3,
+            "force_thresholds_nominal": [force] * 3,
+        }
+        upper = {f"upper_{k}": [UPPER * x for x in v] for k, v in lower.items()}
+        return {f"lower_{k}": v for k, v in lower.items()} | upper
+
+    @property
+    def ur(self) -> dict[str, float]:
+        """In the form of UR's safety settings: the tool force limit [N]."""
+        return {"tool_force_limit_n": UPPER * self.tool["moving"][1]}
+
+    def as_json(self) -> dict[str, Any]:
+        """All numbers, ready for JSON."""
+        arrays = {k: getattr(self, k).tolist() for k in ("standing", "stopped", "moving")}
+        return {
+            "joints": list(self.joints),
+            **arrays,
+            "starting": self.starting.tolist(),
+            "tool_n": {k: list(v) for k, v in self.tool.items()},
+            "seconds": self.seconds,
+            "alarms": self.alarms,
+            "false_alarms_per_hour": self.false_alarms_per_hour,
+            "unseen": {k: list(v) for k, v in self.unseen.items()},
+            "franka": self.franka,
+            "ur": self.ur,
+        }
+
+
+def threshold_card(detector: FittedFreeMotion, traces: Sequence[Trace]) -> ThresholdCard:
+    """The card of a fitted detector.
+
+    Args:
+        detector: fitted.
+        traces: its training logs, for poses, regimes and bounds in motion.
+    """
+    bound, robot = detector.bound, detector.arm.robot
+    judged = [detector.judge(trace) for trace in traces]
+    bounds = np.concatenate([j.bound for j in judged])
+    moving = ~np.concatenate([j.rest for j in judged])
+    usual = np.array(
+        [
+            float(np.median(b[m])) if m.any() else float(least)
+            for b, m, least in zip(bounds.T, moving.T, bound.sliding, strict=True)
+        ]
+    )
+    poses = np.concatenate([t.q[:: max(1, len(t.q) // POSES)] for t in traces])
+    poses = poses[:: max(1, len(poses) // POSES)]
+    standing = bound.floor
+    return ThresholdCard(
+        robot.joint_names,
+        standing,
+        standing + STOP * bound.friction,
+        usual,
+        bound.sliding + START * bound.friction,
+        {
+            "standing": _tool(detector, poses, standing),
+            "moving": _tool(detector, poses, usual),
+        },
+        detector.seconds,
+        detector.alarms,
+        poisson_rate(detector.alarms, detector.seconds / 3600),
+        _unseen(traces, robot.joint_names),
+    )
+
+
+def _tool(detector: FittedFreeMotion, poses: Array, level: Array) -> tuple[float, float]:
+    """Forces at the tool that reach some joint's level, in half and in 95 % of directions [N]."""
+    robot = detector.arm.robot
+    directions = np.random.default_rng(0).standard_normal((DIRECTIONS, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    least: list[Array] = []
+    last = np.array([robot.joints - 1])
+    for q in poses:
+        placed = link_poses(robot, q)
+        jacobian = point_jacobians(robot, placed, last, placed.origin[-1:])[0]
+        torque = np.abs(directions @ jacobian)
+        least.append(1 / (torque / level).max(axis=1))
+    forces = np.concatenate(least)
+    return float(np.quantile(forces, 0.5)), float(np.quantile(forces, 0.95))
+
+
+def _unseen(traces: Sequence[Trace], names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """Joints of each regime that all logs together show for less than :data:`SEEN`."""
+    shown: dict[str, Array] = {}
+    for trace in traces:
+        speed, dt = np.abs(trace.qd), trace.dt
+        moves = speed > 0.02
+        stood = _lasting(~moves, dt)
+        went = _lasting(moves, dt)
+        others = moves.sum(axis=1, keepdims=True) - moves
+        regimes = {
+            "standing for 2 s": stood > 2,
+            "just stopped": (stood > 0) & (stood < 1),
+            "starting": (went > 0) & (went < 0.3),
+            "slow (below 0.1 rad/s)": moves & (speed < 0.1),
+            "fast (above 1 rad/s)": speed > 1,
+            "moving alone": moves & (others == 0),
+            "at rest while others move": ~moves & (others > 0),
+        }
+        for name, rows in regimes.items():
+            shown[name] = shown.get(name, np.zeros(len(names))) + rows.sum(axis=0) * dt
+    lacking = {
+        name: tuple(j for j, s in zip(names, seconds, strict=True) if s < SEEN)
+        for name, seconds in shown.items()
+    }
+    return {name: joints for name, joints in lacking.items() if joints}
+
+
+def _lasting(on: NDArray[np.bool_], dt: float) -> Array:
+    """For how long each column has been on [s], 0 where it is off, shape of ``on``."""
+    rows = np.arange(1, len(on) + 1)[:, None]
+    off = np.maximum.accumulate(np.where(on, 0, rows), axis=0)
+    return np.asarray(np.where(on, (rows - off) * dt, 0.0))
