@@ -133,12 +133,15 @@ def plainly(
     log: Path, trace: Trace, robot: Path, columns: str | None, plain: Plain
 ) -> tuple[Trace, Watch, tuple[str, ...]]:
     """The log, what a detector that nobody trained saw in it, and where its numbers come from."""
-    from tauguard.cli.real_logs import matched, watched_arm
+    from tauguard.cli.real_logs import matched, robot_numbers, watched_arm
     from tauguard.detectors.calibration.plausible import drive_torque
     from tauguard.detectors.thresholds.quiet_start import watch
 
-    arm, source = watched_arm(robot, columns, plain.gains, plain.viscous, plain.coulomb, trace)
-    trace = matched(trace, arm.robot.joint_names)
+    numbers = robot_numbers(robot, trace.joint_names)
+    trace = matched(trace, numbers.joint_names)
+    arm, source = watched_arm(
+        robot, columns, plain.gains, plain.viscous, plain.coulomb, trace, numbers
+    )
     try:
         found = watch(
             trace,

@@ -334,6 +334,7 @@ def watched_arm(
     viscous: tuple[float, ...],
     coulomb: tuple[float, ...],
     trace: Trace,
+    numbers: RobotNumbers,
 ) -> tuple[ArmModel, str]:
     """The arm of a log that no model is given for, and where its gains and friction come from.
 
@@ -354,7 +355,6 @@ def watched_arm(
                 "--gains, --viscous and --coulomb, or give the robot's own file"
             )
         return calibrated, f"the calibration in {robot.name}"
-    numbers = robot_numbers(robot, trace.joint_names)
     preset, source = DRIVES.get(columns or ""), "the flags"
     if is_torque(trace) and not gains:
         gains, source = (1.0,) * numbers.joints, "the log's torques"
