@@ -128,17 +128,14 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
         spec = mujoco.MjSpec.from_file(str(source))
     except ValueError as error:
         raise ValueError(f"{source}: {' '.join(str(error).split())}") from None
-    held = [joint for joint in spec.joints if joint.name not in joints]
-    if held:  # what acts on them goes, too
-        for element in (*spec.keys, *spec.actuators, *spec.tendons, *spec.equalities, *held):
-            spec.delete(element)
+    held = {str(joint.name) for joint in spec.joints} - set(joints)
     for name, numbers in zip(joints, inertial, strict=True):
         joint = spec.joint(name)
         if joint is None:
             raise ValueError(f"the robot file has no joint {name!r}")
         body = joint.parent
         mass, centre, inertia = _about_centre(numbers)
-        for fixed in _welded(body):
+        for fixed in _welded(body, held):
             fixed.mass, fixed.explicitinertial = 0.0, True
             fixed.inertia = np.zeros(3)
             fixed.fullinertia = np.full(6, np.nan)
@@ -152,13 +149,28 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
             spec.delete(text)
     spec.add_text(name=TAG, data=note)
     spec.compile()
-    return str(spec.to_xml())
+    return _without_joints(str(spec.to_xml()), held)
 
 
-def _welded(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
-    """Bodies below ``body`` that move with it."""
+def _without_joints(text: str, held: set[str]) -> str:
+    """MJCF with some joints removed, and with them all that may act on joints."""
+    if not held:
+        return text
+    root = ElementTree.fromstring(text)
+    for section in ("actuator", "equality", "tendon", "keyframe", "sensor"):
+        for element in root.findall(section):
+            root.remove(element)
+    for body in root.iter("body"):
+        for joint in body.findall("joint"):
+            if joint.get("name") in held:
+                body.remove(joint)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _welded(body: mujoco.MjsBody, held: set[str]) -> list[mujoco.MjsBody]:
+    """Bodies below ``body`` that move with it, joints ``held`` counting as none."""
     found = []
     for child in body.bodies:
-        if not child.joints:
-            found += [child, *_welded(child)]
+        if all(joint.name in held for joint in child.joints):
+            found += [child, *_welded(child, held)]
     return found
