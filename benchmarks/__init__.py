@@ -40,6 +40,10 @@ STUDIES: dict[str, Study] = {
         "simulation.environments",
         "what an environment costs beside its physics, many at once, and reactions",
     ),
+    "arms": Study(
+        "simulation.arms",
+        "any arm: servo, residual, divergences, false alarms and a strike, arm by arm",
+    ),
     "rigid": Study(
         "rigid.study",
         "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",

@@ -29,7 +29,7 @@ class DemoPlan:
         return sum(e.seconds for e in (*self.train, *self.judge_struck, *self.judge_free))
 
 
-def demo_plan(seed: int) -> DemoPlan:
+def demo_plan(seed: int, robot: str = "cura6") -> DemoPlan:
     """75 training collisions, 72 judged ones, 10 judged collision-free minutes and a showcase.
 
     The showcase is one run of the arm at work: nine collisions of all kinds, then a payload taken
@@ -44,9 +44,11 @@ def demo_plan(seed: int) -> DemoPlan:
     payloads = (0.0, 1016.0, 4039.0, 2298.0, 782.0)
     show = struck_episodes(base + 3, 1, 9, (30.0,), (0.0,), arm)[0]
     pick = PayloadPick(show.seconds + 1.0, 1016.0)
+    judge_struck = struck_episodes(base + 1, 9, 8, SPEEDS, payloads, arm)
+    judge_free = free_episodes(base + 2, 12, 50.0, SPEEDS, payloads[:4], arm)
     return DemoPlan(
-        train=[*struck, *free],
-        judge_struck=struck_episodes(base + 1, 9, 8, SPEEDS, payloads, arm),
-        judge_free=free_episodes(base + 2, 12, 50.0, SPEEDS, payloads[:4], arm),
-        showcase=replace(show, seconds=show.seconds + 4.0, picks=(pick,)),
+        train=[replace(episode, arm=robot) for episode in (*struck, *free)],
+        judge_struck=[replace(episode, arm=robot) for episode in judge_struck],
+        judge_free=[replace(episode, arm=robot) for episode in judge_free],
+        showcase=replace(show, seconds=show.seconds + 4.0, picks=(pick,), arm=robot),
     )

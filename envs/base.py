@@ -76,6 +76,13 @@ class Task:
     def after(self, i: int, rng: np.random.Generator) -> None:
         """What follows a success of copy ``i``, before its observation is shown."""
 
+    def get_state(self) -> Any:
+        """What the task remembers beside :attr:`memory`."""
+        return None
+
+    def set_state(self, state: Any) -> None:
+        """Go back to what :meth:`get_state` gave."""
+
 
 class ArmEnv(gymnasium.Env[Array, Array]):
     """One arm scene as a Gymnasium environment; subclasses name their task.
@@ -114,7 +121,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         """
         if render_mode is not None:
             one_of("render_mode", render_mode, RENDER_MODES)
-        self.render_mode = render_mode
+        self.render_mode, self._keywords = render_mode, dict(keywords)
         self.world, self.cell, self.task = build(self.task_type, keywords, 1)
         self.metadata = frame_rate(self.world)
         self.action_space, self.observation_space = make_spaces(self.cell)
@@ -148,7 +155,13 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode."""
+        """Begin an episode.
+
+        Raises:
+            ValueError: ``options``: there are none.
+        """
+        if options:
+            raise ValueError(f"options: unknown {', '.join(map(repr, options))}; there are none")
         super().reset(seed=seed)
         self.task.start(0, self.np_random)
         self._begun = True
@@ -181,6 +194,42 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         if self.render_mode == "human":
             self.render()
         return self._seen.copy(), float(reward), over and not diverged, diverged, info
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that the next steps depend on, for :meth:`set_state`; plain arrays."""
+        return self.cell.get_state(0) | {
+            "memory": np.array(self.task.memory),
+            "task": self.task.get_state(),
+            "rng": self.np_random.bit_generator.state,
+            "begun": self._begun,
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to what :meth:`get_state` gave: the same actions give the same bits again.
+
+        Raises:
+            ValueError: a state of another environment.
+        """
+        self.cell.set_state(0, state)
+        self.task.memory[:] = state["memory"]
+        self.task.set_state(state["task"])
+        self.np_random.bit_generator.state = state["rng"]
+        self._begun = state["begun"]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """How it was made and where it is; the window stays behind."""
+        return {
+            "made": (self.render_mode, self._keywords),
+            "spec": self.spec,
+            "state": self.get_state(),
+        }
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Make it anew and go there."""
+        mode, keywords = saved["made"]
+        type(self).__init__(self, mode, **keywords)
+        self.spec = saved["spec"]
+        self.set_state(saved["state"])
 
     def _info(self, figure: list[float], success: bool) -> dict[str, Any]:
         cell, area = self.cell, self._area

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +38,14 @@ FIGURES = (
     SPEED,
 ) = range(len(FIGURES))
 assert len(FIGURES) == _plant.FIGURES
+#: What a snapshot holds: MuJoCo's integration state, derived fields that are read before the next
+#: physics step, and rows of a copy.
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
+ROWS = (
+    "observation", "figure", "tau_ext", "residual", "alarm", "target", "contacts",
+    "q", "qd", "current", "tau", "contact", "region",
+)  # fmt: skip
 #: What replaces an action, by its native code: nothing, velocities, no power, no power and brakes.
 FREE, VELOCITY, LIMP, BRAKE = range(4)
 
@@ -100,6 +110,43 @@ class Cell:
         self.residual[i], self.alarm[i], self.contacts[i] = 0.0, False, 0
         if self.sensing is not None:
             self.sensing[i].reset()
+
+    def get_state(self, i: int) -> dict[str, Any]:
+        """Everything that copy ``i`` depends on: physics, drives, rows, detector, checkers."""
+        data, model = self.datas[i], self.world.scene.model
+        physics = np.empty(mujoco.mj_stateSize(model, STATE))
+        mujoco.mj_getState(model, data, physics, STATE)
+        listener = self.sensing[i].detector if self.sensing else None
+        # Derived quantities as they stand: labels and kinematics are read before the next forward.
+        derived = {name: getattr(data, name).copy() for name in DERIVED}
+        return {
+            "physics": physics,
+            "derived": derived,
+            "plant": np.array(self.plants[i].state()),
+            "rows": {name: getattr(self, name)[i].copy() for name in ROWS},
+            "detector": listener.get_state() if listener else None,
+        }
+
+    def set_state(self, i: int, state: dict[str, Any]) -> None:
+        """Go back to what :meth:`get_state` gave.
+
+        Raises:
+            ValueError: a state of another scene.
+        """
+        data, model = self.datas[i], self.world.scene.model
+        if len(state["physics"]) != mujoco.mj_stateSize(model, STATE):
+            raise ValueError("state: of another scene")
+        self.plants[i].restore(state["plant"].tolist())
+        mujoco.mj_setState(model, data, state["physics"], STATE)
+        for name, values in state["derived"].items():
+            getattr(data, name)[:] = values
+        for name, values in state["rows"].items():
+            getattr(self, name)[i] = values
+        if self.sensing is not None:
+            self.sensing[i].reset()
+            listener = self.sensing[i].detector
+            if listener is not None:
+                listener.set_state(state["detector"])
 
     def step(self, i: int, action: Array, rng: np.random.Generator) -> None:
         """One action of copy ``i``, shape (m,)."""

@@ -31,13 +31,14 @@ class JointEnds:
         """
         self._low, self._high = ranges[:, 0] + MARGIN, ranges[:, 1] - MARGIN
         self._hold = round(FORGOTTEN / (gain * dt))
-        self._left = np.zeros(len(ranges), dtype=np.int64)
+        #: Samples that each joint's residual still counts as zero, shape (n,).
+        self.left = np.zeros(len(ranges), dtype=np.int64)
 
     def clear(self, q: Array, residuals: Array) -> None:
         """Samples in turn: positions (T, n) [rad]; residuals (T, n) are changed in place."""
         near = (q < self._low) | (q > self._high)
-        if not (near.any() or self._left.any()):
+        if not (near.any() or self.left.any()):
             return
         for row in range(len(q)):
-            self._left = np.where(near[row], self._hold, np.maximum(self._left - 1, 0))
-            residuals[row, self._left > 0] = 0.0
+            self.left = np.where(near[row], self._hold, np.maximum(self.left - 1, 0))
+            residuals[row, self.left > 0] = 0.0

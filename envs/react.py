@@ -94,6 +94,14 @@ class React(Task):
                 break
         cell.plants[i].override(FREE, np.zeros(len(self.swing[i][0])))
 
+    def get_state(self) -> Any:
+        """The planned swing."""
+        return [rows.copy() for rows in self.swing]
+
+    def set_state(self, state: Any) -> None:
+        """Go back to it."""
+        self.swing = [rows.copy() for rows in state]
+
     def _plan(self, begin: Array, speed: float, period: float) -> Array:
         """Joint positions, one an action, of a straight swing that speeds up at once: (T, n)."""
         world, model, data = self.cell.world, self.cell.world.scene.model, self._scratch

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,14 @@ class Listener(Protocol):
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """Samples of shape (T, n) in turn: residuals (T, n) [N m] and alarms (T,)."""
+        ...
+
+    def get_state(self) -> Any:
+        """What it remembers, for :meth:`set_state`."""
+        ...
+
+    def set_state(self, state: Any) -> None:
+        """Go back to what :meth:`get_state` gave."""
 
 
 class ObserverListener:
@@ -104,6 +112,15 @@ class ObserverListener:
         self._ends.clear(q, residuals)
         return residuals, np.any(np.abs(residuals) > self.bounds, axis=1)
 
+    def get_state(self) -> Any:
+        """See :class:`Listener`."""
+        return self._observer.get_state(), self._ends.left.copy()
+
+    def set_state(self, state: Any) -> None:
+        """See :class:`Listener`."""
+        self._observer.set_state(state[0])
+        self._ends.left = state[1].copy()
+
 
 class AlarmListener:
     """A trained detector with its threshold; the residual is the plain observer's."""
@@ -126,6 +143,21 @@ class AlarmListener:
             self._observer.step(*sample, (residuals[row], *spare))
         return residuals, alarms
 
+    def get_state(self) -> Any:
+        """See :class:`Listener`.
+
+        Raises:
+            ValueError: always; a trained detector's stream cannot be stored.
+        """
+        raise ValueError(
+            f"detector {self.name}: a trained detector cannot go into a snapshot; expected "
+            f"{', '.join(DETECTORS)} or None"
+        )
+
+    def set_state(self, state: Any) -> None:
+        """See :meth:`get_state`."""
+        self.get_state()
+
 
 class PerArm:
     """One listener an arm, for scenes with several; joints of the arms follow one another."""
@@ -145,6 +177,15 @@ class PerArm:
         ]
         residuals, alarms = zip(*found, strict=True)
         return np.concatenate(residuals, axis=1), np.any(alarms, axis=0)
+
+    def get_state(self) -> Any:
+        """See :class:`Listener`."""
+        return [part.get_state() for part in self._parts]
+
+    def set_state(self, state: Any) -> None:
+        """See :class:`Listener`."""
+        for part, own in zip(self._parts, state, strict=True):
+            part.set_state(own)
 
 
 def listening(world: World, wanted: object) -> Callable[[], Listener] | None:

@@ -226,6 +226,7 @@ class Simulation:
                 "model_sha256": hashlib.sha256(scene.xml.encode()).hexdigest(),
                 "tauguard": importlib.metadata.version("tauguard"),
                 "mujoco": mujoco.__version__,
+                **({} if episode.arm == "cura6" else {"arm": episode.arm}),
             },
             attachments={
                 "scene.xml": scene.xml,

@@ -91,6 +91,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             seed: of copy i: ``seed + i``, or entry i of a list.
             options: ``reset_mask``, a bool array of shape (num_envs,).
         """
+        unknown = [key for key in options or {} if key != "reset_mask"]
+        if unknown:
+            raise ValueError(f"options: unknown {unknown}; expected reset_mask or none")
         if isinstance(seed, list):
             seeds = seed
         else:

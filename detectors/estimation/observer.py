@@ -141,6 +141,18 @@ class MomentumObserver:
             tau = -momentum_terms(self.robot, at, speed, threads=1)[1]
         self._native.reset(at[0], speed[0], rows("tau", np.atleast_2d(tau), n)[0])
 
+    def get_state(self) -> Array:
+        """What it remembers between two steps, for :meth:`set_state`, shape (1 + 4 n,)."""
+        return np.array(self._native.state())
+
+    def set_state(self, state: Array) -> None:
+        """Go back to what :meth:`get_state` gave.
+
+        Raises:
+            ValueError: a state of an arm with other joints.
+        """
+        self._native.restore(state.tolist())
+
     def step(
         self,
         q: Array,

@@ -2,7 +2,9 @@
 // torques.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <vector>
 
 #include "chain.hpp"
@@ -57,6 +59,26 @@ class Observer {
     p_.swap(p_before_);
     beta_.swap(beta_before_);
     return residual_.data();
+  }
+
+  // What it remembers between two steps, as numbers.
+  std::vector<double> state() const {
+    std::vector<double> out = {started_ ? 1.0 : 0.0};
+    for (const auto* v : {&p_before_, &beta_before_, &tau_before_, &residual_})
+      out.insert(out.end(), v->begin(), v->end());
+    return out;
+  }
+
+  // Goes back to what state() gave; false where it is of another length.
+  bool restore(const std::vector<double>& saved) {
+    if (saved.size() != 1 + 4 * gain_.size()) return false;
+    started_ = saved[0] != 0.0;
+    auto from = saved.begin() + 1;
+    for (auto* v : {&p_before_, &beta_before_, &tau_before_, &residual_}) {
+      std::copy(from, from + static_cast<std::ptrdiff_t>(v->size()), v->begin());
+      from += static_cast<std::ptrdiff_t>(v->size());
+    }
+    return true;
   }
 
  private:

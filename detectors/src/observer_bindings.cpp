@@ -3,6 +3,7 @@
 // Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/vector.h>
 
 #include <cmath>
 #include <cstdint>
@@ -195,6 +196,13 @@ void bind_observer(nb::module_& m) {
                  Observer(chain, std::vector<double>(gain.data(), gain.data() + gain.shape(0)));
            })
       .def_prop_ro("started", &Observer::started)
+      .def("state", &Observer::state)
+      .def(
+          "restore",
+          [](Observer& observer, const std::vector<double>& saved) {
+            require(observer.restore(saved), "state: of another arm");
+          },
+          nb::arg("state"))
       .def("reset",
            [](Observer& observer, In1 q, In1 qd, In1 tau) {
              check_sample(observer.chain().joints.size(), q, qd, tau, "tau");

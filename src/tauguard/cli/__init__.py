@@ -19,6 +19,7 @@ COMMANDS = {
     "generate": "a labelled dataset from its description, on all cores or a Ray cluster",
     "inspect": "what a generated dataset holds, and whether it is whole",
     "export": "a generated dataset in the format of another library",
+    "robot": "what is known and assumed about an arm, number by number",
     "simulate": "labelled episodes of the arm at work, as many as asked",
     "train": "a detector from labelled recordings",
     "evaluate": "a detector's figures on labelled recordings",

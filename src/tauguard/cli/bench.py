@@ -14,6 +14,7 @@ def command(
     quick: bool = False,
     seed: int = 0,
     detector: str | None = None,
+    robot: str | None = None,
     json: Path | None = None,
     figure: Path | None = None,
     out: Path = Path("bench"),
@@ -28,6 +29,7 @@ def command(
         quick: a shorter run, 60 s or less on 2 cores (the full one takes up to 30 minutes).
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
+        robot: arms of the study `arms`, by name or file, parted by commas.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
@@ -42,7 +44,10 @@ def command(
         return
     if detector is not None and name != "detection":
         raise ValueError(f"--detector goes with the study detection, not with {name}")
-    more = {} if detector is None else {"detector": detector}
+    if robot is not None and name != "arms":
+        raise ValueError(f"--robot goes with the study arms, not with {name}")
+    given = {"detector": detector, "robot": robot}
+    more = {key: value for key, value in given.items() if value is not None}
     if name == "all":
         if json is not None or figure is not None:
             raise ValueError("json, figure: of one study; all of them go to the folder --out")

@@ -16,7 +16,11 @@ FALSE_ALARMS_PER_HOUR = 10.0
 
 
 def command(
-    out: Path = Path("demo"), seed: int = 0, workers: int | None = None, json: Path | None = None
+    out: Path = Path("demo"),
+    seed: int = 0,
+    robot: str = "cura6",
+    workers: int | None = None,
+    json: Path | None = None,
 ) -> None:
     """Simulate an arm at work, strike it, detect the collisions, leave a recording.
 
@@ -27,6 +31,7 @@ def command(
     Args:
         out: folder of the results (made if it does not exist).
         seed: of the arm and of everything drawn; the same seed gives the same files.
+        robot: which arm, by name or file: see `tauguard robot`.
         workers: processes for the simulation (default: all processors).
         json: write the summary here as well.
     """
@@ -38,9 +43,11 @@ def command(
     from tauguard.datasets import demo_plan, simulate_all
     from tauguard.detectors import figures, match_detection
     from tauguard.envs import simulate
+    from tauguard.models import load_arm
     from tauguard.report import write_json
 
-    plan = demo_plan(seed)
+    load_arm(robot)  # an unknown one is named before anything is simulated
+    plan = demo_plan(seed, robot)
     training = list(simulate_all(plan.train, workers, "simulate training"))
     judged = list(simulate_all([*plan.judge_struck, *plan.judge_free], workers, "simulate test"))
     simulated = time.perf_counter()

@@ -34,12 +34,12 @@ def nominal(traces: Sequence[Trace]) -> ArmModel:
     import numpy as np
 
     from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
-    from tauguard.models import cura6_drive, pin_model
+    from tauguard.models import load_arm, pin_model
 
     arm = traces[0].attachments.get("arm.xml")
     if arm is None:
         raise ValueError("no arm.xml attached: train on recordings that tauguard simulated")
-    drive = cura6_drive(traces[0].meta.get("arm", "cura6"))
+    drive = load_arm(traces[0].meta.get("arm", "cura6")).facts.drive
     # The ripple's frequencies follow from the gear; its heights and phases are identified.
     cycles = np.outer(drive.gear, drive.ripple.cycles) if drive.ripple else np.empty((0, 0))
     robot = RobotNumbers.from_pin(pin_model(arm))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ def command(
     seed: int = 0,
     mismatch_seed: int | None = 0,
     checkers: tuple[str, ...] = (),
+    robot: str = "cura6",
     workers: int | None = None,
     json: Path | None = None,
 ) -> None:
@@ -38,23 +40,26 @@ def command(
             None simulates the nominal arm.
         checkers: contact checkers (mujoco, cloth, rigid) that watch every step; their contacts go
             into the recordings and the replay.
+        robot: which arm, by name or file: see `tauguard robot`.
         workers: processes (default: all processors).
         json: write what was simulated here as JSON.
     """
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
-    from tauguard.models import Mismatch
+    from tauguard.models import Mismatch, load_arm
     from tauguard.report import write_json
 
     if episodes < 1:
         raise ValueError(f"--episodes {episodes}: expected 1 or more")
     if collisions < 0:
         raise ValueError(f"--collisions {collisions}: expected 0 or more")
+    load_arm(robot)  # named before anything is simulated
     arm = None if mismatch_seed is None else Mismatch(seed=mismatch_seed)
     planned = (
         struck_episodes(seed, episodes, collisions, speeds, payloads_g, arm)
         if collisions
         else free_episodes(seed, episodes, seconds, speeds, payloads_g, arm)
     )
+    planned = [replace(episode, arm=robot) for episode in planned]
     paths = write_dataset(planned, out, workers, checkers)
     rows = [told(path, episode) for path, episode in zip(paths, planned, strict=True)]
     if json is not None:

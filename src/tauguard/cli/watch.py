@@ -9,6 +9,9 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+#: Keywords that may name several things, parted by commas.
+LISTS = ("obstacles", "checkers")
+
 
 def command(
     environment: Annotated[str, tyro.conf.Positional],
@@ -68,7 +71,8 @@ def parsed(settings: tuple[str, ...]) -> dict[str, Any]:
         try:
             found[name] = ast.literal_eval(text)
         except (ValueError, SyntaxError):
-            found[name] = text
+            many = name in LISTS and "," in text
+            found[name] = tuple(part.strip() for part in text.split(",")) if many else text
     return found
 
 
@@ -89,6 +93,7 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
     view.layout(charts)
     env.action_space.seed(seed)
     period, now, episodes, worst = 1 / inner.world.settings.control_rate, 0.0, 0, 0.0
+    diverged = 0
     _, info = env.reset(seed=seed)
     began = time.perf_counter()
     while now < seconds:
@@ -97,6 +102,7 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
         _, _, terminated, truncated, info = env.step(action)
         now += period
         worst = max(worst, info["limit_ratio"])
+        diverged += bool(info["reason"])
         if terminated or truncated:
             episodes += 1
             _, info = env.reset()
@@ -107,6 +113,7 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
     where = f"; show it with: rerun {save}" if save else ""
     print(
         f"{now:.1f} s, {episodes} episodes ended, "
+        f"{f'{diverged} of them diverged, ' if diverged else ''}"
         f"largest force {100 * worst:.0f} % of its limit{where}"
     )
 
