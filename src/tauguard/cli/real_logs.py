@@ -28,22 +28,20 @@ def robot_numbers(robot: Path, given: tuple[str, ...] | None = None) -> RobotNum
     Raises:
         ValueError: joints that the robot does not have.
     """
-    import pinocchio as pin
-
     from tauguard.detectors import RobotNumbers
+    from tauguard.detectors.calibration.held_joints import holding
     from tauguard.models import pin_model
 
-    model = pin_model(robot)
-    names = tuple(str(name) for name in model.names)[1:]
+    numbers = RobotNumbers.from_pin(pin_model(robot))
+    names = numbers.joint_names
     if given is None or len(given) >= len(names):
-        return RobotNumbers.from_pin(model)
+        return numbers
     kept = names[: len(given)] if given == unnamed(len(given)) else given
     if not set(kept) <= set(names):
         raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
     lacking = [name for name in names if name not in kept]
     print(f"note: the log lacks {', '.join(lacking)} of {robot.name}: held fixed at 0")
-    held = [model.getJointId(name) for name in lacking]
-    return RobotNumbers.from_pin(pin.buildReducedModel(model, held, pin.neutral(model)))
+    return holding(numbers, lacking)
 
 
 def unnamed(count: int) -> tuple[str, ...]:
