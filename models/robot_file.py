@@ -129,13 +129,16 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
     except ValueError as error:
         raise ValueError(f"{source}: {' '.join(str(error).split())}") from None
     held = {str(joint.name) for joint in spec.joints} - set(joints)
+    if held:
+        spec.compile()
+        spec = mujoco.MjSpec.from_string(_without_joints(str(spec.to_xml()), held))
     for name, numbers in zip(joints, inertial, strict=True):
         joint = spec.joint(name)
         if joint is None:
             raise ValueError(f"the robot file has no joint {name!r}")
         body = joint.parent
         mass, centre, inertia = _about_centre(numbers)
-        for fixed in _welded(body, held):
+        for fixed in _welded(body):
             fixed.mass, fixed.explicitinertial = 0.0, True
             fixed.inertia = np.zeros(3)
             fixed.fullinertia = np.full(6, np.nan)
@@ -149,13 +152,11 @@ def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> 
             spec.delete(text)
     spec.add_text(name=TAG, data=note)
     spec.compile()
-    return _without_joints(str(spec.to_xml()), held)
+    return str(spec.to_xml())
 
 
 def _without_joints(text: str, held: set[str]) -> str:
     """MJCF with some joints removed, and with them all that may act on joints."""
-    if not held:
-        return text
     root = ElementTree.fromstring(text)
     for section in ("actuator", "equality", "tendon", "keyframe", "sensor"):
         for element in root.findall(section):
@@ -167,10 +168,10 @@ def _without_joints(text: str, held: set[str]) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _welded(body: mujoco.MjsBody, held: set[str]) -> list[mujoco.MjsBody]:
-    """Bodies below ``body`` that move with it, joints ``held`` counting as none."""
+def _welded(body: mujoco.MjsBody) -> list[mujoco.MjsBody]:
+    """Bodies below ``body`` that move with it."""
     found = []
     for child in body.bodies:
-        if all(joint.name in held for joint in child.joints):
-            found += [child, *_welded(child, held)]
+        if not child.joints:
+            found += [child, *_welded(child)]
     return found
