@@ -63,5 +63,7 @@ def test_environments_are_named_so_that_gymnasium_finds_them(page):
 def test_no_page_is_lost():
     """Every page can be reached from the README."""
     told = (ROOT / "README.md").read_text()
-    lost = [page.name for page in PAGES[1:] if os.path.relpath(page, ROOT) not in told]
+    site = {"index.md", "reference.md"}  # of the site alone
+    pages = [page for page in PAGES[1:] if page.name not in site]
+    lost = [page.name for page in pages if os.path.relpath(page, ROOT) not in told]
     assert not lost

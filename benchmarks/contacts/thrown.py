@@ -41,6 +41,17 @@ class Thrown:
     ]  #: of moving geoms by name: points that must not pass, own frame [m]
     ctrl: Array  #: of the actuators, shape (nu,)
 
+    @property
+    def speed(self) -> float:
+        """Of the thrown body at the start [m/s]; 0 where nothing is thrown."""
+        model = self.spec.compile()
+        free = [
+            int(model.jnt_dofadr[j])
+            for j in range(model.njnt)
+            if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
+        ]
+        return max((float(np.linalg.norm(self.qvel[d : d + 3])) for d in free), default=0.0)
+
     def start(self, timestep: float, flags: int = 0, stiff: bool = False) -> tuple[Any, Any]:
         """Model and data in the first state; ``stiff`` makes all contacts stiff."""
         model = self.spec.compile()
@@ -81,7 +92,7 @@ def _plate(rng: np.random.Generator) -> Thrown:
 
 
 def _pair(rng: np.random.Generator) -> Thrown:
-    """Two convex bodies head on."""
+    """Two spheres head on."""
     spec, timestep, speed = _world(rng, _FREE)
     reaches, skeletons = [], {}
     for name in ("first", "body"):
