@@ -79,10 +79,13 @@ def _hulls(bodies: Bodies) -> list[tuple[NDArray[np.float64], Any]]:
         points = bodies.origin[:, None] + corners @ bodies.edges
         return [(p, _BLOCK_FACES) for p in points]
     if isinstance(bodies, Hulls):
-        return [
-            (bodies.vertices[i:j], None)
-            for i, j in zip(bodies.offsets, bodies.offsets[1:], strict=False)
-        ]
+        ranges = zip(bodies.offsets, bodies.offsets[1:], strict=False)
+        points = [bodies.vertices[i:j] for i, j in ranges]
+        for row, cloud in enumerate(points):
+            # coal's own hull of flat points ends the process.
+            if np.linalg.matrix_rank(cloud - cloud[0]) < 3:
+                raise ValueError(f"hull {row} is flat: method gjk needs volume; use abfme or auto")
+        return [(cloud, None) for cloud in points]
     raise ValueError(f"method: gjk knows no {type(bodies).__name__}; use abfme or auto")
 
 

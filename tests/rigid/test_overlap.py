@@ -258,3 +258,13 @@ def test_bad_arguments():
         == overlap(none, Tetrahedra(np.zeros((1, 4, 3)))).hit.shape
         == (0,)
     )
+
+
+def test_gjk_refuses_flat_hulls_by_their_row():
+    # coal's convex hull of flat points ends the process.
+    solid = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]])
+    hulls = Hulls(np.concatenate([solid, flat]), [0, 4, 8])
+    with pytest.raises(ValueError, match="hull 1 is flat"):
+        overlap(hulls, hulls, method="gjk")
+    assert overlap(hulls, hulls).hit.all()
