@@ -80,12 +80,12 @@ def _hulls(bodies: Bodies) -> list[tuple[NDArray[np.float64], Any]]:
         return [(p, _BLOCK_FACES) for p in points]
     if isinstance(bodies, Hulls):
         ranges = zip(bodies.offsets, bodies.offsets[1:], strict=False)
-        points = [bodies.vertices[i:j] for i, j in ranges]
-        for row, cloud in enumerate(points):
+        clouds = [bodies.vertices[i:j] for i, j in ranges]
+        for row, cloud in enumerate(clouds):
             # coal's own hull of flat points ends the process.
             if np.linalg.matrix_rank(cloud - cloud[0]) < 3:
                 raise ValueError(f"hull {row} is flat: method gjk needs volume; use abfme or auto")
-        return [(cloud, None) for cloud in points]
+        return [(cloud, None) for cloud in clouds]
     raise ValueError(f"method: gjk knows no {type(bodies).__name__}; use abfme or auto")
 
 

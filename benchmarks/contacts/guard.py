@@ -170,7 +170,7 @@ def _row(
 def _error(line: dict[str, Any], method: str) -> float:
     """Of the first body's velocity at the end, over the speed of the thrown body at the start."""
     apart = line["runs"][method].velocity - line["fine"][-1].velocity
-    return float(np.linalg.norm(apart)) / line["scene"].speed
+    return float(np.linalg.norm(apart) / line["scene"].speed)
 
 
 def _median(values: Iterable[float]) -> float | None:
