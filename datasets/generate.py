@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from functools import partial
 from pathlib import Path
 
 from tqdm import tqdm
 
 from tauguard.contacts import registered
+from tauguard.datasets.workers import in_processes, terminable
 from tauguard.envs import Episode, simulate
 from tauguard.traces import Trace, read_mcap, write_mcap
+from tauguard.traces.whole_file import remove_parts
 
 
 def simulate_all(
@@ -20,7 +22,7 @@ def simulate_all(
     workers: int | None = None,
     label: str = "simulate",
     checkers: Sequence[str] = (),
-) -> Iterator[Trace]:
+) -> Generator[Trace]:
     """The traces of ``episodes`` in their order, whatever the number of workers.
 
     Args:
@@ -30,19 +32,24 @@ def simulate_all(
         checkers: names of contact checkers whose answers go into ``Trace.contacts``. One that is
             not among ours must be registered where a worker imports it, or ``workers`` be 1.
     """
-    one = partial(simulate, checkers=tuple(checkers))
     workers = min(workers or os.cpu_count() or 1, max(len(episodes), 1))
     bar = tqdm(total=len(episodes), desc=label, unit="episode", disable=None, leave=False)
-    with bar:
-        if workers == 1:
-            for episode in episodes:
-                yield one(episode)
-                bar.update()
-            return
-        with multiprocessing.get_context("spawn").Pool(workers) as pool:
-            for trace in pool.imap(one, episodes):
-                yield trace
-                bar.update()
+    one = partial(_numbered, checkers=tuple(checkers))
+    results = in_processes(one, enumerate(episodes), workers)
+    with bar, contextlib.closing(results):
+        early: dict[int, Trace] = {}
+        wanted = 0
+        for number, trace in results:
+            bar.update()
+            early[number] = trace
+            while wanted in early:
+                yield early.pop(wanted)
+                wanted += 1
+
+
+def _numbered(task: tuple[int, Episode], checkers: tuple[str, ...]) -> tuple[int, Trace]:
+    number, episode = task
+    return number, simulate(episode, checkers=checkers)
 
 
 def write_dataset(
@@ -60,7 +67,7 @@ def write_dataset(
         checkers: as for :func:`simulate_all`.
 
     Raises:
-        OSError: the folder cannot be made or written.
+        OSError: the folder cannot be made or written, or a worker died.
         ValueError: an unknown checker; a file of that name holds another episode or other checkers
             (nothing is overwritten).
     """
@@ -72,8 +79,10 @@ def write_dataset(
     paths = [folder / f"episode-{i:0{width}d}.mcap" for i in range(len(episodes))]
     missing = [i for i, path in enumerate(paths) if not _holds(path, episodes[i], checkers)]
     traces = simulate_all([episodes[i] for i in missing], workers, checkers=checkers)
-    for i, trace in zip(missing, traces, strict=True):
-        write_mcap(paths[i], trace)
+    remove_parts(folder)
+    with terminable(), contextlib.closing(traces):
+        for i, trace in zip(missing, traces, strict=True):
+            write_mcap(paths[i], trace)
     return paths
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tauguard.datasets.columns import PRESETS, Column, ColumnMap
 from tauguard.datasets.log_checks import checked
+from tauguard.strangers import reading
 from tauguard.traces.trace import Array, Trace
 
 
@@ -51,19 +52,17 @@ def read_log(
         OSError: the file is missing or cannot be read.
     """
     path = Path(path)
-    try:
-        if path.suffix == ".mcap":
-            from tauguard.datasets.logs_mcap import read_joint_states
+    with reading(path):
+        try:
+            if path.suffix == ".mcap":
+                from tauguard.datasets.logs_mcap import read_joint_states
 
-            return read_joint_states(path, joint_names)
-        return read_csv(path, chosen(columns, path), joint_names)
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: not a text file; expected CSV or MCAP") from error
-    except ValueError as error:
-        message = str(error)
-        if message.startswith(str(path)):
-            raise
-        raise ValueError(f"{path}: {message}") from error
+                return read_joint_states(path, joint_names)
+            return read_csv(path, chosen(columns, path), joint_names)
+        except UnicodeDecodeError as error:
+            raise ValueError("not a text file; expected CSV or MCAP") from error
+        except csv.Error as error:
+            raise ValueError(f"not CSV ({error})") from error
 
 
 def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:

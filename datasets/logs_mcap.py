@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tauguard.traces.mcap import read_mcap
+from tauguard.traces.mcap_container import CHUNK, check_chunks, walk
 from tauguard.traces.trace import Trace
 
 if TYPE_CHECKING:
@@ -32,6 +33,10 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
 
     with open(path, "rb") as stream:
         try:
+            content = stream.read()
+            chunks = [(at, body) for at, code, body in walk(content) if code == CHUNK]
+            check_chunks(chunks, len(content))
+            stream.seek(0)
             reader = make_reader(stream, validate_crcs=True)
             if any(record.name == "tauguard.trace" for record in reader.iter_metadata()):
                 return Log(read_mcap(path)[0], ())
@@ -44,7 +49,7 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
                 have = ", ".join(f"{name} ({kind})" for name, kind in types.items())
                 raise ValueError(f"no topic of type {TYPE}; topics: {have or 'none'}")
             messages = [(m.log_time, m.data) for _, _, m in reader.iter_messages(topics=[topic])]
-        except (McapError, struct.error) as error:
+        except (McapError, struct.error, RecursionError) as error:
             raise ValueError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
     trace = assemble(topic, messages, joint_names)
     notes = checked(trace, lambda row: f"{topic}, message {row}")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.models.mjcf import SpecText, compiled
+from tauguard.models.robot_check import checked_robot
 
 Array = NDArray[np.float64]
 
@@ -70,7 +71,7 @@ def read_arm(
         ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
             joints; the message says what would work.
     """
-    spec = mujoco.MjSpec.from_file(str(path)) if not _is_urdf(path) else _urdf_spec(path)
+    spec = _urdf_spec(path) if _is_urdf(path) else mujoco.MjSpec.from_file(str(checked_robot(path)))
     _name_joints(spec)
     model = compiled(spec)
     limits, speeds = _torque_limits(model), _speeds(path)

@@ -7,6 +7,7 @@ built from the compiled numbers, so that both describe the same arm, for MJCF an
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import mujoco
@@ -15,8 +16,12 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.models.checks import rigid_pose
+from tauguard.models.robot_check import checked_robot
+from tauguard.strangers import read_text
 
 Array = NDArray[np.float64]
+#: Elements of a robot file inside one another, at most.
+MOST_DEPTH = 200
 
 
 def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
@@ -39,21 +44,25 @@ def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjMo
         path = Path(text)
         if not path.is_file():
             raise FileNotFoundError(f"{path}: no such robot file")
-        if path.suffix.lower() == ".urdf" or "<robot" in path.read_text(errors="replace")[:4000]:
-            return mujoco.MjModel.from_xml_string(_without_shapes(path.read_text()))
-        return mujoco.MjModel.from_xml_path(str(path))
+        if path.suffix.lower() == ".urdf" or "<robot" in _beginning(path):
+            return mujoco.MjModel.from_xml_string(_without_shapes(read_text(path)))
+        return mujoco.MjModel.from_xml_path(str(checked_robot(path)))
     except ValueError as error:
         raise ValueError(f"robot: {' '.join(str(error).split())}") from None
 
 
+def _beginning(path: Path) -> str:
+    with open(path, "rb") as stream:
+        return stream.read(4000).decode(errors="replace")
+
+
 def _without_shapes(urdf: str) -> str:
     """A URDF without visual and collision elements, fixed joints kept."""
-    import xml.etree.ElementTree as ElementTree
-
     try:
         root = ElementTree.fromstring(urdf)
     except ElementTree.ParseError as error:
         raise ValueError(f"not well-formed XML ({error})") from None
+    _check_depth(root)
     for link in root.findall("link"):
         for kind in ("visual", "collision"):
             for element in link.findall(kind):
@@ -65,6 +74,15 @@ def _without_shapes(urdf: str) -> str:
         {"fusestatic": "false", "discardvisual": "false", "strippath": "true"},
     )
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _check_depth(root: ElementTree.Element) -> None:
+    """Elements nested deeper than any robot's exhaust the stack of what writes them again."""
+    level, depth = [root], 0
+    while level:
+        level, depth = [child for one in level for child in one], depth + 1
+        if depth > MOST_DEPTH:
+            raise ValueError(f"elements nested more than {MOST_DEPTH} deep")
 
 
 def pin_model(

@@ -9,6 +9,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.models.robot_check import checked_robot
+from tauguard.strangers import read_text
+
 Array = NDArray[np.float64]
 
 #: Name of the element (URDF) or of the custom text (MJCF) that holds a note.
@@ -58,7 +61,7 @@ def read_note(source: str | Path) -> str | None:
 
 def _root(source: str | Path) -> ElementTree.Element:
     try:
-        return ElementTree.fromstring(Path(source).read_text())
+        return ElementTree.fromstring(read_text(source))
     except ElementTree.ParseError as error:
         raise ValueError(f"{source}: not well-formed XML ({error})") from None
 
@@ -125,7 +128,7 @@ def _numbers(values: Array) -> str:
 
 def _mjcf(source: Path, joints: tuple[str, ...], inertial: Array, note: str) -> str:
     try:
-        spec = mujoco.MjSpec.from_file(str(source))
+        spec = mujoco.MjSpec.from_file(str(checked_robot(Path(source))))
     except ValueError as error:
         raise ValueError(f"{source}: {' '.join(str(error).split())}") from None
     held = {str(joint.name) for joint in spec.joints} - set(joints)

@@ -11,20 +11,20 @@ are equal bytes. The metadata record ``tauguard.meta`` holds :attr:`Trace.meta`,
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 import numpy as np
 
+from tauguard.strangers import reading
 from tauguard.traces import mcap_contacts
 from tauguard.traces.mcap_cdr import Anything, Layout
 from tauguard.traces.mcap_container import Contents, Group, Topic, Writer
 from tauguard.traces.mcap_schemas import SCHEMAS
 from tauguard.traces.mcap_time import nanoseconds, stamp
 from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
+from tauguard.traces.whole_file import whole_file
 
 FORMAT = "1"
 LIBRARY = f"tauguard traces {FORMAT}"
@@ -48,24 +48,16 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
     if detection is not None and detection.alarms:
         groups.append(alarm_group(detection.alarms))
     groups += [mcap_contacts.group(one) for one in trace.contacts if len(one)]
-    with NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
-        try:
-            writer = Writer(stream, LIBRARY, SCHEMAS)
-            writer.metadata("tauguard.meta", trace.meta)
-            writer.metadata("tauguard.trace", describe(trace, detection))
-            for name, text in sorted(trace.attachments.items()):
-                media_type = MEDIA_TYPES.get(Path(name).suffix, "text/plain")
-                writer.attachment(name, media_type, text.encode())
-            for group in groups:
-                writer.group(group)
-            writer.finish()
-            stream.close()
-            os.chmod(stream.name, 0o644)
-            os.replace(stream.name, path)
-        except BaseException:
-            stream.close()
-            Path(stream.name).unlink(missing_ok=True)
-            raise
+    with whole_file(path) as stream:
+        writer = Writer(stream, LIBRARY, SCHEMAS)
+        writer.metadata("tauguard.meta", trace.meta)
+        writer.metadata("tauguard.trace", describe(trace, detection))
+        for name, text in sorted(trace.attachments.items()):
+            media_type = MEDIA_TYPES.get(Path(name).suffix, "text/plain")
+            writer.attachment(name, media_type, text.encode())
+        for group in groups:
+            writer.group(group)
+        writer.finish()
 
 
 def read_mcap(path: str | Path) -> tuple[Trace, Detection | None]:
@@ -80,13 +72,12 @@ def read_mcap(path: str | Path) -> tuple[Trace, Detection | None]:
     """
     path = Path(path)
     data = path.read_bytes()
-    try:
+    expected = (
+        "expected a whole MCAP file written by tauguard "
+        "(logs of other programs: tauguard.datasets.read_log)"
+    )
+    with reading(path, expected):
         return decode(Contents(data))
-    except ValueError as error:
-        raise ValueError(
-            f"{path}: {error}; expected a whole MCAP file written by tauguard "
-            "(logs of other programs: tauguard.datasets.read_log)"
-        ) from error
 
 
 def describe(trace: Trace, detection: Detection | None) -> dict[str, str]:

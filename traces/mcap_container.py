@@ -259,6 +259,7 @@ class Contents:
         self.schemas: dict[int, records.Schema] = {}
         self.profile = ""
         self._chunks: list[tuple[int, memoryview]] = []
+        self._size = len(data)
         for offset, opcode, body in walk(data):
             if opcode == Opcode.CHUNK:
                 self._chunks.append((offset, body))
@@ -279,6 +280,7 @@ class Contents:
 
     def messages(self) -> Iterator[tuple[int, NDArray[np.uint32], Bytes]]:
         """Runs of equally long messages: channel, sequence numbers, payloads (rows, size)."""
+        check_chunks(self._chunks, self._size)
         for offset, body in self._chunks:
             try:
                 chunk = records.Chunk.read(ReadDataStream(io.BytesIO(body)))
@@ -287,6 +289,51 @@ class Contents:
                 yield from rows_of(inside) or singles(inside)
             except Exception as error:
                 raise ValueError(f"damaged chunk at byte {offset}: {error}") from error
+
+
+CHUNK = int(Opcode.CHUNK)
+
+#: A chunk that claims more bytes than this is no recording's [bytes], and neither is a file that
+#: unpacks to more than `MOST_UNPACKED` and to more than `MOST_RATIO` times its size.
+MOST_CHUNK, MOST_UNPACKED, MOST_RATIO = 1 << 27, 1 << 29, 64
+
+
+def check_chunks(chunks: Sequence[tuple[int, memoryview]], size: int) -> None:
+    """Refuse chunks that unpack to more than a recording of ``size`` bytes can hold.
+
+    Raises:
+        ValueError: says which chunk, and what it claims.
+    """
+    total = 0
+    for offset, body in chunks:
+        chunk = records.Chunk.read(ReadDataStream(io.BytesIO(body)))
+        claimed = max(chunk.uncompressed_size, unpacked_size(chunk))
+        total += claimed
+        if claimed > MOST_CHUNK or total > max(MOST_UNPACKED, MOST_RATIO * size):
+            raise ValueError(
+                f"the chunk at byte {offset} unpacks to {claimed} bytes, {total} with those before "
+                f"it, out of a file of {size}: more than a recording holds"
+            )
+
+
+def unpacked_size(chunk: records.Chunk) -> int:
+    """Bytes that decompression would give, counted no further than a chunk may go."""
+    if chunk.compression == "zstd":
+        import zstandard
+
+        try:
+            return int(zstandard.frame_content_size(chunk.data))
+        except zstandard.ZstdError as error:
+            raise ValueError(f"damaged chunk: {error}") from error
+    if chunk.compression == "lz4":
+        import lz4.frame
+
+        try:
+            unpacked = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, MOST_CHUNK + 1)
+        except RuntimeError as error:
+            raise ValueError(f"damaged chunk: {error}") from error
+        return len(unpacked)
+    return len(chunk.data)
 
 
 READERS: dict[int, Any] = {

@@ -69,13 +69,15 @@ def main(argv: Sequence[str] | None = None) -> None:
         tyro.cli(module.command, args=args[1:], prog=f"tauguard {name}")
     except BrokenPipeError:
         sys.stderr.close()
-    except KeyboardInterrupt:
-        raise SystemExit(130) from None
+    except KeyboardInterrupt as stop:
+        print(f"tauguard {name}: stopped", file=sys.stderr)
+        raise SystemExit(143 if type(stop) is not KeyboardInterrupt else 130) from None
     except (ValueError, OSError) as error:
         fail(f"{name}: {error}")
 
 
 def fail(message: str) -> None:
     """One line on the standard error stream, exit code 2."""
-    print("tauguard " + " ".join(message.split()), file=sys.stderr)
+    line = " ".join(message.split())
+    print("tauguard " + (line if len(line) <= 2000 else line[:2000] + " ..."), file=sys.stderr)
     raise SystemExit(2)

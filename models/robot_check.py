@@ -1,0 +1,101 @@
+"""Robot files of strangers: what they name stays in their folder, and MuJoCo tries them elsewhere.
+
+MuJoCo's compiler can crash on XML that looks valid, so a file is compiled in a process of limited
+memory and time first.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from functools import lru_cache
+from pathlib import Path
+
+from tauguard.strangers import read_text, reading
+
+#: Limits of the trial [bytes, s].
+MOST_MEMORY, MOST_SECONDS = 4 << 30, 10.0
+#: Files that include one another, at most.
+MOST_INCLUDES = 100
+
+_TRIAL = """
+import sys
+try:
+    import resource
+    for kind, most in ((resource.RLIMIT_AS, int(sys.argv[2])), (resource.RLIMIT_CPU, 20)):
+        hard = resource.getrlimit(kind)[1]
+        resource.setrlimit(kind, (most if hard < 0 else min(most, hard), hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+except ImportError:
+    pass
+import mujoco
+try:
+    mujoco.MjSpec.from_file(sys.argv[1]).compile()
+except ValueError:
+    pass
+"""
+
+
+def checked_robot(path: Path) -> Path:
+    """``path``, once its files are known to be its own and MuJoCo to survive them.
+
+    A file that MuJoCo merely refuses passes: compiling it here says why.
+
+    Raises:
+        ValueError: a file outside the robot's folder is named, or MuJoCo crashes or needs more than
+            10 s or 4 GiB.
+        OSError: cannot be read.
+    """
+    stamp = os.stat(path)
+    _check(str(path.resolve()), stamp.st_mtime_ns, stamp.st_size)
+    return path
+
+
+@lru_cache(maxsize=256)
+def _check(path: str, mtime: int, size: int) -> None:
+    _check_names(Path(path))
+    command = [sys.executable, "-c", _TRIAL, path, str(MOST_MEMORY)]
+    try:
+        trial = subprocess.run(command, capture_output=True, timeout=MOST_SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        raise ValueError(f"{path}: MuJoCo needs more than {MOST_SECONDS:g} s for it") from None
+    if trial.returncode != 0:
+        raise ValueError(
+            f"{path}: MuJoCo does not survive it (a crash, or more than {MOST_MEMORY >> 30} GiB)"
+        )
+
+
+def _check_names(path: Path) -> None:
+    """Every file and folder that the robot names lies in the folder of its own file."""
+    folder, waiting, seen = path.parent.resolve(), [path], set[Path]()
+    while waiting:
+        one = waiting.pop()
+        if one in seen:
+            continue
+        seen.add(one)
+        if len(seen) > MOST_INCLUDES:
+            raise ValueError(f"{path}: more than {MOST_INCLUDES} files include one another")
+        with reading(one, "expected the XML of a robot"):
+            root = ElementTree.fromstring(read_text(one))
+        dirs = [folder]
+        for compiler in root.iter("compiler"):
+            for key in ("meshdir", "texturedir", "assetdir"):
+                if key in compiler.attrib:
+                    dirs.append(_inside(path, folder, folder, compiler.attrib[key]))
+        for element in root.iter():
+            name = element.attrib.get("file")
+            if name is None:
+                continue
+            for where in dirs:
+                target = _inside(path, folder, where, name)
+                if element.tag == "include" and target.is_file():
+                    waiting.append(target)
+
+
+def _inside(robot: Path, folder: Path, where: Path, name: str) -> Path:
+    target = (where / name).resolve()
+    if not target.is_relative_to(folder):
+        raise ValueError(f"{robot}: names {name!r}, a file outside its folder {folder}")
+    return target

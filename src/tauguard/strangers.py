@@ -1,0 +1,74 @@
+"""Files that somebody else made: reading them ends in an answer or in one line."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+#: Most bytes of a text file that is read whole: settings, column maps, robot descriptions.
+MOST_TEXT = 1 << 26
+
+
+@contextlib.contextmanager
+def reading(path: str | Path, expected: str = "") -> Iterator[None]:
+    """In this block whatever the content of ``path`` causes becomes one ``ValueError`` of a line.
+
+    Nesting too deep, numbers too large, missing names, wrong types: a reader cannot foresee all.
+    The message begins with the path; ``expected`` says what would have worked.
+
+    Raises:
+        ValueError: the content cannot be read; the cause is chained.
+        OSError: as raised inside.
+    """
+    try:
+        yield
+    except OSError:
+        raise
+    except ValueError as error:
+        said = str(error)
+        if said.startswith(str(path)):
+            raise
+        raise ValueError(_line(path, said, expected)) from error
+    except (RecursionError, MemoryError) as error:
+        kind = "nested too deep" if isinstance(error, RecursionError) else "too large"
+        raise ValueError(_line(path, kind, expected)) from error
+    except Exception as error:
+        said = f"damaged ({type(error).__name__}: {str(error)[:200]})"
+        raise ValueError(_line(path, said, expected)) from error
+
+
+def _line(path: str | Path, said: str, expected: str) -> str:
+    return f"{path}: {' '.join(said.split())[:1000]}" + (f"; {expected}" if expected else "")
+
+
+def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
+    """A text file of at most ``most`` bytes, UTF-8.
+
+    Raises:
+        ValueError: longer, or not text.
+        OSError: missing or unreadable.
+    """
+    with open(path, "rb") as stream:
+        data = stream.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"{path}: more than {most >> 20} MiB, no such text file is expected")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(
+            f"{path}: not a text file ({error.reason} at byte {error.start})"
+        ) from error
+
+
+def read_json(path: str | Path) -> Any:
+    """The content of a JSON file; depth and length are bounded.
+
+    Raises:
+        ValueError: not JSON, or nested too deep; one line.
+        OSError: missing or unreadable.
+    """
+    with reading(path, "expected JSON"):
+        return json.loads(read_text(path))
