@@ -117,6 +117,8 @@ def load(source: str | Path) -> Configuration:
         return parse(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{where}not TOML ({error})") from None
+    except RecursionError:
+        raise ValueError(f"{where}not TOML of a dataset (nested too deep)") from None
     except ValueError as error:
         raise ValueError(f"{where}{error}") from None
 

@@ -131,7 +131,10 @@ def test_a_robot_file_on_which_mujoco_would_crash_is_one_line(tmp_path, monkeypa
 
 
 def simulate(folder, *more):
-    command = "import sys; from tauguard.cli import main; main(sys.argv[1:])"
+    command = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from tauguard.cli import main; main(sys.argv[1:])"
+    )
     flags = ["simulate", "--out", str(folder), "--collisions", "0", "--seconds", "30", *more]
     return subprocess.Popen(
         [sys.executable, "-c", command, *flags],
