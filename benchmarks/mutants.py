@@ -55,9 +55,9 @@ def _read_mcap(path: Path) -> object:
 
 
 def _read_columns(path: Path) -> object:
-    from tauguard.cli.real_logs import column_map
+    from tauguard.strangers import read_json
 
-    return column_map(str(path))
+    return read_json(path)
 
 
 def _read_robot(path: Path) -> object:
@@ -82,7 +82,7 @@ def _read_model(path: Path) -> object:
 FORMATS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "csv": ("csv", _read_csv),
     "mcap": ("mcap", _read_mcap),
-    "columns": ("json", _read_columns),
+    "json": ("json", _read_columns),
     "mjcf": ("xml", _read_robot),
     "urdf": ("urdf", _read_robot),
     "toml": ("toml", _read_toml),
@@ -108,7 +108,7 @@ def originals(folder: Path) -> dict[str, Path]:
     np.savetxt(found["csv"], np.c_[t, q, qd, q], delimiter=",")
     trace = simulate(free_episodes(0, 1, 4.0, (30.0,), (0.0,), None)[0])
     write_mcap(found["mcap"], trace)
-    found["columns"].write_text(json.dumps(COLUMNS))
+    found["json"].write_text(json.dumps(COLUMNS))
     found["mjcf"].write_text(ARM)
     found["urdf"].write_text(URDF)
     named = files("tauguard.datasets").joinpath("named/tauguard-collisions-v1.toml")
