@@ -84,11 +84,11 @@ def test_an_untold_load_is_found_from_motion_and_a_told_one_is_no_contact(fitted
     assert carrying(untold, Load()).detect(trace).alarms
 
 
-def test_a_rate_four_times_training_s_gives_like_scores(alarm):
-    fast = record(7, dt=0.001, seconds=10.0)
-    slow = record(7, dt=0.01, seconds=10.0)
-    rates = [np.median(alarm.detector.scores(one)) for one in (fast, slow)]
-    assert rates[0] == pytest.approx(rates[1], rel=0.5)
+def test_a_faster_log_than_training_s_is_quiet_and_its_push_is_found(alarm):
+    fast = record(7, dt=0.002, seconds=6.0)
+    assert alarm.detect(fast).alarms == ()
+    struck = add_contact(fast, GAIN, Added(4.0, 0.5, (12.0, 12.0, 6.0), "push"))
+    assert 4.0 < alarm.detect(struck).alarms[0].start < 4.3
 
 
 def test_the_file_gives_the_same_alarms(alarm, tmp_path):
