@@ -46,7 +46,8 @@ NOTES = {
     f"first, and in how many scenes it was above {ADDED:g}; over plain: time over that of plain "
     "steps of the same scene; over fixed: over the largest fixed step (stiff contacts) from "
     "which on all finer ones hold that scene, fixed_ms; unknown: scenes that none holds; error: of "
-    "the first body's velocity at the end against the finest fixed step, over the thrown body's speed. Medians.",
+    "the first body's velocity at the end against the finest fixed step, over the thrown body's "
+    "speed. Medians.",
     "overhead": "a step of a scene in which nothing is to be guarded, plain and guarded.",
 }
 

@@ -149,6 +149,7 @@ def free_motion(
     from tauguard.cli.real_logs import doubts, is_torque, loaded, read_logs, start
     from tauguard.detectors import CollisionAlarm, save_model
     from tauguard.detectors.calibration.arm_file import load_arm
+    from tauguard.detectors.faults import UsualInput
     from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
 
     traces, numbers = read_logs(free, columns, robot, torque)
@@ -162,7 +163,8 @@ def free_motion(
     unmoved = never_moved(list(traces.values()))
     for note in (*doubts(detector.arm, traces, recordings, ()), *unmoved):
         print(f"note: {note}")
-    save_model(CollisionAlarm(detector, 1.0, CONFIRMATION), model)
+    usual = UsualInput.of(list(traces.values()))
+    save_model(CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual), model)
     print(f"{model}: trained on {len(traces)} collision-free logs, {detector.seconds:.0f} s")
     show_card(detector, list(traces.values()), card)
 
