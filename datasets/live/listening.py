@@ -17,6 +17,8 @@ from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
+#: Spans of one state less than this apart are one [s], as `tauguard detect` counts alarms.
+MERGED = 0.2
 #: Latencies are counted in bins of a microsecond, up to so many; longer ones are in the last.
 BINS = 100_000
 #: A source that gives nothing for so long is said to be silent [s]: a fault without a sample.
@@ -73,13 +75,20 @@ class Heard:
     def _mark(self, state: str, up: bool, t: float, reason: str) -> None:
         """Open, prolong or close the span of one state."""
         span = self._open.get(state)
-        if up and span is None:
+        if up and span is None and (last := self._latest(state)) and t - last.end < MERGED:
+            self._open[state] = last
+            last.end = t
+        elif up and span is None:
             span = self._open[state] = Span(state, t, t, reason)
             self.spans.append(span)
         elif up and span is not None:
             span.end = t if np.isfinite(t) else span.end
         elif span is not None:
             del self._open[state]
+
+    def _latest(self, state: str) -> Span | None:
+        """The last span of a state."""
+        return next((span for span in reversed(self.spans) if span.state == state), None)
 
     def _take_back(self, t: float) -> None:
         """A collision that began just before a fault was the fault's own."""
