@@ -238,7 +238,7 @@ def test_ctrl_c_ends_single_queries(ctrl_c):
 
 
 def test_a_signal_handler_that_asks_the_same_mesh_is_refused():
-    n = 900
+    n = 2700  # long enough to be interrupted
     faces, x = np.arange(n).reshape(-1, 3), np.zeros((n, 3))
     ccd, other = MeshCCD(faces), MeshCCD(TWO, threads=2)
     truth, seen = pairs(other.find(X_T0, X_T1)), []
@@ -253,7 +253,7 @@ def test_a_signal_handler_that_asks_the_same_mesh_is_refused():
 
     before = signal.signal(signal.SIGALRM, handler)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.3)
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
         with pytest.raises(InterruptedError):
             ccd.find(x, x)
     finally:

@@ -184,7 +184,7 @@ def test_bags_with_faults(tmp_path):
     data = (tmp_path / "b.mcap").read_bytes()
     for cut in (3, 100, len(data) - 5):
         (tmp_path / "c.mcap").write_bytes(data[:cut])
-        with pytest.raises(ValueError, match=r"c\.mcap: not a whole MCAP file"):
+        with pytest.raises(ValueError, match=r"c\.mcap: .*cut off"):
             read_log(tmp_path / "c.mcap")
     with open(tmp_path / "d.mcap", "wb") as stream:
         Writer(stream).finish()

@@ -176,6 +176,7 @@ def test_a_quick_run_says_no_to_errors_only(monkeypatch):
         monkeypatch.setattr(rigid_claims, "convex_ratios", lambda rows: times)
         monkeypatch.setattr(rigid_claims, "mesh_ratios", lambda rows, volume: [])
         monkeypatch.setattr(rigid_claims, "impacts", lambda rows: [])
+        monkeypatch.setattr(rigid_claims, "distances", lambda rows: [])
         return [row["met"] for row in rigid_claims.claims([], quick)]
 
     assert judged(quick=True) == [False, False, False, "full run", "full run"]

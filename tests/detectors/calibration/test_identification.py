@@ -64,7 +64,7 @@ def test_currents_of_two_joints_exchanged(logs, found, first, second):
     order[first], order[second] = order[second], order[first]
     mixed = [Recording(dataclasses.replace(log, current=log.current[:, order])) for log in logs]
     wrong = identify(ArmModel(nominal(), GAIN), mixed)
-    with pytest.raises(ValueError, match="check the order of the joints"):
+    with pytest.raises(ValueError, match="wrong order, signs"):
         explained(wrong.arm, [r.trace for r in mixed])
     assert explained(found.arm, logs) == ()
 
