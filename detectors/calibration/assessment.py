@@ -77,10 +77,11 @@ def explained(arm: ArmModel, traces: Sequence[Trace], rate: float = 20.0) -> tup
         torque += (np.where(moves, trace.current * arm.drive_gain, 0.0) ** 2).sum(axis=0)
     share = np.sqrt(left / torque)
     worst = int(np.argmax(share))
+    name = arm.robot.joint_names[worst]
     said = (
-        f"{100 * share[worst]:.0f} % of the torque of {arm.robot.joint_names[worst]} in motion is "
-        "not explained: friction that changes with temperature, a load that was not named, or wrong "
-        "order, signs, units or gains of the currents or torques"
+        f"{100 * share[worst]:.0f} % of the torque of {name} in motion is not explained: friction "
+        "that changes with temperature, a load that was not named, or wrong order, signs, units "
+        "or gains of the currents or torques"
     )
     if share[worst] > UNEXPLAINED:
         raise ValueError(said)
