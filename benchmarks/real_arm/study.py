@@ -59,8 +59,7 @@ EARLY = 0.15
 #: Seconds from which the plain observer learns.
 QUIET = 4.0
 NOTES = {
-    "pushes": "found of pushes by an alarm from 0.15 s before the start to the peak of the "
-    "force.",
+    "pushes": "found of pushes by an alarm from 0.15 s before the start to the peak of the force.",
     "false alarms": "per hour of collision-free logs that training has not seen; the plain "
     "observer is not judged in the 4 s that it learns from.",
 }
