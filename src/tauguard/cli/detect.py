@@ -98,7 +98,7 @@ def command(
     said: Sequence[Diagnosis] = ()
     trace = read_one(log, columns, torque)
     if model is not None:
-        trace, detector, found = watched(model, trace, payload)
+        trace, detector, found = watched(model, trace, payload, robot)
         said, notes = explained(detector, trace, found, robot)
     else:
         trace, found, notes = plainly(log, trace, robot, columns, plain)
@@ -112,9 +112,11 @@ def command(
         leave(out, trace, found, result, robot)
 
 
-def watched(model: Path, trace: Trace, payload: str | None) -> tuple[Trace, Any, Watch]:
+def watched(
+    model: Path, trace: Trace, payload: str | None, robot: Path
+) -> tuple[Trace, Any, Watch]:
     """The log in the joints of a trained detector, the detector, and what it saw."""
-    from tauguard.cli.real_logs import carried, is_torque, matched
+    from tauguard.cli.real_logs import carried, check_robot, is_torque, matched
     from tauguard.detectors import load_model
     from tauguard.detectors.methods.free_motion import carrying
     from tauguard.detectors.thresholds.quiet_start import watch_with
@@ -123,6 +125,7 @@ def watched(model: Path, trace: Trace, payload: str | None) -> tuple[Trace, Any,
     if payload is not None:
         alarm = carrying(alarm, carried(payload))
     arm = alarm.detector.arm
+    check_robot(robot, arm.robot.joint_names, model)
     trace = matched(trace, arm.robot.joint_names)
     if is_torque(trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"the log holds torques, {model} was trained on currents")

@@ -48,6 +48,7 @@ def command(
         json: write events and latencies here.
         record: write what was heard as MCAP here.
     """
+    from tauguard.cli.real_logs import check_robot
     from tauguard.datasets.live.listening import listen
     from tauguard.detectors import load_model
     from tauguard.detectors.faults.monitor import Monitor
@@ -60,7 +61,7 @@ def command(
     alarm = load_model(model)
     if alarm.inputs is None:
         raise ValueError(f"{model}: does not say what samples look like; train the detector anew")
-    check_robot(robot, alarm, model)
+    check_robot(robot, alarm.detector.arm.robot.joint_names, model)
     with ExitStack() as stack:
         source = stack.enter_context(opened(ur, port, play, columns, stdin, reconnect, alarm))
         check_source(source, alarm, model)
@@ -77,17 +78,6 @@ def command(
         write_json(json, result)
     if record is not None:
         save(record, heard, alarm)
-
-
-def check_robot(robot: Path, alarm: CollisionAlarm, model: Path) -> None:
-    """Refuse a robot file with other joints than the model's: ``ValueError``."""
-    from tauguard.cli.real_logs import robot_numbers
-
-    own, trained = robot_numbers(robot).joint_names, alarm.detector.arm.robot.joint_names
-    if own != trained:
-        raise ValueError(
-            f"{robot} has the joints {', '.join(own)}; {model} was trained on {', '.join(trained)}"
-        )
 
 
 def check_source(source: LiveSource, alarm: CollisionAlarm, model: Path) -> None:

@@ -20,6 +20,25 @@ if TYPE_CHECKING:
 HEAVIEST = 100.0
 
 
+def check_robot(robot: Path, trained: tuple[str, ...], model: Path) -> None:
+    """Refuse a robot file that is none, or that lacks joints that a model was trained on.
+
+    Raises:
+        ValueError: one line that names both files.
+    """
+    from tauguard.models import pin_model
+
+    try:
+        own = tuple(pin_model(robot).names[1:])
+    except ValueError as error:
+        name = "" if str(robot) in str(error) else f"{robot}: "
+        raise ValueError(f"{name}{error}") from None
+    if not set(trained) <= set(own):
+        raise ValueError(
+            f"{robot} has the joints {', '.join(own)}; {model} was trained on {', '.join(trained)}"
+        )
+
+
 def robot_numbers(robot: Path, given: tuple[str, ...] | None = None) -> RobotNumbers:
     """The numbers of a robot file, joints that a log lacks held fixed at zero, and said so.
 
