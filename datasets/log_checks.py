@@ -10,12 +10,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tauguard.detectors.faults.inputs import FASTEST
 from tauguard.traces.trace import Array, Trace
 
 #: A pause longer than this many samples, and this many seconds, is a gap.
 GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
-#: No arm's joint turns faster [rad/s], and none turns further than two turns [rad]: degrees do.
-FASTEST, FURTHEST = 20.0, 4 * np.pi
+#: No arm's joint turns further than two turns [rad]: degrees do.
+FURTHEST = 4 * np.pi
 #: Seconds over which velocities are summed to be held against the change of position.
 SPAN = 0.1
 #: Samples in a row at the largest current that are called saturated, and how far it must stand out

@@ -160,3 +160,24 @@ def _remember(trace: Trace, front: FrontEnd, estimate: Estimate) -> None:
     if id(trace) not in _ESTIMATES:
         weakref.finalize(trace, _ESTIMATES.pop, id(trace), None)
     _ESTIMATES[id(trace)] = front, estimate
+
+
+class OnFrontEnd(Frozen):
+    """Base of fitted methods that stand on a front end: what they know is what it knows."""
+
+    front: FrontEnd
+
+    @property
+    def arm(self) -> ArmModel:
+        """The calibrated arm."""
+        return self.front.arm
+
+    @property
+    def dt(self) -> float:
+        """Sample interval [s]."""
+        return self.front.dt
+
+    @property
+    def settle(self) -> float:
+        """Until the estimator has settled and found the payload [s]."""
+        return self.front.settle

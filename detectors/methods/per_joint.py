@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
+from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.scaling import Scaling
-from tauguard.detectors.frozen import Frozen
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class FittedPerJoint(Frozen, ABC):
+class FittedPerJoint(OnFrontEnd, ABC):
     """What fitted methods share; with scores they are a ``FittedDetector``."""
 
     front: FrontEnd
@@ -32,21 +31,6 @@ class FittedPerJoint(Frozen, ABC):
         """Check: ``ValueError``."""
         if self.limits.shape != (len(self.scaling.joints),) or not (self.limits > 0).all():
             raise ValueError("limits: expected one number above 0 a joint")
-
-    @property
-    def arm(self) -> ArmModel:
-        """The calibrated arm."""
-        return self.front.arm
-
-    @property
-    def dt(self) -> float:
-        """Sample interval [s]."""
-        return self.front.dt
-
-    @property
-    def settle(self) -> float:
-        """Until the estimator has settled [s]."""
-        return self.front.settle
 
 
 Fitted = TypeVar("Fitted", bound=FittedPerJoint)

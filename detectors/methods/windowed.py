@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
+from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.features.training import Prepared, draw_windows, peaks, severity_target
 from tauguard.detectors.features.windows import WindowShape
-from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
 from tauguard.traces.trace import Trace
 
@@ -133,7 +132,7 @@ def evaluated(
 
 
 @dataclass(frozen=True, eq=False)
-class FittedWindowed(Frozen):
+class FittedWindowed(OnFrontEnd):
     """A fitted regressor on windows: a :class:`~tauguard.detectors.detector.FittedDetector`."""
 
     name: str
@@ -141,21 +140,6 @@ class FittedWindowed(Frozen):
     scaling: Scaling
     shape: WindowShape
     regressor: Regressor
-
-    @property
-    def arm(self) -> ArmModel:
-        """The calibrated arm."""
-        return self.front.arm
-
-    @property
-    def dt(self) -> float:
-        """Sample interval [s]."""
-        return self.front.dt
-
-    @property
-    def settle(self) -> float:
-        """Until the payload is found [s]."""
-        return self.front.settle
 
     def scores(self, trace: Trace) -> Array:
         """Output of the regressor, shape (T,)."""
