@@ -27,6 +27,7 @@ from tauguard.datasets.configuration import Configuration, Split
 from tauguard.datasets.schedule import Planned, planned
 from tauguard.detectors import RobotNumbers, observe
 from tauguard.envs import Simulation, SimulationDiverged
+from tauguard.envs.plant import untimed
 from tauguard.models import Drive, cura6, pin_model
 from tauguard.traces import Trace
 from tauguard.traces.whole_file import whole_file, write_whole
@@ -97,7 +98,8 @@ def make_shard(task: ShardTask) -> Done:
     folder = Path(task.folder)
     kept = fault(folder, task.split, task.number) is None
     if not kept:
-        _write(folder, task, configuration, [planned(configuration, split, n) for n in numbers])
+        with untimed():
+            _write(folder, task, configuration, [planned(configuration, split, n) for n in numbers])
     return Done(task.split, task.number, len(numbers), len(numbers) * split.seconds, kept)
 
 

@@ -149,3 +149,15 @@ class Plant:
 def step_all(
     plants: Sequence[Plant], actions: _Array, mask: NDArray[np.bool_], threads: int
 ) -> None: ...
+def poses(
+    physics: Physics,
+    qpos: Sequence[int],
+    q: _Array,
+    bodies: Sequence[int],
+    joints: Sequence[int],
+    *,
+    position: _Array,
+    rotation: _Array,
+    anchor: _Array,
+    axis: _Array,
+) -> None: ...

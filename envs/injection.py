@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tauguard.envs.episode import CollisionPlan
 from tauguard.envs.motions import Motion
+from tauguard.envs.poses import Poses, cross
 from tauguard.models import Scene
 
 Array = NDArray[np.float64]
@@ -18,8 +19,10 @@ Array = NDArray[np.float64]
 CLAMP_SPEED = 0.005
 #: Shortest and longest way of the link's surface past the sample of a clamp [m].
 CLAMP_TRAVEL = (0.002, 0.06)
-#: A clamp stands for its duration and this long [s]; its path is looked at in strides of [s].
-CLAMP_HOLD, CLAMP_STRIDE = 0.1, 0.02
+#: A clamp stands for its duration and this long [s].
+CLAMP_HOLD = 0.1
+#: A motion is looked at in strides of this length [s], with this many rays at each.
+STRIDE, CASTS = 0.02, 8
 #: An obstacle is in place this long before it touches [s].
 LEAD = 0.15
 
@@ -35,105 +38,189 @@ class Target:
     velocity: Array  #: of the surface point [m/s]
 
 
+@dataclass(frozen=True)
+class _Way:
+    """A link and the arm's joints at some rows of the motion; the link for a while longer."""
+
+    rows: list[int]  #: R of them
+    body: int  #: MuJoCo body of the link
+    position: Array  #: of the link's origin [m], shape (R or more, 3)
+    rotation: Array  #: of the link, shape (R or more, 3, 3)
+    anchor: Array  #: on the joints' axes [m], shape (R, n, 3)
+    axis: Array  #: of the joints, shape (R, n, 3)
+    speed: Array  #: of the link's origin [m/s], shape (R, 3)
+    spin: Array  #: of the link [rad/s], shape (R, 3)
+
+    def velocity(self, number: int, points: Array) -> Array:
+        """Of points of the link, shape (..., 3), at the ``number``-th row [m/s]."""
+        arm = points - self.position[number]
+        return np.asarray(self.speed[number] + cross(self.spin[number], arm))
+
+
 class Aim:
     """Finds surface points of a scene's links by ray casting along a motion."""
 
     def __init__(self, scene: Scene, motion: Motion) -> None:
         """For the scene's collision geometry and the motion's references."""
         self._scene, self._motion = scene, motion
-        self._data = mujoco.MjData(scene.model)
-        self._ahead = mujoco.MjData(scene.model)
+        self._data, self._poses = mujoco.MjData(scene.model), Poses(scene)
+        self._dt = float(motion.t[1] - motion.t[0])
+        self._stride = max(1, round(STRIDE / self._dt))
         model = scene.model
         links = np.isin(model.geom_bodyid, scene.link_bodies)
-        self._solid = links & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+        solid = links & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
         self._groups = np.zeros(6, dtype=np.uint8)
-        self._groups[model.geom_group[self._solid]] = 1
+        self._groups[model.geom_group[solid]] = 1
+        self._geoms = [
+            np.flatnonzero(solid & (model.geom_bodyid == body)).tolist()
+            for body in scene.link_bodies
+        ]
+        self._still = np.abs(motion.qd).max(axis=1) <= 1e-9
 
     def find(self, plan: CollisionPlan, rng: np.random.Generator, last: int) -> Target | None:
         """A target for ``plan`` at the first sample that offers one, up to sample ``last``."""
-        dt = float(self._motion.t[1] - self._motion.t[0])
-        first = round(plan.time / dt)
-        for row in range(first, max(first + 1, last), max(1, round(0.02 / dt))):
-            if plan.at_rest and np.abs(self._motion.qd[row]).max() > 1e-9:
+        first = round(plan.time / self._dt)
+        way = self._way(plan, range(first, max(first + 1, last), self._stride))
+        usable = self._quick_enough(plan, way)
+        for number, row in enumerate(way.rows):
+            if plan.at_rest and not self._still[row]:
                 continue
-            self._pose(row)
-            for _ in range(8):
-                target = self._cast(plan, row, rng)
-                if target is not None:
-                    return target
+            if not usable[number]:
+                self._draw(plan, rng, CASTS)
+                continue
+            target = self._cast(plan, way, number, rng)
+            if target is not None:
+                return target
         return None
 
-    def _pose(self, row: int) -> None:
-        scene, data = self._scene, self._data
-        data.qpos[scene.qpos_adr] = self._motion.q[row]
-        data.qvel[:] = 0
-        data.qvel[scene.dof_adr] = self._motion.qd[row]
-        mujoco.mj_kinematics(scene.model, data)
-        mujoco.mj_comPos(scene.model, data)
+    def _way(self, plan: CollisionPlan, rows: range) -> _Way:
+        body = int(self._scene.link_bodies[plan.link - 1])
+        longer = self._standing(plan) if plan.kind == "clamp" else 1
+        stops = slice(rows.start, rows[-1] + longer, self._stride)
+        position, rotation = self._poses.body(self._motion.q[stops], body)
+        at = np.array(rows)
+        anchor, axis = self._poses.joints(self._motion.q[at])
+        speed, spin = np.zeros((len(at), 3)), np.zeros((len(at), 3))
+        for joint in self._poses.moving[plan.link - 1]:
+            turn = self._motion.qd[at, joint, None] * axis[:, joint]
+            if self._poses.sliding[joint]:
+                speed += turn
+            else:
+                spin += turn
+                speed += cross(turn, position[: len(at)] - anchor[:, joint])
+        return _Way(list(rows), body, position, rotation, anchor, axis, speed, spin)
 
-    def _cast(self, plan: CollisionPlan, row: int, rng: np.random.Generator) -> Target | None:
-        scene, data = self._scene, self._data
-        body = int(scene.link_bodies[plan.link - 1])
-        inside = self._inside(body, rng)
+    def _quick_enough(self, plan: CollisionPlan, way: _Way) -> NDArray[np.bool_]:
+        """At which rows some point that :meth:`_inside` gives may be quick enough for a clamp.
+
+        Speed is convex along a line, so that the ends of the line in each geom have the largest.
+        """
+        if plan.kind != "clamp":
+            return np.ones(len(way.rows), dtype=bool)
+        model, count = self._scene.model, len(way.rows)
+        fastest = np.zeros(count)
+        for geom in self._geoms[plan.link - 1]:
+            turned = np.zeros(9)
+            mujoco.mju_quat2Mat(turned, model.geom_quat[geom])
+            for end in (-0.8, 0.8):
+                local = model.geom_pos[geom] + end * model.geom_size[geom, 1] * turned[2::3]
+                speed = way.speed + cross(way.spin, way.rotation[:count] @ local)
+                fastest = np.maximum(fastest, np.linalg.norm(speed, axis=1))
+        return fastest > 0.999 * CLAMP_SPEED
+
+    def _draw(
+        self, plan: CollisionPlan, rng: np.random.Generator, count: int
+    ) -> tuple[list[int], Array, Array]:
+        """What ``count`` casts need: geoms, places along their axes, pushes (none for clamps)."""
+        own, size = self._geoms[plan.link - 1], self._scene.model.geom_size
+        if plan.kind == "clamp" and len(own) == 1:  # nothing is drawn to choose one of one
+            reach = float(size[own[0], 1]) * 0.8
+            return own * count, rng.uniform(-reach, reach, count), np.zeros((count, 3))
+        geoms, places, pushes = [], np.empty(count), np.zeros((count, 3))
+        for k in range(count):
+            geom = own[int(rng.integers(len(own)))]
+            reach = float(size[geom, 1]) * 0.8
+            geoms.append(geom)
+            places[k] = rng.uniform(-reach, reach)
+            if plan.kind != "clamp":
+                pushes[k] = rng.normal(size=3)
+        return geoms, places, pushes
+
+    def _cast(
+        self, plan: CollisionPlan, way: _Way, number: int, rng: np.random.Generator
+    ) -> Target | None:
+        """The first target of :data:`CASTS` rays at a row; only what it took is drawn."""
+        data = self._data
+        data.qpos[self._scene.qpos_adr] = self._motion.q[way.rows[number]]
+        mujoco.mj_kinematics(self._scene.model, data)
+        before = rng.bit_generator.state
+        geoms, places, pushes = self._draw(plan, rng, CASTS)
+        inside = data.geom_xpos[geoms] + data.geom_xmat[geoms][:, 2::3] * places[:, None]
         if plan.kind == "clamp":
-            velocity = self._velocity(body, inside)
-            speed = float(np.linalg.norm(velocity))
-            if speed < CLAMP_SPEED:
-                return None
-            push = -velocity / speed
-        else:
-            push = rng.normal(size=3)
-            push /= np.linalg.norm(push)
-        origin = inside - 2.0 * push
-        geom = np.full(1, -1, dtype=np.int32)
-        distance = mujoco.mj_ray(
-            scene.model, data, origin, push, self._groups, 1, -1, geom, np.zeros(3)
-        )
-        if distance < 0 or scene.model.geom_bodyid[geom[0]] != body:
-            return None
-        point = origin + distance * push
-        if not self._reaches(plan, body, point, push):
-            return None
-        if plan.kind == "clamp" and not self._stops_soon(plan, row, body, point, push):
-            return None
-        return Target(row, body, point, push, self._velocity(body, point))
+            pushes = -way.velocity(number, inside)
+        size = np.sqrt((pushes**2).sum(axis=1))
+        quick = size >= (CLAMP_SPEED if plan.kind == "clamp" else 0.0)
+        pushes /= np.where(size > 0, size, 1.0)[:, None]
+        points, hit = self._hits(way.body, inside, pushes, quick)
+        if plan.kind == "clamp":
+            hit &= self._stops_soon(plan, way, number, points, pushes)
+        for taken in np.flatnonzero(hit):
+            point, push = points[taken], pushes[taken]
+            if self._reaches(plan, way, number, point, push):
+                rng.bit_generator.state = before
+                self._draw(plan, rng, int(taken) + 1)
+                speed = way.velocity(number, point)
+                return Target(way.rows[number], way.body, point, push, speed)
+        return None
 
-    def _reaches(self, plan: CollisionPlan, body: int, point: Array, push: Array) -> bool:
+    def _hits(
+        self, body: int, inside: Array, pushes: Array, wanted: NDArray[np.bool_]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Where rays towards points in a body meet it, and whether they do so before another."""
+        model, geom, normal = self._scene.model, np.full(1, -1, dtype=np.int32), np.zeros(3)
+        origins, distances = inside - 2.0 * pushes, np.zeros(len(inside))
+        hit = wanted.copy()
+        for k in np.flatnonzero(wanted):
+            distances[k] = mujoco.mj_ray(
+                model, self._data, origins[k], pushes[k], self._groups, 1, -1, geom, normal
+            )
+            hit[k] = distances[k] >= 0 and model.geom_bodyid[geom[0]] == body
+        return origins + distances[:, None] * pushes, hit
+
+    def _reaches(
+        self, plan: CollisionPlan, way: _Way, number: int, point: Array, push: Array
+    ) -> bool:
         """Whether some force of the plan's range gives a torque of its severity here."""
         if plan.severity is None or plan.force is None:
             return True
-        model, jac = self._scene.model, np.zeros((3, self._scene.model.nv))
-        mujoco.mj_jac(model, self._data, jac, None, point, body)
-        lever = float(np.abs(push @ jac[:, self._scene.dof_adr[:4]]).max())
+        levers = [0.0]
+        for joint in self._poses.moving[plan.link - 1]:
+            along = way.axis[number, joint]
+            arm = (
+                push
+                if self._poses.sliding[joint]
+                else cross(point - way.anchor[number, joint], push)
+            )
+            levers += [abs(float(along @ arm))] if joint < 4 else []
         low, high = plan.severity
-        return low < lever * plan.force[1] and lever * plan.force[0] < high
+        return low < max(levers) * plan.force[1] and max(levers) * plan.force[0] < high
+
+    def _standing(self, plan: CollisionPlan) -> int:
+        return round((plan.duration + CLAMP_HOLD) / self._dt)
 
     def _stops_soon(
-        self, plan: CollisionPlan, row: int, body: int, point: Array, push: Array
-    ) -> bool:
+        self, plan: CollisionPlan, way: _Way, number: int, points: Array, pushes: Array
+    ) -> NDArray[np.bool_]:
         """Whether the surface goes on for a little way only: it presses and does not sweep."""
-        stride = max(1, round(CLAMP_STRIDE / float(self._motion.t[1])))
-        stop = row + round((plan.duration + CLAMP_HOLD) / float(self._motion.t[1]))
-        path = body_points(self._scene, self._motion.q[row:stop:stride], body, point, self._ahead)
-        ahead = float((-(path - point) @ push).max())
-        return CLAMP_TRAVEL[0] <= ahead <= CLAMP_TRAVEL[1]
-
-    def _inside(self, body: int, rng: np.random.Generator) -> Array:
-        """A point near the middle of one of the link's collision geoms."""
-        model = self._scene.model
-        geoms = np.flatnonzero(self._solid & (model.geom_bodyid == body))
-        geom = geoms[int(rng.integers(len(geoms)))]
-        axis = self._data.geom_xmat[geom].reshape(3, 3)[:, 2]
-        reach = float(model.geom_size[geom, 1]) * 0.8
-        inside: Array = self._data.geom_xpos[geom] + axis * rng.uniform(-reach, reach)
-        return inside
-
-    def _velocity(self, body: int, point: Array) -> Array:
-        model, data = self._scene.model, self._data
-        jac = np.zeros((3, model.nv))
-        mujoco.mj_jac(model, data, jac, None, point, body)
-        velocity: Array = jac @ data.qvel
-        return velocity
+        count = len(range(0, self._standing(plan), self._stride))
+        stand = slice(number, number + count)
+        position, rotation = way.position[stand], way.rotation[stand]
+        local = (points - position[0]) @ rotation[0]
+        # The way along -push of each point: rows x points.
+        turned = np.einsum("pi,tij,pj->tp", pushes, rotation, local)
+        along = turned + position @ pushes.T - (points * pushes).sum(axis=1)
+        reach = (-along).max(axis=0)
+        return np.asarray((reach >= CLAMP_TRAVEL[0]) & (reach <= CLAMP_TRAVEL[1]))
 
 
 def pulse_wrench(
@@ -159,7 +246,7 @@ def pulse_wrench(
     size = np.where(during, np.sin(np.pi * np.clip(steps * dt / duration, 0, 1)), 0.0)
     table[:, :3] = force * size[:, None] * target.direction
     moved = target.point + np.outer(steps * dt, target.velocity)
-    table[:, 3:] = np.cross(moved - com, table[:, :3])
+    table[:, 3:] = cross(moved - com, table[:, :3])
     return table
 
 
@@ -184,29 +271,3 @@ def clamp_centre(target: Target, path: Array, depth: float, radius: float) -> Ar
     """
     ahead = float((-(path - target.point) @ target.direction).max(initial=0.0))
     return target.point - (ahead - depth + radius) * target.direction
-
-
-def body_points(
-    scene: Scene,
-    q: Array,
-    body: int,
-    point: Array | None = None,
-    data: mujoco.MjData | None = None,
-) -> Array:
-    """World path of a body-fixed point along joint positions (T, n), shape (T, 3) [m].
-
-    ``point`` is given in the world at ``q[0]``; the default is the body's centre of mass. ``data``
-    is scratch space: where many short paths are asked for, making it costs more than they do.
-    """
-    model = scene.model
-    data = mujoco.MjData(model) if data is None else data
-    path, local = np.empty((len(q), 3)), None
-    for row, position in enumerate(q):
-        data.qpos[scene.qpos_adr] = position
-        mujoco.mj_kinematics(model, data)
-        frame = data.xmat[body].reshape(3, 3)
-        if local is None:
-            start = data.xipos[body] if point is None else point
-            local = frame.T @ (start - data.xpos[body])
-        path[row] = data.xpos[body] + frame @ local
-    return path

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.models import Scene
+from tauguard.envs.poses import Poses, cross
 from tauguard.traces import Collision
 
 Array = NDArray[np.float64]
@@ -36,28 +35,28 @@ class Wrenches:
         return cls(-contact[:, :, 1:4], -contact[:, :, 4:7], contact[:, :, 7:10].copy())
 
 
-def external_torque(scene: Scene, q: Array, wrenches: Wrenches) -> Array:
+def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
     """``tau_ext``: the sum of J^T w over the links [N m], shape (T, n).
 
     Args:
-        scene: whose kinematics to use.
+        poses: of the scene.
         q: true joint positions [rad], shape (T, n).
         wrenches: what pushes the links; rows without any cost nothing.
     """
     tau = np.zeros_like(q)
     pushed = (wrenches.force != 0).any(axis=2) | (wrenches.torque != 0).any(axis=2)
-    model, data = scene.model, mujoco.MjData(scene.model)
-    jac_p, jac_r = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-    for row in np.flatnonzero(pushed.any(axis=1)):
-        data.qpos[scene.qpos_adr] = q[row]
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        for link in np.flatnonzero(pushed[row]):
-            body = int(scene.link_bodies[link])
-            mujoco.mj_jac(model, data, jac_p, jac_r, wrenches.point[row, link], body)
-            tau[row] += (
-                jac_p.T @ wrenches.force[row, link] + jac_r.T @ wrenches.torque[row, link]
-            )[scene.dof_adr]
+    touched = np.flatnonzero(pushed.any(axis=1))
+    anchor, axis = poses.joints(q[touched])
+    for link, moving in enumerate(poses.moving):
+        here = np.flatnonzero(pushed[touched, link])
+        rows = touched[here]
+        force, torque = wrenches.force[rows, link], wrenches.torque[rows, link]
+        point = wrenches.point[rows, link]
+        for joint in moving:
+            along, arm = axis[here, joint], point - anchor[here, joint]
+            turned = torque + cross(arm, force)
+            work = force if poses.sliding[joint] else turned
+            tau[rows, joint] += np.einsum("ij,ij->i", along, work)
     return tau
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import mujoco
 import numpy as np
@@ -31,6 +31,10 @@ class Recording:
     current: Array  #: true motor currents, held over the step [A], shape (T, n)
     contact: Array  #: contact sensors [found, N, N m, m], shape (T, links, SENSOR_WIDTH)
     poses: Array  #: obstacle positions and quaternions (wxyz), shape (T, obstacles, 7)
+
+    def rows(self, begin: int, end: int) -> Recording:
+        """A view of some of the rows."""
+        return Recording(*(getattr(self, f.name)[begin:end] for f in fields(self)))
 
 
 class SimulationLoop:
@@ -81,6 +85,17 @@ class SimulationLoop:
         mujoco.mj_setState(self.model, self.data, saved[0], mujoco.mjtState.mjSTATE_INTEGRATION)
         self._plant.restore(saved[1].tolist())
 
+    def recording(self, rows: int) -> Recording:
+        """Room for so many rows."""
+        joints, links = len(self.scene.joint_names), self._sensors[1] // SENSOR_WIDTH
+        return Recording(
+            q=np.empty((rows, joints)),
+            qd=np.empty((rows, joints)),
+            current=np.empty((rows, joints)),
+            contact=np.zeros((rows, links, SENSOR_WIDTH)),
+            poses=np.empty((rows, len(self._obstacles), 7)),
+        )
+
     def run(
         self,
         q_des: Array,
@@ -88,6 +103,7 @@ class SimulationLoop:
         tau_ff: Array,
         wrench: Array | None = None,
         wrench_body: int = -1,
+        out: Recording | None = None,
     ) -> Recording:
         """Run one step per row of the references.
 
@@ -98,24 +114,18 @@ class SimulationLoop:
             wrench: force [N] and torque about the centre of mass [N m] in the world frame, applied
                 to ``wrench_body``, shape (T, 6).
             wrench_body: id of the body that the wrench acts on.
+            out: T rows to write into (default: new ones).
 
         Raises:
             SimulationDiverged: a joint position is not finite or a velocity beyond 1000 rad/s.
         """
-        rows, joints = q_des.shape
-        links = self._sensors[1] // SENSOR_WIDTH
-        out = Recording(
-            q=np.empty((rows, joints)),
-            qd=np.empty((rows, joints)),
-            current=np.empty((rows, joints)),
-            contact=np.zeros((rows, links, SENSOR_WIDTH)),
-            poses=np.empty((rows, len(self._obstacles), 7)),
-        )
+        rows = len(q_des)
+        out = self.recording(rows) if out is None else out
         track = _plant.Track(
             q=out.q,
             qd=out.qd,
             current=out.current,
-            sensors=out.contact.reshape(rows, links * SENSOR_WIDTH),
+            sensors=out.contact.reshape(rows, self._sensors[1]),
             poses=out.poses,
             bodies=self._obstacles,
             sensor_begin=self._sensors[0],

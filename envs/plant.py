@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,6 +83,20 @@ def _address(function: str) -> int:
     return address
 
 
+@contextlib.contextmanager
+def untimed() -> Iterator[None]:
+    """In this block MuJoCo does not look at the clock in every step (for ``MjData.timer``).
+
+    That is a tenth of a small arm's step. It holds for the whole process.
+    """
+    timer = ctypes.c_void_p.in_dll(_library(), "mjcb_time")
+    before, timer.value = timer.value, None
+    try:
+        yield
+    finally:
+        timer.value = before
+
+
 def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) -> _plant.Plant:
     """The plant that steps ``data``, which it keeps alive, as well as the scene's model.
 
@@ -92,11 +108,16 @@ def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) 
     """
     model = scene.model
     dt, constant = float(model.opt.timestep), scene.drive.electrical_time_constant
-    physics = _plant.Physics(
-        model, data, step=_address("mj_step"), kinematics=_address("mj_kinematics")
-    )
+    physics = make_physics(model, data)
     decay = float(np.exp(-dt / constant)) if constant else 0.0
     return _plant.Plant(physics, _joints(scene, nominal, gains), dt=dt, decay=decay)
+
+
+def make_physics(model: mujoco.MjModel, data: mujoco.MjData) -> _plant.Physics:
+    """MuJoCo's step and kinematics of ``data`` for native code, which keeps both alive."""
+    return _plant.Physics(
+        model, data, step=_address("mj_step"), kinematics=_address("mj_kinematics")
+    )
 
 
 def _joints(scene: Scene, nominal: Drive, gains: Gains) -> list[_plant.Joint]:

@@ -18,6 +18,7 @@ from tauguard.envs.checking import checked
 from tauguard.envs.episode import CollisionPlan, Episode, PayloadPick
 from tauguard.envs.loop import Recording, SimulationLoop
 from tauguard.envs.motions import Workspace, random_motion
+from tauguard.envs.poses import Poses
 from tauguard.envs.striking import Striking, Window
 from tauguard.models import (
     Clamp,
@@ -77,8 +78,8 @@ def workspace(scene: Scene) -> Workspace:
     )
 
 
-def scene_for(episode: Episode) -> Scene:
-    """The scene that an episode needs, and nothing else."""
+def scene_for(episode: Episode, visuals: bool = True) -> Scene:
+    """The scene that an episode needs, and nothing else; ``visuals`` as for ``compose``."""
     kinds = {plan.kind for plan in episode.collisions}
     carries = episode.payload_g > 0 or any(pick.payload_g > 0 for pick in episode.picks)
     scene = compose(
@@ -90,7 +91,8 @@ def scene_for(episode: Episode) -> Scene:
             striker=Striker() if "strike" in kinds else None,
             clamp=Clamp() if "clamp" in kinds else None,
             labels=bool(kinds & {"strike", "clamp"}),
-        )
+        ),
+        visuals,
     )
     drive = scene.drive
     if episode.ideal_drive:
@@ -118,7 +120,7 @@ class Simulation:
         """
         self._checkers = [_known(c) for c in checkers]
         self.episode = episode
-        self.scene = scene_for(episode)
+        self.scene = scene_for(episode, visuals=bool(checkers))
         self.nominal = nominal or self.scene.facts.nominal
         streams = np.random.SeedSequence(episode.seed).spawn(3)
         motion_rng, aim_rng, self._sensor_rng = map(np.random.default_rng, streams)
@@ -136,13 +138,13 @@ class Simulation:
         self._feed_forward = self._feed_forward + self._known_friction()
         self.loop = SimulationLoop(self.scene, self.nominal)
         self.loop.reset(self.motion.q[0])
+        self._recording = self.loop.recording(len(self.motion.t))
         self.striking = Striking(self.scene, self.motion, self.loop, self._follow, aim_rng)
         self._payload = 0.0
         self._windows: list[Window] = []
 
     def run(self) -> Trace:
         """Simulate the whole episode."""
-        parts: list[Recording] = []
         payload = np.full(len(self.motion.t), self.episode.payload_g / 1000)
         row, injected = 0, []
         jobs: list[CollisionPlan | PayloadPick] = [*self.episode.collisions, *self.episode.picks]
@@ -152,19 +154,18 @@ class Simulation:
             stop = len(payload) if index + 1 == len(jobs) else self._row(jobs[index + 1].time)
             start = max(row, self._row(job.time))
             if isinstance(job, CollisionPlan):
-                start, window = self.striking.carry_out(job, row, start, stop, parts)
+                start, window = self.striking.carry_out(job, row, start, stop)
                 if window is not None:
                     injected.append((window.begin * self.episode.timestep, job.kind))
-                    parts.append(window.recording)
                     self._windows.append(window)
                     start = window.begin + len(window.recording.q)
             else:
-                parts.append(self._follow(row, start))
+                self._follow(row, start)
                 self._carry(job.payload_g)
                 payload[start:] = job.payload_g / 1000
             row = start
-        parts.append(self._follow(row, len(payload)))
-        return self._trace(_joined(parts), payload, injected)
+        self._follow(row, len(payload))
+        return self._trace(self._recording, payload, injected)
 
     def _known_friction(self) -> Array:
         """What the servo adds to make up for the friction that it knows of [N m], (T, n)."""
@@ -188,7 +189,12 @@ class Simulation:
     ) -> Recording:
         rows = slice(start, stop)
         return self.loop.run(
-            self.motion.q[rows], self.motion.qd[rows], self._feed_forward[rows], wrench, body
+            self.motion.q[rows],
+            self.motion.qd[rows],
+            self._feed_forward[rows],
+            wrench,
+            body,
+            self._recording.rows(start, stop),
         )
 
     def _trace(
@@ -203,7 +209,7 @@ class Simulation:
             wrenches.force[rows] = window.wrenches.force
             wrenches.torque[rows] = window.wrenches.torque
             wrenches.point[rows] = window.wrenches.point
-        tau_ext = labels.external_torque(scene, recording.q, wrenches)
+        tau_ext = labels.external_torque(Poses(scene), recording.q, wrenches)
         truth = _truth(motion.t, scene, recording, wrenches, tau_ext, payload, injected)
         sensors = scene.drive.sensors
         q, qd, current = recording.q, recording.qd, recording.current
@@ -234,15 +240,6 @@ class Simulation:
                 "episode.json": episode.to_json(),
             },
         )
-
-
-def _joined(parts: list[Recording]) -> Recording:
-    return Recording(
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("q", "qd", "current", "contact", "poses")
-        )
-    )
 
 
 def _truth(

@@ -15,13 +15,13 @@ from tauguard.envs.injection import (
     LEAD,
     Aim,
     Target,
-    body_points,
     clamp_centre,
     launch,
     pulse_wrench,
 )
 from tauguard.envs.loop import Recording, SimulationLoop
 from tauguard.envs.motions import Motion
+from tauguard.envs.poses import Poses, cross
 from tauguard.models import Scene
 
 Array = NDArray[np.float64]
@@ -57,12 +57,12 @@ class Window:
 
 
 class Follow(Protocol):
-    """Runs the loop along the motion's rows, pushing a body with a wrench if one is given."""
+    """Runs the loop along the motion's rows and records them, over what was recorded before."""
 
     def __call__(
         self, start: int, stop: int, wrench: Array | None = None, body: int = -1
     ) -> Recording:
-        """Rows ``start`` to ``stop``."""
+        """Rows ``start`` to ``stop``, with a wrench on a body if one is given."""
 
 
 class Striking:
@@ -79,38 +79,38 @@ class Striking:
         """For one scene and its motion; ``rng`` draws where and which way it is struck."""
         self._scene, self._motion, self._loop, self._follow = scene, motion, loop, follow
         self._rng = rng
+        self._aim, self._poses = Aim(scene, motion), Poses(scene)
         self._dt = float(scene.model.opt.timestep)
 
     def _row(self, time: float) -> int:
         return round(time / self._dt)
 
     def carry_out(
-        self, plan: CollisionPlan, row: int, start: int, stop: int, parts: list[Recording]
+        self, plan: CollisionPlan, row: int, start: int, stop: int
     ) -> tuple[int, Window | None]:
-        """Runs up to the collision's window (into ``parts``) and carries the collision out there.
+        """Runs from ``row`` up to the collision's window and carries the collision out there.
 
         Returns:
             The row reached before the window, and the window; none where no target fitted.
         """
         lead = 0 if plan.kind == "pulse" else self._row(LEAD)
         tail = self._row(0.3 if plan.kind == "strike" else plan.duration + CLAMP_HOLD)
-        aim = Aim(self._scene, self._motion)
         late = replace(plan, time=max(plan.time, (row + lead) * self._dt))
         at = row
         for attempt in range(TARGETS):
             late = self._relaxed(late, attempt)
-            target = aim.find(late, self._rng, stop - tail)
+            target = self._aim.find(late, self._rng, stop - tail)
             if target is None or target.row + tail > stop or target.row - lead < at:
                 continue
             begin = target.row - lead
-            parts.append(self._follow(at, begin))
+            self._follow(at, begin)
             at = begin
             saved = self._loop.save()
             window = self._search(late, target, begin, target.row + tail)
             if window is not None:
                 return begin, window
             self._loop.restore(saved)
-        parts.append(self._follow(at, max(at, start)))
+        self._follow(at, max(at, start))
         return max(at, start), None
 
     def _relaxed(self, plan: CollisionPlan, attempt: int) -> CollisionPlan:
@@ -161,11 +161,11 @@ class Striking:
         self, plan: CollisionPlan, target: Target, strength: float, begin: int, end: int
     ) -> Window | None:
         """The window with this strength; ``None`` where the obstacle touched too early."""
-        scene, dt = self._scene, self._dt
+        dt = self._dt
         rows = end - begin
         wrench, body = None, -1
         if plan.kind == "pulse":
-            com = body_points(scene, self._motion.q[begin:end], target.body)
+            com = self._poses.points(self._motion.q[begin:end], target.body)
             wrench = pulse_wrench(target, com, strength, plan.duration, dt, rows, 0)
             body = target.body
         elif plan.kind == "strike":
@@ -181,7 +181,7 @@ class Striking:
         )
         if plan.kind != "pulse" and (wrenches.force[: self._row(CLEAR)] != 0).any():
             return None
-        tau = labels.external_torque(scene, recording.q, wrenches)
+        tau = labels.external_torque(self._poses, recording.q, wrenches)
         peak_tau = float(np.abs(tau[:, :4]).max(initial=0.0))
         peak_force = float(np.linalg.norm(wrenches.force, axis=2).max(initial=0.0))
         return Window(begin, recording, wrenches, peak_tau, peak_force)
@@ -198,7 +198,7 @@ class Striking:
         model = self._scene.model
         body = model.body("clamp")
         references = self._motion.q[target.row : end]
-        path = body_points(self._scene, references, target.body, target.point)
+        path = self._poses.points(references, target.body, target.point)
         radius = float(model.geom_size[int(body.geomadr[0]), 0])
         self._loop.data.mocap_pos[body.mocapid[0]] = clamp_centre(target, path, depth, radius)
 
@@ -220,8 +220,8 @@ class Striking:
         link = int(np.flatnonzero(np.asarray(self._scene.link_bodies) == target.body)[0])
         force = wrench[:, :3]
         point = target.point + np.outer(np.arange(rows) * dt, target.velocity)
-        com = body_points(self._scene, recording.q, target.body)
+        com = self._poses.points(recording.q, target.body)
         found.force[:, link] = force
-        found.torque[:, link] = wrench[:, 3:] - np.cross(point - com, force)
+        found.torque[:, link] = wrench[:, 3:] - cross(point - com, force)
         found.point[:, link] = point
         return found

@@ -6,6 +6,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -78,6 +79,33 @@ std::size_t follow(Plant& p, Matrix q_des, Matrix qd_des, Matrix tau_ff, Matrix 
   nb::gil_scoped_release release;
   const tauguard::geometry::RoundToNearest guard;
   return p.follow({q_des.data(), qd_des.data(), tau_ff.data(), p.joints()}, rows, track);
+}
+
+// Where bodies and joints are along joint positions, without dynamics: a row of each table a row of
+// q, whose columns go to the addresses `qpos`.
+void poses(const Physics& physics, const std::vector<int>& qpos, Matrix q,
+           const std::vector<int>& bodies, const std::vector<int>& joints, Held position,
+           Held rotation, Held anchor, Held axis) {
+  const std::size_t rows = q.shape(0), n = qpos.size();
+  if (q.shape(1) != n) throw nb::value_error("q: expected a column an address");
+  if (position.size() != 3 * rows * bodies.size() || rotation.size() != 3 * position.size() ||
+      anchor.size() != 3 * rows * joints.size() || axis.size() != anchor.size())
+    throw nb::value_error("poses: tables of other sizes than asked for");
+  double *p = position.data(), *r = rotation.data(), *o = anchor.data(), *a = axis.data();
+  nb::gil_scoped_release release;
+  const tauguard::geometry::RoundToNearest guard;
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t i = 0; i < n; ++i) physics.qpos()[qpos[i]] = q.data()[row * n + i];
+    physics.kinematics();
+    for (int body : bodies) {
+      p = std::copy_n(physics.position(body), 3, p);
+      r = std::copy_n(physics.rotation(body), 9, r);
+    }
+    for (int joint : joints) {
+      o = std::copy_n(physics.anchor(joint), 3, o);
+      a = std::copy_n(physics.axis(joint), 3, a);
+    }
+  }
 }
 
 void bind_joint(nb::module_& m) {
@@ -256,6 +284,8 @@ NB_MODULE(_plant, m) {
   bind_outputs(m);
   bind_plant(m);
   m.def("step_all", &step_all, "plants"_a, "actions"_a, "mask"_a, "threads"_a);
+  m.def("poses", &poses, "physics"_a, "qpos"_a, "q"_a, "bodies"_a, "joints"_a, nb::kw_only(),
+        "position"_a, "rotation"_a, "anchor"_a, "axis"_a);
   m.attr("CONTACT_WIDTH") = contact_width;
   m.attr("SENSOR_WIDTH") = sensor_width;
   m.attr("FIGURES") = static_cast<int>(figures);

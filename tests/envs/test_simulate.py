@@ -5,9 +5,13 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tauguard.envs import CollisionPlan, Episode, PayloadPick, Simulation, labels, simulate
-from tauguard.models import Mismatch
+from tauguard.envs.plant import untimed
+from tauguard.envs.poses import Poses
+from tauguard.models import Mismatch, SceneSpec, compose
 from tauguard.traces import STRATA
 
 KINDS = ("strike", "pulse", "clamp")
@@ -156,3 +160,38 @@ def test_bad_plans_and_keys_are_named():
     with pytest.raises(ValueError, match=r"unknown keys \['sped'\]"):
         Episode.from_json('{"seed": 1, "sped": 3}')
     assert STRATA[0] == (4.0, 8.0)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=10, deadline=None)
+def test_external_torque_is_that_of_mujocos_jacobians(seed):
+    rng = np.random.default_rng(seed)
+    scene = compose(SceneSpec(arm=rng.choice(["cura6", "cura6-long"])), visuals=False)
+    q = rng.uniform(-2, 2, (3, 6))
+    wrenches = labels.Wrenches(*(rng.normal(size=(3, 6, 3)) for _ in range(3)))
+    wrenches.force[1] = wrenches.torque[1] = 0
+    wrenches.force[2, 3] = wrenches.torque[2, 3] = 0
+    found = labels.external_torque(Poses(scene), q, wrenches)
+    data, wanted = mujoco.MjData(scene.model), np.zeros((3, 6))
+    linear, angular = np.zeros((2, 3, scene.model.nv))
+    for row in range(3):
+        data.qpos[scene.qpos_adr] = q[row]
+        mujoco.mj_kinematics(scene.model, data)
+        mujoco.mj_comPos(scene.model, data)
+        for link, body in enumerate(scene.link_bodies):
+            point = wrenches.point[row, link]
+            mujoco.mj_jac(scene.model, data, linear, angular, point, int(body))
+            wanted[row] += (
+                linear.T @ wrenches.force[row, link] + angular.T @ wrenches.torque[row, link]
+            )[scene.dof_adr]
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+def test_mujoco_keeps_its_clock_after_a_run_without_it():
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
+    data = mujoco.MjData(model)
+    with untimed():
+        mujoco.mj_step(model, data)
+        assert data.timer[0].duration == 0
+    mujoco.mj_step(model, data)
+    assert data.timer[0].duration > 0
