@@ -32,9 +32,12 @@ def first_moment(trace: Trace, detection: Detection | None) -> float:
     return min(found, default=float(trace.t[0]))
 
 
-def cut(trace: Trace, detection: Detection | None, start: float) -> tuple[Trace, Detection | None]:
-    """What is left from time ``start`` [s] on; events that end before it are dropped."""
-    rows = slice(int(np.searchsorted(trace.t, start - 1e-9)), None)
+def cut(
+    trace: Trace, detection: Detection | None, start: float, end: float = np.inf
+) -> tuple[Trace, Detection | None]:
+    """What lies between ``start`` and ``end`` [s]; events that lie outside are dropped."""
+    first, last = np.searchsorted(trace.t, [start - 1e-9, end + 1e-9])
+    rows = slice(int(first), int(last))
 
     def rest(value: Any, *names: str) -> dict[str, Any]:
         arrays = {name: getattr(value, name) for name in names}
@@ -44,14 +47,14 @@ def cut(trace: Trace, detection: Detection | None, start: float) -> tuple[Trace,
     if truth is not None:
         arrays = rest(truth, "tau_ext", "contact_force", "payload", "contact_link")
         arrays |= rest(truth, "contact_point", "contact_vector", "obstacle_poses")
-        kept = tuple(c for c in truth.collisions if c.end >= start)
+        kept = tuple(c for c in truth.collisions if c.end >= start and c.onset <= end)
         truth = replace(truth, collisions=kept, **arrays)
     commands = rest(trace, "q_des", "qd_des", "qdd_des")
     signals = rest(trace, "t", "q", "qd", "current")
-    contacts = tuple(one.between(start, np.inf) for one in trace.contacts)
+    contacts = tuple(one.between(start, end) for one in trace.contacts)
     trace = replace(trace, truth=truth, contacts=contacts, **signals, **commands)
     if detection is not None:
-        alarms = tuple(a for a in detection.alarms if a.end >= start)
+        alarms = tuple(a for a in detection.alarms if a.end >= start and a.start <= end)
         said = rest(detection, "t", "residual", "score", "alarm")
         detection = replace(detection, alarms=alarms, **said)
     return trace, detection

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import Any
 
@@ -25,6 +26,14 @@ img { max-width: 100%; height: auto; min-width: 0; } figure { margin: 1rem 0; }
 summary { cursor: pointer; padding: 0.3rem 0; } code { background: #f4f4f4; }
 @media print { nav { display: none; } .wide { overflow: visible; } }
 """
+
+
+@dataclass(frozen=True)
+class Link:
+    """A cell of a table that leads somewhere."""
+
+    address: str  #: relative to the page, or whole
+    text: str
 
 
 def page(title: str, sections: Mapping[str, str]) -> str:
@@ -57,6 +66,8 @@ def tables(rows: Sequence[Mapping[str, Any]], notes: Mapping[str, str]) -> str:
 
 
 def _cell(value: object) -> str:
+    if isinstance(value, Link):
+        return f'<td><a href="{escape(value.address)}">{escape(value.text)}</a></td>'
     text = cell(value)
     mark = f' class="{text}"' if text in ("yes", "no") else ""
     return f"<td{mark}>{escape(text)}</td>"

@@ -355,9 +355,12 @@ from gymnasium.utils.env_checker import check_env
 from tauguard.environments import ENVIRONMENTS
 warnings.simplefilter("error")
 for name in ENVIRONMENTS:
-    env = gymnasium.make(name, render_mode="rgb_array").unwrapped
-    env.metadata = env.metadata | {"render_modes": ["rgb_array"]}  # a window needs a display
-    check_env(env)
+    env = gymnasium.make(name, render_mode="rgb_array")
+    env.reset(seed=0)
+    assert env.render().shape == (480, 640, 3)
+env = gymnasium.make("tauguard/Reach-v0", render_mode="rgb_array").unwrapped
+env.metadata = env.metadata | {"render_modes": ["rgb_array"]}  # a window needs a display
+check_env(env)
 env = gymnasium.make("tauguard/Reach-v0", render_mode="rgb_array")
 env.reset(seed=0)
 a = env.render()

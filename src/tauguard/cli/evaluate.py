@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tauguard.cli.events import EventFolder
     from tauguard.detectors import CollisionAlarm, Matching
     from tauguard.models import LinkSurface
     from tauguard.traces import Detection, Trace
@@ -21,6 +22,8 @@ def command(
     detector: str | None = None,
     json: Path | None = None,
     figure: Path | None = None,
+    events: Path | None = None,
+    late: float = 0.05,
 ) -> None:
     """Evaluate a trained detector on labelled recordings; they must not be those of its training.
 
@@ -33,8 +36,12 @@ def command(
         detector: module:Class of the method, if it is not one of tauguard's own.
         json: write the figures here.
         figure: draw them here (PNG).
+        events: a folder for ten seconds of every missed collision, late detection and false
+            alarm, with a page that `tauguard replay --web` opens.
+        late: with --events, a collision found later than this is an event [s].
     """
     from tauguard.cli.dataset import judged
+    from tauguard.cli.events import EventFolder
     from tauguard.cli.folder import labelled
     from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.detectors import figures, load_model
@@ -51,9 +58,9 @@ def command(
         if data is not None
         else iter([(str(traces), iter(labelled(Path(str(traces)))))])
     )
-    rows = []
+    rows, wrong = [], None if events is None else EventFolder(events, late)
     for name, recordings in parts:
-        matchings, diagnosis = judged_one_by_one(alarm, recordings)
+        matchings, diagnosis = judged_one_by_one(alarm, recordings, name, wrong)
         summary = figures(matchings)
         summary["diagnosis"] = diagnosis
         rows.append({"split": name, **summary} if data is not None else summary)
@@ -63,6 +70,9 @@ def command(
         if figure is not None:
             drawn = figure if data is None else figure.with_stem(f"{figure.stem}-{name}")
             draw(drawn, summary, matchings)
+    if wrong is not None:
+        page = wrong.finish()
+        print(f"{page}: open it with `tauguard replay --web {page.parent}`")
     if json is not None:
         write_json(
             json,
@@ -78,15 +88,20 @@ def command(
 
 
 def judged_one_by_one(
-    alarm: CollisionAlarm, recordings: Iterable[Trace]
+    alarm: CollisionAlarm,
+    recordings: Iterable[Trace],
+    split: str,
+    wrong: EventFolder | None = None,
 ) -> tuple[list[Matching], dict[str, Any]]:
     """Every recording judged, and the figures of what is said after its alarms; one in memory."""
     from tauguard.detectors import diagnosis_figures, match_detection
 
     matchings, said = [], []
-    for trace in recordings:
+    for number, trace in enumerate(recordings, start=1):
         found = alarm.detect(trace)
         matchings.append(match_detection(found, trace, alarm.settle))
+        if wrong is not None:
+            wrong.add(split, number, matchings[-1], (trace, found))
         said += explained(alarm, found, trace)
     return matchings, diagnosis_figures(said)
 

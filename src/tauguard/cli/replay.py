@@ -1,4 +1,4 @@
-"""``tauguard replay FILE.mcap``: a recording for rerun."""
+"""``tauguard replay PATH``: recordings for rerun, in its own window or in a browser."""
 
 from __future__ import annotations
 
@@ -11,22 +11,40 @@ import tyro
 
 
 def command(
-    file: Annotated[Path, tyro.conf.Positional],
+    path: Annotated[Path, tyro.conf.Positional],
     /,
     out: Path | None = None,
     robot: Path | None = None,
     whole: bool = False,
     open: bool = False,
+    web: bool = False,
+    port: int = 0,
 ) -> None:
     """Turn an MCAP recording into an .rrd that shows the arm moving beside its signals.
 
+    With --web it is shown in a browser; so is an .rrd file, or the folder of `evaluate --events`.
+
     Args:
-        file: an MCAP file written by tauguard.
-        out: the recording (default: FILE with the ending .rrd).
-        robot: MJCF or URDF file of the robot (default: the one attached to FILE).
+        path: an MCAP file written by tauguard; with --web also an .rrd file or a folder of them.
+        out: the recording (default: PATH with the ending .rrd).
+        robot: MJCF or URDF file of the robot (default: the one attached to PATH).
         whole: keep what comes before the first detected collision.
         open: show it in the rerun viewer, which listens on 127.0.0.1 only.
+        web: serve it and rerun's web viewer on 127.0.0.1, until interrupted.
+        port: with --web, of the page (default: a free one).
     """
+    shown = path
+    if not (web and (path.is_dir() or path.suffix == ".rrd")):
+        shown = recorded(path, out, robot, whole)
+    if web:
+        serve(shown, port)
+    elif open:
+        viewer = Path(sys.executable).with_name("rerun")
+        subprocess.run([viewer, "--bind", "127.0.0.1", shown], check=False)
+
+
+def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> Path:
+    """The MCAP file as an .rrd file."""
     from tauguard.replay import write_rrd
     from tauguard.traces import read_mcap
 
@@ -34,6 +52,21 @@ def command(
     out = out or file.with_suffix(".rrd")
     write_rrd(out, trace, detection, robot, whole=whole)
     print(f"{out}  ({out.stat().st_size / 1e6:.1f} MB; show it with: rerun {out})")
-    if open:
-        viewer = Path(sys.executable).with_name("rerun")
-        subprocess.run([viewer, "--bind", "127.0.0.1", out], check=False)
+    return out
+
+
+def serve(shown: Path, port: int) -> None:
+    """Serve a recording, or a folder with a page that links to its recordings."""
+    from tauguard.replay.browser import BrowserReplay
+
+    if not shown.exists():
+        raise FileNotFoundError(f"{shown}: no such file or folder")
+    folder = shown if shown.is_dir() else shown.parent
+    if shown.is_dir() and not (shown / "index.html").exists():
+        raise ValueError(
+            f"{shown}: no index.html in it; `tauguard evaluate --events {shown}` writes one"
+        )
+    with BrowserReplay(folder, port) as replay:
+        address = f"{replay.address}/" if shown.is_dir() else replay.url(shown.name)
+        print(f"open {address} in a browser; Ctrl-C ends this", flush=True)
+        replay.wait()

@@ -52,7 +52,7 @@ def test_a_monotone_change_of_the_score_changes_no_alarm(seed, power, shift):
 
 def test_the_guarantee_holds_in_as_many_draws_as_it_says():
     rng = np.random.default_rng(5)
-    kept, draws = 0, 200
+    kept, draws = 0, 120
     for _ in range(draws):
         episodes = [single(p) for p in rng.exponential(size=300)]
         found = guaranteed_threshold(episodes, 2.0, 0.9)

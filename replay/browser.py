@@ -1,0 +1,145 @@
+"""Recordings in a browser: their folder served on 127.0.0.1, beside rerun's own web viewer.
+
+The viewer is the one that comes with the rerun SDK, so it reads what this SDK has written. Nothing
+is fetched from elsewhere.
+"""
+
+from __future__ import annotations
+
+import http.client
+import http.server
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+#: Both servers listen here only; the viewer is waited for this long [s].
+HOST, PATIENCE = "127.0.0.1", 20.0
+#: What is served of a folder.
+SERVED = (".rrd", ".html", ".png")
+
+
+class BrowserReplay:
+    """Serves a folder's recordings and the viewer that shows them, until it is closed."""
+
+    def __init__(self, folder: Path, port: int = 0) -> None:
+        """Start both servers.
+
+        Args:
+            folder: of ``.rrd`` files, and of an ``index.html`` that links to ``open/NAME.rrd``.
+            port: of the folder; 0 for a free one.
+
+        Raises:
+            OSError: the port is taken, or the viewer did not come up.
+        """
+        handler = partial(_Folder, directory=str(folder))
+        try:
+            self._files = _Server((HOST, port), handler)
+        except OSError as error:
+            raise OSError(f"port {port}: {error.strerror}; --port 0 takes a free one") from error
+        self.address = f"http://{HOST}:{self._files.server_address[1]}"
+        threading.Thread(target=self._files.serve_forever, daemon=True).start()
+        viewer_port = _free_port()
+        self._files.viewer = f"http://{HOST}:{viewer_port}"
+        self._files.address = self.address
+        self._viewer = _start_viewer(viewer_port, self.address)
+
+    def url(self, name: str) -> str:
+        """Where a browser sees the recording ``name`` of the folder."""
+        return _viewed(self._files.viewer, self.address, name)
+
+    def wait(self) -> None:
+        """Serve until the viewer ends or the user interrupts."""
+        self._viewer.wait()
+
+    def close(self) -> None:
+        """Stop both servers."""
+        self._viewer.terminate()
+        self._viewer.wait()
+        self._files.shutdown()
+        self._files.server_close()
+
+    def __enter__(self) -> BrowserReplay:
+        """The servers, running."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop both servers."""
+        self.close()
+
+
+class _Server(http.server.ThreadingHTTPServer):
+    """The folder's server, which knows where the viewer is."""
+
+    daemon_threads = True
+    viewer = address = ""
+
+
+class _Folder(http.server.SimpleHTTPRequestHandler):
+    """The folder's own files; ``open/NAME`` leads to the viewer with that recording."""
+
+    server: _Server
+
+    def do_GET(self) -> None:
+        """A file of the folder, the page, or the way to the viewer."""
+        path = unquote(self.path.partition("?")[0])
+        if path.startswith("/open/"):
+            self.send_response(http.HTTPStatus.FOUND)
+            self.send_header("Location", _viewed(self.server.viewer, self.server.address, path[6:]))
+            self.end_headers()
+        elif path == "/" or path.endswith(SERVED):
+            super().do_GET()
+        else:
+            self.send_error(http.HTTPStatus.NOT_FOUND)
+
+    def list_directory(self, path: str | os.PathLike[str]) -> None:
+        """Nothing but what has a name is shown."""
+        self.send_error(http.HTTPStatus.NOT_FOUND)
+
+    def end_headers(self) -> None:
+        """The viewer, and no other page, may read the files."""
+        self.send_header("Access-Control-Allow-Origin", self.server.viewer)
+        super().end_headers()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing of each request."""
+
+
+def _viewed(viewer: str, files: str, name: str) -> str:
+    """The viewer's address with a recording, drawn by WebGL, which every browser has."""
+    return f"{viewer}/?url={quote(f'{files}/{quote(name)}', safe='')}&renderer=webgl"
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def _start_viewer(port: int, files: str) -> subprocess.Popen[bytes]:
+    """rerun's web viewer, once it answers; ``files`` keeps it from opening a port for data."""
+    program = Path(sys.executable).with_name("rerun")
+    options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(port), f"{files}/none.rrd"]
+    quiet = {**os.environ, "RERUN_ANALYTICS": "0", "RUST_LOG": "error"}
+    viewer = subprocess.Popen([program, *options], env=quiet, stdout=subprocess.DEVNULL)
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end and viewer.poll() is None:
+        connection = http.client.HTTPConnection(HOST, port, timeout=1)
+        try:
+            connection.request("HEAD", "/")
+            connection.getresponse()
+        except OSError:
+            time.sleep(0.1)
+        else:
+            return viewer
+        finally:
+            connection.close()
+    viewer.kill()
+    raise OSError(f"the web viewer did not come up on {HOST}:{port} within {PATIENCE:.0f} s")

@@ -1,0 +1,123 @@
+"""What a detector got wrong, as recordings of ten seconds and a page that opens them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tauguard.detectors import Matching
+    from tauguard.traces import Detection, Trace
+
+#: A recording begins this long before its event and lasts this long [s].
+BEFORE, LENGTH = 0.5, 10.0
+#: Recordings written of one kind of event, at most.
+MOST = 100
+KINDS = ("missed", "late", "false alarm")
+
+
+@dataclass(frozen=True)
+class Event:
+    """One thing that a detector got wrong."""
+
+    kind: str  #: one of :data:`KINDS`
+    at: float  #: onset of the collision, or start of the alarm [s]
+    collision: str = ""  #: its kind
+    link: int | None = None
+    peak_torque: float | None = None  #: [N m]
+    delay: float | None = None  #: [s]
+
+
+def events_of(matching: Matching, late: float) -> Iterator[Event]:
+    """Missed collisions, those found later than ``late`` [s], and false alarms, in this order."""
+    pairs = list(zip(matching.collisions, matching.delays, strict=True))
+    for wanted in ("missed", "late"):
+        for c, delay in pairs:
+            kind = "missed" if delay is None else "late" if delay > late else ""
+            if kind == wanted:
+                yield Event(kind, c.onset, c.kind, c.link, c.peak_tau, delay)
+    for alarm in matching.false_alarms:
+        yield Event("false alarm", alarm.start)
+
+
+class EventFolder:
+    """Writes a recording of each event, and in the end the page."""
+
+    def __init__(self, folder: Path, late: float) -> None:
+        """Make the folder.
+
+        Args:
+            folder: new, or one that this has written before.
+            late: collisions found later than this are events [s].
+
+        Raises:
+            ValueError: the folder holds something else.
+        """
+        if folder.exists() and (not folder.is_dir() or _strange(folder)):
+            raise ValueError(f"{folder}: holds other files; --events takes a folder of its own")
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("*.rrd"):
+            old.unlink()
+        self._folder, self._late = folder, late
+        self._rows: list[dict[str, Any]] = []
+        self._found = dict.fromkeys(KINDS, 0)
+
+    def add(self, split: str, number: int, matching: Matching, of: tuple[Trace, Detection]) -> None:
+        """The events of one recording: the ``number``-th of ``split``."""
+        for event in events_of(matching, self._late):
+            self._found[event.kind] += 1
+            if self._found[event.kind] <= MOST:
+                name = f"{event.kind.replace(' ', '-')}-{self._found[event.kind]:03d}.rrd"
+                self._write(name, event, *of)
+                self._rows.append({"split": split, "recording": number, "file": name, **_of(event)})
+
+    def _write(self, name: str, event: Event, trace: Trace, detection: Detection) -> None:
+        from tauguard.replay import write_rrd
+        from tauguard.replay.story import cut
+
+        start = max(float(trace.t[0]), event.at - BEFORE)
+        part, said = cut(trace, detection, start, start + LENGTH)
+        write_rrd(self._folder / name, part, said, whole=True)
+
+    def finish(self) -> Path:
+        """Write the page; its path."""
+        from tauguard.report.page import Link, page, tables
+
+        counts = ", ".join(f"{count} {kind}" for kind, count in self._found.items())
+        how = (
+            f"<p>{counts}. Late is later than {1e3 * self._late:.0f} ms. A recording begins "
+            f"{BEFORE} s before its event and lasts {LENGTH:.0f} s; at most {MOST} of a kind are "
+            f"kept. The links work while <code>tauguard replay --web {self._folder}</code> runs; "
+            "<code>rerun FILE</code> opens a file without it.</p>"
+        )
+        rows = [{**row, "file": Link(f"open/{row['file']}", row["file"])} for row in self._rows]
+        sections = {
+            kind.capitalize(): tables([_shown(row) for row in rows if row["kind"] == kind], {})
+            or "<p>None.</p>"
+            for kind in KINDS
+        }
+        path = self._folder / "index.html"
+        path.write_text(page("What the detector got wrong", {"How to read": how, **sections}))
+        return path
+
+
+def _strange(folder: Path) -> bool:
+    return any(p.suffix != ".rrd" and p.name != "index.html" for p in folder.iterdir())
+
+
+def _of(event: Event) -> dict[str, Any]:
+    return {
+        "kind": event.kind,
+        "at [s]": round(event.at, 3),
+        "collision": event.collision or None,
+        "link": event.link,
+        "peak torque [N m]": None if event.peak_torque is None else round(event.peak_torque, 1),
+        "delay [ms]": None if event.delay is None else round(1e3 * event.delay),
+    }
+
+
+def _shown(row: dict[str, Any]) -> dict[str, Any]:
+    """A row of the page: its kind is the section's name."""
+    return {name: value for name, value in row.items() if name != "kind" and value is not None}

@@ -1,0 +1,107 @@
+"""Recordings in a browser: what is served, to whom, and what a browser shows."""
+
+import http.client
+import io
+import time
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from urllib.parse import unquote
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from tauguard.cli.events import EventFolder
+from tauguard.detectors import match_detection
+from tauguard.replay import write_rrd
+from tauguard.replay.browser import BrowserReplay
+
+
+def beside(name):
+    """A module that stands beside this file."""
+    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+arm, chromium = beside("arm"), beside("chromium")
+
+
+@pytest.fixture(scope="module")
+def replay(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wrong")
+    trace, detection = arm.make()
+    write_rrd(folder / "a b.rrd", trace, detection, whole=True)
+    (folder / "index.html").write_text('<a href="open/a b.rrd">here</a>')
+    (folder / "secret.txt").write_text("not served")
+    with BrowserReplay(folder) as running:
+        yield running
+
+
+def answer(replay, path):
+    connection = http.client.HTTPConnection(*replay.address[7:].split(":"), timeout=10)
+    connection.request("GET", path)
+    response = connection.getresponse()
+    return response, response.read()
+
+
+def test_the_folders_recordings_and_its_page_are_served_and_nothing_else(replay):
+    response, page = answer(replay, "/")
+    assert response.status == 200
+    assert b"open/a b.rrd" in page
+    viewer = replay.url("x").partition("/?")[0]
+    response, recording = answer(replay, "/a%20b.rrd")
+    assert recording[:4] == b"RRF2"
+    assert response.headers["Access-Control-Allow-Origin"] == viewer
+    assert replay.address.startswith("http://127.0.0.1:")
+    for path in ("/secret.txt", "/../secret.txt", "/%2e%2e/x.rrd", "/missing.rrd"):
+        assert answer(replay, path)[0].status == 404
+
+
+def test_a_link_leads_to_the_viewer_with_that_recording(replay):
+    response, _ = answer(replay, "/open/a%20b.rrd")
+    assert response.status == 302
+    target = response.headers["Location"]
+    assert target == replay.url("a b.rrd")
+    assert f"{replay.address}/a%20b.rrd" in unquote(target)
+    viewer = http.client.HTTPConnection(*target[7:].partition("/")[0].split(":"), timeout=10)
+    viewer.request("GET", "/")
+    assert b"rerun" in viewer.getresponse().read().lower()
+
+
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="no Chromium")
+def test_a_browser_shows_the_arm(replay, tmp_path):
+    page = chromium.Page(f"{replay.address}/open/a%20b.rrd", tmp_path / "profile")
+    blue, end = 0, time.monotonic() + 120
+    try:
+        while blue <= 200 and time.monotonic() < end:
+            time.sleep(0.5)
+            picture = matplotlib.image.imread(io.BytesIO(page.picture()))
+            scene = picture[60:330, 10:380, :3]  # the 3D view
+            # as blue as the arm's cylinder
+            blue = ((scene[..., 2] > scene[..., 0] + 0.2) & (scene[..., 2] > 0.3)).sum()
+    finally:
+        page.close()
+    assert blue > 200
+    assert len(np.unique(scene.reshape(-1, 3), axis=0)) > 300  # shaded, not blank
+
+
+def test_every_kind_of_mistake_has_its_recording_and_its_row(tmp_path):
+    trace, detection = arm.make(hits=3)  # the first is missed, two are found after 12 ms
+    alarm = detection.alarms[0]
+    false = type(alarm)(trace.t[50], trace.t[60])
+    said = type(detection)(**{**vars(detection), "alarms": (false, *detection.alarms)})
+    folder = EventFolder(tmp_path / "wrong", late=0.01)
+    folder.add("test", 1, match_detection(said, trace), (trace, said))
+    page = folder.finish().read_text()
+    names = {p.name for p in (tmp_path / "wrong").glob("*.rrd")}
+    assert names == {"missed-001.rrd", "late-001.rrd", "late-002.rrd", "false-alarm-001.rrd"}
+    assert all(f'<a href="open/{name}">{name}</a>' in page for name in names)
+    assert "1 missed, 2 late, 1 false alarm" in page
+
+
+def test_a_folder_of_other_things_is_not_written_into(tmp_path):
+    (tmp_path / "thesis.txt").write_text("keep")
+    with pytest.raises(ValueError, match="other files"):
+        EventFolder(tmp_path, late=0.05)
