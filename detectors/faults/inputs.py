@@ -24,10 +24,17 @@ FASTEST = 20.0
 SPAN = 20e-3
 #: Share of a joint's travel that position and velocity may differ by: filters lag, time jitters.
 SHARE = 0.2
+#: The same over one sample: a time stamp may be half an interval late.
+STEP_SHARE = 0.5
 #: What is allowed beyond that share, over the most that training shows.
 MARGIN = 3.0
 #: Resolution that any encoder is allowed [rad]: training at rest may show none.
 RESOLUTION = 2e-4
+
+#: Samples in a row that may be missing before it is a gap; they are interpolated.
+LATE = 2
+#: Intervals in a row that may be unlike training's, at least.
+ODD = 10
 
 #: By the number that the native check answers: a name, and a text with the joint and the value.
 FAULTS: dict[int, tuple[str, str]] = {
@@ -54,6 +61,7 @@ class UsualInput:
     joint_names: tuple[str, ...]
     dt: float  #: sample interval [s]
     longest: float  #: longest interval that is not a gap [s]
+    odd: int  #: intervals in a row that may be other than ``dt`` by a quarter
     repeats: int  #: samples in a row in which no signal changes
     window: int  #: samples over which velocities are summed
     current: Array  #: largest believable ``|current|`` [A], shape (n,)
@@ -75,7 +83,8 @@ class UsualInput:
         return cls(
             traces[0].joint_names,
             dt,
-            max(2.5 * dt, 1.25 * max(float(np.diff(trace.t).max()) for trace in traces)),
+            max((LATE + 1.3) * dt, 1.25 * max(float(np.diff(trace.t).max()) for trace in traces)),
+            max(ODD, *(2 * _longest_run(_odd(trace, dt)) + 3 for trace in traces)),
             # At least two, so that one packet that comes twice is not called frozen.
             2 + max(_longest_run(np.asarray(_same(trace).all(axis=1))) for trace in traces),
             window,
@@ -87,12 +96,25 @@ class UsualInput:
 
 
 def _beyond(trace: Trace, window: int) -> Array:
-    """Most that position and velocity differ by over ``window`` samples, less SHARE, (n,)."""
+    """Most that position and velocity differ by over ``window`` samples, beyond what is allowed.
+
+    Allowed are a share of the travel, and what a velocity or a time stamp that is late
+    differs by.
+    Shape (n,).
+    """
     travel = np.diff(trace.t)[:, None] * (trace.qd[1:] + trace.qd[:-1]) / 2
     error = np.diff(trace.q, axis=0) - travel
-    return np.asarray(
-        (np.abs(_sums(error, window)) - SHARE * np.abs(_sums(travel, window))).max(axis=0).clip(0)
-    )
+    late = np.minimum(np.abs(np.diff(trace.t) - trace.dt), trace.dt)[:, None]
+    bend = trace.dt * np.abs(np.diff(trace.qd, axis=0)) + late * np.abs(trace.qd[1:])
+    share = STEP_SHARE if window == 1 else SHARE
+    left = np.abs(_sums(error, window)) - share * np.abs(_sums(travel, window))
+    return np.asarray((left - _sums(bend, window)).max(axis=0).clip(0))
+
+
+def _odd(trace: Trace, dt: float) -> NDArray[np.bool_]:
+    """Which intervals are other than ``dt`` by a quarter, shape (T - 1,)."""
+    ratio = np.diff(trace.t) / dt
+    return np.asarray((ratio <= 0.8) | (ratio >= 1.25))
 
 
 def _sums(values: Array, window: int) -> Array:
@@ -129,10 +151,12 @@ class FaultCheck:
         self._check = Check(
             usual.dt,
             usual.longest,
+            usual.odd,
             FASTEST,
             usual.repeats,
             usual.window,
             SHARE,
+            STEP_SHARE,
             usual.current,
             usual.step,
             usual.drift,

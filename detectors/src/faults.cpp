@@ -15,10 +15,12 @@ std::vector<double> values(const In1& x) { return {x.data(), x.data() + x.shape(
 
 class Check {
  public:
-  Check(double dt, double longest, double speed, std::int64_t repeats, std::int64_t window,
-        double share, In1 current, In1 step, In1 drift, Ids stuck)
+  Check(double dt, double longest, std::int64_t odd, double speed, std::int64_t repeats,
+        std::int64_t window, double share, double step_share, In1 current, In1 step, In1 drift,
+        Ids stuck)
       : n_(current.shape(0)),
-        check_(usual(dt, longest, speed, repeats, window, share, current, step, drift, stuck)) {}
+        check_(usual(dt, longest, odd, speed, repeats, window, share, step_share, current, step,
+                     drift, stuck)) {}
 
   std::tuple<int, int, double> step(double t, In1 q, In1 qd, In1 current) {
     require(q.shape(0) == n_ && qd.shape(0) == n_ && current.shape(0) == n_,
@@ -30,9 +32,9 @@ class Check {
   void reset() { check_.reset(); }
 
  private:
-  static Usual usual(double dt, double longest, double speed, std::int64_t repeats,
-                     std::int64_t window, double share, const In1& current, const In1& step,
-                     const In1& drift, const Ids& stuck) {
+  static Usual usual(double dt, double longest, std::int64_t odd, double speed,
+                     std::int64_t repeats, std::int64_t window, double share, double step_share,
+                     const In1& current, const In1& step, const In1& drift, const Ids& stuck) {
     const std::size_t n = current.shape(0);
     require(dt > 0 && longest > 0 && window > 0 && repeats > 0,
             "dt, longest, window, repeats: expected above 0");
@@ -40,11 +42,13 @@ class Check {
             "current, step, drift, stuck: expected one entry a joint");
     return {dt,
             longest,
+            odd,
             speed,
             repeats,
             window,
             values(current),
             share,
+            step_share,
             values(step),
             values(drift),
             {stuck.data(), stuck.data() + n}};
@@ -60,8 +64,8 @@ class Check {
 NB_MODULE(_faults, m) {
   using namespace tauguard::detectors;
   nb::class_<Check>(m, "Check")
-      .def(nb::init<double, double, double, std::int64_t, std::int64_t, double, In1, In1, In1,
-                    Ids>())
+      .def(nb::init<double, double, std::int64_t, double, std::int64_t, std::int64_t, double,
+                    double, In1, In1, In1, Ids>())
       .def("step", &Check::step)
       .def("reset", &Check::reset);
 }

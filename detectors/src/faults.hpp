@@ -30,11 +30,13 @@ enum class Fault : std::int32_t {
 struct Usual {
   double dt = 0;                    // sample interval [s]
   double longest = 0;               // longest interval that is not a gap [s]
+  std::int64_t odd = 0;             // intervals in a row that may be other than dt by a quarter
   double speed = 0;                 // no joint turns faster [rad/s]
   std::int64_t repeats = 0;         // samples in a row in which no signal changes
   std::int64_t window = 0;          // samples over which velocities are summed
   std::vector<double> current;      // largest |current| [A]
   double share = 0;                 // of the travel that position and velocity may differ by
+  double step_share = 0;            // the same over one sample, whose time stamp may be late
   std::vector<double> step;         // |change of q less qd dt| beyond that, over one sample [rad]
   std::vector<double> drift;        // the same summed over `window` samples [rad]
   std::vector<std::int64_t> stuck;  // samples in a row with one joint's current unchanged
@@ -55,18 +57,17 @@ class FaultCheck {
         last_(3 * n_),
         errors_(static_cast<std::size_t>(usual_.window) * n_),
         travels_(errors_.size()),
+        bends_(errors_.size()),
         sums_(n_),
         travelled_(n_),
+        bent_(n_),
         unchanged_(n_) {}
 
   void reset() {
     begun_ = false;
-    repeats_ = filled_ = 0;
-    slow_ = 0;
-    std::fill(errors_.begin(), errors_.end(), 0.0);
-    std::fill(travels_.begin(), travels_.end(), 0.0);
-    std::fill(sums_.begin(), sums_.end(), 0.0);
-    std::fill(travelled_.begin(), travelled_.end(), 0.0);
+    repeats_ = filled_ = odd_ = 0;
+    for (auto* v : {&errors_, &travels_, &bends_, &sums_, &travelled_, &bent_})
+      std::fill(v->begin(), v->end(), 0.0);
     std::fill(unchanged_.begin(), unchanged_.end(), 0);
   }
 
@@ -119,9 +120,10 @@ class FaultCheck {
       begun_ = true;
       return {Fault::gap, -1, dt};
     }
-    // An average over some 10 intervals: a wrong rate, not one late sample.
-    slow_ += (dt / usual_.dt - 1 - slow_) / 10;
-    if (slow_ > 0.5 || slow_ < -0.3) say(Fault::rate, -1, dt);
+    // No interval like training's for a while: a wrong rate, not samples that come late.
+    const double ratio = dt / usual_.dt, late = std::fabs(dt - usual_.dt);
+    odd_ = ratio > 0.8 && ratio < 1.25 ? 0 : odd_ + 1;
+    if (odd_ > usual_.odd) say(Fault::rate, -1, dt);
     const double* lq = last_.data();
     const double* lqd = lq + n_;
     const double* lc = lqd + n_;
@@ -133,13 +135,19 @@ class FaultCheck {
     for (std::size_t j = 0; j < n_; ++j) {
       const auto joint = static_cast<std::int32_t>(j);
       const double travel = dt * (qd[j] + lqd[j]) / 2, error = q[j] - lq[j] - travel;
+      // What a velocity that is a sample late differs by, and a time stamp that is.
+      const double bend =
+          usual_.dt * std::fabs(qd[j] - lqd[j]) + std::min(late, usual_.dt) * std::fabs(qd[j]);
       sums_[j] += error - errors_[row + j];
       travelled_[j] += travel - travels_[row + j];
+      bent_[j] += bend - bends_[row + j];
       errors_[row + j] = error;
       travels_[row + j] = travel;
-      if (std::fabs(error) > usual_.step[j] + usual_.share * std::fabs(travel))
+      bends_[row + j] = bend;
+      if (std::fabs(error) > usual_.step[j] + usual_.step_share * std::fabs(travel) + bend)
         say(Fault::position_against_velocity, joint, error);
-      if (std::fabs(sums_[j]) > usual_.drift[j] + usual_.share * std::fabs(travelled_[j]))
+      if (std::fabs(sums_[j]) >
+          usual_.drift[j] + usual_.share * std::fabs(travelled_[j]) + bent_[j])
         say(Fault::position_against_velocity, joint, sums_[j]);
       unchanged_[j] = current[j] == lc[j] ? unchanged_[j] + 1 : 0;
       if (unchanged_[j] > usual_.stuck[j]) say(Fault::current_stuck, joint, current[j]);
@@ -151,10 +159,11 @@ class FaultCheck {
 
   void sum_anew() {
     for (std::size_t j = 0; j < n_; ++j) {
-      sums_[j] = travelled_[j] = 0;
+      sums_[j] = travelled_[j] = bent_[j] = 0;
       for (std::size_t k = j; k < errors_.size(); k += n_) {
         sums_[j] += errors_[k];
         travelled_[j] += travels_[k];
+        bent_[j] += bends_[k];
       }
     }
   }
@@ -169,9 +178,9 @@ class FaultCheck {
   Usual usual_;
   std::size_t n_;
   bool begun_ = false;
-  double time_ = 0, slow_ = 0;
-  std::int64_t repeats_ = 0, filled_ = 0;
-  std::vector<double> last_, errors_, travels_, sums_, travelled_;
+  double time_ = 0;
+  std::int64_t repeats_ = 0, filled_ = 0, odd_ = 0;
+  std::vector<double> last_, errors_, travels_, bends_, sums_, travelled_, bent_;
   std::vector<std::int64_t> unchanged_;
 };
 
