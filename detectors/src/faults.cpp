@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "bindings.hpp"
+#include "torques.hpp"
 
 namespace tauguard::detectors {
 namespace {
@@ -58,6 +59,31 @@ class Check {
   FaultCheck check_;
 };
 
+class Torques {
+ public:
+  Torques(In1 gain, In1 noise, double rate)
+      : n_(gain.shape(0)), check_(values(gain), values(noise), bounds(rate)) {
+    require(noise.shape(0) == n_ && rate > 0, "gain, noise, rate: one entry a joint, above 0");
+  }
+
+  std::tuple<int, int, double> step(In1 residual, In1 current, double dt) {
+    require(residual.shape(0) == n_ && current.shape(0) == n_ && dt > 0,
+            "residual, current, dt: expected one entry a joint, dt above 0");
+    const Verdict v = check_.step(residual.data(), current.data(), dt);
+    return {static_cast<int>(v.fault), v.joint, v.value};
+  }
+
+ private:
+  static TorqueBounds bounds(double rate) {
+    TorqueBounds set;
+    set.rate = rate;
+    return set;
+  }
+
+  std::size_t n_;
+  TorqueCheck check_;
+};
+
 }  // namespace
 }  // namespace tauguard::detectors
 
@@ -68,4 +94,5 @@ NB_MODULE(_faults, m) {
                     double, In1, In1, In1, Ids>())
       .def("step", &Check::step)
       .def("reset", &Check::reset);
+  nb::class_<Torques>(m, "Torques").def(nb::init<In1, In1, double>()).def("step", &Torques::step);
 }

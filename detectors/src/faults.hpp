@@ -24,6 +24,8 @@ enum class Fault : std::int32_t {
   frozen,
   position_against_velocity,
   current_stuck,
+  torque_opposed,
+  torque_size,
 };
 
 // What is usual of one arm's samples; all arrays hold one entry a joint.

@@ -1,0 +1,77 @@
+// Whether the drives' torques are those of this arm's motion: signs, exchanged joints, gains, load.
+//
+// needed = r + given is what the model says the motion takes, given what the currents say the
+// drives give, both through the observer's filter. The ratio E[given needed] / E[needed^2] of a
+// joint is 1 but for errors and contacts, -1 with the other sign. E is an average that forgets: a
+// fast one, for torques that work against the motion, and a slow one, for those of another size.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "faults.hpp"
+
+namespace tauguard::detectors {
+
+struct TorqueBounds {
+  double rate = 20;   // of the observer that gives the residual [1/s]
+  double fast = 0.5;  // time constants of the averages [s]
+  double slow = 4.0;
+  double opposed = -0.4;  // fast ratio below which a torque works against the motion
+  double least = 0.4;     // slow ratios outside of which a torque has another size
+  double most = 1.7;
+  double heard = 8.0;  // times the joint's noise that is needed for a ratio to mean anything
+};
+
+class TorqueCheck {
+ public:
+  TorqueCheck(std::vector<double> gain, std::vector<double> noise, TorqueBounds bounds)
+      : gain_(std::move(gain)), noise_(std::move(noise)), set_(bounds), n_(gain_.size()) {
+    for (auto* v : {&given_, &fast_square_, &fast_product_, &slow_square_, &slow_product_})
+      v->resize(n_);
+  }
+
+  void reset() { time_ = 0; }
+
+  // One sample: the residual of the plain observer [N m], the currents [A], the time step [s].
+  Verdict step(const double* residual, const double* current, double dt) {
+    const bool first = time_ == 0;
+    const double low = first ? 1.0 : 1 - std::exp(-set_.rate * dt);
+    const double fast = 1 - std::exp(-dt / set_.fast), slow = 1 - std::exp(-dt / set_.slow);
+    time_ += dt;
+    Verdict found;
+    for (std::size_t j = 0; j < n_; ++j) {
+      given_[j] += low * (gain_[j] * current[j] - given_[j]);
+      const double needed = given_[j] + residual[j];
+      const double square = needed * needed, product = needed * given_[j];
+      if (first) fast_square_[j] = fast_product_[j] = slow_square_[j] = slow_product_[j] = square;
+      fast_square_[j] += fast * (square - fast_square_[j]);
+      fast_product_[j] += fast * (product - fast_product_[j]);
+      slow_square_[j] += slow * (square - slow_square_[j]);
+      slow_product_[j] += slow * (product - slow_product_[j]);
+      if (found.fault != Fault::none) continue;
+      const double loud = set_.heard * noise_[j] * (set_.heard * noise_[j]);
+      const double ratio = fast_product_[j] / fast_square_[j];
+      const double size = slow_product_[j] / slow_square_[j];
+      const auto joint = static_cast<std::int32_t>(j);
+      if (time_ > set_.fast && fast_square_[j] > loud && ratio < set_.opposed)
+        found = {Fault::torque_opposed, joint, ratio};
+      else if (time_ > set_.slow && slow_square_[j] > loud &&
+               (size < set_.least || size > set_.most))
+        found = {Fault::torque_size, joint, size};
+    }
+    return found;
+  }
+
+ private:
+  std::vector<double> gain_, noise_;
+  TorqueBounds set_;
+  std::size_t n_;
+  double time_ = 0;
+  std::vector<double> given_, fast_square_, fast_product_, slow_square_, slow_product_;
+};
+
+}  // namespace tauguard::detectors
