@@ -11,28 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.datasets.live.sample import LiveSource, Sample, SourceClosed
-from tauguard.detectors.faults.inputs import SPAN
-from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer, Monitor
+from tauguard.detectors.faults.monitor import FAULT, Answer, Monitor
+from tauguard.detectors.faults.spans import Spans
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
-#: Spans of one state less than this apart are one [s], as `tauguard detect` counts alarms.
-MERGED = 0.2
 #: Latencies are counted in bins of a microsecond, up to so many; longer ones are in the last.
 BINS = 100_000
 #: A source that gives nothing for so long is said to be silent [s]: a fault without a sample.
 SILENT = 0.1
-
-
-@dataclass
-class Span:
-    """A stretch of collision or fault, by the robot's clock."""
-
-    state: str  #: "collision" or "fault"
-    start: float  #: [s]
-    end: float  #: [s]
-    reason: str = ""  #: of a fault, its first
 
 
 @dataclass
@@ -44,7 +32,7 @@ class Heard:
     samples: int = 0  #: that came, believed or not
     first: float = np.nan  #: robot's time of the first sample [s]
     last: float = np.nan  #: and of the last one
-    spans: list[Span] = field(default_factory=list)
+    spans: Spans = field(default_factory=Spans)
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(BINS, np.int64))
     """Samples by their latency from packet to answer, in microseconds."""
     slowest: int = 0  #: [ns]
@@ -52,7 +40,6 @@ class Heard:
     scores: list[float] = field(default_factory=list)
     alarms: list[bool] = field(default_factory=list)
     ended: str = ""  #: why it ended
-    _open: dict[str, Span] = field(default_factory=dict)
 
     def add(self, sample: Sample, answer: Answer, latency: int) -> None:
         """One sample with its answer."""
@@ -67,39 +54,11 @@ class Heard:
                 self.rows.append(sample)
                 self.scores.append(answer.score)
                 self.alarms.append(answer.alarm)
-        if answer.state == FAULT:
-            self._take_back(t)
-        self._mark(COLLISION, answer.alarm, t, "")
-        self._mark(FAULT, bool(answer.reason), t, answer.reason)
-
-    def _mark(self, state: str, up: bool, t: float, reason: str) -> None:
-        """Open, prolong or close the span of one state."""
-        span = self._open.get(state)
-        if up and span is None and (last := self._latest(state)) and t - last.end < MERGED:
-            self._open[state] = last
-            last.end = t
-        elif up and span is None:
-            span = self._open[state] = Span(state, t, t, reason)
-            self.spans.append(span)
-        elif up and span is not None:
-            span.end = t if np.isfinite(t) else span.end
-        elif span is not None:
-            del self._open[state]
-
-    def _latest(self, state: str) -> Span | None:
-        """The last span of a state."""
-        return next((span for span in reversed(self.spans) if span.state == state), None)
-
-    def _take_back(self, t: float) -> None:
-        """A collision that began just before a fault was the fault's own."""
-        span = self._open.get(COLLISION)
-        if span is not None and not t - span.start > SPAN:
-            self.spans.remove(span)
-            del self._open[COLLISION]
+        self.spans.add(t, answer)
 
     def silent(self, seconds: float) -> None:
         """Nothing came for ``seconds``."""
-        self._mark(FAULT, True, self.last, f"silent: no sample for {seconds:.1f} s")
+        self.spans.mark(FAULT, True, self.last, f"silent: no sample for {seconds:.1f} s")
 
     def trace(self) -> Trace:
         """The believed samples as a trace."""

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors._faults import Check
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.faults.torques import torque_ratios
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
@@ -68,10 +70,15 @@ class UsualInput:
     step: Array  #: ``|change of q less qd dt|`` over one sample beyond SHARE [rad], shape (n,)
     drift: Array  #: the same over ``window`` samples [rad], shape (n,)
     stuck: Counts  #: samples in a row with one joint's current unchanged, shape (n,)
+    ratios: Array  #: of torque given to torque needed, see ``torques.torque_ratios``, shape (3, n)
 
     @classmethod
-    def of(cls, traces: Sequence[Trace]) -> UsualInput:
+    def of(cls, traces: Sequence[Trace], arm: ArmModel | None = None) -> UsualInput:
         """What the samples of these traces show.
+
+        Args:
+            traces: of training.
+            arm: calibrated; without it nothing is learned of the torques.
 
         Raises:
             ValueError: no traces, or of fewer than two samples.
@@ -92,6 +99,7 @@ class UsualInput:
             MARGIN * np.max([_beyond(trace, 1) for trace in traces], axis=0) + RESOLUTION,
             MARGIN * np.max([_beyond(trace, window) for trace in traces], axis=0) + RESOLUTION,
             np.max([_stuck(trace) for trace in traces], axis=0),
+            np.ones((3, len(traces[0].joint_names))) if arm is None else torque_ratios(traces, arm),
         )
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.detector import same_rate
 from tauguard.detectors.faults.inputs import SPAN, FaultCheck, UsualInput
+from tauguard.detectors.faults.torques import TorqueCheck
 from tauguard.detectors.thresholds.alarm import AlarmStream, CollisionAlarm
 
 Array = NDArray[np.float64]
@@ -37,13 +38,17 @@ class Monitor:
     A sample with a fault never reaches the detector. While faults last, and afterwards until the
     detector has settled again, the state is ``fault``. A collision whose alarm was up before the
     fault stays a collision. An alarm that came within 20 ms of the fault is the fault's own.
+
+    Torques that cannot be this arm's are a fault as well; as a hard contact looks the same for half
+    a second, the detector goes on, and an alarm that is up stays a collision with that reason.
     """
 
     def __init__(self, alarm: CollisionAlarm, usual: UsualInput) -> None:
         """Begin before the first sample."""
-        self._alarm, self._check = alarm, FaultCheck(usual)
+        self._alarm, self._usual, self._check = alarm, usual, FaultCheck(usual)
         self._dt, self._settle = usual.dt, alarm.settle
         self._stream: AlarmStream = alarm.stream()
+        self._torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
         self._last: tuple[Array, Array, Array] | None = None
         self._time = -np.inf
         self._ready = -np.inf  # from when on the detector is believed
@@ -87,8 +92,9 @@ class Monitor:
         missing = self._bridge(t, sample)
         passed, self._last, self._time = t - self._time, sample, t
         usual = missing == 0 and same_rate(passed, self._dt)
-        up = self._stream.step(q, qd, current, passed if usual else None)
-        score = self._stream.score
+        interval = passed if usual else None
+        up = self._stream.step(q, qd, current, interval)
+        score, torques = self._stream.score, self._torques.step(q, qd, current, interval)
         if t < self._ready and self._reason:
             held = self._answer.alarm
             return Answer(
@@ -96,7 +102,7 @@ class Monitor:
             )
         self._reason = ""
         self._raised = min(self._raised, t) if up else np.inf
-        return Answer(COLLISION if up else FREE, up, score, "")
+        return Answer(COLLISION if up else FAULT if torques else FREE, up, score, torques)
 
     def _bridge(self, t: float, sample: tuple[Array, Array, Array]) -> int:
         """Interpolate the samples that are missing before this one, or begin anew; their number."""
@@ -106,6 +112,7 @@ class Monitor:
         missing = max(self._bad, round((t - self._time) / self._dt) - 1)
         if t < self._time or missing > max(BRIDGED, SPAN / self._dt):
             self._stream = self._alarm.stream()
+            self._torques = TorqueCheck(self._alarm.detector.arm, self._dt, self._usual.ratios)
             self._ready = t + self._settle
         else:
             for k in range(1, missing + 1):
@@ -114,6 +121,7 @@ class Monitor:
                     a + share * (b - a) for a, b in zip(self._last, sample, strict=True)
                 )
                 self._stream.step(q, qd, current)
+                self._torques.step(q, qd, current)
             if self._bad:
                 self._ready = max(self._ready, t + WINDOW)
         self._bad = 0

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors._faults import Torques
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
+from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
@@ -14,6 +17,9 @@ Array = NDArray[np.float64]
 RATE = 20.0
 #: A joint's noise counts as this share of the largest one's at least: a wrist is seldom known well.
 SHARE = 0.1
+#: A fast ratio below the first works against the motion; slow ones outside of the other two say
+#: another size. With loads and contacts in training, what those show beyond, and the margin.
+OPPOSED, LEAST, MOST, MARGIN = -0.4, 0.4, 1.7, 0.4
 #: By the number that the native check answers.
 TEXTS = {
     14: "torque: the current of {joint} works against the motion ({value:.2f} of the torque that "
@@ -30,18 +36,26 @@ class TorqueCheck:
     its own torque for half a second looks the same as a wrong sign.
     """
 
-    def __init__(self, arm: ArmModel, dt: float) -> None:
+    def __init__(self, arm: ArmModel, dt: float, ratios: Array | None = None) -> None:
         """Begin before the first sample.
 
         Args:
             arm: calibrated.
             dt: sample interval of steps [s].
+            ratios: what training showed, see :func:`torque_ratios` (default: nothing unusual).
         """
+        seen = np.ones((3, arm.robot.joints)) if ratios is None else ratios
+        bounds = (
+            np.minimum(OPPOSED, seen[0] - MARGIN),
+            np.minimum(LEAST, seen[1] - MARGIN),
+            np.maximum(MOST, seen[2] + MARGIN),
+        )
         noise = np.asarray(arm.noise, dtype=np.float64)
         floor = np.maximum(noise, SHARE * noise.max())
         self._names, self._dt = arm.robot.joint_names, dt
         self._observer = Estimator(arm, RATE, dt, Unknowns.none())
-        self._check = Torques(np.ascontiguousarray(arm.drive_gain, dtype=np.float64), floor, RATE)
+        gain = np.ascontiguousarray(arm.drive_gain, dtype=np.float64)
+        self._check = Torques(gain, floor, RATE, *bounds)
         self._out = tuple(np.zeros((3, len(noise))))
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> str:
@@ -59,3 +73,23 @@ class TorqueCheck:
         self._observer.step(q, qd, current, self._out, dt)  # type: ignore[arg-type]
         number, joint, value = self._check.step(self._out[0], current, dt or self._dt)
         return TEXTS[number].format(joint=self._names[joint], value=value) if number else ""
+
+    @property
+    def extremes(self) -> Array:
+        """Least fast, least slow and largest slow ratio so far, shape (3, n)."""
+        return np.array(self._check.extremes()).reshape(3, -1)
+
+
+def torque_ratios(traces: Sequence[Trace], arm: ArmModel) -> Array:
+    """What traces show of the ratios of torque given to torque needed, shape (3, n).
+
+    The least over 0.5 s, the least and the largest over 4 s; 1 where nothing counted.
+    """
+    found = np.ones((3, arm.robot.joints))
+    for trace in traces:
+        check = TorqueCheck(arm, trace.dt)
+        for q, qd, current in zip(trace.q, trace.qd, trace.current, strict=True):
+            check.step(q, qd, current)
+        own = check.extremes
+        found = np.vstack([np.minimum(found[:2], own[:2]), np.maximum(found[2:], own[2:])])
+    return found

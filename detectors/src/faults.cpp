@@ -3,6 +3,7 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include <tuple>
 
@@ -61,9 +62,10 @@ class Check {
 
 class Torques {
  public:
-  Torques(In1 gain, In1 noise, double rate)
-      : n_(gain.shape(0)), check_(values(gain), values(noise), bounds(rate)) {
-    require(noise.shape(0) == n_ && rate > 0, "gain, noise, rate: one entry a joint, above 0");
+  Torques(In1 gain, In1 noise, double rate, In1 opposed, In1 least, In1 most)
+      : n_(gain.shape(0)),
+        check_(values(gain), values(noise), bounds(n_, rate, opposed, least, most)) {
+    require(noise.shape(0) == n_, "noise: expected one entry a joint");
   }
 
   std::tuple<int, int, double> step(In1 residual, In1 current, double dt) {
@@ -72,11 +74,18 @@ class Torques {
     const Verdict v = check_.step(residual.data(), current.data(), dt);
     return {static_cast<int>(v.fault), v.joint, v.value};
   }
+  std::vector<double> extremes() const { return check_.extremes(); }
 
  private:
-  static TorqueBounds bounds(double rate) {
+  static TorqueBounds bounds(std::size_t n, double rate, const In1& opposed, const In1& least,
+                             const In1& most) {
+    require(rate > 0 && opposed.shape(0) == n && least.shape(0) == n && most.shape(0) == n,
+            "opposed, least, most: expected one entry a joint; rate: above 0");
     TorqueBounds set;
     set.rate = rate;
+    set.opposed = values(opposed);
+    set.least = values(least);
+    set.most = values(most);
     return set;
   }
 
@@ -94,5 +103,8 @@ NB_MODULE(_faults, m) {
                     double, In1, In1, In1, Ids>())
       .def("step", &Check::step)
       .def("reset", &Check::reset);
-  nb::class_<Torques>(m, "Torques").def(nb::init<In1, In1, double>()).def("step", &Torques::step);
+  nb::class_<Torques>(m, "Torques")
+      .def(nb::init<In1, In1, double, In1, In1, In1>())
+      .def("step", &Torques::step)
+      .def("extremes", &Torques::extremes);
 }

@@ -20,10 +20,10 @@ struct TorqueBounds {
   double rate = 20;   // of the observer that gives the residual [1/s]
   double fast = 0.5;  // time constants of the averages [s]
   double slow = 4.0;
-  double opposed = -0.4;  // fast ratio below which a torque works against the motion
-  double least = 0.4;     // slow ratios outside of which a torque has another size
-  double most = 1.7;
-  double heard = 8.0;  // times the joint's noise that is needed for a ratio to mean anything
+  double heard = 8.0;           // times its noise that a joint needs for a ratio to mean anything
+  std::vector<double> opposed;  // fast ratio below which a torque works against the motion, n
+  std::vector<double> least;    // slow ratios outside of which a torque has another size, n
+  std::vector<double> most;
 };
 
 class TorqueCheck {
@@ -32,9 +32,16 @@ class TorqueCheck {
       : gain_(std::move(gain)), noise_(std::move(noise)), set_(bounds), n_(gain_.size()) {
     for (auto* v : {&given_, &fast_square_, &fast_product_, &slow_square_, &slow_product_})
       v->resize(n_);
+    for (auto* v : {&fast_least_, &slow_least_, &slow_most_}) v->assign(n_, 1.0);
   }
 
-  void reset() { time_ = 0; }
+  // The least fast, the least slow and the largest slow ratio so far, n each; 1 where none counted.
+  std::vector<double> extremes() const {
+    std::vector<double> all(fast_least_);
+    all.insert(all.end(), slow_least_.begin(), slow_least_.end());
+    all.insert(all.end(), slow_most_.begin(), slow_most_.end());
+    return all;
+  }
 
   // One sample: the residual of the plain observer [N m], the currents [A], the time step [s].
   Verdict step(const double* residual, const double* current, double dt) {
@@ -52,16 +59,21 @@ class TorqueCheck {
       fast_product_[j] += fast * (product - fast_product_[j]);
       slow_square_[j] += slow * (square - slow_square_[j]);
       slow_product_[j] += slow * (product - slow_product_[j]);
-      if (found.fault != Fault::none) continue;
       const double loud = set_.heard * noise_[j] * (set_.heard * noise_[j]);
-      const double ratio = fast_product_[j] / fast_square_[j];
-      const double size = slow_product_[j] / slow_square_[j];
       const auto joint = static_cast<std::int32_t>(j);
-      if (time_ > set_.fast && fast_square_[j] > loud && ratio < set_.opposed)
-        found = {Fault::torque_opposed, joint, ratio};
-      else if (time_ > set_.slow && slow_square_[j] > loud &&
-               (size < set_.least || size > set_.most))
-        found = {Fault::torque_size, joint, size};
+      if (time_ > set_.fast && fast_square_[j] > loud) {
+        const double ratio = fast_product_[j] / fast_square_[j];
+        fast_least_[j] = std::min(fast_least_[j], ratio);
+        if (found.fault == Fault::none && ratio < set_.opposed[j])
+          found = {Fault::torque_opposed, joint, ratio};
+      }
+      if (time_ > set_.slow && slow_square_[j] > loud) {
+        const double size = slow_product_[j] / slow_square_[j];
+        slow_least_[j] = std::min(slow_least_[j], size);
+        slow_most_[j] = std::max(slow_most_[j], size);
+        if (found.fault == Fault::none && (size < set_.least[j] || size > set_.most[j]))
+          found = {Fault::torque_size, joint, size};
+      }
     }
     return found;
   }
@@ -72,6 +84,7 @@ class TorqueCheck {
   std::size_t n_;
   double time_ = 0;
   std::vector<double> given_, fast_square_, fast_product_, slow_square_, slow_product_;
+  std::vector<double> fast_least_, slow_least_, slow_most_;
 };
 
 }  // namespace tauguard::detectors

@@ -61,7 +61,7 @@ def train(
     """
     own, rest = held_out(traces)
     alarm = with_rate(detector.fit(own, arm), rest, per_hour)
-    return replace(alarm, inputs=UsualInput.of(traces))
+    return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm))
 
 
 def with_rate(

@@ -86,18 +86,18 @@ def test_a_silent_robot_is_a_fault(alarm, struck):
             raise SourceClosed("gone")
 
     heard = listen(Silent(struck), Monitor(alarm, alarm.inputs))
-    assert [span.state for span in heard.spans if span.reason][-1] == "fault"
-    assert heard.spans[-1].reason.startswith("silent: no sample for")
+    assert [span.state for span in heard.spans.found if span.reason][-1] == "fault"
+    assert heard.spans.found[-1].reason.startswith("silent: no sample for")
 
 
 def test_a_frozen_robot_is_a_fault_and_no_collision(alarm, struck):
     packets = Fault("frozen", 4.0, 0.5).apply(Packets.of(struck))
     frozen = Trace(struck.joint_names, packets.t, packets.q, packets.qd, packets.current)
     heard = listen(Handed(frozen), Monitor(alarm, alarm.inputs))
-    faults = [span for span in heard.spans if span.state == "fault"]
+    faults = heard.spans.of("fault")
     assert 4.0 <= faults[0].start - struck.t[0] <= 4.02
     assert not any(
-        span.state == "collision" and 4.0 < span.start - struck.t[0] < 4.5 for span in heard.spans
+        span.state == "collision" and 4.0 < span.start - struck.t[0] < 4.5 for span in heard.spans.found
     )
 
 

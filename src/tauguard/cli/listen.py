@@ -151,8 +151,8 @@ class Display:
 
 def summary(heard: Heard, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:
     """The figures of a run, ready for JSON; events as `tauguard detect` writes them."""
-    collisions = [s for s in heard.spans if s.state == "collision"]
-    faults = [s for s in heard.spans if s.state == "fault"]
+    collisions = heard.spans.of("collision")
+    faults = heard.spans.of("fault")
     return {
         "name": "listen",
         "joints": list(heard.joint_names),

@@ -163,7 +163,7 @@ def free_motion(
     unmoved = never_moved(list(traces.values()))
     for note in (*doubts(detector.arm, traces, recordings, ()), *unmoved):
         print(f"note: {note}")
-    usual = UsualInput.of(list(traces.values()))
+    usual = UsualInput.of(list(traces.values()), detector.arm)
     save_model(CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual), model)
     print(f"{model}: trained on {len(traces)} collision-free logs, {detector.seconds:.0f} s")
     show_card(detector, list(traces.values()), card)
