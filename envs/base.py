@@ -95,8 +95,9 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     the area; a point contact has none, else it is 0), ``limit_ratio`` (peak force over the region's
     transient limit, or its quasi-static one after 0.5 s of contact or where the region cannot
     move), ``region`` (of that ratio, 1-based, 0 for none; names in :attr:`regions`), ``tau_ext``
-    [N m], ``residual`` [N m] and ``alarm`` of the detector, ``onset`` (a collision began in this
-    step), ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
+    [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the detector (what is wrong with its
+    samples, "" for nothing; see ``docs/live.md``), ``onset`` (a collision began in this step),
+    ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
     0: none), and ``reason``, why an episode was cut short ("" where it was not). Peaks are over
     the physics steps of the action. With checkers, ``contacts`` has the pairs that each reported.
 
@@ -248,6 +249,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "onset": bool(figure[ONSET]),
             "onset_time": figure[ONSET_TIME],
             "link": int(figure[LINK]),
+            "fault": cell.faults()[0],
             "reason": DIVERGED_REASON if figure[DIVERGED] else "",
         }
         if cell.watching:

@@ -180,6 +180,10 @@ class Cell:
         if self.world.settings.noise:
             sensing.show(self.observation[i], *measured)
 
+    def faults(self) -> list[str]:
+        """What is wrong with each copy's samples of the last action, "" for nothing."""
+        return [one.fault for one in self.sensing] if self.sensing else [""] * self.rows
+
     def _watched(self, i: int, action: Array) -> None:
         """A step with contact checkers: each sees every physics step."""
         plant, data, watching = self.plants[i], self.datas[i], self.watching[i]

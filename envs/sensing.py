@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -19,6 +20,7 @@ from tauguard.detectors import (
 )
 from tauguard.detectors.detector import same_rate
 from tauguard.detectors.estimation.observer import PLAIN_GAIN
+from tauguard.detectors.faults.monitor import Monitor
 from tauguard.envs.actions import observation_table
 from tauguard.envs.joint_ends import JointEnds
 from tauguard.envs.settings import DETECTORS
@@ -44,6 +46,10 @@ class Listener(Protocol):
     @property
     def name(self) -> str:
         """The detector's name."""
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with the samples of the last :meth:`steps`, "" for nothing."""
 
     @property
     def settle(self) -> float:
@@ -72,7 +78,7 @@ class ObserverListener:
     decides the threshold. A trained detector is several times as sensitive.
     """
 
-    name, settle = "observer", 0.0
+    name, settle, fault = "observer", 0.0, ""
 
     def __init__(
         self,
@@ -130,17 +136,37 @@ class AlarmListener:
         arm = alarm.detector.arm
         self.name, self.settle = alarm.detector.name, alarm.settle
         self.bounds: Array = SIGMAS * np.asarray(arm.noise)
-        self._stream = alarm.stream()
+        self._step = self._monitored(alarm)
         self._observer = Estimator(arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none())
+        self._last = np.zeros(arm.robot.joints)
+        self.fault = ""
+
+    def _monitored(self, alarm: CollisionAlarm) -> Callable[[Array, Array, Array], bool]:
+        """The alarm at one sample; a model that knows its samples names their faults."""
+        if alarm.inputs is None:
+            return alarm.stream().step
+        monitor, times = Monitor(alarm, alarm.inputs), itertools.count()
+
+        def step(q: Array, qd: Array, current: Array) -> bool:
+            answer = monitor.step(next(times) * alarm.detector.dt, q, qd, current)
+            self.fault = answer.reason
+            return answer.alarm
+
+        return step
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
-        """See :class:`Listener`."""
+        """See :class:`Listener`; a residual stays where a sample is not finite."""
         residuals, alarms = np.empty_like(q), np.zeros(len(q), dtype=np.bool_)
-        spare = np.empty((2, q.shape[1]))
+        spare, faults = np.empty((2, q.shape[1])), ""
         for row in range(len(q)):
             sample = (q[row], qd[row], current[row])
-            alarms[row] = self._stream.step(*sample)
-            self._observer.step(*sample, (residuals[row], *spare))
+            alarms[row] = self._step(*sample)
+            faults = faults or self.fault
+            residuals[row] = self._last
+            if not self.fault or np.isfinite(sample).all():
+                self._observer.step(*sample, (residuals[row], *spare))
+            self._last = residuals[row]
+        self.fault = faults
         return residuals, alarms
 
     def get_state(self) -> Any:
@@ -166,6 +192,7 @@ class PerArm:
         """Take one of each arm, in order."""
         self._parts = parts
         self.name, self.settle = parts[0].name, max(part.settle for part in parts)
+        self.fault = ""
         self.bounds: Array = np.concatenate([part.bounds for part in parts])
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
@@ -176,6 +203,7 @@ class PerArm:
             for k, part in enumerate(self._parts)
         ]
         residuals, alarms = zip(*found, strict=True)
+        self.fault = next((part.fault for part in self._parts if part.fault), "")
         return np.concatenate(residuals, axis=1), np.any(alarms, axis=0)
 
     def get_state(self) -> Any:
@@ -276,6 +304,11 @@ class Sensing:
     def settle(self) -> float:
         """The detector is silent for this long after a reset [s]."""
         return self.detector.settle if self.detector else 0.0
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with what the sensors measured in the last action, "" for nothing."""
+        return self.detector.fault if self.detector else ""
 
     @property
     def bounds(self) -> Array:

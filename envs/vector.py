@@ -205,6 +205,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "onset": figure[ONSET] != 0,
             "onset_time": figure[ONSET_TIME],
             "link": figure[LINK].astype(np.int64),
+            "fault": np.array(cell.faults(), dtype=object),
             "reason": reason,
         }
         if cell.watching:

@@ -88,4 +88,4 @@ def _kept(trace: Trace, answers: list[Answer], spans: Spans) -> np.ndarray:
     kept = np.zeros(len(trace.t), dtype=np.bool_)
     for span in spans.of("collision"):
         kept |= (trace.t >= span.start) & (trace.t <= span.end)
-    return kept & np.array([a.alarm for a in answers])
+    return np.asarray(kept & np.array([a.alarm for a in answers]))

@@ -70,7 +70,7 @@ class TorqueCheck:
         Raises:
             ValueError: wrong shapes or numbers that are not finite.
         """
-        self._observer.step(q, qd, current, self._out, dt)  # type: ignore[arg-type]
+        self._observer.step(q, qd, current, self._out, dt)
         number, joint, value = self._check.step(self._out[0], current, dt or self._dt)
         return TEXTS[number].format(joint=self._names[joint], value=value) if number else ""
 

@@ -11,6 +11,8 @@ from tauguard.detectors.calibration.plausible import drive_torque, plausible
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.observer import observe
 from tauguard.detectors.evaluation.events import find_alarms
+from tauguard.detectors.faults.detection import detect_with_faults
+from tauguard.detectors.faults.spans import Span
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
 from tauguard.traces.trace import Array, Bools, Detection, Trace
@@ -34,6 +36,8 @@ class Watch:
     bounds change with the motion, only what each joint is measured by to name the loudest."""
     quiet_until: float  #: [s]; alarms are counted from here on
     notes: tuple[str, ...]
+    faults: tuple[Span, ...] = ()  #: of the samples themselves; no alarm is looked for in them
+    fault_seconds: float = 0.0  #: in which collisions may be missed
 
 
 def watch(
@@ -137,7 +141,8 @@ def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
     tau = drive_torque(arm, trace)
     residual = observe(arm.robot, trace.t, trace.q, trace.qd, tau, GAIN)
     notes = list(plausible(arm.robot, trace, tau, residual, rows, GAIN))
-    detection = replace(alarm.detect(trace), residual=residual)
+    monitored = detect_with_faults(alarm, trace)
+    detection = replace(monitored.detection, residual=residual)
     detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
     if detection.alarm[rows].mean() > STRANGE:
         notes.append(
@@ -145,7 +150,14 @@ def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
             "held all the time, or this is not the arm, the joints' order, the sign or the unit of "
             "the currents that the detector was trained on"
         )
-    return Watch(detection, np.asarray(arm.noise), settled, tuple(notes))
+    return Watch(
+        detection,
+        np.asarray(arm.noise),
+        settled,
+        tuple(notes),
+        monitored.faults,
+        monitored.fault_seconds,
+    )
 
 
 def loudest_joint(found: Watch, start: float, end: float) -> int:

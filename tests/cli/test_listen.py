@@ -97,7 +97,8 @@ def test_a_frozen_robot_is_a_fault_and_no_collision(alarm, struck):
     faults = heard.spans.of("fault")
     assert 4.0 <= faults[0].start - struck.t[0] <= 4.02
     assert not any(
-        span.state == "collision" and 4.0 < span.start - struck.t[0] < 4.5 for span in heard.spans.found
+        span.state == "collision" and 4.0 < span.start - struck.t[0] < 4.5
+        for span in heard.spans.found
     )
 
 

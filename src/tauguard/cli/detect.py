@@ -66,8 +66,11 @@ def command(
 ) -> None:
     """Look for collisions in a log of joint positions, velocities and motor currents.
 
-    With --model a trained detector watches the log. Without one, every joint's threshold is learned
-    from the first --quiet seconds, in which nothing may touch the arm, and the rest is watched.
+    With --model a trained detector watches the log: free, collision, or fault where the samples
+    themselves are wrong (frozen, missing, of another arm), as `tauguard listen` says it. Without
+    one, every joint's threshold is learned from the first --quiet seconds, in which nothing may
+    touch the arm, and the rest is watched.
+
     Torques that the motion does not explain are refused: currents in a wrong unit or of the other
     sign. Currents of exchanged joints are noticed only as far as gravity loads those joints.
 
@@ -184,7 +187,7 @@ def summary(
     from tauguard.detectors import poisson_rate
     from tauguard.detectors.thresholds.quiet_start import loudest_joint
 
-    watched = float(trace.t[-1] - found.quiet_until)
+    watched = float(trace.t[-1] - found.quiet_until) - found.fault_seconds
     events: list[dict[str, Any]] = []
     for alarm in found.detection.alarms:
         joint = loudest_joint(found, alarm.start, alarm.end)
@@ -209,6 +212,8 @@ def summary(
         "detector": found.detection.detector,
         "score_threshold": found.detection.threshold,
         "thresholds_nm": [v if np.isfinite(v) else None for v in found.thresholds.tolist()],
+        "faults": [{"start": f.start, "end": f.end, "reason": f.reason} for f in found.faults],
+        "fault_seconds": found.fault_seconds,
         "alarms": len(events),
         "alarms_per_hour": 3600 * len(events) / watched,
         "alarms_per_hour_high": poisson_rate(len(events), watched / 3600)["high"],
@@ -227,6 +232,10 @@ def report(result: dict[str, Any]) -> None:
     for event in result["events"]:
         line = f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}"
         print(line + what(event))
+    for fault in result["faults"]:
+        print(f"fault {fault['start']:.3f} s to {fault['end']:.3f} s: {fault['reason']}")
+    if result["fault_seconds"]:
+        print(f"faults hide collisions in {result['fault_seconds']:.2f} s of this log")
     count, seconds = result["alarms"], result["watched_seconds"]
     print(
         f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched; in a log without "
