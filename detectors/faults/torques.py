@@ -15,8 +15,9 @@ Array = NDArray[np.float64]
 
 #: Rate of the observer whose residual is looked at [1/s].
 RATE = 20.0
-#: A joint's noise counts as this share of the largest one's at least: a wrist is seldom known well.
-SHARE = 0.1
+#: A joint counts as noisy as this share of the noisiest at least: a load can turn the torque of a
+#: wrist around, but not that of a shoulder.
+SHARE = 0.5
 #: A fast ratio below the first works against the motion; slow ones outside of the other two say
 #: another size. With loads and contacts in training, what those show beyond, and the margin.
 OPPOSED, LEAST, MOST, MARGIN = -0.4, 0.4, 1.7, 0.4

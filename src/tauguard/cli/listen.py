@@ -9,11 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tauguard.datasets.live import LiveSource, Sample
     from tauguard.datasets.live.listening import Heard
     from tauguard.detectors import CollisionAlarm
     from tauguard.detectors.faults.monitor import Answer
 
+#: Pictures a second in rerun.
+FRAMES = 30
 DISCLAIMER = "tauguard listens only: it stops nothing and certifies nothing"
 
 
@@ -25,14 +29,19 @@ def command(
     play: Path | None = None,
     columns: str | None = None,
     stdin: bool = False,
+    ros: str | None = None,
+    payload: str | None = None,
+    torque: bool = False,
     seconds: float = float("inf"),
     reconnect: float = 10.0,
     json: Path | None = None,
     record: Path | None = None,
+    rerun: str | None = None,
 ) -> None:
     """Watch a robot as it runs: free, collision or fault, live. Nothing is sent to the robot.
 
-    One of --ur, --play and --stdin names where the samples come from. It ends after --seconds, with
+    One of --ur, --play, --stdin and --ros names where the samples come from. It ends after
+    --seconds, with
     Ctrl-C, or when the robot has been gone for --reconnect seconds.
 
     Args:
@@ -43,32 +52,50 @@ def command(
         play: a log (CSV or MCAP) to play at its own pace instead.
         columns: of a CSV file, see `tauguard detect`.
         stdin: read lines "t, q1.., qd1.., current1.." from the standard input.
+        ros: topic with sensor_msgs/JointState, currents (or torques) in effort; needs ROS 2.
+        payload: what the arm carries, as KG or KG,X,Y,Z, see `tauguard detect`.
+        torque: the source gives joint torques [N m] instead of currents.
         seconds: how long.
         reconnect: seconds to go on trying when the connection breaks.
         json: write events and latencies here.
         record: write what was heard as MCAP here.
+        rerun: `view` opens the rerun viewer; FILE.rrd records what it would show.
     """
     from tauguard.cli.real_logs import check_robot
+    from tauguard.datasets.live.display import Behind
     from tauguard.datasets.live.listening import listen
     from tauguard.detectors import load_model
     from tauguard.detectors.faults.monitor import Monitor
 
-    if sum((ur is not None, play is not None, stdin)) != 1:
-        raise ValueError("give one of --ur HOST, --play LOG and --stdin")
-    for name, path in (("--json", json), ("--record", record)):
+    sources = (ur is not None, play is not None, stdin, ros is not None)
+    if sum(sources) != 1:
+        raise ValueError("give one of --ur HOST, --play LOG, --stdin and --ros TOPIC")
+    if ur is not None and torque:
+        raise ValueError("--torque: not beside --ur, whose controller sends currents")
+    shown = None if rerun in (None, "view") else Path(str(rerun))
+    if shown is not None and shown.suffix != ".rrd":
+        raise ValueError(f"--rerun {rerun}: expected `view`, or a file that ends with .rrd")
+    for name, path in (("--json", json), ("--record", record), ("--rerun", shown)):
         if path is not None and not path.absolute().parent.is_dir():
             raise ValueError(f"{name} {path}: the folder {path.parent} does not exist")
-    alarm = load_model(model)
+    alarm = told(load_model(model), model, payload, torque)
     if alarm.inputs is None:
         raise ValueError(f"{model}: does not say what samples look like; train the detector anew")
     check_robot(robot, alarm.detector.arm.robot.joint_names, model)
     with ExitStack() as stack:
-        source = stack.enter_context(opened(ur, port, play, columns, stdin, reconnect, alarm))
-        check_source(source, alarm, model)
         print(DISCLAIMER, flush=True)
-        display = stack.enter_context(Display())
+        source = stack.enter_context(opened(ur, port, play, columns, stdin, ros, reconnect, alarm))
+        check_source(source, alarm, model)
+        views = [stack.enter_context(Behind(Terminal().show))]
+        if rerun is not None:
+            views.append(stack.enter_context(Behind(charts(robot, shown, alarm))))
         monitor = Monitor(alarm, alarm.inputs)
-        heard = listen(source, monitor, seconds, display.show, keep=record is not None)
+
+        def show(sample: Sample, answer: Answer) -> None:
+            for view in views:
+                view.put(sample, answer)
+
+        heard = listen(source, monitor, seconds, show, keep=record is not None)
         events = list(source.events)
     result = summary(heard, events, alarm)
     report(result)
@@ -78,6 +105,16 @@ def command(
         write_json(json, result)
     if record is not None:
         save(record, heard, alarm)
+
+
+def told(alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool) -> CollisionAlarm:
+    """The alarm of an arm with this load, if it was trained on such signals."""
+    from tauguard.cli.real_logs import carried
+    from tauguard.detectors.methods.free_motion import carrying
+
+    if torque and not (alarm.detector.arm.drive_gain == 1).all():
+        raise ValueError(f"--torque: {model} was trained on currents")
+    return alarm if payload is None else carrying(alarm, carried(payload))
 
 
 def check_source(source: LiveSource, alarm: CollisionAlarm, model: Path) -> None:
@@ -100,6 +137,7 @@ def opened(
     play: Path | None,
     columns: str | None,
     stdin: bool,
+    ros: str | None,
     reconnect: float,
     alarm: CollisionAlarm,
 ) -> Any:
@@ -111,30 +149,24 @@ def opened(
     if ur is not None:
         return UrSource(ur, port, 1 / dt, reconnect)
     if play is not None:
-        return PlayedSource(read_log(play, columns, names).trace)
+        from tauguard.cli.real_logs import column_map, matched
+
+        return PlayedSource(matched(read_log(play, column_map(columns), names).trace, names))
+    if ros is not None:
+        from tauguard.datasets.live.ros import RosSource
+
+        return RosSource(ros, names, 1 / dt)
     assert stdin
     return LineSource(sys.stdin, names, 1 / dt)
 
 
-class Display:
-    """The state in the terminal: a line where it changes, and the score where it is a terminal.
-
-    Writing never holds up the detector: what a slow terminal cannot take is left out.
-    """
+class Terminal:
+    """The state in the terminal: a line where it changes, and the score where it is a terminal."""
 
     def __init__(self, every: float = 0.1) -> None:
         """Show the score every so many seconds."""
         self._every, self._next, self._state = every, 0.0, ""
         self._live = sys.stdout.isatty()
-
-    def __enter__(self) -> Display:
-        """Ready."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """End the line."""
-        if self._live:
-            print()
 
     def show(self, sample: Sample, answer: Answer) -> None:
         """One answer."""
@@ -147,6 +179,39 @@ class Display:
             self._next = now + self._every
             print(f"\r{sample.t:10.3f} s  {answer.state}  score {answer.score:.2f} ", end="")
             sys.stdout.flush()
+
+
+def charts(
+    robot: Path, save: Path | None, alarm: CollisionAlarm
+) -> Callable[[Sample, Answer], None]:
+    """The arm, its currents and the score in rerun: in its viewer, or in a file."""
+    import mujoco
+    import numpy as np
+
+    from tauguard.replay.live import LiveView
+    from tauguard.replay.robot import load_model as load_robot
+
+    names = alarm.detector.arm.robot.joint_names
+    model = load_robot(robot)
+    view, data = LiveView(model, save), mujoco.MjData(model)
+    rows = [model.jnt_qposadr[model.joint(name).id] for name in names]
+    view.layout({"score": "Score (1: threshold)", "state": "0 free, 1 collision, 2 fault"})
+    states, due = {"free": 0, "collision": 1, "fault": 2}, [-np.inf, 0.0]
+
+    def show(sample: Sample, answer: Answer) -> None:
+        if (
+            not (sample.t - due[0] >= 1 / FRAMES or sample.t < due[0])
+            or not np.isfinite(sample.q).all()
+        ):
+            return
+        due[0] = sample.t
+        data.qpos[rows] = sample.q
+        mujoco.mj_kinematics(model, data)
+        view.show(data, sample.t, [])
+        view.chart("score", ["score"], [answer.score / max(alarm.threshold, 1e-9)])
+        view.chart("state", ["state"], [states[answer.state]])
+
+    return show
 
 
 def summary(heard: Heard, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:

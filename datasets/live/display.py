@@ -1,0 +1,62 @@
+"""What is shown runs behind: a slow terminal or viewer loses answers, never the detector time."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Self
+
+from tauguard.datasets.live.sample import Sample
+from tauguard.detectors.faults.monitor import Answer
+
+#: Answers that wait to be shown; older ones are dropped, changes of state last.
+WAITING = 1000
+#: Seconds that the end waits for what has not been shown yet.
+PATIENCE = 1.0
+
+
+class Behind:
+    """Shows answers in a thread of its own, and drops what that cannot keep up with.
+
+    Attributes:
+        dropped: answers that were not shown.
+    """
+
+    def __init__(self, show: Callable[[Sample, Answer], None], waiting: int = WAITING) -> None:
+        """Bind what shows one answer; it may block."""
+        self._show, self._most = show, waiting
+        self._queue: deque[tuple[Sample, Answer]] = deque()
+        self._wake, self._over = threading.Event(), False
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._state = ""
+        self.dropped = 0
+
+    def put(self, sample: Sample, answer: Answer) -> None:
+        """Take one answer; returns at once."""
+        changed, self._state = answer.state != self._state, answer.state
+        if len(self._queue) >= self._most and not (changed and len(self._queue) < 2 * self._most):
+            self.dropped += 1
+            return
+        self._queue.append((sample, answer))
+        self._wake.set()
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Show what is left, for a second at most."""
+        self._over = True
+        self._wake.set()
+        self._thread.join(PATIENCE)
+
+    def _run(self) -> None:
+        while not self._over or self._queue:
+            self._wake.wait()
+            self._wake.clear()
+            with contextlib.suppress(IndexError):
+                while True:
+                    self._show(*self._queue.popleft())

@@ -1,0 +1,112 @@
+"""A ROS 2 topic with sensor_msgs/JointState, where rclpy is there."""
+
+from __future__ import annotations
+
+import math
+import queue
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tauguard.datasets.live.sample import Closing, Sample, SourceClosed
+
+#: Samples that wait to be read; more are lost, and counted.
+WAITING = 1000
+
+
+def sample_of(message: Any, names: Sequence[str], arrived: int) -> Sample:
+    """A JointState as a sample, its joints by name in any order.
+
+    Raises:
+        ValueError: a joint is not in it, or it has no velocities or no efforts.
+    """
+    order = list(message.name)
+    if missing := [name for name in names if name not in order]:
+        raise ValueError(f"JointState: no {', '.join(missing)}; it has {', '.join(order)}")
+    rows = [order.index(name) for name in names]
+    signals = (message.position, message.velocity, message.effort)
+    for what, signal in zip(("position", "velocity", "effort"), signals, strict=True):
+        if len(signal) != len(order):
+            raise ValueError(f"JointState: {len(signal)} numbers in {what}, {len(order)} joints")
+    stamp = message.header.stamp
+    q, qd, effort = (np.array([signal[i] for i in rows], dtype=np.float64) for signal in signals)
+    return Sample(stamp.sec + 1e-9 * stamp.nanosec, q, qd, effort, arrived)
+
+
+class RosSource(Closing):
+    """Subscribes to one topic and publishes nothing.
+
+    Args:
+        topic: of type sensor_msgs/JointState.
+        joint_names: that are read.
+        rate: samples a second that will come.
+
+    Raises:
+        ValueError: there is no rclpy.
+    """
+
+    def __init__(self, topic: str, joint_names: Sequence[str], rate: float) -> None:
+        """Subscribe."""
+        try:
+            import rclpy
+            from rclpy.executors import SingleThreadedExecutor
+            from rclpy.qos import qos_profile_sensor_data
+            from sensor_msgs.msg import JointState
+        except ImportError as error:
+            raise ValueError(
+                f"--ros {topic}: {error}; source a ROS 2 installation first, or pipe the topic "
+                "into --stdin"
+            ) from None
+        self.joint_names, self.rate = tuple(joint_names), rate
+        self.events: list[str] = []
+        self._waiting: queue.Queue[Sample | ValueError] = queue.Queue(WAITING)
+        self._lost, self._last = 0, math.nan
+        self._context = rclpy.Context()
+        self._context.init()
+        self._node = rclpy.create_node("tauguard_listen", context=self._context)
+        self._node.create_subscription(JointState, topic, self._heard, qos_profile_sensor_data)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        threading.Thread(target=self._executor.spin, daemon=True).start()
+
+    def _heard(self, message: Any) -> None:
+        """One message, in the executor's thread."""
+        try:
+            found: Sample | ValueError = sample_of(message, self.joint_names, time.monotonic_ns())
+        except ValueError as error:
+            found = error
+        try:
+            self._waiting.put_nowait(found)
+        except queue.Full:
+            self._lost += 1
+            self.events[-1:] = [f"{self._lost} samples lost: they came faster than they were read"]
+
+    def read(self, timeout: float) -> Sample | None:
+        """The next sample, or None if none came within ``timeout`` seconds.
+
+        Raises:
+            SourceClosed: ROS has been shut down.
+            ValueError: a message without the joints, velocities or efforts.
+        """
+        try:
+            found = self._waiting.get(timeout=timeout)
+        except queue.Empty:
+            if not self._context.ok():
+                raise SourceClosed("ROS has been shut down") from None
+            return None
+        if isinstance(found, ValueError):
+            raise found
+        passed, self._last = found.t - self._last, found.t
+        if passed * self.rate > 1.5:
+            self.events.append(f"{round(passed * self.rate) - 1} samples lost before {found.t:.3f}")
+        return found
+
+    def close(self) -> None:
+        """Leave the topic."""
+        if self._context.ok():
+            self._executor.shutdown()
+            self._node.destroy_node()
+            self._context.shutdown()
