@@ -7,6 +7,7 @@ import queue
 import threading
 import time
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -51,10 +52,11 @@ class RosSource(Closing):
     def __init__(self, topic: str, joint_names: Sequence[str], rate: float) -> None:
         """Subscribe."""
         try:
-            import rclpy
-            from rclpy.executors import SingleThreadedExecutor
-            from rclpy.qos import qos_profile_sensor_data
-            from sensor_msgs.msg import JointState
+            # Of the ROS 2 installation, not of ours: no dependency that a package index could give.
+            rclpy: Any = import_module("rclpy")
+            executors: Any = import_module("rclpy.executors")
+            qos: Any = import_module("rclpy.qos")
+            kind: Any = import_module("sensor_msgs.msg").JointState
         except ImportError as error:
             raise ValueError(
                 f"--ros {topic}: {error}; source a ROS 2 installation first, or pipe the topic "
@@ -67,8 +69,8 @@ class RosSource(Closing):
         self._context = rclpy.Context()
         self._context.init()
         self._node = rclpy.create_node("tauguard_listen", context=self._context)
-        self._node.create_subscription(JointState, topic, self._heard, qos_profile_sensor_data)
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._node.create_subscription(kind, topic, self._heard, qos.qos_profile_sensor_data)
+        self._executor = executors.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         threading.Thread(target=self._executor.spin, daemon=True).start()
 
