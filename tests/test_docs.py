@@ -7,18 +7,20 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 # Shown and judged by tests/contacts/test_page.py.
 ELSEWHERE = {"contacts"}
+
+
+def name(page):
+    return str(page.relative_to(ROOT).with_suffix(""))
 
 
 def blocks(page):
     return re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
 
 
-@pytest.mark.parametrize(
-    "page", [p for p in PAGES if p.stem not in ELSEWHERE], ids=lambda page: page.stem
-)
+@pytest.mark.parametrize("page", [p for p in PAGES if p.stem not in ELSEWHERE], ids=name)
 def test_the_blocks_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shared = {"__name__": "page"}
@@ -26,14 +28,14 @@ def test_the_blocks_run(page, tmp_path, monkeypatch):
         exec(compile(block, page.name, "exec"), shared)
 
 
-@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CONTRIBUTING.md"], ids=name)
 def test_links_lead_somewhere(page):
     prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
     for link in re.findall(r"\]\(([^)#:]+)\)", prose):
         assert (page.parent / link).exists(), f"{page.name}: {link}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=name)
 def test_commands_exist(page):
     """What follows `tauguard` in shell blocks is a command, and its flags are its own."""
     from tauguard.benchmarks import STUDIES
@@ -51,7 +53,7 @@ def test_commands_exist(page):
             assert re.search(rf"\b{flag.replace('-', '_')}:", source), f"{command} --{flag}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=name)
 def test_environments_are_named_so_that_gymnasium_finds_them(page):
     from tauguard.environments import ENVIRONMENTS
 
