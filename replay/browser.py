@@ -6,9 +6,11 @@ is fetched from elsewhere.
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import http.server
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -60,8 +62,7 @@ class BrowserReplay:
 
     def close(self) -> None:
         """Stop both servers."""
-        self._viewer.terminate()
-        self._viewer.wait()
+        _end(self._viewer)
         self._files.shutdown()
         self._files.server_close()
 
@@ -128,7 +129,10 @@ def _start_viewer(port: int, files: str) -> subprocess.Popen[bytes]:
     program = Path(sys.executable).with_name("rerun")
     options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(port), f"{files}/none.rrd"]
     quiet = {**os.environ, "RERUN_ANALYTICS": "0", "RUST_LOG": "error"}
-    viewer = subprocess.Popen([program, *options], env=quiet, stdout=subprocess.DEVNULL)
+    # `rerun` is a script that starts the program: as a group of their own both can be ended.
+    viewer = subprocess.Popen(
+        [program, *options], env=quiet, stdout=subprocess.DEVNULL, start_new_session=True
+    )
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end and viewer.poll() is None:
         connection = http.client.HTTPConnection(HOST, port, timeout=1)
@@ -141,5 +145,11 @@ def _start_viewer(port: int, files: str) -> subprocess.Popen[bytes]:
             return viewer
         finally:
             connection.close()
-    viewer.kill()
+    _end(viewer)
     raise OSError(f"the web viewer did not come up on {HOST}:{port} within {PATIENCE:.0f} s")
+
+
+def _end(viewer: subprocess.Popen[bytes]) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(viewer.pid, signal.SIGTERM)
+    viewer.wait()

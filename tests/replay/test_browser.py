@@ -2,6 +2,7 @@
 
 import http.client
 import io
+import socket
 import time
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -85,6 +86,14 @@ def test_a_browser_shows_the_arm(replay, tmp_path):
         page.close()
     assert blue > 200
     assert len(np.unique(scene.reshape(-1, 3), axis=0)) > 300  # shaded, not blank
+
+
+def test_nothing_is_left_when_it_is_closed(tmp_path):
+    with BrowserReplay(tmp_path) as running:
+        viewer = running.url("x")[7:].partition("/")[0].split(":")
+    for address in (viewer, running.address[7:].split(":")):
+        with socket.socket() as probe:
+            assert probe.connect_ex((address[0], int(address[1]))) != 0
 
 
 def test_every_kind_of_mistake_has_its_recording_and_its_row(tmp_path):
