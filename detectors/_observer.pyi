@@ -93,3 +93,36 @@ class Estimator:
         left: Array,
         acceleration: Array,
     ) -> None: ...
+
+REGIME_SLOW: float
+
+class FreeMotion:
+    def __init__(
+        self,
+        chain: Chain,
+        basis: FrictionBasis,
+        drive_gain: list[float],
+        weights: list[float],
+        level: list[float],
+        mass: float,
+        moment: float,
+        rest: list[float],
+        stop: list[float],
+        least: list[float],
+        moving: list[float],
+        start: list[float],
+    ) -> None: ...
+    def reset(self) -> None: ...
+    def run(
+        self,
+        dt: Array,
+        q: Array,
+        qd: Array,
+        current: Array,
+        ratio: Array,
+        bound: Array,
+        residual: Array,
+        qdd: Array,
+        rest: Array,
+    ) -> None: ...
+    def step(self, q: Array, qd: Array, current: Array, dt: float) -> float: ...

@@ -126,18 +126,24 @@ class FrictionModel:
         torque: Array = np.einsum("tjc,jc->tj", columns, self.weights)
         return torque
 
-    def coulomb(self, speed: float = 0.1) -> Array:
-        """Friction at ``speed`` [rad/s] of joints that carry nothing but it [N m], shape (n,)."""
+    def coulomb(self, speed: float = 0.1, load: ArrayLike = 0.0) -> Array:
+        """Friction at ``speed`` [rad/s], the mean of both directions [N m], shape (n,).
+
+        Args:
+            speed: [rad/s].
+            load: what the joints carry besides their friction [N m], shape (n,) or a number.
+        """
         n = len(self.weights)
         q = np.linspace(0.0, 0.5, 500)[:, None].repeat(n, axis=1)
+        carried = 0 * q + np.asarray(load, dtype=np.float64)
         level: Array = np.zeros(n)
         for _ in range(5):  # load-dependent friction counts the torque that overcomes friction
             there, back = (
                 self.torque(
                     sign * q,
                     np.full_like(q, sign * speed),
-                    sign * level + 0 * q,
-                    0 * q if self.modelled else None,
+                    sign * level + carried,
+                    carried if self.modelled else None,
                 )[-1]
                 for sign in (1.0, -1.0)
             )

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.evaluation.metrics import poisson_rate
-from tauguard.detectors.features.free_bound import START, STOP
 from tauguard.detectors.methods.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Trace
 
@@ -38,7 +37,7 @@ class ThresholdCard:
     """Force at the last link's origin [N], standing and moving: found in half of all poses and
     directions, and in 95 % of those in which any force reaches a joint."""
     seconds: float  #: of collision-free motion
-    alarms: int  #: in left-out logs; the factors have seen them
+    alarms: int  #: in left-out logs, under bounds from the others
     false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %)
     unseen: dict[str, tuple[str, ...]]  #: joints by regime that the logs do not show
 
@@ -88,21 +87,22 @@ def threshold_card(detector: FittedFreeMotion, traces: Sequence[Trace]) -> Thres
     judged = [detector.judge(trace) for trace in traces]
     bounds = np.concatenate([j.bound for j in judged])
     moving = ~np.concatenate([j.rest for j in judged])
+    sliding = np.maximum(bound.moving[:, 0], bound.least)
     usual = np.array(
         [
             float(np.median(b[m])) if m.any() else float(least)
-            for b, m, least in zip(bounds.T, moving.T, bound.sliding, strict=True)
+            for b, m, least in zip(bounds.T, moving.T, sliding, strict=True)
         ]
     )
     poses = np.concatenate([t.q[:: max(1, len(t.q) // POSES)] for t in traces])
     poses = poses[:: max(1, len(poses) // POSES)]
-    standing = bound.floor
+    standing = bound.rest
     return ThresholdCard(
         robot.joint_names,
         standing,
-        standing + STOP * bound.friction,
+        standing + bound.stop,
         usual,
-        bound.sliding + START * bound.friction,
+        np.maximum(usual, sliding) + bound.start,
         {
             "standing": _tool(detector, poses, standing),
             "moving": _tool(detector, poses, usual),

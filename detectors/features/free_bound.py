@@ -1,46 +1,42 @@
-"""What collision-free motion may leave of a joint's residual: prior knowledge of geared joints.
+"""What collision-free motion may leave of a joint's residual, in units of the joint's friction.
 
-All bounds are multiples of the joint's friction level, since friction is what a model knows least:
+Friction is what a model knows least, so all bounds are multiples of each joint's friction level.
 
-* **At rest** static friction may hold any torque, so only its change counts: the residual's
-  distance from the band of values that it has had of late. The band follows the residual outwards
-  and closes behind it, so that what a push leaves is taken up, and letting go is no new push. For
-  some seconds after the joint has stopped, or while others move, the controller's integral action
-  and the change of load shift the torque: the bound is larger.
-* **In motion** the residual itself counts. The bound grows with the inertial torque, and with what
-  slow errors may still be (:mod:`~tauguard.detectors.estimation.slow_errors`). While a joint starts
-  or creeps, its friction is between static and sliding: the bound is larger.
+* **At rest** static friction may hold any torque, so only its change counts: the residual less a
+  baseline that follows it. Motion of any joint stirs the torques of those that stand: the
+  controllers' integral action, and loads that move.
+* **In motion** the residual itself counts, without slow errors. Its bound is linear in speed and
+  accelerations, by a quantile regression on left-out logs that is pulled towards a prior. While a
+  joint starts, its friction is between static and sliding: the bound is larger.
 
-The constants were chosen on three real arms (UR10e, UR5, UR3); the free logs of an arm then scale
-the two bounds of each joint (:mod:`~tauguard.detectors.methods.free_motion`).
+``src/regimes.hpp`` says how the bounds are applied. The constants here and there were chosen on
+three real arms (UR10e, UR5, UR3).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from tauguard.detectors.calibration.recording import Recording
+from tauguard.detectors.dynamics.robot import gravity_torque
+from tauguard.detectors.estimation.estimator import ArmModel
 
-#: A joint slower than this [rad/s] for so long [s] is at rest.
-SLOW, WAIT = 0.02, 0.2
+Array = NDArray[np.float64]
+
 #: Bound at rest: deviations of the noise, and multiples of the friction level.
 NOISE, REST = 8.0, 0.3
-#: What a stop adds at first, and what others' motion adds at ``OTHERS_SPEED`` [rad/s] and above.
-STOP, OTHERS, OTHERS_SPEED = 1.4, 1.2, 0.2
-#: Time constant with which a stop, and others' motion, are forgotten [s].
-SETTLES = 1.0
-#: Time constants of the band: outwards, and closing [s].
-FOLLOW, CLOSE = 0.3, 0.8
-#: Bound in motion, and what a start or creeping at up to ``CREEP`` [rad/s] adds.
-MOTION, START, CREEP = 0.5, 1.8, 0.04
-#: Time constant with which a start is forgotten [s].
-STARTED = 0.12
-#: Share of the inertial torque, and for how long it counts [s].
-INERTIAL, HELD = 0.2, 0.2
+#: What motion of any joint adds to the bound at rest, and a start to that in motion.
+STOP, START = 1.2, 1.0
+#: The bound in motion over the 99 % quantile of left-out residuals, and its least value.
+MARGIN, LEAST = 1.7, 0.6
+#: Prior of that quantile, in friction levels per 1, rad/s, own and largest acceleration [rad/s^2].
+PRIOR = np.array([0.3, 0.02, 0.05, 0.03])
+#: Where the logs' gravity torques stand that the friction level is taken at.
+LOADED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,90 +45,55 @@ class Bound:
 
     friction: Array  #: level of each joint's friction [N m], shape (n,)
     noise: Array  #: deviation of the residual of a joint at rest [N m], shape (n,)
-    resting: Array  #: factors of the bound at rest, shape (n,)
-    moving: Array  #: factors of the bound in motion, shape (n,)
+    quantile: Array
+    """99 % of the residual in motion [N m per 1, rad/s, rad/s^2, rad/s^2], shape (n, 4)."""
+
+    @classmethod
+    def prior(cls, friction: Array) -> Bound:
+        """Before any log was looked at."""
+        return cls(friction, 0.02 * friction, friction[:, None] * PRIOR)
 
     @property
-    def floor(self) -> Array:
+    def rest(self) -> Array:
         """Bound of a joint that has long been at rest [N m], shape (n,)."""
-        level: Array = np.maximum(NOISE * self.noise, REST * self.friction) * self.resting
+        level: Array = np.maximum(NOISE * self.noise, REST * self.friction)
         return level
 
     @property
-    def sliding(self) -> Array:
-        """Bound of a joint at constant speed, slow errors known [N m], shape (n,)."""
-        level: Array = np.maximum(NOISE * self.noise, MOTION * self.friction) * self.moving
+    def stop(self) -> Array:
+        """What motion of any joint adds to the bound at rest [N m], shape (n,)."""
+        return STOP * self.friction
+
+    @property
+    def start(self) -> Array:
+        """What a start adds to the bound in motion [N m], shape (n,)."""
+        return START * self.friction
+
+    @property
+    def moving(self) -> Array:
+        """Bound in motion per 1, |qd_j|, |qdd_j| and the largest |qdd|, shape (n, 4)."""
+        return MARGIN * self.quantile
+
+    @property
+    def least(self) -> Array:
+        """Least bound in motion [N m], shape (n,)."""
+        level: Array = np.maximum(NOISE * self.noise, LEAST * self.friction)
         return level
 
 
-class JointRegimes:
-    """What each joint does, what counts of its residual, and its bound; sample by sample.
+def friction_level(arm: ArmModel, recordings: Sequence[Recording]) -> Array:
+    """What a joint's bounds are measured in [N m], shape (n,).
 
-    Attributes:
-        rest: which joints are at rest, shape (n,).
-        moved: how long each has been in motion [s], shape (n,).
-        signal: what counts of the residual [N m], shape (n,).
-        bound: [N m], shape (n,).
+    Friction at 0.1 rad/s under the load that gravity puts on the joint in the logs, or 1.5 times
+    the error in motion where that is more. Without the load, a joint that carries the arm would
+    count as one of half its friction.
     """
-
-    def __init__(self, bound: Bound) -> None:
-        """Begin at rest."""
-        n = len(bound.friction)
-        self._of = bound
-        self._slow_for, self.moved = np.full(n, 10.0), np.zeros(n)
-        self._low, self._high = np.zeros(n), np.zeros(n)
-        self._stirred, self._starting = np.full(n, STOP), np.ones(n)
-        self._inertial = np.zeros(n)
-        self._others = ~np.eye(n, dtype=np.bool_)
-        self._first = True
-        self.rest = np.ones(n, dtype=np.bool_)
-        self.signal, self.bound = np.zeros(n), np.ones(n)
-
-    def motion(self, qd: Array, inertial: Array, dt: float) -> None:
-        """Take up speeds [rad/s] and inertial torques [N m], shape (n,), ``dt`` s after the last.
-
-        Goes before :meth:`judge` of the same sample.
-        """
-        speed = np.abs(qd)
-        slow = speed < SLOW
-        self._slow_for = np.where(slow, self._slow_for + dt, 0.0)
-        self.moved = np.where(slow, 0.0, self.moved + dt)
-        self._stays = self.rest
-        self.rest = self._slow_for >= WAIT
-        others = np.where(self._others, speed, 0.0).max(axis=1)
-        added = np.maximum(
-            np.where(slow, 0.0, STOP), OTHERS * np.minimum(1.0, others / OTHERS_SPEED)
-        )
-        self._stirred = np.maximum(self._stirred * np.exp(-dt / SETTLES), added)
-        self._starting = np.maximum(
-            self._starting * np.exp(-dt / STARTED), 1 / (1 + (speed / CREEP) ** 2)
-        )
-        self._inertial = np.maximum(np.abs(inertial), self._inertial * np.exp(-dt / HELD))
-
-    def judge(self, residual: Array, spread: Array, dt: float) -> Array:
-        """The ratio of what counts to its bound, shape (n,).
-
-        Args:
-            residual: without slow errors [N m], shape (n,).
-            spread: deviation that they leave [N m], shape (n,).
-            dt: time since the last sample [s].
-        """
-        stays = self.rest & self._stays & (not self._first)
-        self._first = False
-        above, below = np.maximum(residual - self._high, 0), np.minimum(residual - self._low, 0)
-        out, back = 1 - np.exp(-dt / FOLLOW), 1 - np.exp(-dt / CLOSE)
-        self._high += np.where(above > 0, out * above, back * (residual - self._high))
-        self._low += np.where(below < 0, out * below, back * (residual - self._low))
-        self._high = np.where(stays, self._high, residual)
-        self._low = np.where(stays, self._low, residual)
-        keep = np.exp(-dt / FOLLOW)
-        outside = np.where(stays, keep * (above + below), 0.0)
-        self.signal = np.where(self.rest, outside, residual)
-        of = self._of
-        at_rest = of.floor + of.friction * self._stirred
-        pushed = MOTION * of.friction + INERTIAL * self._inertial
-        moving = np.maximum(NOISE * of.noise, pushed) * of.moving
-        moving = moving + spread + START * of.friction * self._starting
-        self.bound = np.where(self.rest, at_rest, moving)
-        ratio: Array = np.abs(self.signal) / self.bound
-        return ratio
+    n = arm.robot.joints
+    level = 1.5 * np.asarray(arm.noise)
+    if arm.friction is not None:
+        poses = np.concatenate([r.trace.q[:: max(1, len(r.trace.q) // 100)] for r in recordings])
+        load = np.quantile(np.abs(gravity_torque(arm.robot, poses)), LOADED, axis=0)
+        level = np.maximum(level, arm.friction.coulomb(load=load))
+    least: Array = np.maximum(level, max(0.02 * float(level.max()), 1e-3))
+    assert least.shape == (n,)
+    return least

@@ -4,10 +4,9 @@ Momentum observer at 30/s, slow errors (load, friction) tracked while joints mov
 bound (:mod:`~tauguard.detectors.features.free_bound`). The score is the largest ratio of a joint's
 signal to its bound; 1 is the threshold.
 
-The bounds are prior knowledge in units of each joint's friction. The logs move them: a joint's two
-factors, at rest and in motion, follow the largest ratios that logs reach under a calibration that
-has not seen them, weighed against :data:`PRIOR_BLOCKS` blocks of the prior. A regime that the logs
-do not show keeps the prior.
+The bounds are prior knowledge in units of each joint's friction. Logs move the bound in motion: a
+regression on what is left of the residual in logs that the calibration has not seen, pulled
+towards the prior where the logs show little.
 """
 
 from __future__ import annotations
@@ -26,26 +25,33 @@ from tauguard.detectors.detector import check_joints
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals
 from tauguard.detectors.estimation.slow_errors import UNKNOWN_LOAD, LoadDeviation
-from tauguard.detectors.features.free_bound import Bound
-from tauguard.detectors.features.free_stream import FreeStream
+from tauguard.detectors.evaluation.events import find_alarms
+from tauguard.detectors.features.free_bound import PRIOR, Bound, friction_level
+from tauguard.detectors.features.free_stream import SLOW, FreeStream, native
+from tauguard.detectors.features.quantile_regression import upper_quantile
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
-from tauguard.detectors.thresholds.confirmation import confirmation_samples
-from tauguard.detectors.thresholds.rates import block_maxima, sustained
+from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
+from tauguard.detectors.thresholds.quiet_start import SERIES
+from tauguard.detectors.thresholds.rates import sustained
 from tauguard.traces.trace import Bools, Trace
 
 Array = NDArray[np.float64]
 
 #: Confirmation of an alarm [s].
 CONFIRMATION = 0.04
-#: Length of the blocks whose peaks the factors follow [s], and how many of them the prior is worth.
-BLOCK, PRIOR_BLOCKS = 0.5, 60
-#: A factor over the second largest peak, and its range.
-HEADROOM, LEAST, MOST = 1.35, 0.8, 3.0
+#: The quantile of the residual in motion that is learned.
+QUANTILE = 0.99
+#: Seconds of motion that the prior is worth, where speed and accelerations are these [rad/s, ...].
+WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0])
+#: Time between two rows of the regression [s].
+EVERY = 0.04
 #: Calibrations that leave logs out, at most.
 FOLDS = 5
 #: Rate of the filter that the calibration looks through [1/s].
 CALIBRATION_RATE = 20.0
+#: Seconds at a log's beginning that nothing is learned from, nor an alarm raised in.
+SETTLE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +59,8 @@ class Judged:
     """What a detector saw of a trace; rows are samples."""
 
     t: Array  #: [s], shape (T,)
+    qd: Array  #: [rad/s], shape (T, n)
+    qdd: Array  #: [rad/s^2], shape (T, n)
     ratio: Array  #: of each joint's signal to its bound, shape (T, n)
     bound: Array  #: [N m], shape (T, n)
     residual: Array  #: without slow errors [N m], shape (T, n)
@@ -68,10 +76,9 @@ class FittedFreeMotion(Frozen):
     bound: Bound
     load: LoadDeviation  #: how uncertain the carried load is
     seconds: float  #: of collision-free motion that the bounds rest on
-    alarms: int
-    """In the training logs, each under a calibration from others; their bounds have seen them."""
+    alarms: int  #: in the training logs, each under calibration and bounds from the others
     name: str = "free-motion"
-    settle: float = 0.5  #: [s]
+    settle: float = SETTLE  #: [s]
 
     def carrying(self, load: Load) -> FittedFreeMotion:
         """The same detector of the arm with a load in its gripper; ``Load()`` for none."""
@@ -103,15 +110,13 @@ class FittedFreeMotion(Frozen):
             raise ValueError(
                 f"the trace has {len(trace.joint_names)} joints, this detector {joints}"
             )
-        stream, steps = self.stream(), intervals(trace.t, len(trace.t))
-        ratio, bound, residual = (np.empty_like(trace.q) for _ in range(3))
-        rest = np.empty(trace.q.shape, dtype=np.bool_)
-        dt = trace.dt
-        for k in range(len(trace.t)):
-            stream.step(trace.q[k], trace.qd[k], trace.current[k], float(steps[k - 1]) if k else dt)
-            ratio[k], bound[k] = stream.ratio, stream.regimes.bound
-            residual[k], rest[k] = stream.residual, stream.regimes.rest
-        return Judged(trace.t, ratio, bound, residual, rest)
+        ratio, bound, residual, qdd, rest = (np.empty_like(trace.q) for _ in range(5))
+        steps = np.concatenate([[trace.dt], intervals(trace.t, len(trace.t))])
+        q, qd, current = (np.ascontiguousarray(x) for x in (trace.q, trace.qd, trace.current))
+        native(self.arm, self.bound, self.load).run(
+            steps, q, qd, current, ratio, bound, residual, qdd, rest
+        )
+        return Judged(trace.t, trace.qd, qdd, ratio, bound, residual, rest > 0)
 
 
 def carrying(alarm: CollisionAlarm, load: Load) -> CollisionAlarm:
@@ -145,91 +150,83 @@ class FreeMotion:
         recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
         check_joints([r.trace for r in recordings], arm)
         parts = pieces(recordings, FOLDS)
-        bare = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
         moving = [r for r in parts if moves(r.trace)]
         standing = [r for r in parts if not moves(r.trace)]
-        data = [filtered(r, arm.robot, arm.drive_gain, bare, CALIBRATION_RATE) for r in moving]
-
-        def calibrated(use: Sequence[int]) -> ArmModel:
-            own, known = [moving[i] for i in use], [data[i] for i in use]
-            return identify(arm, own, friction=bare, rate=CALIBRATION_RATE, data=known).arm
-
-        everything = range(len(moving))
-        whole = calibrated(everything)
-        prior = _prior(whole, max(r.trace.dt for r in recordings))
-        judged = [_judged(prior, r) for r in standing]
-        folds = [everything[k::FOLDS] for k in range(min(FOLDS, len(moving)))]
-        for fold in tqdm(folds, desc="leave out", unit="part", disable=None, leave=False):
-            others = [i for i in everything if i not in fold]
-            try:
-                model = calibrated(others)
-            except ValueError:  # too little motion is left without the fold
-                model = whole
-            judged += [_judged(replace(prior, arm=model), moving[i]) for i in fold]
-        return _moved(prior, judged)
+        models, whole = _calibrations(arm, moving)
+        bound = Bound.prior(friction_level(whole, moving))
+        dt = max(r.trace.dt for r in recordings)
+        prior = FittedFreeMotion(whole, dt, bound, UNKNOWN_LOAD, 0.0, 0)
+        left_out = [replace(prior, arm=model) for model in models] + [prior] * len(standing)
+        parts = [*moving, *standing]
+        judged = [_told(one, r).judge(r.trace) for one, r in zip(left_out, parts, strict=True)]
+        alarms = 0
+        for fold in range(FOLDS):
+            own = range(fold, len(parts), FOLDS)
+            if not own:
+                continue
+            fresh = learned(bound, [j for k, j in enumerate(judged) if k not in own])
+            for k in own:
+                alarms += _alarms(_told(replace(left_out[k], bound=fresh), parts[k]), parts[k])
+        seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
+        return replace(prior, bound=learned(bound, judged), seconds=seconds, alarms=alarms)
 
 
-def friction_level(arm: ArmModel) -> Array:
-    """What a joint's bounds are measured in [N m], shape (n,).
+def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmModel], ArmModel]:
+    """For each part the calibration from the parts of other folds, and that from all."""
+    bare = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
+    data = [filtered(r, arm.robot, arm.drive_gain, bare, CALIBRATION_RATE) for r in parts]
 
-    Coulomb friction, or 1.5 times the error in motion where that is more; small joints leave more
-    of their friction than large ones, and a quarter of the (logarithmic) way to the largest is
-    added.
-    """
-    coulomb = arm.friction.coulomb() if arm.friction else np.zeros(arm.robot.joints)
-    level = np.maximum(np.maximum(coulomb, 1.5 * np.asarray(arm.noise)), 1e-3)
-    level = np.maximum(level, 0.02 * level.max())
-    scaled: Array = level**0.75 * level.max() ** 0.25
-    return scaled
+    def calibrated(use: Sequence[int]) -> ArmModel:
+        own, known = [parts[i] for i in use], [data[i] for i in use]
+        return identify(arm, own, friction=bare, rate=CALIBRATION_RATE, data=known).arm
 
-
-def _prior(arm: ArmModel, dt: float) -> FittedFreeMotion:
-    one = np.ones(arm.robot.joints)
-    level = friction_level(arm)
-    bound = Bound(level, 0.02 * level, one, one)
-    return FittedFreeMotion(arm, dt, bound, UNKNOWN_LOAD, 0.0, 0)
-
-
-def _judged(prior: FittedFreeMotion, recording: Recording) -> Judged:
-    known = prior if recording.load is None else prior.carrying(recording.load)
-    return known.judge(recording.trace)
+    everything = range(len(parts))
+    whole = calibrated(everything)
+    models = [whole] * len(parts)
+    turns = range(min(FOLDS, len(parts)))
+    for fold in tqdm(turns, desc="leave out", unit="part", disable=None, leave=False):
+        try:
+            model = calibrated([i for i in everything if i % FOLDS != fold])
+        except ValueError:  # too little motion is left without the fold
+            model = whole
+        models[fold::FOLDS] = [model] * len(models[fold::FOLDS])
+    return models, whole
 
 
-def _moved(prior: FittedFreeMotion, judged: Sequence[Judged]) -> FittedFreeMotion:
-    """The prior with each joint's noise and factors from left-out logs."""
-    noise = _noise(judged, prior.bound.noise)
-    factors = [_factors(judged, at_rest) for at_rest in (True, False)]
-    bound = replace(prior.bound, noise=noise, resting=factors[0], moving=factors[1])
-    seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
-    alarms = sum(_alarms(part, bound, prior.bound) for part in judged)
-    return replace(prior, bound=bound, seconds=seconds, alarms=alarms)
+def _told(detector: FittedFreeMotion, recording: Recording) -> FittedFreeMotion:
+    return detector if recording.load is None else detector.carrying(recording.load)
 
 
-def _held(part: Judged, ratio: Array) -> Array:
-    """What each joint's ratio holds for the time of a confirmation, shape (T, n)."""
-    dt = float(np.median(np.diff(part.t)))
-    samples = confirmation_samples(CONFIRMATION, dt)
-    held = np.column_stack([sustained(column, samples) for column in ratio.T])
-    held[part.t - part.t[0] < 0.5] = 0.0
-    return held
+def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
+    """The prior bounds moved by what left-out logs show."""
+    return replace(
+        prior, noise=_noise(judged, prior.noise), quantile=_quantiles(judged, prior.friction)
+    )
 
 
-def _factors(judged: Sequence[Judged], at_rest: bool) -> Array:
-    """Each joint's factor, shape (n,), of the bound at rest or in motion."""
-    found = []
-    for part in judged:
-        rows = max(1, round(BLOCK / float(np.median(np.diff(part.t)))))
-        held = _held(part, np.where(part.rest == at_rest, part.ratio, 0.0))
-        found.append(np.column_stack([block_maxima(column, rows)[0] for column in held.T]))
-    peaks = np.concatenate(found)
-    out = np.ones(peaks.shape[1])
-    for j, own in enumerate(peaks.T):
-        shown = np.sort(own[own > 0])[::-1]
-        if len(shown):
-            seen = HEADROOM * float(shown[min(1, len(shown) - 1)])
-            weighed = (PRIOR_BLOCKS + len(shown) * seen) / (PRIOR_BLOCKS + len(shown))
-            out[j] = np.clip(weighed, LEAST, MOST)
-    return out
+def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
+    """Each joint's quantile of the residual in motion, shape (n, 4)."""
+    rows = [np.flatnonzero(p.t - p.t[0] > 2 * SETTLE)[:: _stride(p)] for p in judged]
+    pairs = list(zip(judged, rows, strict=True))
+
+    def stacked(name: str) -> Array:
+        parts = [np.abs(getattr(p, name)[r]) for p, r in pairs]
+        return np.concatenate([np.empty((0, len(friction))), *parts])
+
+    qd, qdd, residual = stacked("qd"), stacked("qdd"), stacked("residual")
+    hardest = qdd.max(axis=1, initial=0.0)
+    found = np.empty((len(friction), len(PRIOR)))
+    for j, level in enumerate(friction):
+        on = qd[:, j] >= SLOW
+        x = np.column_stack([np.ones(on.sum()), qd[on, j], qdd[on, j], hardest[on]])
+        weight = WORTH / EVERY * USUAL
+        y = residual[on, j] / level
+        found[j] = level * upper_quantile(x, y, QUANTILE, PRIOR, weight)
+    return found
+
+
+def _stride(part: Judged) -> int:
+    return max(1, round(EVERY / float(np.median(np.diff(part.t)))))
 
 
 def _noise(judged: Sequence[Judged], prior: Array) -> Array:
@@ -240,15 +237,16 @@ def _noise(judged: Sequence[Judged], prior: Array) -> Array:
         step, settled = max(1, round(0.05 / dt)), max(1, round(1.0 / dt))
         still = sustained(part.rest.all(axis=1).astype(float), settled) > 0
         changes.append((part.residual[step:] - part.residual[:-step])[still[step:]])
-    all_of = np.concatenate(changes)
+    all_of = np.concatenate(changes or [np.empty((0, len(prior)))])
     if len(all_of) < 100:
         return prior
     noise: Array = np.median(np.abs(all_of), axis=0) / 0.6745 / np.sqrt(2)
     return np.maximum(noise, 1e-3 * prior)
 
 
-def _alarms(part: Judged, bound: Bound, prior: Bound) -> int:
-    """Alarms of a left-out part under the factors that were learned."""
-    factor = np.where(part.rest, bound.resting, bound.moving)
-    held = _held(part, part.ratio / np.minimum(factor, 1.0)).max(axis=1) > 1
-    return int(np.count_nonzero(held[1:] & ~held[:-1]))
+def _alarms(detector: FittedFreeMotion, recording: Recording) -> int:
+    """False alarms in a collision-free recording."""
+    trace = recording.trace
+    samples = confirmation_samples(CONFIRMATION, trace.dt)
+    above = (detector.scores(trace) > 1) & (trace.t - trace.t[0] > SETTLE)
+    return len(find_alarms(trace.t, confirmed(above, samples), SERIES))

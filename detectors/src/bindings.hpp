@@ -44,5 +44,6 @@ inline void check_sample(std::size_t n, const In1& q, const In1& qd, const In1& 
 }
 
 void bind_estimator(nb::module_& m);
+void bind_free_motion(nb::module_& m);
 
 }  // namespace tauguard::detectors

@@ -229,4 +229,5 @@ NB_MODULE(_observer, m) {
   m.def("filter", &filter, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
         nb::arg().noconvert());
   bind_estimator(m);
+  bind_free_motion(m);
 }

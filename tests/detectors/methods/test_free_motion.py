@@ -54,6 +54,45 @@ def test_what_a_push_leaves_is_taken_up(alarm):
     assert found.alarms[0].end < 13.5
 
 
+def test_bounds_follow_motion_and_what_the_logs_taught(alarm):
+    """The native bounds against their formula, from the trace's own speeds."""
+    trace = record(7, dwell=(8.0, 14.0))
+    seen, bound = alarm.detector.judge(trace), alarm.detector.bound
+    # What is judged is one sample late.
+    speed = np.vstack([np.abs(trace.qd[:1]), np.abs(trace.qd[:-1])])
+    slow, t = speed < 0.02, trace.t
+    still = np.flatnonzero(slow.all(axis=1) & (t > 8))
+    stopped = t[still[0]]
+    rows = (t > stopped + 0.3) & (t < 13.5)
+    assert seen.rest[rows].all()
+    # One second after the last motion e times less, the rest as it was learned.
+    first, later = seen.bound[t > stopped + 1.0][0], seen.bound[t > stopped + 3.0][0]
+    assert (first - bound.rest) / (later - bound.rest) == pytest.approx(np.full(3, np.e**2), 0.05)
+    assert (first - bound.rest <= bound.stop * np.exp(-0.95)).all()
+    went = (t > 2) & (speed > 0.02).all(axis=1)
+    linear = np.stack(
+        [np.ones_like(speed), speed, np.abs(seen.qdd), np.abs(seen.qdd).max(1)[:, None] + 0 * speed]
+    )
+    least = np.maximum(np.einsum("ktj,jk->tj", linear, bound.moving), bound.least)
+    above = (seen.bound - least)[went]
+    assert above.min() > -1e-9
+    assert (np.median(above, axis=0) < 0.3 * bound.least).all()  # what slow errors leave
+
+
+def test_letting_go_is_no_new_push(alarm):
+    trace = record(7, dwell=(6.0, 24.0))
+    for seconds in (0.4, 0.8):
+        pushed = add_contact(trace, GAIN, Added(12.0, seconds, (8.0, 8.0, 4.0), "push"))
+        found = alarm.detect(pushed).alarms
+        assert len(found) == 1
+        assert found[0].end < 12.0 + seconds + 0.1
+
+
+def test_friction_counts_at_the_load_that_the_logs_show(fitted):
+    bare = fitted.arm.friction.coulomb()
+    assert (fitted.bound.friction >= 0.99 * bare).all()
+
+
 def test_scores_do_not_depend_on_what_comes_after(alarm):
     trace = record(7)
     whole = alarm.detector.scores(trace)

@@ -1,0 +1,70 @@
+// The free-motion detector on arrays; shapes are checked in Python.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/vector.h>
+
+#include "bindings.hpp"
+#include "free_motion.hpp"
+
+namespace tauguard::detectors {
+
+namespace {
+
+using Numbers = std::vector<double>;
+
+FreeMotion* make(const Chain& chain, const FrictionBasis& basis, const Numbers& drive_gain,
+                 const Numbers& weights, const Numbers& level, double mass, double moment,
+                 const Numbers& rest, const Numbers& stop, const Numbers& least,
+                 const Numbers& moving, const Numbers& start) {
+  const std::size_t n = chain.joints.size();
+  require(n > 0 && drive_gain.size() == n && level.size() == n && rest.size() == n &&
+              stop.size() == n && least.size() == n && start.size() == n &&
+              moving.size() == 4 * n && weights.size() == n * basis.columns() &&
+              basis.cycles.size() == n * basis.ripples,
+          "FreeMotion: array lengths differ");
+  return new FreeMotion(
+      chain, basis, {drive_gain, weights, level, mass, moment, {rest, stop, least, moving, start}});
+}
+
+void copy(const std::vector<double>& from, double* to) { std::copy(from.begin(), from.end(), to); }
+
+void run(FreeMotion& stream, In1 dt, In2 q, In2 qd, In2 current, Out2 ratio, Out2 bound,
+         Out2 residual, Out2 qdd, Out2 rest) {
+  const std::size_t rows = q.shape(0), n = stream.joints();
+  for (const auto& a : {q, qd, current})
+    require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
+  for (const auto& a : {ratio, bound, residual, qdd, rest})
+    require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
+  require(dt.shape(0) == rows, "run: one interval a row");
+  nb::gil_scoped_release release;
+  stream.reset();
+  for (std::size_t t = 0; t < rows; ++t) {
+    const std::size_t at = n * t;
+    stream.step(q.data() + at, qd.data() + at, current.data() + at, dt.data()[t]);
+    copy(stream.ratio(), ratio.data() + at);
+    copy(stream.bound(), bound.data() + at);
+    copy(stream.residual(), residual.data() + at);
+    copy(stream.qdd(), qdd.data() + at);
+    for (std::size_t j = 0; j < n; ++j) rest.data()[at + j] = stream.rest(j);
+  }
+}
+
+}  // namespace
+
+void bind_free_motion(nb::module_& m) {
+  nb::class_<FreeMotion>(m, "FreeMotion")
+      .def(nb::new_(&make))
+      .def("reset", &FreeMotion::reset)
+      .def("run", &run, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(),
+           nb::arg().noconvert(), nb::arg().noconvert(), nb::arg().noconvert(),
+           nb::arg().noconvert())
+      .def("step", [](FreeMotion& stream, In1 q, In1 qd, In1 current, double dt) {
+        check_sample(stream.joints(), q, qd, current, "current");
+        require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
+        stream.step(q.data(), qd.data(), current.data(), dt);
+        return *std::max_element(stream.ratio().begin(), stream.ratio().end());
+      });
+  m.attr("REGIME_SLOW") = Regimes::slow;
+}
+
+}  // namespace tauguard::detectors

@@ -1,0 +1,111 @@
+// What each joint of a real arm does, what counts of its residual, and how large that may be
+// without a contact.
+//
+// At rest static friction may hold any torque, so only a change counts: the residual less a
+// baseline that follows it. Motion of any joint stirs the torques of all that stand: integral
+// action of the controllers, changing loads. That adds to the bound, fully from `full_speed` on,
+// and is forgotten within about a second. For a second after an excess only change away from what
+// was before counts, so that letting go is no new push.
+//
+// In motion the residual without slow errors counts. The bound is linear in speed and
+// accelerations; while a joint starts, its friction is between static and sliding, and more is
+// allowed.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace tauguard::detectors {
+
+struct RegimeBounds {
+  std::vector<double> rest;    // of a joint that has long been at rest [N m], n
+  std::vector<double> stop;    // what motion of any joint adds to it [N m], n
+  std::vector<double> least;   // in motion at least [N m], n
+  std::vector<double> moving;  // per 1, |qd_j|, |qdd_j|, largest |qdd|, n x 4
+  std::vector<double> start;   // what a start adds [N m], n
+};
+
+class Regimes {
+ public:
+  static constexpr double slow = 0.02;       // a joint slower than this [rad/s] ...
+  static constexpr double wait = 0.1;        // ... for so long [s] is at rest
+  static constexpr double full_speed = 0.1;  // motion from which `stop` counts fully [rad/s]
+  static constexpr double settles = 1.0;     // time constant with which that is forgotten [s]
+  static constexpr double follow = 0.3;      // time constant of the baseline [s]
+  static constexpr double after = 1.0;       // change away only, for so long after an excess [s]
+  static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
+
+  explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), n_(of_.rest.size()) { reset(); }
+
+  void reset() {
+    slow_for_.assign(n_, 10.0);
+    moved_.assign(n_, 0.0);
+    base_.assign(n_, 0.0);
+    before_.assign(n_, 0.0);
+    rest_.assign(n_, 0);
+    stirred_ = 1.0;
+    since_ = after;
+  }
+
+  const double* moved() const { return moved_.data(); }  // how long in motion [s]
+  bool rest(std::size_t j) const { return rest_[j]; }
+
+  // Speeds [rad/s], `dt` s after the last; goes before judge().
+  void motion(const double* qd, double dt) {
+    fastest_ = 0.0;
+    for (std::size_t j = 0; j < n_; ++j) {
+      const double speed = std::fabs(qd[j]);
+      fastest_ = std::max(fastest_, speed);
+      slow_for_[j] = speed < slow ? slow_for_[j] + dt : 0.0;
+      moved_[j] = speed < slow ? 0.0 : moved_[j] + dt;
+    }
+    stirred_ *= std::exp(-dt / settles);
+    if (fastest_ >= slow) stirred_ = std::max(stirred_, std::min(1.0, fastest_ / full_speed));
+  }
+
+  // Ratios of what counts to its bound, and the bounds [N m]. `residual` is the observer's, `left`
+  // it less slow errors, `spread` the deviation that they leave, all [N m], n.
+  void judge(const double* residual, const double* left, const double* spread, const double* qd,
+             const double* qdd, double dt, double* ratio, double* bound) {
+    double hardest = 0.0, largest = 0.0;
+    for (std::size_t j = 0; j < n_; ++j) hardest = std::max(hardest, std::fabs(qdd[j]));
+    since_ += dt;
+    for (std::size_t j = 0; j < n_; ++j) {
+      const bool was = rest_[j];
+      rest_[j] = slow_for_[j] >= wait;
+      double signal = left[j];
+      if (rest_[j]) {
+        signal = changed(j, residual[j], !was, dt);
+        bound[j] = of_.rest[j] + of_.stop[j] * stirred_;
+      } else {
+        const double* per = &of_.moving[4 * j];
+        const double linear =
+            per[0] + per[1] * std::fabs(qd[j]) + per[2] * std::fabs(qdd[j]) + per[3] * hardest;
+        bound[j] = std::max(linear, of_.least[j]) + spread[j] +
+                   of_.start[j] * std::exp(-moved_[j] / starts);
+      }
+      ratio[j] = std::fabs(signal) / bound[j];
+      largest = std::max(largest, ratio[j]);
+    }
+    if (largest > 1.0) since_ = 0.0;
+  }
+
+ private:
+  double changed(std::size_t j, double residual, bool begins, double dt) {
+    if (begins) base_[j] = before_[j] = residual;
+    if (since_ >= after) before_[j] = base_[j];
+    const double change = residual - base_[j];
+    const bool back = change * (base_[j] - before_[j]) < 0.0;
+    base_[j] = residual - change * std::exp(-dt / follow);
+    return since_ < after && back ? 0.0 : change;
+  }
+
+  RegimeBounds of_;
+  std::size_t n_;
+  std::vector<double> slow_for_, moved_, base_, before_;
+  std::vector<char> rest_;
+  double stirred_ = 1.0, since_ = 0.0, fastest_ = 0.0;
+};
+
+}  // namespace tauguard::detectors
