@@ -1,3 +1,6 @@
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,15 +42,9 @@ class Scene:
         skip: NDArray[np.uint8],
     ) -> Answer: ...
 
-class Judge:
+class Guard:
     def __init__(
-        self,
-        xpos_t0: Doubles,
-        xmat_t0: Doubles,
-        xpos_t1: Doubles,
-        xmat_t1: Doubles,
-        x_t0: Doubles,
-        x_t1: Doubles,
+        self, addresses: dict[str, int], settings: dict[str, float], held: object
     ) -> None: ...
     def add(
         self,
@@ -63,7 +60,26 @@ class Judge:
     def flex_pair(
         self, a: Ints, radii: Doubles, elements: Ints, skip: NDArray[np.uint8]
     ) -> None: ...
-    def judge(self) -> tuple[Ints, Doubles] | None: ...
+    def partners(self, rows: Ints) -> None: ...
+    def sheet(self, ends: Ints, rest: Doubles, stiffness: Doubles) -> None: ...
+    def spins(self, dofs: Ints) -> None: ...
+    def start(self, sheets: bool) -> None: ...
+    def step(self, owner: object, each: Callable[[], None] | None) -> int: ...
+    def report(
+        self,
+    ) -> tuple[
+        int,
+        int,
+        list[tuple[float, int, bool]],
+        list[int],
+        list[int],
+        list[int],
+        float,
+        Doubles | None,
+    ]: ...
+    def passing(self) -> list[Any]: ...
+    def stiffened(self) -> list[int]: ...
+    def close(self) -> None: ...
 
 def carried(xpos: Doubles, xmat: Doubles, body: Ints, local: Doubles) -> Doubles: ...
 def all_finite(a: Doubles, b: Doubles, c: Doubles) -> bool: ...

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.contacts.guard.verdict import Hit
+from tauguard.contacts.guard.report import Pair
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hit:
+    """A pair that would pass through itself."""
+
+    pair: Pair
+    vertices: NDArray[np.int32]  #: of flexes, that take part; empty for two geoms
+
 
 #: Times that further pairs are added before everything stands still.
 ROUNDS = 8

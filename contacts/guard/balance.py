@@ -80,6 +80,11 @@ class Sheet:
         self._stiffness[:, upper[0], upper[1]] = packed[:, :6]
         self._stiffness[:, upper[1], upper[0]] = packed[:, :6]
 
+    def rows(self) -> tuple[NDArray[np.int32], Array, Array]:
+        """Ends of each element's edges, their squares at rest and the stiffness, all flat."""
+        ends = np.ascontiguousarray(self._ends, dtype=np.int32).ravel()
+        return ends, np.ascontiguousarray(self._rest).ravel(), self._stiffness.ravel()
+
     def energy(self, vertices: Array) -> float:
         """At these positions [J]."""
         edges = vertices[self._ends[..., 0]] - vertices[self._ends[..., 1]]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from tauguard.contacts._contacts import Judge
+from tauguard.contacts._contacts import Guard
 from tauguard.contacts.geoms import CONVEX, hull_vertices
 
 Array = NDArray[np.float64]
@@ -18,17 +18,17 @@ _NONE = np.zeros((0, 3))
 
 
 class Cores:
-    """The shapes of a model's geoms at any depth, added to a native judge once each.
+    """The shapes of a model's geoms at any depth, added to a native guard once each.
 
     Args:
         model: MjModel.
         kinds: The kind of each geom.
-        judge: Where shapes are added.
+        guard: Where shapes are added.
     """
 
-    def __init__(self, model: Any, kinds: list[str], judge: Judge) -> None:
+    def __init__(self, model: Any, kinds: list[str], guard: Guard) -> None:
         """Nothing is added yet."""
-        self._model, self._kinds, self._judge = model, kinds, judge
+        self._model, self._kinds, self._guard = model, kinds, guard
         self._hulls: dict[int, _Hull] = {}
         self._added: dict[tuple[int, float], int] = {}
 
@@ -63,7 +63,7 @@ class Cores:
         mujoco.mju_quat2Mat(mat, model.geom_quat[geom])
         place = np.ascontiguousarray(model.geom_pos[geom], dtype=np.float64)
         body = int(model.geom_bodyid[geom])
-        return self._judge.add(CONVEX.index(kind), size, radius, body, place, mat, vertices)
+        return self._guard.add(CONVEX.index(kind), size, radius, body, place, mat, vertices)
 
     def _hull(self, geom: int) -> _Hull:
         mesh = int(self._model.geom_dataid[geom])

@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from tauguard.contacts.guard.balance import Balance
-from tauguard.contacts.guard.stiffening import Pair
+
+#: A partner of a contact: ("geom", id) or ("flex", id).
+Partner = tuple[str, int]
+#: Both partners of a contact, sorted.
+Pair = tuple[Partner, Partner]
 
 
 @dataclass(frozen=True)

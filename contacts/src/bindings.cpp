@@ -1,40 +1,12 @@
 // tauguard.contacts._contacts: a scene's pairs over one step. Arguments are checked in Python.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
 #include <mutex>
 
-#include "sweep.hpp"
+#include "arrays.hpp"
 #include "tauguard/geometry/rounding.hpp"
-#include "verdict.hpp"
 
-namespace nb = nanobind;
 using namespace tauguard::contacts;
 
-using Doubles = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Anything = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
-using Rows3 = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Rows9 = nb::ndarray<const double, nb::shape<-1, 9>, nb::c_contig, nb::device::cpu>;
-using Ints = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using IntRows = nb::ndarray<const std::int32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Bytes = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Mask = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-
 namespace {
-
-template <class T, std::size_t N>
-auto owned(std::vector<T>&& values, std::array<std::size_t, N> shape) {
-  auto* held = new std::vector<T>(std::move(values));
-  nb::capsule owner(held, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-  return nb::ndarray<nb::numpy, T>(held->data(), N, shape.data(), owner);
-}
-
-std::vector<Vec> vectors(const Rows3& rows) {
-  std::vector<Vec> out(rows.shape(0));
-  for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = {rows.data()[3 * i], rows.data()[3 * i + 1], rows.data()[3 * i + 2]};
-  return out;
-}
 
 Poses poses_of(const Rows3& xpos_t0, const Rows9& xmat_t0, const Rows3& xpos_t1,
                const Rows9& xmat_t1) {
@@ -54,31 +26,6 @@ nb::tuple answer(const std::vector<Row>& rows, const Counts& counts) {
   return nb::make_tuple(owned(std::move(ids), std::array<std::size_t, 2>{rows.size(), 3}),
                         owned(std::move(values), std::array<std::size_t, 2>{rows.size(), 8}),
                         nb::make_tuple(counts.moved, counts.reused, counts.candidates));
-}
-
-template <class T, class Array>
-std::vector<T> list(const Array& values) {
-  return std::vector<T>(values.data(), values.data() + values.size());
-}
-
-std::pair<Shape, Frame> shape_of(int core, const Doubles& size, double radius, const Doubles& pos,
-                                 const Doubles& mat, const Rows3& vertices) {
-  Shape shape{static_cast<Core>(core),
-              {size.data()[0], size.data()[1], size.data()[2]},
-              radius,
-              {},
-              {},
-              {},
-              {},
-              {}};
-  for (const Vec& v : vectors(vertices))
-    shape.x.push_back(v[0]), shape.y.push_back(v[1]), shape.z.push_back(v[2]);
-  Frame frame;
-  for (int i = 0; i < 3; ++i) {
-    frame.row[i] = {mat.data()[3 * i], mat.data()[3 * i + 1], mat.data()[3 * i + 2]};
-    frame.at[i] = pos.data()[i];
-  }
-  return {std::move(shape), frame};
 }
 
 // The geoms of a scene and which of them meet.
@@ -157,55 +104,6 @@ class Scene {
   std::mutex busy_;
 };
 
-// Judges steps between the poses in two fixed sets of arrays: those of two MjData.
-class Judge {
- public:
-  Judge(Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1, Rows9 xmat_t1, Rows3 x_t0, Rows3 x_t1)
-      : xpos_t0_(xpos_t0),
-        xpos_t1_(xpos_t1),
-        x_t0_(x_t0),
-        x_t1_(x_t1),
-        xmat_t0_(xmat_t0),
-        xmat_t1_(xmat_t1) {}
-
-  int add(int core, Doubles size, double radius, int body, Doubles pos, Doubles mat,
-          Rows3 vertices) {
-    const auto [shape, frame] = shape_of(core, size, radius, pos, mat, vertices);
-    return verdict_.add(shape, body, frame);
-  }
-
-  void pair(Ints a, Ints b) { verdict_.add_pair(list<std::int32_t>(a), list<std::int32_t>(b)); }
-
-  void flex_pair(Ints a, Doubles radii, IntRows elements, Bytes skip) {
-    verdict_.add_flex_pair(list<std::int32_t>(a), list<double>(radii), list<std::int32_t>(elements),
-                           static_cast<int>(elements.shape(1)), list<std::uint8_t>(skip));
-  }
-
-  // None, or rows (pair, feature, level, deepest) and (t, way).
-  nb::object judge() {
-    std::vector<Hit> hits;
-    {
-      const tauguard::geometry::RoundToNearest guard;
-      verdict_.judge(poses_of(xpos_t0_, xmat_t0_, xpos_t1_, xmat_t1_), x_t0_.data(), x_t1_.data(),
-                     &hits);
-    }
-    if (hits.empty()) return nb::none();
-    std::vector<std::int32_t> ids;
-    std::vector<double> values;
-    for (const Hit& h : hits) {
-      ids.insert(ids.end(), {h.pair, h.feature, h.level, h.deepest});
-      values.insert(values.end(), {h.t, h.way});
-    }
-    return nb::make_tuple(owned(std::move(ids), std::array<std::size_t, 2>{hits.size(), 4}),
-                          owned(std::move(values), std::array<std::size_t, 2>{hits.size(), 2}));
-  }
-
- private:
-  Rows3 xpos_t0_, xpos_t1_, x_t0_, x_t1_;
-  Rows9 xmat_t0_, xmat_t1_;
-  Verdict verdict_;
-};
-
 // Points (V, 3) that bodies carry, in the order of MuJoCo's own sums so that the bits are its own.
 auto carried(Rows3 xpos, Rows9 xmat, Ints body, Rows3 local) {
   std::vector<double> out(3 * body.size());
@@ -261,12 +159,7 @@ NB_MODULE(_contacts, m) {
       .def("pairs", &Scene::pairs)
       .def("find", &Scene::find)
       .def("find_flex", &Scene::find_flex);
-  nb::class_<Judge>(m, "Judge")
-      .def(nb::init<Rows3, Rows9, Rows3, Rows9, Rows3, Rows3>())
-      .def("add", &Judge::add)
-      .def("pair", &Judge::pair)
-      .def("flex_pair", &Judge::flex_pair)
-      .def("judge", &Judge::judge);
+  bind_guard(m);
   m.def("carried", &carried);
   m.def("simplices", &simplices);
   m.def("all_finite", &all_finite);

@@ -61,8 +61,22 @@ double Shape::extent() const {
   return 0;
 }
 
+namespace {
+
+// Adds whole turns to a rotation vector so that it comes nearest to another one.
+void add_turns(const double* turn, double* angular) {
+  const Vec to = {turn[0], turn[1], turn[2]}, from = {angular[0], angular[1], angular[2]};
+  const double angle = norm(from), far = norm(to);
+  if (!(far > 0)) return;
+  const Vec axis = angle > 1e-9 ? (1 / angle) * from : (1 / far) * to;
+  const double whole = 2 * M_PI * std::round((dot(to, axis) - angle) / (2 * M_PI));
+  for (int i = 0; i < 3; ++i) angular[i] += whole * axis[i];
+}
+
+}  // namespace
+
 RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1,
-                           const double* xmat_t1) {
+                           const double* xmat_t1, const double* turn) {
   double pose[16] = {}, linear[3], angular[3] = {};
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) pose[4 * i + j] = xmat_t0[3 * i + j];
@@ -100,6 +114,7 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
       for (int i = 0; i < 3; ++i) angular[i] = scale * axis[i];
     }
   }
+  if (turn) add_turns(turn, angular);
   return RigidMotion(pose, linear, angular);
 }
 

@@ -44,9 +44,9 @@ struct Frame {
 };
 
 // The motion of a body between two poses: its origin moves linearly, its frame turns at a constant
-// rate about the shortest rotation vector.
+// rate about the shortest rotation vector, or about the one nearest to `turn` if that is given.
 RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1,
-                           const double* xmat_t1);
+                           const double* xmat_t1, const double* turn = nullptr);
 
 // A shape on a moving body, or a simplex whose vertices move linearly. Positions are relative to an
 // origin near both partners.

@@ -32,9 +32,11 @@ struct Box {
 // Holds all of a moving shape on its way; `motion` is its body's.
 Box swept(Mover mover, const RigidMotion& motion);
 
-// Where the bodies are at both ends of a step: (nbody, 3) and (nbody, 9).
+// Where the bodies are at both ends of a step: (nbody, 3) and (nbody, 9). `turn`, if given, is
+// about how far each turns between them (nbody, 3) [rad]: it decides how many whole turns are made.
 struct Poses {
   const double *xpos_t0, *xmat_t0, *xpos_t1, *xmat_t1;
+  const double* turn = nullptr;
 };
 
 struct Counts {

@@ -1,6 +1,7 @@
 #include "verdict.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tauguard::contacts {
 namespace {
@@ -107,11 +108,13 @@ void Verdict::update(const Poses& p) {
     double now[24];
     std::copy_n(p.xpos_t0 + 3 * b, 3, now), std::copy_n(p.xmat_t0 + 9 * b, 9, now + 3);
     std::copy_n(p.xpos_t1 + 3 * b, 3, now + 12), std::copy_n(p.xmat_t1 + 9 * b, 9, now + 15);
-    fresh_[b] = !std::equal(now, now + 24, last_.begin() + 24 * b);
+    const double* turn = p.turn ? p.turn + 3 * b : nullptr;
+    fresh_[b] = turn || !std::equal(now, now + 24, last_.begin() + 24 * b);
     if (!fresh_[b]) continue;
     std::copy_n(now, 24, last_.begin() + 24 * b);
-    still_[b] = std::equal(now, now + 12, now + 12);
-    motions_[b] = motion_between(now, now + 3, now + 12, now + 15);
+    motions_[b] = motion_between(now, now + 3, now + 12, now + 15, turn);
+    still_[b] = motions_[b].speed == 0 && std::equal(now, now + 12, now + 12);
+    if (turn && motions_[b].speed > M_PI) last_[24 * b] = NAN;  // poses alone do not tell it
   }
   for (std::size_t e = 0; e < entries_.size(); ++e)
     if (whole_[e] && fresh_[entries_[e].body])

@@ -6,8 +6,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from tauguard.benchmarks.contacts import guard
+from tauguard.benchmarks.contacts.draws import FAMILIES, scenes
 from tauguard.benchmarks.contacts.referee import Referee
-from tauguard.benchmarks.contacts.thrown import FAMILIES, scenes
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -24,8 +24,8 @@ def test_the_referee_sees_what_flies_through_with_contacts_off_and_nothing_that_
     for scene in scenes(family, 1, 3):
         for back in (False, True):
             model, data = scene.start(scene.timestep)
+            referee = Referee(model, data)
             model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-            referee = Referee(scene, model, data)
             if back:
                 data.qvel[:] *= -1
             for _ in range(round(scene.seconds / scene.timestep) + 1):
@@ -37,7 +37,7 @@ def test_the_referee_sees_what_flies_through_with_contacts_off_and_nothing_that_
 def test_the_referee_counts_energy():
     scene = next(scenes("pair", 1, 1))
     model, data = scene.start(1e-3)
-    referee = Referee(scene, model, data)
+    referee = Referee(model, data)
     data.qvel[:] *= 2
     mujoco.mj_step(model, data)
     referee.look()
@@ -54,12 +54,14 @@ def test_plain_steps_lose_what_guarded_steps_hold():
     assert lost > 2
 
 
-def test_a_step_that_holds_by_luck_is_not_the_first_that_holds():
-    def play(held):
-        return guard.Played(held, False, False, 1.0, 1.0, 1.0, np.zeros(3))
+def test_a_step_that_holds_by_luck_is_not_the_first_that_holds(monkeypatch):
+    def play(scene, method, step, stiff):
+        return guard.Played(step in scene, False, False, 1.0, 1.0, 1.0, np.zeros(3))
 
-    assert guard._first([play(True), play(False), play(True), play(True)]) == 2
-    assert guard._first([play(True), play(False)]) is None
+    monkeypatch.setattr(guard, "played", play)
+    fixed = (4.0, 3.0, 2.0, 1.0)
+    assert guard._first(guard._fine({4.0, 2.0, 1.0}, fixed)) == 2.0
+    assert guard._first(guard._fine({4.0, 3.0}, fixed)) is None
 
 
 def test_the_study_draws_what_it_has():

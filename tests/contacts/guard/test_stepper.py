@@ -7,10 +7,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tauguard.contacts import GuardedStepper, State
-from tauguard.contacts.guard.arrest import arrest
+from tauguard.contacts.guard.arrest import Hit, arrest
 from tauguard.contacts.guard.balance import Books
-from tauguard.contacts.guard.stiffening import SOLREF, Stiffening
-from tauguard.contacts.guard.verdict import Hit
 from tauguard.contacts.scenes import SCENES, ball_cloth, sphere_plate
 from tauguard.contacts.scenes.impacts import IMPACT_POINTS
 
@@ -129,7 +127,7 @@ def test_the_report_tells_what_was_done():
         if report.cuts and cut is None:
             cut = report
             assert guard.stiffened == ((("flex", 0), ("geom", 0)),)
-            assert model.flex_solref[0, 0] == SOLREF[0]
+            assert model.flex_solref[0, 0] == 1e-4
         after = model.geom_margin, model.flex_margin, int(model.opt.disableflags)
         for a, b in zip(margins, after, strict=True):
             np.testing.assert_array_equal(a, b)
@@ -196,7 +194,7 @@ def test_stopped_partners_move_as_one_and_momentum_stays():
     mujoco.mj_step(model, data)
     data.qpos[0] += 1
     pair = (("geom", 0), ("geom", 1))
-    hit = Hit(pair, True, False, False, 0.5, 1.0, np.zeros(0, dtype=np.int32))
+    hit = Hit(pair, np.zeros(0, dtype=np.int32))
     assert arrest(model, data, start, 2e-3, [hit], lambda: []) == [hit]
     np.testing.assert_allclose(data.qvel[[0, 6]], [-50, -50], atol=1e-9)
     np.testing.assert_allclose(data.qvel[[3, 4, 5, 9, 10, 11]], 0, atol=1e-9)
@@ -261,24 +259,31 @@ def test_only_what_is_asked_for_is_covered():
     assert data.qvel[-4] == -50.0
 
 
-def test_a_contact_pair_or_a_geom_is_stiffened_where_there_is_no_flex():
-    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><geom name="a" size="1"/>
-      <body><freejoint/><geom name="b" size="1" priority="3"/><geom name="c" size="1"/></body>
-      </worldbody><contact><pair geom1="c" geom2="a"/></contact></mujoco>""")
-    stiffening = Stiffening(model)
-    ab, ac = (("geom", 0), ("geom", 1)), (("geom", 0), ("geom", 2))
-    assert stiffening.stiffen(ab)
-    assert not stiffening.stiffen(ab)
-    assert model.geom_priority.tolist() == [4, 3, 0]
-    assert stiffening.stiffen(ac)
-    assert model.pair_solref[0, 0] == model.geom_solref[0, 0] == SOLREF[0]
-    assert stiffening.pairs() == (ab, ac)
-    assert stiffening.restore(ac)
-    assert model.pair_solref[0, 0] == 0.02
-    assert stiffening.restore(ab)
-    assert not stiffening.restore(ab)
-    assert model.geom_priority.tolist() == [0, 3, 0]
-    assert model.geom_solref[0].tolist() == [0.02, 1.0]
+@pytest.mark.parametrize("explicit", [False, True])
+def test_a_contact_pair_or_a_geom_is_stiffened_and_put_back(explicit):
+    """The lower geom gets a priority above its partner's; an explicit pair has its own numbers."""
+    pair = '<contact><pair geom1="ball" geom2="plate"/></contact>' if explicit else ""
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco><option gravity="0 0 0" timestep="5e-3"/>
+      <worldbody><geom name="plate" type="box" size=".1 .1 .001"/><body pos="0 0 .1"><freejoint/>
+      <geom name="ball" size=".01" mass=".02" priority="3"/></body></worldbody>{pair}</mujoco>""")
+    data = mujoco.MjData(model)
+    data.qvel[2] = -40
+    names = ("geom_solref", "geom_solimp", "geom_priority", "pair_solref", "pair_solimp")
+    before = {name: getattr(model, name).copy() for name in names}
+    guard = GuardedStepper(model, data)
+    while not guard.stiffened:
+        guard.step()
+    assert guard.stiffened == ((("geom", 0), ("geom", 1)),)
+    if explicit:
+        assert model.pair_solref[0, 0] == 1e-4
+        np.testing.assert_array_equal(model.geom_solref, before["geom_solref"])
+    else:
+        assert model.geom_priority.tolist() == [4, 3]
+        assert model.geom_solref[0, 0] == 1e-4
+    guard.close()
+    assert not guard.stiffened
+    for name in names:
+        np.testing.assert_array_equal(getattr(model, name), before[name])
 
 
 def test_the_stretch_energy_has_mujocos_spring_force_as_its_gradient():

@@ -1,0 +1,132 @@
+"""Which pairs a guard covers, and by which cores it judges them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.contacts._contacts import Guard
+from tauguard.contacts.checker import geom_kinds
+from tauguard.contacts.geoms import CONVEX
+from tauguard.contacts.guard.cores import Cores
+from tauguard.contacts.guard.crossings import elements
+from tauguard.contacts.guard.report import Pair, Partner
+from tauguard.contacts.pairs import flex_pairs, geom_flex_pairs, geom_pairs
+
+#: Layers taken off both partners, as shares of half their thickness. Where the cores of the last
+#: level never meet, the pair cannot have passed through itself anywhere.
+LEVELS = (0.0, 0.5, 0.75, 0.95)
+#: Of geoms against flexes there is one more level, no deeper than this many radii of the flex:
+#: MuJoCo pushes a cloth's triangles out of a geom each by its own shortest way.
+NEAR_FLEX = 4.0
+
+#: Numbers of the native places: what carries the parameters of a contact.
+_PLACES = {"pair": 0, "geom": 1, "flex": 2}
+
+
+class Covered:
+    """Tells a native guard its pairs.
+
+    Attributes:
+        pairs: Those that are covered, by their numbers; flexes against flexes last.
+        sheets: Of flexes against flexes, by their ids.
+        uncovered: Pairs that may touch and are not covered.
+
+    Args:
+        model: MjModel.
+        guard: What is told.
+        rigid: Whether geoms against geoms are covered.
+        cloth: Whether flexes are covered, against geoms, one another and themselves.
+    """
+
+    def __init__(self, model: Any, guard: Guard, rigid: bool, cloth: bool) -> None:
+        """Choose the pairs and copy the shapes, at every level."""
+        self._model, self._guard = model, guard
+        kinds = geom_kinds(model)
+        self._cores = Cores(model, kinds, guard)
+        self._known = np.isin(kinds, CONVEX)
+        self.pairs: list[Pair] = []
+        self.uncovered: list[Pair] = []
+        self._explicit = {
+            tuple(sorted((int(model.pair_geom1[k]), int(model.pair_geom2[k])))): k
+            for k in range(model.npair)
+        }
+        self._add_rigid(rigid)
+        self._add_flexes(cloth)
+        self.sheets = self._add_sheets(cloth)
+
+    def _add_rigid(self, wanted: bool) -> None:
+        pairs, rows = geom_pairs(self._model), []
+        for a, b in zip(pairs.first.tolist(), pairs.second.tolist(), strict=True):
+            own: Pair = (("geom", min(a, b)), ("geom", max(a, b)))
+            if not (wanted and self._known[a] and self._known[b]):
+                self.uncovered.append(own)
+                continue
+            cores = [
+                [self._cores.add(g, level * self._cores.radius(g)) for level in LEVELS]
+                for g in (a, b)
+            ]
+            self._guard.pair(*(np.array(c, dtype=np.int32) for c in cores))
+            self.pairs.append(own)
+            number = self._explicit.get((own[0][1], own[1][1]))
+            carrier = own[0] if number is None else ("pair", number)
+            rows.append(_row(own, carrier, len(LEVELS) - 1))
+        self._tell(rows)
+
+    def _add_flexes(self, wanted: bool) -> None:
+        model, pairs, rows = self._model, geom_flex_pairs(self._model), []
+        for geom, flex in zip(pairs.first.tolist(), pairs.second.tolist(), strict=True):
+            own: Pair = (("flex", flex), ("geom", geom))
+            if not (wanted and self._known[geom]):
+                self.uncovered.append(own)
+                continue
+            radius, thick = float(model.flex_radius[flex]), self._cores.radius(geom)
+            near = min(thick, NEAR_FLEX * radius)
+            layers = [0.0, 0.5 * near, *(level * thick for level in LEVELS[1:])]
+            radii = [radius * (1 - level) for level in (0.0, 0.5, *LEVELS[1:])]
+            simplices = elements(model, flex)
+            bodies = model.flex_vertbodyid[simplices]
+            hangs = (bodies == int(model.geom_bodyid[geom])).any(axis=1).astype(np.uint8)
+            cores = np.array([self._cores.add(geom, layer) for layer in layers], dtype=np.int32)
+            self._guard.flex_pair(cores, np.array(radii), simplices, hangs)
+            self.pairs.append(own)
+            rows.append(_row(own, own[0], len(LEVELS)))
+        self._tell(rows)
+
+    def _add_sheets(self, wanted: bool) -> list[tuple[int, int]]:
+        model, pairs, rows = self._model, flex_pairs(self._model), []
+        chosen = []
+        for a, b in zip(pairs.first.tolist(), pairs.second.tolist(), strict=True):
+            own: Pair = (("flex", a), ("flex", b))
+            if not (wanted and model.flex_dim[a] == model.flex_dim[b] == 2):
+                self.uncovered.append(own)
+                continue
+            self.pairs.append(own)
+            chosen.append((a, b))
+            rows.append(_row(own, own[0], len(LEVELS)))
+        self._tell(rows)
+        return chosen
+
+    def _tell(self, rows: list[NDArray[np.int32]]) -> None:
+        if rows:
+            self._guard.partners(np.array(rows, dtype=np.int32))
+
+
+def _row(pair: Pair, carrier: Partner, last: int) -> NDArray[np.int32]:
+    places = [(_PLACES[kind], number) for kind, number in (*pair, carrier)]
+    return np.array([*np.ravel(places), last], dtype=np.int32)
+
+
+def names(covers: Sequence[str]) -> tuple[bool, bool]:
+    """Whether ``rigid`` and ``cloth`` are among the covered kinds of pairs.
+
+    Raises:
+        ValueError: another name.
+    """
+    for one in covers:
+        if one not in ("rigid", "cloth"):
+            raise ValueError(f"checker {one!r}: a guard covers rigid and cloth")
+    return "rigid" in covers, "cloth" in covers

@@ -1,0 +1,62 @@
+"""Flexes of triangles against one another and themselves: middles that cross."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.cloth import Groups, MeshCCD
+
+Array = NDArray[np.float64]
+
+
+class Crossings:
+    """Which vertices and faces, and which edges, cross in a step.
+
+    Args:
+        model: MjModel.
+        pairs: of two-dimensional flexes, by their ids.
+        first: number of the first of these pairs.
+    """
+
+    def __init__(self, model: Any, pairs: Sequence[tuple[int, int]], first: int) -> None:
+        """Build the mesh of all flexes that take part."""
+        meets = np.zeros((model.nflex, model.nflex), dtype=bool)
+        for a, b in pairs:
+            meets[a, b] = meets[b, a] = True
+        chosen = np.flatnonzero(meets.any(axis=1))
+        faces = np.concatenate([elements(model, int(f)) for f in chosen])
+        self._flex = np.repeat(np.arange(model.nflex), model.flex_vertnum)
+        self._mesh = MeshCCD(faces, groups=Groups(self._flex, meets))
+        self._number = {pair: first + k for k, pair in enumerate(pairs)}
+
+    def find(self, x_t0: Array, x_t1: Array) -> list[tuple[int, list[int], float]]:
+        """A row for everything that crosses: the pair's number, the vertices, how far they go [m].
+
+        Args:
+            x_t0: Vertices of all flexes at the start of a step. Shape (V, 3), m.
+            x_t1: At its end.
+        """
+        frame = self._mesh.find(x_t0, x_t1)
+        faces, edges = self._mesh.faces, self._mesh.edges
+        rows = [(v, *faces[f]) for v, f in frame.vf]
+        rows += [(*edges[e], *edges[g]) for e, g in frame.ee]
+        if not rows:
+            return []
+        travel = 2 * float(np.linalg.norm(x_t1 - x_t0, axis=1).max())
+        return [(self._pair(row), [int(v) for v in row], travel) for row in rows]
+
+    def _pair(self, corners: Sequence[int]) -> int:
+        first, second = sorted((int(self._flex[corners[0]]), int(self._flex[corners[-1]])))
+        return self._number[first, second]
+
+
+def elements(model: Any, flex: int) -> NDArray[np.int32]:
+    """The simplices of a flex by the vertices of all flexes. Shape (E, corners)."""
+    corners = int(model.flex_dim[flex]) + 1
+    start, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
+    local = model.flex_elem[start : start + corners * count].reshape(-1, corners)
+    return np.ascontiguousarray(local + model.flex_vertadr[flex], dtype=np.int32)

@@ -1,0 +1,177 @@
+"""Addresses of MuJoCo's functions and of one model's and data's fields, for the native guard.
+
+Functions come from the library that the Python binding has loaded. Arrays are found through the
+binding. Scalars, and arrays that MuJoCo moves within its arena, are found through the layout of
+the structs, as :mod:`mujoco.introspect` declares it for the installed version; it is compared with
+what the binding shows.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from pathlib import Path
+from typing import Any
+
+import mujoco
+from mujoco.introspect import ast_nodes
+from mujoco.introspect.structs import STRUCTS
+
+FUNCTIONS = (
+    "mj_step",
+    "mj_step1",
+    "mj_step2",
+    "mj_kinematics",
+    "mj_comPos",
+    "mj_comVel",
+    "mj_flex",
+    "mj_tendon",
+    "mj_makeM",
+    "mj_energyPos",
+    "mj_getState",
+    "mj_setState",
+    "mj_copyState",
+    "mj_mulM",
+    "mj_jacBodyCom",
+    "mj_integratePos",
+)
+#: Parts of the state that kinematics follow from.
+POSE = int(
+    mujoco.mjtState.mjSTATE_QPOS
+    | mujoco.mjtState.mjSTATE_MOCAP_POS
+    | mujoco.mjtState.mjSTATE_MOCAP_QUAT
+)
+#: All that a step depends on.
+INTEGRATION = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+_MODEL_ARRAYS = (
+    *(f"{kind}_{name}" for kind in ("pair", "geom", "flex") for name in ("margin", "solref")),
+    *(f"{kind}_solimp" for kind in ("pair", "geom", "flex")),
+    *("geom_priority", "flex_priority", "pair_geom1", "pair_geom2"),
+    *("flex_vertbodyid", "flex_vert"),
+)
+_DATA_ARRAYS = (
+    *("qpos", "qvel", "energy", "qfrc_actuator", "qfrc_applied", "xfrc_applied"),
+    *("xpos", "xmat", "flexvert_xpos"),
+)
+_END_ARRAYS = ("qvel", "energy", "xpos", "xmat", "flexvert_xpos", "cvel")
+_MOVING = ("ncon", "nefc", "contact", "efc_aref", "efc_margin", "efc_vel", "efc_pos")
+_NUMBERS = ("nq", "nv", "nbody", "ngeom", "nflex", "nflexvert", "ntendon")
+_TYPES = {
+    "int": ctypes.c_int,
+    "mjtNum": ctypes.c_double,
+    "double": ctypes.c_double,
+    "float": ctypes.c_float,
+    "mjtSize": ctypes.c_int64,
+    "size_t": ctypes.c_size_t,
+    "uintptr_t": ctypes.c_size_t,
+    "uint64_t": ctypes.c_uint64,
+    "mjtByte": ctypes.c_uint8,
+    "mjtBool": ctypes.c_bool,
+    "char": ctypes.c_char,
+}
+
+
+def addresses(model: Any, data: Any, end: Any) -> dict[str, int]:
+    """Everything that the native guard reads and calls, by name.
+
+    Args:
+        model: MjModel.
+        data: MjData that is stepped.
+        end: another MjData of the model.
+
+    Raises:
+        RuntimeError: the installed MuJoCo lays out its structs otherwise than it declares.
+    """
+    out = {name: _function(name) for name in FUNCTIONS}
+    out |= {name: _array(model, name) for name in _MODEL_ARRAYS}
+    out |= {name: _array(data, name) for name in _DATA_ARRAYS}
+    out |= {f"end_{name}": _array(end, name) for name in _END_ARRAYS}
+    out |= {name: int(getattr(model, name)) for name in _NUMBERS}
+    fields, contact = _layout("mjData"), _layout("mjContact")
+    base = data._address
+    out |= {name: base + int(getattr(fields, name).offset) for name in (*_MOVING, "time")}
+    names = ("dist", "dim", "geom", "flex", "efc_address")
+    out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
+    option = model._address + int(_layout("mjModel", "opt").opt.offset)
+    options = ("timestep", "disableflags", "integrator", "cone")
+    out |= {name: option + int(getattr(_layout("mjOption"), name).offset) for name in options}
+    _compare(model, data, out, base + int(fields.qpos.offset))
+    return out | {
+        "model": model._address,
+        "data": base,
+        "end": end._address,
+        "contact_size": ctypes.sizeof(contact),
+        "interpolated": bool(model.nflex) and bool(model.flex_interp.any()),
+        "state_size": mujoco.mj_stateSize(model, INTEGRATION),
+        "sig_integration": INTEGRATION,
+        "sig_pose": POSE,
+        "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
+        "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
+        "refsafe": int(mujoco.mjtDisableBit.mjDSBL_REFSAFE),
+    }
+
+
+def _compare(model: Any, data: Any, found: dict[str, int], qpos: int) -> None:
+    """Fields that the binding shows are where the layout says."""
+    same = (
+        ctypes.c_double.from_address(found["timestep"]).value == model.opt.timestep,
+        ctypes.c_int.from_address(found["cone"]).value == model.opt.cone,
+        ctypes.c_double.from_address(found["time"]).value == data.time,
+        ctypes.c_int.from_address(found["ncon"]).value == data.ncon,
+        ctypes.c_int.from_address(found["nefc"]).value == data.nefc,
+        not model.nq or ctypes.c_size_t.from_address(qpos).value == found["qpos"],
+    )
+    if not all(same):
+        raise RuntimeError(
+            f"MuJoCo {mujoco.__version__}: its structs are not laid out as it declares them; "
+            "guarded steps were made for MuJoCo 4.0"
+        )
+
+
+def _array(owner: Any, name: str) -> int:
+    return int(getattr(owner, name).ctypes.data)
+
+
+@functools.cache
+def _function(name: str) -> int:
+    address = ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value
+    assert address is not None
+    return address
+
+
+@functools.cache
+def _library() -> ctypes.CDLL:
+    """The MuJoCo library that the Python binding has loaded."""
+    folder = Path(mujoco.__file__).parent
+    names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib")]
+    if not names:
+        raise OSError(f"no MuJoCo library beside its Python binding in {folder.name}")
+    return ctypes.CDLL(str(names[0]))
+
+
+@functools.cache
+def _layout(struct: str, last: str | None = None) -> Any:
+    """A struct of MuJoCo's, up to the field ``last`` if given."""
+    fields = []
+    for field in STRUCTS[struct].fields:
+        if not hasattr(field, "type"):
+            raise RuntimeError(f"MuJoCo {mujoco.__version__}: {struct} has a field without a type")
+        fields.append((field.name, _ctype(field.type)))
+        if field.name == last:
+            break
+    return type(struct, (ctypes.Structure,), {"_fields_": fields})
+
+
+def _ctype(kind: Any) -> Any:
+    if isinstance(kind, ast_nodes.PointerType):
+        return ctypes.c_void_p
+    if isinstance(kind, ast_nodes.ArrayType):
+        out = _ctype(kind.inner_type)
+        for extent in reversed(kind.extents):
+            out = out * extent
+        return out
+    name = kind.name.removeprefix("struct ").rstrip("_")
+    if name in _TYPES:
+        return _TYPES[name]
+    return _layout(name) if name in STRUCTS else ctypes.c_int  # an enumeration

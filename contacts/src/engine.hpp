@@ -1,0 +1,79 @@
+// MuJoCo as the guard sees it: functions and fields of one model and its data, by address. Python
+// finds the addresses (contacts/guard/engine.py); nothing here depends on MuJoCo's headers.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace tauguard::contacts {
+
+// Parts of a state that are saved, restored and copied: MuJoCo's mjtState.
+struct Signatures {
+  int integration, pose;
+};
+
+// One contact in MuJoCo's list.
+struct Contact {
+  double distance;
+  int dim, row;  // condim; its first row, -1: none
+  int geom[2], flex[2];
+};
+
+struct Engine {
+  using Step = void (*)(const void*, void*);
+  const void* model;
+  void *data, *end;  // what is stepped; the kinematics of a step's end
+
+  Step step, step1, step2, kinematics, com_pos, com_vel, flex, tendon, make_m, energy_pos;
+  void (*get_state)(const void*, const void*, double*, int);
+  void (*set_state)(const void*, void*, const double*, int);
+  void (*copy_state)(const void*, const void*, void*, int);
+  void (*mul_m)(const void*, const void*, double*, const double*);
+  void (*jac_com)(const void*, const void*, double*, double*, int);
+  void (*integrate)(const void*, double*, const double*, double);
+
+  int nq, nv, nbody, ngeom, nflex, nflexvert, ntendon;
+  Signatures signature;
+  int state_size;
+  bool interpolated;  // some flex's vertices do not hang on bodies of their own
+
+  // Of the model; timestep, flags, margins and parameters are changed within a step.
+  double* timestep;
+  int *disableflags, *integrator, *cone;
+  double *margin[3], *solref[3], *solimp[3];  // by place: an explicit pair, a geom, a flex
+  int* priority[3];
+  const int *pair_geom1, *pair_geom2;
+  const int* flex_vertbodyid;
+  const double* flex_vert;
+
+  // Of the data.
+  double *time, *qpos, *qvel, *energy;
+  const double *actuator, *applied, *wrench;
+  const double *xpos, *xmat, *flexvert;
+  const int *ncon, *nefc;
+  char* const* contacts;
+  std::size_t contact_size, at_dist, at_dim, at_geom, at_flex, at_row;
+  double *const *efc_aref, *const *efc_margin;
+  double *const *efc_vel, *const *efc_pos;
+
+  // Of `end`.
+  double *end_qvel, *end_energy;
+  const double *end_xpos, *end_xmat, *end_flexvert, *end_cvel;
+
+  int discrete, pyramidal, refsafe;  // values of MuJoCo's enumerations
+
+  Contact contact(int k) const {
+    const char* p = *contacts + static_cast<std::size_t>(k) * contact_size;
+    const int* geom_ids = reinterpret_cast<const int*>(p + at_geom);
+    const int* flex_ids = reinterpret_cast<const int*>(p + at_flex);
+    return {*reinterpret_cast<const double*>(p + at_dist),
+            *reinterpret_cast<const int*>(p + at_dim),
+            *reinterpret_cast<const int*>(p + at_row),
+            {geom_ids[0], geom_ids[1]},
+            {flex_ids[0], flex_ids[1]}};
+  }
+  bool is_discrete() const { return *integrator == discrete; }
+};
+
+}  // namespace tauguard::contacts

@@ -1,0 +1,250 @@
+// The guarded stepper: what of a model it covers, and its steps.
+#include <memory>
+#include <string>
+
+#include "arrays.hpp"
+#include "stepper.hpp"
+#include "tauguard/geometry/rounding.hpp"
+
+namespace tauguard::contacts {
+namespace {
+
+// Fills an engine from addresses and numbers by name; Python holds what they point into.
+class Addresses {
+ public:
+  explicit Addresses(const nb::dict& values) : values_(values) {}
+  std::int64_t number(const char* name) const { return nb::cast<std::int64_t>(values_[name]); }
+  template <class T>
+  void set(const char* name, T* field) const {
+    if constexpr (std::is_pointer_v<T>)
+      *field = reinterpret_cast<T>(static_cast<std::uintptr_t>(number(name)));
+    else
+      *field = static_cast<T>(number(name));
+  }
+
+ private:
+  const nb::dict& values_;
+};
+
+void set_functions(const Addresses& a, Engine* e) {
+  a.set("mj_step", &e->step), a.set("mj_step1", &e->step1), a.set("mj_step2", &e->step2);
+  a.set("mj_kinematics", &e->kinematics), a.set("mj_comPos", &e->com_pos);
+  a.set("mj_comVel", &e->com_vel), a.set("mj_flex", &e->flex), a.set("mj_tendon", &e->tendon);
+  a.set("mj_makeM", &e->make_m), a.set("mj_energyPos", &e->energy_pos);
+  a.set("mj_getState", &e->get_state), a.set("mj_setState", &e->set_state);
+  a.set("mj_copyState", &e->copy_state), a.set("mj_mulM", &e->mul_m);
+  a.set("mj_jacBodyCom", &e->jac_com), a.set("mj_integratePos", &e->integrate);
+}
+
+void set_model(const Addresses& a, Engine* e) {
+  a.set("model", &e->model), a.set("timestep", &e->timestep);
+  a.set("disableflags", &e->disableflags), a.set("integrator", &e->integrator);
+  a.set("cone", &e->cone);
+  const char* kinds[3] = {"pair", "geom", "flex"};
+  for (int k = 0; k < 3; ++k) {
+    const std::string kind = kinds[k];
+    a.set((kind + "_margin").c_str(), &e->margin[k]);
+    a.set((kind + "_solref").c_str(), &e->solref[k]);
+    a.set((kind + "_solimp").c_str(), &e->solimp[k]);
+    e->priority[k] = nullptr;
+    if (k > 0) a.set((kind + "_priority").c_str(), &e->priority[k]);
+  }
+  a.set("pair_geom1", &e->pair_geom1), a.set("pair_geom2", &e->pair_geom2);
+  a.set("flex_vertbodyid", &e->flex_vertbodyid), a.set("flex_vert", &e->flex_vert);
+  a.set("nq", &e->nq), a.set("nv", &e->nv), a.set("nbody", &e->nbody);
+  a.set("ngeom", &e->ngeom), a.set("nflex", &e->nflex), a.set("nflexvert", &e->nflexvert);
+  a.set("ntendon", &e->ntendon), a.set("interpolated", &e->interpolated);
+  a.set("state_size", &e->state_size), a.set("sig_integration", &e->signature.integration);
+  a.set("sig_pose", &e->signature.pose), a.set("discrete", &e->discrete);
+  a.set("pyramidal", &e->pyramidal), a.set("refsafe", &e->refsafe);
+}
+
+void set_data(const Addresses& a, Engine* e) {
+  a.set("data", &e->data), a.set("end", &e->end), a.set("time", &e->time);
+  a.set("qpos", &e->qpos), a.set("qvel", &e->qvel), a.set("energy", &e->energy);
+  a.set("qfrc_actuator", &e->actuator), a.set("qfrc_applied", &e->applied);
+  a.set("xfrc_applied", &e->wrench), a.set("xpos", &e->xpos), a.set("xmat", &e->xmat);
+  a.set("flexvert_xpos", &e->flexvert), a.set("ncon", &e->ncon), a.set("nefc", &e->nefc);
+  a.set("contact", &e->contacts), a.set("contact_size", &e->contact_size);
+  a.set("at_dist", &e->at_dist), a.set("at_dim", &e->at_dim), a.set("at_geom", &e->at_geom);
+  a.set("at_flex", &e->at_flex), a.set("at_efc_address", &e->at_row);
+  a.set("efc_aref", &e->efc_aref), a.set("efc_margin", &e->efc_margin);
+  a.set("efc_vel", &e->efc_vel), a.set("efc_pos", &e->efc_pos);
+  a.set("end_qvel", &e->end_qvel), a.set("end_energy", &e->end_energy);
+  a.set("end_xpos", &e->end_xpos), a.set("end_xmat", &e->end_xmat);
+  a.set("end_flexvert_xpos", &e->end_flexvert), a.set("end_cvel", &e->end_cvel);
+}
+
+Engine engine_of(const nb::dict& values) {
+  const Addresses a(values);
+  Engine e{};
+  set_functions(a, &e), set_model(a, &e), set_data(a, &e);
+  return e;
+}
+
+nb::object array_of(const std::vector<double>& values) {
+  return nb::cast(owned(std::vector<double>(values), std::array<std::size_t, 1>{values.size()}));
+}
+
+// Hits as rows: pair, simplices of the flex that came deepest, vertices of flexes that crossed.
+nb::list rows_of(const std::vector<PairHit>& hits) {
+  nb::list out;
+  for (const PairHit& hit : hits) {
+    nb::list features, corners;
+    for (const auto f : hit.features) features.append(f);
+    for (const auto c : hit.corners) corners.append(c);
+    out.append(nb::make_tuple(hit.pair, hit.passed, features, corners));
+  }
+  return out;
+}
+
+class Guard {
+ public:
+  Guard(const nb::dict& addresses, const nb::dict& settings, nb::object held)
+      : engine_(engine_of(addresses)), held_(std::move(held)) {
+    const auto number = [&](const char* name) { return nb::cast<double>(settings[name]); };
+    s_.stiff = number("stiff") != 0, s_.most = static_cast<int>(number("most"));
+    s_.beyond = number("beyond"), s_.room = number("room"), s_.smallest = number("smallest");
+    s_.push = number("push"), s_.watched = static_cast<int>(number("watched"));
+    s_.look = static_cast<int>(number("look")), s_.turned = number("turned");
+    s_.deeper_geom = number("deeper_geom"), s_.deeper_flex = number("deeper_flex");
+    allowed_ = number("allowed");
+  }
+
+  int add(int core, Doubles size, double radius, int body, Doubles pos, Doubles mat,
+          Rows3 vertices) {
+    const auto [shape, frame] = shape_of(core, size, radius, pos, mat, vertices);
+    return verdict_.add(shape, body, frame);
+  }
+  void pair(Ints a, Ints b) { verdict_.add_pair(list<std::int32_t>(a), list<std::int32_t>(b)); }
+  void flex_pair(Ints a, Doubles radii, IntRows elements, Bytes skip) {
+    verdict_.add_flex_pair(list<std::int32_t>(a), list<double>(radii), list<std::int32_t>(elements),
+                           static_cast<int>(elements.shape(1)), list<std::uint8_t>(skip));
+  }
+  // Partners of every pair, in the order they were added, flexes against flexes last: rows (kind,
+  // number) of the first, the second and what carries their parameters, and the last level.
+  void partners(IntRows rows) {
+    for (std::size_t i = 0; i < rows.shape(0); ++i) {
+      const std::int32_t* r = rows.data() + 7 * i;
+      const auto place = [&](int k) { return Place{static_cast<Place::Kind>(r[k]), r[k + 1]}; };
+      pairs_.push_back({place(0), place(2), place(4)}), last_.push_back(r[6]);
+    }
+  }
+  void sheet(Ints ends, Doubles rest, Doubles stiffness) {
+    sheets_.push_back({list<std::int32_t>(ends), list<double>(rest), list<double>(stiffness)});
+  }
+  void spins(Ints dofs) { spins_ = list<int>(dofs); }
+
+  // All was added. Whether flexes are covered against flexes: the owner's `_crossing` finds them.
+  void start(bool sheets) {
+    stepper_ =
+        std::make_unique<Stepper>(engine_, std::move(verdict_), std::move(pairs_), std::move(last_),
+                                  std::move(sheets_), std::move(spins_), s_, allowed_);
+    Stepper::Crossings find;
+    if (sheets) find = [this](std::vector<PairHit>* hits) { add_crossings(hits); };
+    stepper_->set_callbacks(find, [this](const std::vector<PairHit>& hits, const double* qpos,
+                                         double length) { return arrested(hits, qpos, length); });
+  }
+
+  // The number of contacts where nothing else is to be said, or -1. `owner` is not held beyond the
+  // call: it holds this.
+  int step(nb::handle owner, nb::object each) {
+    owner_ = owner;
+    std::function<void()> call;
+    if (!each.is_none())
+      call = [&each] {
+        const nb::gil_scoped_acquire acquire;
+        each();
+      };
+    bool quiet;
+    {
+      const nb::gil_scoped_release release;
+      const tauguard::geometry::RoundToNearest guard;
+      quiet = stepper_->step(call);
+    }
+    return quiet ? stepper_->report().contacts : -1;
+  }
+
+  // Steps, contacts, cuts (time, pair, stiffened), pairs restored, passed and arrested, energy
+  // added, and the state at the start if the step was redone.
+  nb::tuple report() const {
+    const Report& r = stepper_->report();
+    const auto ids = [](const std::vector<int>& values) {
+      nb::list out;
+      for (const int v : values) out.append(v);
+      return out;
+    };
+    nb::list cuts;
+    for (const Cut& cut : r.cuts) cuts.append(nb::make_tuple(cut.time, cut.pair, cut.stiffened));
+    return nb::make_tuple(r.steps, r.contacts, cuts, ids(r.restored), ids(r.passed),
+                          ids(r.arrested), r.added,
+                          r.redone ? array_of(stepper_->first()) : nb::none());
+  }
+
+  // What passes on the way to where the data is now.
+  nb::list passing() {
+    std::vector<PairHit> through;
+    for (PairHit& hit : stepper_->judge())
+      if (hit.passed) through.push_back(std::move(hit));
+    return rows_of(through);
+  }
+  nb::list stiffened() const {
+    nb::list out;
+    for (const int pair : stepper_->stiffened()) out.append(pair);
+    return out;
+  }
+  void close() { stepper_->close(); }
+
+ private:
+  // Rows (pair, vertices, way) of owner._crossing(x_t1).
+  void add_crossings(std::vector<PairHit>* hits) {
+    const nb::gil_scoped_acquire acquire;
+    for (const nb::handle row : owner_.attr("_crossing")(array_of(stepper_->vertices()))) {
+      PairHit hit{nb::cast<int>(row[0]),    0,  true, false, false, 0,
+                  nb::cast<double>(row[2]), {}, {}};
+      for (const nb::handle v : row[1]) hit.corners.push_back(nb::cast<std::int32_t>(v));
+      hits->push_back(std::move(hit));
+    }
+  }
+  // The pairs that owner._arrest(rows, qpos, length) stopped.
+  std::vector<int> arrested(const std::vector<PairHit>& hits, const double* qpos, double length) {
+    const nb::gil_scoped_acquire acquire;
+    std::vector<int> out;
+    const auto from = reinterpret_cast<std::uintptr_t>(qpos);
+    for (const nb::handle pair : owner_.attr("_arrest")(rows_of(hits), from, length))
+      out.push_back(nb::cast<int>(pair));
+    return out;
+  }
+
+  Engine engine_;
+  nb::object held_;   // what the addresses point into
+  nb::handle owner_;  // of the step that is being made
+  Settings s_{};
+  double allowed_ = 0;
+  Verdict verdict_;
+  std::vector<Partners> pairs_;
+  std::vector<int> last_, spins_;
+  std::vector<Sheet> sheets_;
+  std::unique_ptr<Stepper> stepper_;
+};
+
+}  // namespace
+
+void bind_guard(nb::module_& m) {
+  nb::class_<Guard>(m, "Guard")
+      .def(nb::init<nb::dict, nb::dict, nb::object>())
+      .def("add", &Guard::add)
+      .def("pair", &Guard::pair)
+      .def("flex_pair", &Guard::flex_pair)
+      .def("partners", &Guard::partners)
+      .def("sheet", &Guard::sheet)
+      .def("spins", &Guard::spins)
+      .def("start", &Guard::start)
+      .def("step", &Guard::step, nb::arg("owner"), nb::arg("each").none())
+      .def("report", &Guard::report)
+      .def("passing", &Guard::passing)
+      .def("stiffened", &Guard::stiffened)
+      .def("close", &Guard::close);
+}
+
+}  // namespace tauguard::contacts

@@ -1,0 +1,139 @@
+// A step that did not stand, in pieces.
+#include <algorithm>
+
+#include "stepper.hpp"
+
+namespace tauguard::contacts {
+namespace {
+
+// Shares of its way that a piece with too much energy goes instead, until it has not.
+constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
+
+}  // namespace
+
+// `fresh` opens the account of energy anew.
+void Stepper::redo(std::vector<PairHit> hits, bool fresh, const std::function<void()>& each) {
+  report_.redone = true;
+  std::fill(arrested_.begin(), arrested_.end(), 0);
+  speeds_.clear();
+  e_.set_state(e_.model, e_.data, first_.data(), e_.signature.integration);
+  if (fresh) account_.open(e_.qvel);
+  const double end = *e_.time + whole_;
+  push_ = s_.push / whole_;
+  if (hits.empty()) {  // only pushed out too fast
+    push_ = 0;
+    for (std::size_t i = 0; i < guarded_.size(); ++i)
+      if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
+  }
+  double rest = whole_, length = shorter(hits, whole_);
+  while (rest > 0) {
+    length = piece(std::min(length, rest), each);
+    rest = length < rest * (1 - 1e-9) ? rest - length : 0;
+    length = rest;
+  }
+  *e_.time = end;
+  report_.restored = release();
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    if (passed_[i]) report_.passed.push_back(static_cast<int>(i));
+    if (arrested_[i]) report_.arrested.push_back(static_cast<int>(i));
+  }
+}
+
+// Go on by `length` or less, however many attempts it takes; how far it went.
+double Stepper::piece(double length, const std::function<void()>& each) {
+  e_.get_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
+  std::copy_n(e_.qvel, e_.nv, velocity_.begin());
+  std::copy_n(e_.qpos, e_.nq, qpos_.begin());
+  Entry entry{};
+  for (;;) {
+    rows_.step(length, held(length), push_);
+    ++report_.steps;
+    std::vector<PairHit> hits = judge();
+    note_lost(hits);
+    hits = unseen(std::move(hits));
+    entry = account_.entry(velocity_.data(), length, x_t1_.data());
+    const bool fails = !bearable(hits, length);
+    if (!fails && !account_.overdrawn(entry)) break;
+    if (length <= s_.smallest * whole_ || report_.steps >= s_.most) {
+      entry = last_resort(length, hits, entry);
+      break;
+    }
+    e_.set_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
+    if (fails)
+      length = shorter(hits, length);
+    else if (push_ != 0)
+      push_ = 0;
+    else
+      length *= 0.5;
+  }
+  report_.contacts = std::max(report_.contacts, *e_.ncon);
+  account_.book(entry);
+  report_.added += std::max(entry.gain, 0.0);
+  if (each) each();
+  return length;
+}
+
+std::vector<Held> Stepper::held(double length) const {
+  std::vector<Held> out;
+  for (const auto& [pair, speed] : speeds_)
+    out.push_back({pair, s_.room * speed * length + s_.beyond});
+  return out;
+}
+
+// Whether nothing passes through, nor becomes deeper unless a shorter piece was tried.
+bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
+  return std::all_of(hits.begin(), hits.end(), [&](const PairHit& hit) {
+    const bool rigid = pairs_[hit.pair].first.kind == Place::geom;
+    const double share = rigid ? s_.deeper_geom : s_.deeper_flex;
+    return !hit.passed && speeds_.count(hit.pair) && length <= share * whole_ * 1.000001;
+  });
+}
+
+// The work ran out: stop what passes through, then slow down what has too much energy.
+Entry Stepper::last_resort(double length, const std::vector<PairHit>& hits, Entry entry) {
+  std::vector<PairHit> through;
+  for (const PairHit& hit : hits)
+    if (hit.passed) through.push_back(hit);
+  if (!through.empty()) {
+    for (const int pair : arrest_(through, qpos_.data(), length)) arrested_[pair] = 1;
+    entry = account_.entry(velocity_.data(), length, x_t1_.data());
+  }
+  const std::vector<double> whole(e_.qvel, e_.qvel + e_.nv);
+  for (const double share : slower) {
+    if (!account_.overdrawn(entry)) break;
+    for (const auto& [pair, speed] : speeds_) arrested_[pair] = 1;
+    for (int i = 0; i < e_.nv; ++i) e_.qvel[i] = share * whole[i];
+    std::copy(qpos_.begin(), qpos_.end(), e_.qpos);
+    e_.integrate(e_.model, e_.qpos, e_.qvel, length);
+    if (passes() && share > 0) continue;
+    entry = account_.entry(velocity_.data(), length, x_t1_.data());
+  }
+  return entry;
+}
+
+bool Stepper::passes() {
+  const std::vector<PairHit> hits = judge();
+  return std::any_of(hits.begin(), hits.end(), [](const PairHit& h) { return h.passed; });
+}
+
+// How long the next attempt is; its pairs join those that are held.
+double Stepper::shorter(const std::vector<PairHit>& hits, double length) {
+  double share = 1;
+  bool fresh = false;
+  for (const PairHit& hit : hits) {
+    const auto [entry, first] = speeds_.try_emplace(hit.pair, 0.0);
+    fresh = fresh || first;
+    entry->second = std::max(entry->second, hit.way / length);
+    if (first && pairs_[hit.pair].first.kind == Place::geom && hit.time > 0)
+      share = std::min(share, hit.time + s_.beyond / std::max(hit.way, s_.beyond));
+  }
+  if (!fresh && !hits.empty()) share = 0.5;
+  for (const PairHit& hit : hits) {
+    if (!guarded_[hit.pair]) guarded_[hit.pair] = 1, ++guarded_count_;
+    const bool stiffened = s_.stiff && stiffening_.stiffen(hit.pair);
+    report_.cuts.push_back({*e_.time + share * length, hit.pair, stiffened});
+  }
+  return std::max(share * length, std::min(length, 0.5 * s_.smallest * whole_));
+}
+
+}  // namespace tauguard::contacts

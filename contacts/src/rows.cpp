@@ -1,0 +1,91 @@
+#include "rows.hpp"
+
+#include <algorithm>
+
+namespace tauguard::contacts {
+namespace {
+
+// Time constant of a row that the integrator `discrete` is to resolve within the step [s].
+constexpr double rigid = 1e-6;
+
+// Puts margins, parameters and flags back, whatever happens within the step.
+class Borrowed {
+ public:
+  explicit Borrowed(const Engine& e) : e_(e), flags_(*e.disableflags) {}
+  ~Borrowed() {
+    *e_.disableflags = flags_;
+    for (auto it = saved_.rbegin(); it != saved_.rend(); ++it) *it->first = it->second;
+  }
+  Borrowed(const Borrowed&) = delete;
+  Borrowed& operator=(const Borrowed&) = delete;
+  void set(double* place, double value) {
+    saved_.emplace_back(place, *place);
+    *place = value;
+  }
+
+ private:
+  const Engine& e_;
+  int flags_;
+  std::vector<std::pair<double*, double>> saved_;
+};
+
+}  // namespace
+
+void Rows::step(double length, const std::vector<Held>& held, double push) {
+  const bool discrete = e_.is_discrete();
+  Borrowed borrowed(e_);
+  *e_.timestep = length;
+  std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
+  for (const Held& h : held) {
+    const Place at = pairs_[h.pair].carrier;
+    double* margin = e_.margin[at.kind] + at.number;
+    borrowed.set(margin, std::max(*margin, h.margin));
+    if (discrete) {
+      borrowed.set(e_.solref[at.kind] + 2 * at.number, rigid);
+      borrowed.set(e_.solref[at.kind] + 2 * at.number + 1, 1.0);
+    }
+    if (at.kind == Place::flex)
+      flexes_[at.number] = 1;
+    else if (at.kind == Place::geom)
+      geoms_[at.number] = 1;
+    else
+      geoms_[e_.pair_geom1[at.number]] = geoms_[e_.pair_geom2[at.number]] = 1;
+  }
+  if (discrete) *e_.disableflags |= e_.refsafe;
+  e_.step1(e_.model, e_.data);
+  aim(length, push);
+  e_.step2(e_.model, e_.data);
+}
+
+void Rows::aim(double length, double push) {
+  if (!*e_.nefc) return;
+  for (int k = 0; k < *e_.ncon; ++k) {
+    const Contact contact = e_.contact(k);
+    bool chosen = false;
+    for (int i = 0; i < 2; ++i)
+      chosen = chosen || (contact.geom[i] >= 0 && geoms_[contact.geom[i]]) ||
+               (contact.flex[i] >= 0 && flexes_[contact.flex[i]]);
+    if (chosen && contact.row >= 0) aim_contact(contact, length, push);
+  }
+}
+
+void Rows::aim_contact(const Contact& contact, double length, double push) {
+  const bool pyramids = *e_.cone == e_.pyramidal && contact.dim > 1;
+  const int first = contact.row, count = pyramids ? 2 * (contact.dim - 1) : 1;
+  const bool discrete = e_.is_discrete();
+  const double* now = *e_.efc_vel;
+  // Both edges of a pyramid's first direction have the normal speed in their middle.
+  const double normal = count > 1 ? 0.5 * (now[first] + now[first + 1]) : now[first];
+  const double speed =
+      contact.distance > 0 ? -contact.distance / length : std::max(-contact.distance * push, 0.0);
+  for (int row = first; row < first + count; ++row) {
+    // Friction acts where they touch; across a gap only what goes along the normal is stopped.
+    const double aim = speed + (contact.distance > 0 ? now[row] - normal : 0.0);
+    if (discrete)
+      (*e_.efc_margin)[row] = (*e_.efc_pos)[row] + length * aim;
+    else
+      (*e_.efc_aref)[row] = (aim - now[row]) / length;
+  }
+}
+
+}  // namespace tauguard::contacts

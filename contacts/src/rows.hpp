@@ -1,0 +1,41 @@
+// A piece of a step in which the solver stops the approach of chosen pairs before they are deep.
+//
+// The margins of the chosen pairs are as wide as the pair may travel, so that MuJoCo lists every
+// place in which they are about to meet. Between mj_step1 and mj_step2 each of their rows gets the
+// velocity that it is to have at the end: for a gap d and a piece of length h no faster than d / h
+// towards each other, and in overlap none. The solver then finds the least change of velocity (in
+// the metric of the inertia) that obeys; as all these velocities allow standing still, that change
+// takes energy and never adds any, except for what pushes an overlap out.
+#pragma once
+
+#include "stiffening.hpp"
+
+namespace tauguard::contacts {
+
+// A pair that is held, and how far it may travel in the piece [m].
+struct Held {
+  int pair;
+  double margin;
+};
+
+class Rows {
+ public:
+  Rows(const Engine& engine, const std::vector<Partners>& pairs)
+      : e_(engine),
+        pairs_(pairs),
+        geoms_(engine.ngeom, 0),
+        flexes_(static_cast<std::size_t>(engine.nflex), 0) {}
+
+  // One mj_step of `length` [s]; overlaps are pushed out at most at `push` times their depth [1/s].
+  void step(double length, const std::vector<Held>& held, double push);
+
+ private:
+  void aim(double length, double push);
+  void aim_contact(const Contact& contact, double length, double push);
+
+  const Engine& e_;
+  const std::vector<Partners>& pairs_;
+  std::vector<char> geoms_, flexes_;
+};
+
+}  // namespace tauguard::contacts

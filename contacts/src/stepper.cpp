@@ -1,0 +1,223 @@
+#include "stepper.hpp"
+
+#include <algorithm>
+
+namespace tauguard::contacts {
+namespace {
+
+std::uint64_t key(const Place& first, const Place& second) {
+  const auto one = [](const Place& p) {
+    return static_cast<std::uint64_t>(p.number) << 1 | (p.kind == Place::geom ? 1u : 0u);
+  };
+  return one(first) << 32 | one(second);
+}
+
+// Both partners of a contact, in the order of pairs: flexes first, then by number.
+std::uint64_t key(const Contact& contact) {
+  Place p[2];
+  for (int i = 0; i < 2; ++i)
+    p[i] = contact.geom[i] >= 0 ? Place{Place::geom, contact.geom[i]}
+                                : Place{Place::flex, contact.flex[i]};
+  const bool swap = p[0].kind != p[1].kind ? p[0].kind == Place::geom : p[0].number > p[1].number;
+  return swap ? key(p[1], p[0]) : key(p[0], p[1]);
+}
+
+std::vector<int> marked(const std::vector<char>& marks) {
+  std::vector<int> out;
+  for (std::size_t i = 0; i < marks.size(); ++i)
+    if (marks[i]) out.push_back(static_cast<int>(i));
+  return out;
+}
+
+// Sets the timestep back at the end, also after an exception.
+struct Timestep {
+  const Engine& e;
+  double whole;
+  ~Timestep() { *e.timestep = whole; }
+};
+
+}  // namespace
+
+Stepper::Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pairs,
+                 std::vector<int> last_level, std::vector<Sheet> sheets, std::vector<int> spins,
+                 const Settings& settings, double allowed)
+    : e_(engine),
+      pairs_(std::move(pairs)),
+      last_level_(std::move(last_level)),
+      s_(settings),
+      verdict_(std::move(verdict)),
+      account_(e_, std::move(sheets), allowed),
+      stiffening_(e_, pairs_),
+      rows_(e_, pairs_),
+      spins_(std::move(spins)),
+      first_(engine.state_size),
+      saved_(engine.state_size),
+      velocity_(engine.nv),
+      qpos_(engine.nq),
+      x_t1_(3 * static_cast<std::size_t>(engine.nflexvert)),
+      turn_(3 * static_cast<std::size_t>(engine.nbody)),
+      guarded_(pairs_.size(), 0),
+      passed_(pairs_.size(), 0),
+      arrested_(pairs_.size(), 0) {
+  for (std::size_t i = 0; i < pairs_.size(); ++i)
+    number_[key(pairs_[i].first, pairs_[i].second)] = static_cast<int>(i);
+}
+
+bool Stepper::step(const std::function<void()>& each) {
+  e_.get_state(e_.model, e_.data, first_.data(), e_.signature.integration);
+  const bool watched = watched_ > 0;
+  if (watched) std::copy_n(e_.qvel, e_.nv, velocity_.begin());
+  whole_ = *e_.timestep;
+  e_.step(e_.model, e_.data);
+  std::vector<PairHit> hits = judge();
+  std::fill(passed_.begin(), passed_.end(), 0);
+  bool lost = false;
+  if (!hits.empty()) {
+    for (const PairHit& hit : hits) lost = lost || hit.lost;
+    note_lost(hits);
+    hits = unseen(std::move(hits));
+  }
+  report_ = Report{};
+  if (hits.empty() && (!watched || solvent())) {
+    report_.contacts = *e_.ncon;
+    const bool released = stands();
+    if (lost) report_.passed = marked(passed_);
+    return !released && !lost;
+  }
+  watched_ = s_.watched;
+  const Timestep back{e_, whole_};
+  redo(std::move(hits), !watched, each);
+  return false;
+}
+
+// The step stands as mj_step made it; true if some pair's parameters were put back.
+bool Stepper::stands() {
+  watched_ = std::max(watched_ - 1, 0);
+  if (!guarded_count_) return false;
+  ++since_;
+  if (*e_.ncon == contacts_ && since_ < s_.look) return false;
+  since_ = 0, contacts_ = *e_.ncon;
+  report_.restored = release();
+  return !report_.restored.empty();
+}
+
+std::vector<PairHit> Stepper::judge() {
+  e_.copy_state(e_.model, e_.data, e_.end, e_.signature.pose);
+  e_.kinematics(e_.model, e_.end);
+  if (e_.nflex) carry();
+  std::vector<Hit> rows;
+  const Poses poses{e_.xpos, e_.xmat, e_.end_xpos, e_.end_xmat, turns()};
+  verdict_.judge(poses, e_.flexvert, x_t1_.data(), &rows);
+  std::vector<PairHit> hits;
+  for (const Hit& row : rows) {
+    const int last = last_level_[row.pair];
+    if (hits.empty() || hits.back().pair != row.pair)
+      hits.push_back({row.pair, -1, false, false, true, INFINITY, 0, {}, {}});
+    PairHit& hit = hits.back();
+    if (row.deepest > last) {
+      hit.lost = true;
+      continue;
+    }
+    if (row.deepest > hit.deepest) hit.deepest = row.deepest, hit.features.clear();
+    if (row.deepest == hit.deepest) hit.features.push_back(row.feature);
+    hit.passed = hit.deepest == last;
+    hit.brushed = hit.brushed && row.level == 0;
+    hit.time = std::min(hit.time, row.t), hit.way = std::max(hit.way, row.way);
+  }
+  if (crossings_) crossings_(&hits);
+  return hits;
+}
+
+// Rotation vectors of bodies over the step by their speed at its end, where something turns fast.
+const double* Stepper::turns() {
+  double most = 0;
+  const double h = *e_.timestep;
+  for (const int dof : spins_) most = std::max(most, std::fabs(e_.qvel[dof]));
+  if (!(most * h > s_.turned)) return nullptr;
+  std::copy_n(e_.qvel, e_.nv, e_.end_qvel);
+  e_.com_pos(e_.model, e_.end), e_.com_vel(e_.model, e_.end);
+  for (int b = 0; b < e_.nbody; ++b)
+    for (int k = 0; k < 3; ++k) turn_[3 * b + k] = h * e_.end_cvel[6 * b + k];
+  return turn_.data();
+}
+
+// The flexes' vertices at the end of the step, in the order of MuJoCo's own sums.
+void Stepper::carry() {
+  if (e_.interpolated) {
+    e_.com_pos(e_.model, e_.end), e_.flex(e_.model, e_.end);
+    std::copy_n(e_.end_flexvert, x_t1_.size(), x_t1_.begin());
+    return;
+  }
+  for (int i = 0; i < e_.nflexvert; ++i) {
+    const int body = e_.flex_vertbodyid[i];
+    const double *at = e_.end_xpos + 3 * body, *r = e_.end_xmat + 9 * body,
+                 *v = e_.flex_vert + 3 * i;
+    const bool origin = v[0] == 0 && v[1] == 0 && v[2] == 0;
+    for (int k = 0; k < 3; ++k)
+      x_t1_[3 * i + k] =
+          origin ? at[k] : r[3 * k] * v[0] + r[3 * k + 1] * v[1] + r[3 * k + 2] * v[2] + at[k];
+  }
+}
+
+void Stepper::note_lost(const std::vector<PairHit>& hits) {
+  for (const PairHit& hit : hits)
+    if (hit.lost) passed_[hit.pair] = 1;
+}
+
+// Without what is lost, and without pairs that only brushed and whose contact MuJoCo listed.
+std::vector<PairHit> Stepper::unseen(std::vector<PairHit> hits) {
+  const auto gone = [](const PairHit& hit) { return hit.time == INFINITY; };
+  hits.erase(std::remove_if(hits.begin(), hits.end(), gone), hits.end());
+  if (std::none_of(hits.begin(), hits.end(), [](const PairHit& h) { return h.brushed; }))
+    return hits;
+  const std::vector<char> seen = listed();
+  const auto known = [&](const PairHit& hit) { return hit.brushed && seen[hit.pair]; };
+  hits.erase(std::remove_if(hits.begin(), hits.end(), known), hits.end());
+  return hits;
+}
+
+// Whether a plain step gives no more energy than contacts may; then it is booked.
+bool Stepper::solvent() {
+  const Entry entry = account_.entry(velocity_.data(), *e_.timestep, x_t1_.data());
+  if (account_.overdrawn(entry)) return false;
+  account_.book(entry);
+  return true;
+}
+
+// By pair: whether MuJoCo lists a contact of it.
+std::vector<char> Stepper::listed() const {
+  std::vector<char> seen(pairs_.size(), 0);
+  for (int k = 0; k < *e_.ncon; ++k) {
+    const auto found = number_.find(key(e_.contact(k)));
+    if (found != number_.end()) seen[found->second] = 1;
+  }
+  return seen;
+}
+
+// Let go of the pairs that have parted; those whose parameters are as before again.
+std::vector<int> Stepper::release() {
+  std::vector<int> out;
+  if (!guarded_count_) return out;
+  const std::vector<char> seen = listed();
+  for (std::size_t i = 0; i < guarded_.size(); ++i) {
+    if (!guarded_[i] || seen[i]) continue;
+    guarded_[i] = 0, --guarded_count_;
+    if (stiffening_.restore(static_cast<int>(i))) out.push_back(static_cast<int>(i));
+  }
+  return out;
+}
+
+std::vector<int> Stepper::stiffened() const {
+  std::vector<int> out;
+  for (std::size_t i = 0; i < pairs_.size(); ++i)
+    if (stiffening_.is_stiff(static_cast<int>(i))) out.push_back(static_cast<int>(i));
+  return out;
+}
+
+void Stepper::close() {
+  for (const int pair : stiffened()) stiffening_.restore(pair);
+  std::fill(guarded_.begin(), guarded_.end(), 0);
+  guarded_count_ = watched_ = 0;
+}
+
+}  // namespace tauguard::contacts

@@ -1,0 +1,54 @@
+// Contact parameters written for as long as a guarded contact lasts, and put back after it.
+#pragma once
+
+#include <array>
+#include <map>
+
+#include "engine.hpp"
+
+namespace tauguard::contacts {
+
+// What carries the parameters of a contact: an explicit pair, a geom or a flex, and its number.
+struct Place {
+  enum Kind { pair, geom, flex } kind;
+  int number;
+  bool operator<(const Place& o) const {
+    return kind != o.kind ? kind < o.kind : number < o.number;
+  }
+  bool operator==(const Place& o) const { return kind == o.kind && number == o.number; }
+};
+
+// Both partners of a contact, in order (flexes first), and what carries its parameters.
+struct Partners {
+  Place first, second, carrier;
+};
+
+class Stiffening {
+ public:
+  // Stiff enough that a fast body does not sink through within its own radius.
+  static constexpr std::array<double, 2> solref = {1e-4, 1.0};
+  static constexpr std::array<double, 5> solimp = {0.99, 0.999, 0.001, 0.5, 2.0};
+
+  Stiffening(const Engine& engine, const std::vector<Partners>& pairs)
+      : e_(engine), pairs_(pairs), stiff_(pairs.size(), 0) {}
+
+  // Make a pair stiff, its carrier with a priority above the partner's so that no averaging
+  // softens it; false if it was already.
+  bool stiffen(int pair);
+  // Undo that, once no other pair needs it; false if it was not stiff.
+  bool restore(int pair);
+  bool is_stiff(int pair) const { return stiff_[pair]; }
+
+ private:
+  struct Saved {
+    std::array<double, 2> solref;
+    std::array<double, 5> solimp;
+    int priority, users;
+  };
+  const Engine& e_;
+  const std::vector<Partners>& pairs_;
+  std::vector<char> stiff_;
+  std::map<Place, Saved> saved_;
+};
+
+}  // namespace tauguard::contacts
