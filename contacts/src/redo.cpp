@@ -44,10 +44,15 @@ double Stepper::piece(double length, const std::function<void()>& each) {
   e_.get_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
   std::copy_n(e_.qvel, e_.nv, velocity_.begin());
   std::copy_n(e_.qpos, e_.nq, qpos_.begin());
+  const double begin = *e_.time;
   Entry entry{};
   for (;;) {
     rows_.step(length, held(length), push_);
     ++report_.steps;
+    if (*e_.time != begin + length) {
+      note_reset();
+      break;
+    }
     std::vector<PairHit> hits = judge();
     note_lost(hits);
     hits = unseen(std::move(hits));

@@ -68,10 +68,12 @@ bool Stepper::step(const std::function<void()>& each) {
   const bool watched = watched_ > 0;
   if (watched) std::copy_n(e_.qvel, e_.nv, velocity_.begin());
   whole_ = *e_.timestep;
+  const double after = *e_.time + whole_;
   e_.step(e_.model, e_.data);
   std::vector<PairHit> hits = judge();
   std::fill(passed_.begin(), passed_.end(), 0);
-  bool lost = false;
+  bool lost = *e_.time != after;
+  if (lost) note_reset();
   if (!hits.empty()) {
     for (const PairHit& hit : hits) lost = lost || hit.lost;
     note_lost(hits);
@@ -158,6 +160,9 @@ void Stepper::carry() {
           origin ? at[k] : r[3 * k] * v[0] + r[3 * k + 1] * v[1] + r[3 * k + 2] * v[2] + at[k];
   }
 }
+
+// MuJoCo found numbers that are not finite and reset the data: nothing is known of any pair.
+void Stepper::note_reset() { std::fill(passed_.begin(), passed_.end(), 1); }
 
 void Stepper::note_lost(const std::vector<PairHit>& hits) {
   for (const PairHit& hit : hits)

@@ -86,6 +86,7 @@ class Stepper {
   double shorter(const std::vector<PairHit>& hits, double length);
   bool bearable(const std::vector<PairHit>& hits, double length) const;
   void note_lost(const std::vector<PairHit>& hits);
+  void note_reset();
   std::vector<PairHit> unseen(std::vector<PairHit> hits);
   bool solvent();
   bool passes();
