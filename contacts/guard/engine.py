@@ -94,7 +94,7 @@ def addresses(model: Any, data: Any, end: Any) -> dict[str, int]:
     names = ("dist", "dim", "geom", "flex", "efc_address")
     out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
     option = model._address + int(_layout("mjModel", "opt").opt.offset)
-    options = ("timestep", "disableflags", "integrator", "cone")
+    options = ("timestep", "disableflags", "integrator", "cone", "solver", "iterations")
     out |= {name: option + int(getattr(_layout("mjOption"), name).offset) for name in options}
     _compare(model, data, out, base + int(fields.qpos.offset))
     return out | {
@@ -108,6 +108,7 @@ def addresses(model: Any, data: Any, end: Any) -> dict[str, int]:
         "sig_pose": POSE,
         "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
         "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
+        "newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
         "refsafe": int(mujoco.mjtDisableBit.mjDSBL_REFSAFE),
     }
 

@@ -40,7 +40,7 @@ struct Engine {
 
   // Of the model; timestep, flags, margins and parameters are changed within a step.
   double* timestep;
-  int *disableflags, *integrator, *cone;
+  int *disableflags, *integrator, *cone, *solver, *iterations;
   double *margin[3], *solref[3], *solimp[3];  // by place: an explicit pair, a geom, a flex
   int* priority[3];
   const int *pair_geom1, *pair_geom2;
@@ -61,7 +61,7 @@ struct Engine {
   double *end_qvel, *end_energy;
   const double *end_xpos, *end_xmat, *end_flexvert, *end_cvel;
 
-  int discrete, pyramidal, refsafe;  // values of MuJoCo's enumerations
+  int discrete, pyramidal, refsafe, newton;  // values of MuJoCo's enumerations
 
   Contact contact(int k) const {
     const char* p = *contacts + static_cast<std::size_t>(k) * contact_size;

@@ -39,7 +39,7 @@ void set_functions(const Addresses& a, Engine* e) {
 void set_model(const Addresses& a, Engine* e) {
   a.set("model", &e->model), a.set("timestep", &e->timestep);
   a.set("disableflags", &e->disableflags), a.set("integrator", &e->integrator);
-  a.set("cone", &e->cone);
+  a.set("cone", &e->cone), a.set("solver", &e->solver), a.set("iterations", &e->iterations);
   const char* kinds[3] = {"pair", "geom", "flex"};
   for (int k = 0; k < 3; ++k) {
     const std::string kind = kinds[k];
@@ -57,6 +57,7 @@ void set_model(const Addresses& a, Engine* e) {
   a.set("state_size", &e->state_size), a.set("sig_integration", &e->signature.integration);
   a.set("sig_pose", &e->signature.pose), a.set("discrete", &e->discrete);
   a.set("pyramidal", &e->pyramidal), a.set("refsafe", &e->refsafe);
+  a.set("newton", &e->newton);
 }
 
 void set_data(const Addresses& a, Engine* e) {

@@ -8,12 +8,15 @@ namespace {
 // Time constant of a row that the integrator `discrete` is to resolve within the step [s].
 constexpr double rigid = 1e-6;
 
+constexpr int least_iterations = 100;
+
 // Puts margins, parameters and flags back, whatever happens within the step.
 class Borrowed {
  public:
-  explicit Borrowed(const Engine& e) : e_(e), flags_(*e.disableflags) {}
+  explicit Borrowed(const Engine& e)
+      : e_(e), flags_(*e.disableflags), solver_(*e.solver), iterations_(*e.iterations) {}
   ~Borrowed() {
-    *e_.disableflags = flags_;
+    *e_.disableflags = flags_, *e_.solver = solver_, *e_.iterations = iterations_;
     for (auto it = saved_.rbegin(); it != saved_.rend(); ++it) *it->first = it->second;
   }
   Borrowed(const Borrowed&) = delete;
@@ -25,7 +28,7 @@ class Borrowed {
 
  private:
   const Engine& e_;
-  int flags_;
+  int flags_, solver_, iterations_;
   std::vector<std::pair<double*, double>> saved_;
 };
 
@@ -35,6 +38,8 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
   const bool discrete = e_.is_discrete();
   Borrowed borrowed(e_);
   *e_.timestep = length;
+  // Others leave stiff rows far from solved within their iterations, and what they leave passes.
+  *e_.solver = e_.newton, *e_.iterations = std::max(*e_.iterations, least_iterations);
   std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
   for (const Held& h : held) {
     const Place at = pairs_[h.pair].carrier;
