@@ -68,6 +68,10 @@ STUDIES: dict[str, Study] = {
         "real_arm.study",
         "logs of real arms: pushes found, delays and false alarms, beside three simple rules",
     ),
+    "faults": Study(
+        "faults.study",
+        "faults of samples: which are seen, how soon, false alarms, and what goes untold",
+    ),
     "detection": Study(
         "detection.study",
         "the dissertation's experiment: detectors, speeds, operating points, false alarms",

@@ -160,13 +160,11 @@ class UrSource(Closing):
         while (found := self._reader.next()) is None:
             if self._socket is None:
                 raise ConnectionResetError("closed")
-            wait = deadline - time.monotonic()
-            if wait <= 0:
-                return None
-            self._socket.settimeout(wait)
+            # Look once more after the deadline: this program may have been kept from running.
+            self._socket.settimeout(max(0.0, deadline - time.monotonic()))
             try:
                 data = self._socket.recv(65536)
-            except TimeoutError:
+            except (TimeoutError, BlockingIOError):
                 return None
             if not data:
                 raise ConnectionResetError("the robot closed the connection")

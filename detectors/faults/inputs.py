@@ -35,8 +35,8 @@ RESOLUTION = 2e-4
 
 #: Samples in a row that may be missing before it is a gap; they are interpolated.
 LATE = 2
-#: Intervals in a row that may be unlike training's, at least.
-ODD = 10
+#: Intervals in a row that may be unlike training's, at least: as many as SPAN holds of twice dt, or this.
+ODD = 3
 
 #: By the number that the native check answers: a name, and a text with the joint and the value.
 FAULTS: dict[int, tuple[str, str]] = {
@@ -91,7 +91,11 @@ class UsualInput:
             traces[0].joint_names,
             dt,
             max((LATE + 1.3) * dt, 1.25 * max(float(np.diff(trace.t).max()) for trace in traces)),
-            max(ODD, *(2 * _longest_run(_odd(trace, dt)) + 3 for trace in traces)),
+            max(
+                ODD,
+                round(SPAN / dt / 2) - 2,
+                *(2 * _longest_run(_odd(trace, dt)) + 3 for trace in traces),
+            ),
             # At least two, so that one packet that comes twice is not called frozen.
             2 + max(_longest_run(np.asarray(_same(trace).all(axis=1))) for trace in traces),
             window,

@@ -2,6 +2,7 @@
 
 import json
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from tauguard.datasets.live.listening import listen
 from tauguard.datasets.live.packets import Fault, Packets
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, RobotNumbers, make_detector, train
+from tauguard.detectors.faults.detection import detect_with_faults
 from tauguard.detectors.faults.monitor import Monitor
 from tauguard.envs import simulate
 from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
@@ -102,6 +104,19 @@ def test_a_frozen_robot_is_a_fault_and_no_collision(alarm, struck):
     )
 
 
+def test_a_file_is_answered_as_the_stream_is(alarm, struck):
+    whole = detect_with_faults(alarm, struck)
+    assert whole.faults == ()
+    assert whole.detection.alarm.tolist() == alarm.detect(struck).alarm.tolist()
+    packets = Fault("frozen", 4.0, 0.5).apply(Packets.of(struck))
+    frozen = Trace(struck.joint_names, packets.t, packets.q, packets.qd, packets.current)
+    heard = listen(Handed(frozen), Monitor(alarm, alarm.inputs))
+    found = detect_with_faults(alarm, frozen)
+    spans = [(s.start, s.end, s.reason) for s in heard.spans.of("fault")]
+    assert [(s.start, s.end, s.reason) for s in found.faults] == spans
+    assert 0.5 <= found.fault_seconds <= 0.5 + alarm.settle + 0.1
+
+
 def test_its_size_does_not_grow_with_time(alarm, struck):
     heard = listen(Handed(struck), Monitor(alarm, alarm.inputs))
     assert heard.rows == []
@@ -123,3 +138,22 @@ def test_the_summary_is_json(alarm, struck):
     result = summary(listen(Handed(struck), Monitor(alarm, alarm.inputs)), [], alarm)
     assert json.loads(json.dumps(result))["samples"] == len(struck.t)
     assert set(result["latency_us"]) == {"median", "p99", "p99_9", "p99_99", "max"}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "give one of --ur HOST, --play LOG, --stdin and --ros TOPIC"),
+        ({"ur": "h", "stdin": True}, "give one of"),
+        ({"ur": "h", "torque": True}, "--torque: not beside --ur"),
+        ({"stdin": True, "rerun": "a.mp4"}, "expected `view`, or a file that ends with .rrd"),
+        ({"stdin": True, "rerun": "no_such/a.rrd"}, "the folder no_such does not exist"),
+        ({"stdin": True, "json": "no_such/a.json"}, "the folder no_such does not exist"),
+    ],
+)
+def test_flags_that_do_not_fit_are_named_before_anything_is_read(given, said):
+    from tauguard.cli.listen import command
+
+    paths = {key: Path(value) for key, value in given.items() if key == "json"}
+    with pytest.raises(ValueError, match=said):
+        command(Path("none.skops"), Path("none.urdf"), **(given | paths))

@@ -187,7 +187,8 @@ def summary(
     from tauguard.detectors import poisson_rate
     from tauguard.detectors.thresholds.quiet_start import loudest_joint
 
-    watched = float(trace.t[-1] - found.quiet_until) - found.fault_seconds
+    whole = float(trace.t[-1] - found.quiet_until)
+    watched = max(whole - found.fault_seconds, trace.dt)
     events: list[dict[str, Any]] = []
     for alarm in found.detection.alarms:
         joint = loudest_joint(found, alarm.start, alarm.end)

@@ -1,0 +1,1 @@
+"""Faults of samples: which are seen, how soon, and what they cost."""

@@ -1,0 +1,78 @@
+"""The arms of the fault study: a detector each, and logs that it was not trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauguard.benchmarks.real_arm.arms import ARMS, available, nominal, recordings
+from tauguard.datasets.plans import free_episodes, struck_episodes
+from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers, make_detector, train
+from tauguard.detectors.faults import UsualInput
+from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
+from tauguard.envs import simulate
+from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
+from tauguard.traces.trace import Trace
+
+#: Every so many samples of a simulation are kept: 500 Hz.
+THIN = 2
+#: Of a real arm's collision-free logs every so many are left out of training.
+LEFT_OUT = 3
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A trained detector and logs that neither it nor its fault checks have seen."""
+
+    name: str
+    alarm: CollisionAlarm
+    logs: dict[str, Trace]
+
+
+def arms(quick: bool, seed: int) -> Iterator[Watched]:
+    """The simulated arm, then the real ones whose logs are there; quick: the simulated one."""
+    yield simulated(quick, seed)
+    if quick:
+        return
+    names = [arm.name for arm in available()]
+    for arm in ARMS:
+        if arm.name in names:
+            yield real(arm.name)
+
+
+def simulated(quick: bool, seed: int) -> Watched:
+    """A CURA6 drawn by the seed, 500 Hz; logs with collisions and other loads."""
+    drawn = Mismatch(seed=1000 + seed)
+    speeds, loads = (20.0, 60.0), (0.0, 2000.0)
+    free = free_episodes(seed, 3 if quick else 8, 20.0 if quick else 40.0, speeds, loads, drawn)
+    struck = struck_episodes(500 + seed, 1 if quick else 4, 8, (40.0,), (0.0, 1000.0), drawn)
+    arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
+    training = [thinned(simulate(episode)) for episode in free]
+    alarm = train(make_detector("moving-thresholds"), training, arm, 5.0)
+    return Watched(
+        "simulated", alarm, {f"struck_{k}": thinned(simulate(e)) for k, e in enumerate(struck)}
+    )
+
+
+def thinned(trace: Trace) -> Trace:
+    """Every ``THIN``-th sample."""
+    rows = slice(None, None, THIN)
+    return Trace(
+        trace.joint_names, trace.t[rows], trace.q[rows], trace.qd[rows], trace.current[rows]
+    )
+
+
+def real(name: str) -> Watched:
+    """A real arm, trained on two thirds of its collision-free logs; the rest and contacts judge."""
+    arm = next(arm for arm in ARMS if arm.name == name)
+    free = recordings(arm, ("free",))
+    own = [log for k, log in enumerate(free) if k % LEFT_OUT]
+    training = [free[log] for log in own]
+    detector = FreeMotion().fit(training, nominal(arm))
+    usual = UsualInput.of([r.trace for r in training], detector.arm)
+    alarm = CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual)
+    others = recordings(arm, ("contact", "jointwise", "validation"))
+    logs = {log: r.trace for log, r in (free | others).items() if log not in own}
+    return Watched(name, alarm, logs)

@@ -1,0 +1,45 @@
+"""The fault study on a small simulated arm."""
+
+import numpy as np
+import pytest
+
+from tauguard.benchmarks.faults.arms import Watched, thinned
+from tauguard.benchmarks.faults.study import Tally, clean, moments
+from tauguard.datasets.plans import free_episodes, struck_episodes
+from tauguard.detectors import ArmModel, RobotNumbers, make_detector, train
+from tauguard.envs import simulate
+from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
+
+
+@pytest.fixture(scope="module")
+def watched():
+    drawn = Mismatch(seed=4)
+    free = [thinned(simulate(e)) for e in free_episodes(9, 3, 8.0, (40.0,), (0.0,), drawn)]
+    arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
+    alarm = train(make_detector("residual-thresholds"), free, arm, 5.0)
+    log = thinned(simulate(struck_episodes(2, 1, 3, (40.0,), (0.0,), drawn)[0]))
+    return Watched("small", alarm, {"log": log})
+
+
+def test_a_log_without_a_fault_has_none_and_the_alarms_of_detect(watched):
+    row = clean(watched, "log", watched.logs["log"])
+    assert row["false_fault_s"] == 0
+    assert row["alarms"] == row["alarms_of_detect"] > 0
+
+
+@pytest.mark.parametrize("name", ["nan", "frozen", "missing"])
+def test_a_fault_is_seen_and_leaves_nothing_untold(watched, name):
+    tally = Tally()
+    chosen = moments(watched, np.random.default_rng(1), 2)
+    assert len(chosen) == 2
+    for trace, start in chosen:
+        tally.add(watched, trace, name, start)
+    row = tally.row("small", name)
+    assert row["seen"]["value"] == 1
+    assert row["untold_s"] == 0
+    assert row["longest_ms"] <= 100.001
+
+
+def test_the_moments_follow_from_the_seed(watched):
+    one, two = (moments(watched, np.random.default_rng(3), 3) for _ in range(2))
+    assert [start for _, start in one] == [start for _, start in two]
