@@ -35,7 +35,7 @@ RESOLUTION = 2e-4
 
 #: Samples in a row that may be missing before it is a gap; they are interpolated.
 LATE = 2
-#: Intervals in a row that may be unlike training's, at least: as many as SPAN holds of twice dt, or this.
+#: Intervals in a row that may be unlike training's, at least: this, or what SPAN holds of twice dt.
 ODD = 3
 
 #: By the number that the native check answers: a name, and a text with the joint and the value.
