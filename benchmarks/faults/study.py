@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from tauguard.benchmarks.faults.arms import Watched, arms
@@ -32,6 +33,8 @@ from tauguard.traces.trace import Trace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
 
 #: Moments of each fault, an arm: in a full run, in a quick one.
 MOMENTS = (12, 3)
@@ -194,9 +197,9 @@ def loop(watched: Watched) -> list[Row]:
     assert watched.alarm.inputs is not None
     trace = max(watched.logs.values(), key=lambda one: len(one.t))
     monitor, stream = Monitor(watched.alarm, watched.alarm.inputs), watched.alarm.stream()
-    calls = {
-        "monitor": lambda *row: monitor.step(*row),
-        "alarm alone": lambda _, *r: stream.step(*r),
+    calls: dict[str, Callable[[float, Array, Array, Array], object]] = {
+        "monitor": monitor.step,
+        "alarm alone": lambda _, q, qd, current: stream.step(q, qd, current),
     }
     times: dict[str, list[int]] = {name: [] for name in calls}
     gc.disable()  # as `listen` does
