@@ -8,6 +8,10 @@ _Array = NDArray[np.float64]
 
 FIGURES: int
 CONTACT_WIDTH: int
+PEAK_WIDTH: int
+REACH_WIDTH: int
+WALK_WIDTH: int
+PERSON_SEGMENTS: int
 SENSOR_WIDTH: int
 
 class Joint:
@@ -53,11 +57,39 @@ class Region:
         joint: int,
         qpos: int,
         dof: int,
+        mocap: int,
+        held: bool,
         sensor: int,
         quasi_static: float,
         transient: float,
         span: float,
         speed: float,
+    ) -> None: ...
+
+class Anatomy:
+    def __init__(
+        self,
+        *,
+        hip_height: float = ...,
+        trunk: float = ...,
+        shoulder: float = ...,
+        hip_half: float = ...,
+        neck: float = ...,
+        head: float = ...,
+        upper_arm: float = ...,
+        lower_arm: float = ...,
+        hand: float = ...,
+        grip: float = ...,
+        thigh: float = ...,
+        shank: float = ...,
+        floor: float = ...,
+        facing: float = ...,
+        hand_speed: float = ...,
+        walk_speed: float = ...,
+        reaction_time: float = ...,
+        seated: bool = ...,
+        hanging: bool = ...,
+        reacts: bool = ...,
     ) -> None: ...
 
 class Surroundings:
@@ -68,6 +100,8 @@ class Surroundings:
         gravity: Sequence[float],
         tools: Sequence[Tool],
         regions: Sequence[Region],
+        person_begin: int,
+        person: Anatomy,
         sensor_begin: int,
         low: Sequence[float],
         high: Sequence[float],
@@ -87,6 +121,10 @@ class Rows:
         tau: _Array,
         contact: _Array,
         region: _Array,
+        tau_peak: _Array,
+        peak: _Array,
+        reaches: _Array,
+        walks: _Array,
     ) -> None: ...
 
 class Track:
@@ -133,6 +171,7 @@ class Plant:
     def run(self, steps: int) -> None: ...
     def finish(self) -> None: ...
     def refresh(self) -> None: ...
+    def aim(self, place: _Array, hold: float) -> None: ...
     def override(self, kind: int, speed: _Array) -> None: ...
     def follow(
         self,

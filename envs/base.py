@@ -26,8 +26,8 @@ from tauguard.envs.cell import (
 )
 from tauguard.envs.rendering import Picture
 from tauguard.envs.settings import Settings, one_of
-from tauguard.envs.world import World, build_world, crossing
-from tauguard.models import BodyProxy, Scene
+from tauguard.envs.world import World, build_world, crossing, opposite, region_pressure
+from tauguard.models import BodyProxy, Person, Scene
 
 Array = NDArray[np.float64]
 
@@ -58,6 +58,11 @@ class Task:
     def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
         """Where a body region goes that was asked for by name."""
         return crossing(region, bare, reach)
+
+    @classmethod
+    def person(cls, bare: Scene, reach: float) -> Person:
+        """Where "person" stands."""
+        return opposite(bare, reach)
 
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Begin an episode of copy ``i``; the last thing it does is :meth:`Cell.start`."""
@@ -98,8 +103,15 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the detector (what is wrong with its
     samples, "" for nothing; see ``docs/live.md``), ``onset`` (a collision began in this step),
     ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
-    0: none), and ``reason``, why an episode was cut short ("" where it was not). Peaks are over
-    the physics steps of the action. With checkers, ``contacts`` has the pairs that each reported.
+    0: none), ``tau_ext_peak`` (by joint, of the largest size [N m]), ``alarm_delay`` of the latest
+    collision [s] (-1: no alarm, or none yet), and ``reason``, why an episode was cut short (""
+    where it was not). Peaks are over the physics steps of the action.
+
+    Of each of the k body regions in :attr:`regions`, at its peak: ``region_force`` [N],
+    ``region_pressure`` [N/cm^2], ``region_point`` [m] and ``region_direction`` of the force on the
+    person, shapes (k,), (k,), (k, 3), (k, 3), zero where nothing touched; without ``contact_area``
+    the pressure is an estimate, see :func:`tauguard.envs.world.region_pressure`. With checkers,
+    ``contacts`` has the pairs that each reported.
 
     The limits follow ISO 10218-2:2025; not every value could be confirmed from an open source:
     ``unwrapped.regions`` says which were not. A simulated force replaces no measurement.
@@ -250,8 +262,10 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "onset_time": figure[ONSET_TIME],
             "link": int(figure[LINK]),
             "fault": cell.faults()[0],
+            "tau_ext_peak": cell.tau_peak[0].copy(),
+            "alarm_delay": cell.alarm_delay.item(0),
             "reason": DIVERGED_REASON if figure[DIVERGED] else "",
-        }
+        } | touches(cell, 0)
         if cell.watching:
             info["contacts"] = cell.contacts[0].copy()
         return info
@@ -281,9 +295,20 @@ def build(task_type: type[Task], keywords: dict[str, Any], rows: int) -> tuple[W
         if own and str(error).startswith("keyword "):
             raise ValueError(f"{error}, {', '.join(own)}") from None
         raise
-    world = build_world(settings, task_type.arms, task_type.proxy)
+    world = build_world(settings, task_type.arms, task_type.proxy, task_type.person)
     cell = Cell(world, rows)
     return world, cell, task_type(cell, **own)
+
+
+def touches(cell: Cell, rows: int | slice) -> dict[str, Array]:
+    """What each body region felt in one copy, or in all, at its peak."""
+    peak = cell.peak[rows].copy()
+    return {
+        "region_force": peak[..., 0],
+        "region_pressure": region_pressure(cell.world, peak[..., 0]),
+        "region_point": peak[..., 1:4],
+        "region_direction": peak[..., 4:7],
+    }
 
 
 def frame_rate(world: World) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tauguard.envs import _plant
 from tauguard.envs.actions import Entry, action_scale, action_table, observation_table
+from tauguard.envs.people import REACHES, WALKS, anatomy, draw_script
 from tauguard.envs.plant import make_plant
 from tauguard.envs.sensing import Sensing, listening
 from tauguard.envs.settings import CONTROLS
@@ -44,8 +45,11 @@ STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
 ROWS = (
     "observation", "figure", "tau_ext", "residual", "alarm", "target", "contacts",
-    "q", "qd", "current", "tau", "contact", "region",
+    "q", "qd", "current", "tau", "contact", "region", "tau_peak", "peak", "alarm_delay",
+    "alarm_last", "reaches", "walks",
 )  # fmt: skip
+#: An alarm later than this after the onset does not detect it [s].
+LATEST = 0.5
 #: What replaces an action, by its native code: nothing, velocities, no power, no power and brakes.
 FREE, VELOCITY, LIMP, BRAKE = range(4)
 
@@ -65,7 +69,13 @@ class Cell:
             every physics step of the last action, shape (rows, substeps, n).
         contact: at every physics step the net force on the arm [N], and link (1-based, 0: none),
             point [m] and force [N] of the largest force on a link, shape (rows, substeps, 8).
-        region: where the body regions were [m], shape (rows, substeps, regions, 3).
+        region: where the body regions were, position [m] and quaternion (w, x, y, z), shape
+            (rows, substeps, regions, 7).
+        tau_peak: external torque of the largest size over the action, by joint [N m], (rows, n).
+        peak: of each body region over the action: force [N], point [m], direction of the force on
+            the person, shape (rows, regions, 7); zero without a touch.
+        alarm_delay: of the latest collision's alarm [s], -1 where there is none, shape (rows,).
+        reaches, walks: what a person does, see :func:`tauguard.envs.people.draw_script`.
     """
 
     def __init__(self, world: World, rows: int) -> None:
@@ -81,7 +91,14 @@ class Cell:
         self.target = np.zeros((rows, world.arms, 3))
         self.q, self.qd, self.current, self.tau = (np.zeros((rows, steps, n)) for _ in range(4))
         self.contact = np.zeros((rows, steps, _plant.CONTACT_WIDTH))
-        self.region = np.zeros((rows, steps, len(world.regions), 3))
+        regions = len(world.regions)
+        self.region = np.zeros((rows, steps, regions, 7))
+        self.tau_peak = np.zeros((rows, n))
+        self.peak = np.zeros((rows, regions, _plant.PEAK_WIDTH))
+        self.alarm_delay = np.full(rows, -1.0)
+        self.alarm_last = np.zeros(rows, dtype=np.bool_)
+        self.reaches = np.zeros((rows, 2, REACHES, _plant.REACH_WIDTH))
+        self.walks = np.zeros((rows, WALKS, _plant.WALK_WIDTH))
         self.datas = [mujoco.MjData(world.scene.model) for _ in range(rows)]
         self.plants = [self._make_plant(i) for i in range(rows)]
         self.sensing: list[Sensing] | None = None
@@ -103,11 +120,17 @@ class Cell:
         mujoco.mj_resetData(self.world.scene.model, data)
         data.qpos[self.world.scene.qpos_adr] = q
 
+    def send_person(self, i: int, rng: np.random.Generator) -> None:
+        """Draw what the person of copy ``i`` does in the next episode, if there is one."""
+        if self.world.person is not None:
+            self.reaches[i], self.walks[i] = draw_script(self.world.person, rng)
+
     def start(self, i: int) -> None:
         """Begin an episode of copy ``i`` from the state in its data."""
         mujoco.mj_forward(self.world.scene.model, self.datas[i])
         self.plants[i].reset()
         self.residual[i], self.alarm[i], self.contacts[i] = 0.0, False, 0
+        self.alarm_delay[i], self.alarm_last[i] = -1.0, False
         if self.sensing is not None:
             self.sensing[i].reset()
 
@@ -175,14 +198,30 @@ class Cell:
         if self.figure[i, DIVERGED]:
             return
         sensing = self.sensing[i]
+        if self.figure[i, ONSET]:
+            self.alarm_delay[i] = -1.0
+        before = bool(self.alarm_last[i])
         measured = sensing.measure(rng, self.q[i], self.qd[i], self.current[i])
         self.residual[i], self.alarm[i] = sensing.detect(*measured)
+        if self.alarm[i] and self.alarm_delay[i] < 0 <= self.figure[i, ONSET_TIME]:
+            self._time_alarm(i, before)
+        self.alarm_last[i] = sensing.alarms[-1]
         if self.world.settings.noise:
             sensing.show(self.observation[i], *measured)
 
     def faults(self) -> list[str]:
         """What is wrong with each copy's samples of the last action, "" for nothing."""
         return [one.fault for one in self.sensing] if self.sensing else [""] * self.rows
+
+    def _time_alarm(self, i: int, before: bool) -> None:
+        """How long after the onset the alarm rose; one that was up before detects nothing."""
+        alarms = self.sensing[i].alarms if self.sensing else np.zeros(0)
+        dt, now = self.world.settings.timestep, self.figure[i, TIME]
+        rises = alarms & ~np.append(before, alarms[:-1])
+        delays = now - dt * np.arange(len(alarms), 0, -1) - self.figure[i, ONSET_TIME]
+        found = np.flatnonzero(rises & (delays > -dt / 2))
+        if found.size and delays[found[0]] <= LATEST:
+            self.alarm_delay[i] = max(0.0, float(delays[found[0]]))
 
     def _watched(self, i: int, action: Array) -> None:
         """A step with contact checkers: each sees every physics step."""
@@ -211,6 +250,10 @@ class Cell:
             tau=self.tau[i],
             contact=self.contact[i],
             region=self.region[i],
+            tau_peak=self.tau_peak[i],
+            peak=self.peak[i],
+            reaches=self.reaches[i],
+            walks=self.walks[i],
         )
         around = _surroundings(world, self.observations)
         plant.surround(around, _controls(world), rows, substeps=world.settings.substeps)
@@ -252,6 +295,8 @@ def _surroundings(world: World, observations: list[Entry]) -> _plant.Surrounding
         gravity=model.opt.gravity.tolist(),
         tools=[_plant.Tool(site=site, body=body, first=first) for site, body, first in world.tools],
         regions=[_region(world, region) for region in world.regions],
+        person_begin=next((k for k, r in enumerate(world.regions) if r.mocap >= 0), -1),
+        person=anatomy(world.person),
         sensor_begin=_sensor(model, "contact_link1") if labels else -1,
         low=[entry.low for entry in observations],
         high=[entry.high for entry in observations],
@@ -265,6 +310,8 @@ def _region(world: World, region: RegionInfo) -> _plant.Region:
         joint=joint,
         qpos=int(model.jnt_qposadr[joint]) if joint >= 0 else -1,
         dof=int(model.jnt_dofadr[joint]) if joint >= 0 else -1,
+        mocap=region.mocap,
+        held=region.held,
         sensor=_sensor(model, f"contact_{region.name}") if world.scene.spec.labels else -1,
         quasi_static=region.quasi_static,
         transient=region.transient,

@@ -21,6 +21,11 @@ Array = NDArray[np.float64]
 TOLERANCE, BONUS = 0.03, 1.0
 #: An episode starts this near to home [rad].
 START_SPREAD = 0.1
+#: With a person: this share of targets is the one of so many whose straight way passes nearest to
+#: them, and as often their hand reaches for that way: to a place in its outer part, give or take
+#: [m], where it stays [s].
+TEMPTED, CANDIDATES = 0.5, 6
+OUTER, GIVE_OR_TAKE, STAYS = (0.4, 1.0), 0.03, 0.6
 #: A target is at least this far from where the tool is [m].
 APART = 0.1
 
@@ -28,7 +33,7 @@ APART = 0.1
 class Reach(Task):
     """Reward: how much nearer the tool came [m], and 1 for a target; then comes the next one."""
 
-    defaults: ClassVar[dict[str, Any]] = {"obstacles": ("hand", "lower_arm", "chest")}
+    defaults: ClassVar[dict[str, Any]] = {"obstacles": ("person",)}
 
     def __init__(self, cell: Cell, **options: Any) -> None:
         """Prepare drawing targets."""
@@ -57,9 +62,13 @@ class Reach(Task):
         home = cell.world.scene.home
         cell.place(i, home + rng.uniform(-START_SPREAD, START_SPREAD, len(home)))
         self.send_regions(i, rng)
+        cell.send_person(i, rng)
+        cell.start(i)
         for arm in range(cell.world.arms):
             cell.target[i, arm] = self.draw(rng, arm, None)
-        cell.start(i)
+        if cell.world.person is not None:
+            self.tempt(i, rng, None)
+        cell.plants[i].refresh()
         self.memory[i] = cell.figure[i, DISTANCE]
 
     def send_regions(self, i: int, rng: np.random.Generator) -> None:
@@ -88,6 +97,21 @@ class Reach(Task):
                 break
         return place
 
+    def tempt(self, i: int, rng: np.random.Generator, apart: Array | None) -> None:
+        """A target beyond the person, or their hand in the way to it: the first arm's."""
+        cell, data = self.cell, self.cell.datas[i]
+        tool = tool_position(cell.world, data)
+        behind, reaches = rng.random(2) < TEMPTED
+        if behind:
+            bodies = [r.body for r in cell.world.regions if r.mocap >= 0]
+            places = [self.draw(rng, 0, apart) for _ in range(CANDIDATES)]
+            nearest = [_clearance(tool, place, data.xpos[bodies]) for place in places]
+            cell.target[i, 0] = places[int(np.argmin(nearest))]
+        way = tool + rng.uniform(*OUTER) * (cell.target[i, 0] - tool)
+        goal = way + rng.normal(0.0, GIVE_OR_TAKE, 3)
+        if reaches:
+            cell.plants[i].aim(goal, STAYS)
+
     def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
         """Progress and bonus; never over by itself. The memory is the last distance [m]."""
         distance = figure[DISTANCE]
@@ -99,12 +123,25 @@ class Reach(Task):
         cell = self.cell
         for arm in range(cell.world.arms):
             cell.target[i, arm] = self.draw(rng, arm, cell.target[i, arm].copy())
+        if cell.world.person is not None:
+            self.tempt(i, rng, cell.target[i, 0].copy())
         cell.plants[i].refresh()
         self.memory[i] = cell.figure[i, DISTANCE]
 
 
+def _clearance(begin: Array, end: Array, points: Array) -> float:
+    """Least distance of points (m, 3) from the way from ``begin`` to ``end`` [m]."""
+    way = end - begin
+    share = np.clip((points - begin) @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+    return float(np.linalg.norm(begin + share[:, None] * way - points, axis=1).min())
+
+
 class ReachEnv(ArmEnv):
-    """Bring the tool to places while body regions of a person cross the path.
+    """Bring the tool to places beside a person who works, reaches into the way and walks.
+
+    Half of the targets lie where the way to them passes near the person, and half of the times the
+    person's hand reaches for that way: who ignores people hits them. A single body region that
+    crosses the workspace is ``obstacles=("hand",)``.
 
     ## Actions (joint velocity, the default; n joints)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import mujoco
@@ -15,7 +16,7 @@ from tauguard.envs.cell import FORCE, FREE, ONSET_TIME, RATIO, SPEED, TIME, VELO
 from tauguard.envs.settings import positive
 from tauguard.envs.vector import VectorArmEnv
 from tauguard.envs.world import World, find_tools, tool_position
-from tauguard.models import BodyProxy, Scene
+from tauguard.models import BodyProxy, Person, Scene
 
 Array = NDArray[np.float64]
 
@@ -68,6 +69,19 @@ class React(Task):
         x, y, z = _bare_tool(bare, data)
         return BodyProxy(region, (x, y + LINK + BALL, z), direction=(0.0, 1.0, 0.0), radius=BALL)
 
+    @classmethod
+    def person(cls, bare: Scene, reach: float) -> Person:
+        """Stands with hanging arms, the chest in the way of the swing."""
+        data = mujoco.MjData(bare.model)
+        data.qpos[bare.qpos_adr] = bare.home
+        mujoco.mj_kinematics(bare.model, data)
+        x, y, z = _bare_tool(bare, data)
+        someone = Person(motion="still", facing=-np.pi / 2)
+        thick = max(part.radius for part in someone.parts())
+        return replace(
+            someone, position=(x, y + LINK + thick), floor=float(z) - someone.chest_height()
+        )
+
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Swing into the region, up to the alarm (with a detector) or the first touch."""
         cell, period = self.cell, 1 / self.cell.world.settings.control_rate
@@ -77,6 +91,7 @@ class React(Task):
         self.swing[i] = self._plan(begin, speed, period)
         cell.place(i, self.swing[i][0])
         cell.target[i, 0] = begin + np.array([0.0, RUN_UP + BEYOND, 0.0])
+        cell.send_person(i, rng)
         cell.start(i)
         self.memory[i] = 0.0
         still = np.zeros(len(cell.actions))

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from tauguard.detectors import find_alarms
 from tauguard.envs.base import ArmEnv
@@ -147,7 +148,10 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
         wrenches.force[touched, link] = contact[touched, 5:8]
         wrenches.point[touched, link] = contact[touched, 2:5]
         poses = np.tile(np.eye(4), (*region.shape[:2], 1, 1))
-        poses[:, :, :3, 3] = region
+        if region.size:
+            turns = Rotation.from_quat(region[..., 3:].reshape(-1, 4), scalar_first=True)
+            poses[:, :, :3, :3] = turns.as_matrix().reshape(*region.shape[:2], 3, 3)
+        poses[:, :, :3, 3] = region[..., :3]
         return Truth(
             tau_ext=tau,
             contact_force=contact[:, 0].copy(),

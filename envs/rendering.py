@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -20,6 +21,8 @@ SHOWN = (0, 1, 2)
 AMBIENT, DIFFUSE, SKY = 0.35, 0.4, ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90))
 #: The floor that is drawn, not simulated: half extents and grid [m], height [m] and colour.
 FLOOR, FLOOR_HEIGHT, FLOOR_COLOUR = (8.0, 8.0, 1.0), -0.001, (0.80, 0.82, 0.85, 1.0)
+#: What an arm stands on where people stand lower: half its extents [m] and colour.
+PEDESTAL, PEDESTAL_COLOUR = (0.25, 0.3), (0.62, 0.64, 0.67, 1.0)
 #: The lamp that throws the shadows: where it stands [m], shining down, and how bright.
 LAMP, LAMP_COLOUR = (0.0, 0.0, 3.0), 0.35
 #: Shadows fall this far from the middle of the scene [m].
@@ -52,14 +55,14 @@ def _staged(world: World) -> mujoco.MjModel:
         width=256,
         height=256,
     )
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=FLOOR,
-        pos=[0, 0, FLOOR_HEIGHT],
-        rgba=FLOOR_COLOUR,
-        contype=0,
-        conaffinity=0,
-    )
+    person = world.person
+    floor = FLOOR_HEIGHT if person is None else person.floor
+    _draw(spec, mujoco.mjtGeom.mjGEOM_PLANE, FLOOR, [0, 0, floor], FLOOR_COLOUR)
+    if floor < FLOOR_HEIGHT:
+        height = (FLOOR_HEIGHT - floor) / 2
+        for base in _bases(world):
+            place = [base[0], base[1], FLOOR_HEIGHT - height]
+            _draw(spec, mujoco.mjtGeom.mjGEOM_BOX, [*PEDESTAL, height], place, PEDESTAL_COLOUR)
     spec.worldbody.add_light(
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
         pos=LAMP,
@@ -68,6 +71,19 @@ def _staged(world: World) -> mujoco.MjModel:
         castshadow=True,
     )
     return spec.compile()
+
+
+def _draw(
+    spec: mujoco.MjSpec, kind: Any, size: Sequence[float], place: Sequence[float], rgba: Any
+) -> None:
+    """A shape that only shows."""
+    spec.worldbody.add_geom(type=kind, size=size, pos=place, rgba=rgba, contype=0, conaffinity=0)
+
+
+def _bases(world: World) -> list[NDArray[np.float64]]:
+    """Where the arms stand [m]."""
+    model = world.scene.model
+    return [model.body_pos[model.body_rootid[body]] for _, body, _ in world.tools]
 
 
 class Picture:
@@ -118,7 +134,11 @@ class Picture:
     def _look(self, camera: Any) -> None:
         """From beside the first arm's front; two arms from the side, so that neither hides one."""
         world, reach = self._world, self._world.reach
-        if world.arms == 1:
+        if world.person is not None:
+            x, y = np.mean([*[base[:2] for base in _bases(world)], world.person.position], axis=0)
+            camera.lookat[:] = (x, y, world.person.floor + 0.5 * world.person.stature)
+            camera.distance, camera.azimuth, camera.elevation = 2.9, 130.0, -12.0
+        elif world.arms == 1:
             camera.lookat[:] = (0.35 * reach, 0.0, 0.4 * reach)
             camera.distance, camera.azimuth, camera.elevation = 1.9 * reach, 140.0, -20.0
         else:

@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.models import BodyProxy, Cloth, Mismatch, Robot, Table
-from tauguard.models.body_regions import body_region
+from tauguard.models import BODY_REGIONS, BodyProxy, Cloth, Mismatch, Person, Robot, Table
 from tauguard.models.scene import INTEGRATORS
 
 #: Control modes, in the native order; what an action of 1 means is in :mod:`tauguard.envs.actions`.
 CONTROLS = ("current", "torque", "joint_velocity", "joint_position", "cartesian")
 #: Detectors that need no file.
 DETECTORS = ("observer",)
+#: The obstacle that is a whole person.
+PERSON = "person"
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Settings:
     robot: str | Robot = "cura6"  #: or a name, a file or a robot, see ``tauguard robot``
     payload_g: float = 0.0  #: carried, not told to controller and observer [g]
     mismatch: Mismatch | int | None = None  #: simulated against nominal arm; a number is a seed
-    obstacles: tuple[str | BodyProxy, ...] = ()  #: body regions, or proxies placed by hand
+    obstacles: tuple[str | BodyProxy | Person, ...] = ()  #: "person", body regions, or such by hand
     table: Table | None = None  #: a board that the arm can touch
     cloth: Cloth | None = None  #: a hanging cloth
     detector: Any = None  #: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``
@@ -65,10 +66,9 @@ class Settings:
             raise ValueError(f"mismatch {self.mismatch!r}: expected a Mismatch, a seed, or None")
         for name in ("obstacles", "checkers"):
             value = getattr(self, name)
-            object.__setattr__(self, name, (value,) if isinstance(value, str) else tuple(value))
-        for item in self.obstacles:
-            if not isinstance(item, BodyProxy):
-                body_region(item)
+            one = isinstance(value, str | BodyProxy | Person)
+            object.__setattr__(self, name, (value,) if one else tuple(value))
+        _check_obstacles(self.obstacles)
         if isinstance(self.detector, os.PathLike):
             object.__setattr__(self, "detector", os.fspath(self.detector))
         named = isinstance(self.detector, str) and self.detector not in DETECTORS
@@ -97,6 +97,16 @@ class Settings:
                 hint = f"did you mean {near[0]}? " if near else ""
                 raise ValueError(f"keyword {name!r}: {hint}expected one of {', '.join(known)}")
         return cls(**{**defaults, **given})
+
+
+def _check_obstacles(obstacles: tuple[Any, ...]) -> None:
+    known = (PERSON, *BODY_REGIONS)
+    for item in obstacles:
+        if not isinstance(item, BodyProxy | Person) and item not in known:
+            raise ValueError(f"obstacles: {item!r}; expected some of {', '.join(known)}")
+    people = [item for item in obstacles if item == PERSON or isinstance(item, Person)]
+    if len(people) > 1:
+        raise ValueError(f"obstacles: {len(people)} persons; expected at most one")
 
 
 def one_of(name: str, value: object, known: tuple[str, ...]) -> None:

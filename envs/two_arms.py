@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.reach import Reach
+from tauguard.envs.two_arms_scene import PLACE
 from tauguard.envs.vector import VectorArmEnv
-from tauguard.models import Table
+from tauguard.models import Person, Scene, Table
 
+#: A person's distance from the line between the arms, in units of the reach.
+BESIDE = 0.75
 #: Between the arms, low enough to work above.
 BOARD = Table(position=(0.55, 0.0, 0.05), half_extents=(0.3, 0.6, 0.02))
 
@@ -18,6 +23,12 @@ class TwoArms(Reach):
 
     arms: ClassVar[int] = 2
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "table": BOARD}
+
+    @classmethod
+    def person(cls, bare: Scene, reach: float) -> Person:
+        """Beside the table, looking at it."""
+        x = PLACE[0] / 2
+        return Person(position=(x, -max(BESIDE * reach, 0.6)), facing=np.pi / 2)
 
 
 class TwoArmsEnv(ArmEnv):

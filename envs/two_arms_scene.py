@@ -7,11 +7,11 @@ from dataclasses import fields, replace
 import mujoco
 import numpy as np
 
-from tauguard.models import BodyProxy, Drive, Scene
+from tauguard.models import Drive, Scene
 from tauguard.models.arm import ARM_BITS, OBSTACLE_BITS
 from tauguard.models.mjcf import SpecText
-from tauguard.models.obstacles import Obstacle, add_pairs
-from tauguard.models.scene import _add_label, lean_model
+from tauguard.models.obstacles import Springy, add_pairs
+from tauguard.models.scene import _add_label, lean_model, region_names
 
 #: Names of the second arm's parts begin with this.
 PREFIX = "arm2_"
@@ -19,7 +19,7 @@ PREFIX = "arm2_"
 PLACE = (1.1, 0.0, 0.0)
 
 
-def add_second_arm(scene: Scene, proxies: tuple[BodyProxy, ...]) -> Scene:
+def add_second_arm(scene: Scene) -> Scene:
     """The scene with a second, nominal arm of the same kind; joints and links of both in a row.
 
     The two arms can touch one another, and both can touch what stands around. The model is without
@@ -48,11 +48,13 @@ def add_second_arm(scene: Scene, proxies: tuple[BodyProxy, ...]) -> Scene:
                 whole.delete(sensor)
         for i, link in enumerate(links, start=len(first) + 1):
             _add_label(whole, link, f"contact_link{i}")
-        for proxy in proxies:
-            _add_label(whole, proxy.region, f"contact_{proxy.region}")
-    if proxies:
-        obstacles: dict[str, Obstacle] = {proxy.region: proxy for proxy in proxies}
-        add_pairs(whole, shapes, obstacles)
+        for name in region_names(scene.spec):
+            _add_label(whole, name, f"contact_{name}")
+    person = () if scene.spec.person is None else scene.spec.person.parts()
+    parts: dict[str, Springy] = {proxy.region: proxy for proxy in scene.spec.proxies}
+    parts |= {part.name: part for part in person}
+    if parts:
+        add_pairs(whole, shapes, parts)
     return _located(scene, whole, links)
 
 

@@ -11,7 +11,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from tauguard.envs.base import DIVERGED_REASON, RENDER_MODES, Task, build, frame_rate, make_spaces
+from tauguard.envs.base import (
+    DIVERGED_REASON,
+    RENDER_MODES,
+    Task,
+    build,
+    frame_rate,
+    make_spaces,
+    touches,
+)
 from tauguard.envs.cell import (
     COST,
     DISTANCE,
@@ -206,8 +214,10 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "onset_time": figure[ONSET_TIME],
             "link": figure[LINK].astype(np.int64),
             "fault": np.array(cell.faults(), dtype=object),
+            "tau_ext_peak": cell.tau_peak.copy(),
+            "alarm_delay": cell.alarm_delay.copy(),
             "reason": reason,
-        }
+        } | touches(cell, slice(None))
         if cell.watching:
             infos["contacts"] = cell.contacts.copy()
         for key in list(infos):

@@ -10,18 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.envs.plant import Gains
-from tauguard.envs.settings import Settings
+from tauguard.envs.settings import PERSON, Settings
 from tauguard.envs.two_arms_scene import add_second_arm, both_drives
 from tauguard.models import (
     BodyProxy,
     Drive,
     Mismatch,
+    Person,
     Scene,
     SceneSpec,
     compose,
     set_payload,
     without_losses,
 )
+from tauguard.models.person import PersonPart
 
 Array = NDArray[np.float64]
 
@@ -41,6 +43,8 @@ SPAN = 0.6
 #: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
 #: a torso at less.
 HAND_SPEED, BODY_SPEED = 0.8, 0.3
+#: A person's hips are this far from the arm [reach], at least so far [m].
+OPPOSITE, NEAREST_PERSON = 0.9, 0.6
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,10 @@ class RegionInfo:
     joint: int  #: -1: held in place
     quasi_static: float  #: limit [N]
     transient: float  #: limit [N]; 0: no blow is allowed
+    mocap: int  #: of the frame that a person moves; -1: not of a person
+    held: bool  #: cannot move away: its limit is the quasi-static one
+    stiffness: float  #: of its contact [N/m]
+    radius: float  #: [m]
     span: float  #: [m]
     speed: float  #: [m/s]
     unconfirmed: tuple[str, ...]  #: values that no open source confirmed
@@ -72,6 +80,7 @@ class World:
     max_speed: Array  #: [rad/s], shape (n,)
     tools: tuple[tuple[int, int, int], ...]  #: an arm: site or -1, body, index of its first joint
     regions: tuple[RegionInfo, ...]
+    person: Person | None
     reach: float  #: from the first joint to the tool at most [m]
 
     @property
@@ -89,9 +98,15 @@ class World:
 
 
 Placing = Callable[[str, Scene, float], BodyProxy]
+Standing = Callable[[Scene, float], Person]
 
 
-def build_world(settings: Settings, arms: int = 1, placing: Placing | None = None) -> World:
+def build_world(
+    settings: Settings,
+    arms: int = 1,
+    placing: Placing | None = None,
+    standing: Standing | None = None,
+) -> World:
     """Compile what ``settings`` ask for, and nothing else.
 
     Args:
@@ -99,6 +114,7 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
         arms: 1 or 2.
         placing: where a body region goes that was asked for by name (default: :func:`crossing`),
             from its name, the bare arm's scene and the arm's reach [m].
+        standing: where "person" stands (default: :func:`opposite`), from the same.
 
     Raises:
         ValueError, FileNotFoundError: a robot that cannot be used.
@@ -119,13 +135,10 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
         visuals=False,
     )
     reach = arm_reach(bare)
-    proxies = tuple(
-        item if isinstance(item, BodyProxy) else (placing or crossing)(item, bare, reach)
-        for item in settings.obstacles
-    )
-    scene = compose(replace(spec, proxies=proxies), visuals=False)
+    proxies, person = _people(settings, bare, reach, placing or crossing, standing or opposite)
+    scene = compose(replace(spec, proxies=proxies, person=person), visuals=False)
     if arms == 2:
-        scene = add_second_arm(scene, proxies)
+        scene = add_second_arm(scene)
     if settings.ideal_drive:
         scene = without_losses(scene)
     if settings.payload_g > 0:
@@ -133,17 +146,26 @@ def build_world(settings: Settings, arms: int = 1, placing: Placing | None = Non
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
     # A diverged state must stay visible instead of starting again at the origin by itself.
     scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return _known(settings, scene, bare, proxies, reach, arms)
+    return _known(settings, scene, bare, reach, arms)
 
 
-def _known(
-    settings: Settings,
-    scene: Scene,
-    bare: Scene,
-    proxies: tuple[BodyProxy, ...],
-    reach: float,
-    arms: int,
-) -> World:
+def _people(
+    settings: Settings, bare: Scene, reach: float, placing: Placing, standing: Standing
+) -> tuple[tuple[BodyProxy, ...], Person | None]:
+    """The body regions and the person that were asked for, placed."""
+    proxies: list[BodyProxy] = []
+    person = None
+    for item in settings.obstacles:
+        if isinstance(item, Person):
+            person = item
+        elif item == PERSON:
+            person = standing(bare, reach)
+        else:
+            proxies.append(item if isinstance(item, BodyProxy) else placing(item, bare, reach))
+    return tuple(proxies), person
+
+
+def _known(settings: Settings, scene: Scene, bare: Scene, reach: float, arms: int) -> World:
     model = scene.model
     joints = [model.joint(name).id for name in scene.joint_names]
     limited = model.jnt_limited[joints].astype(bool)[:, None]
@@ -165,7 +187,8 @@ def _known(
         torque_limit=np.tile(nominal.torque_limit, arms),
         max_speed=np.tile(speed, arms),
         tools=find_tools(scene, arms),
-        regions=tuple(_region(scene, proxy, reach) for proxy in proxies),
+        regions=_regions(scene, reach),
+        person=scene.spec.person,
         reach=reach,
     )
 
@@ -182,6 +205,39 @@ def crossing(region: str, bare: Scene, reach: float) -> BodyProxy:
     return BodyProxy(region, position=(x, y, z), direction=direction)
 
 
+def opposite(bare: Scene, reach: float) -> Person:
+    """A person at work opposite the arm, within its reach."""
+    return Person(position=(max(OPPOSITE * reach, NEAREST_PERSON), 0.0))
+
+
+def _regions(scene: Scene, reach: float) -> tuple[RegionInfo, ...]:
+    """The proxies, then the person's."""
+    spec = scene.spec
+    person = () if spec.person is None else spec.person.parts()
+    return (
+        *(_region(scene, proxy, reach) for proxy in spec.proxies),
+        *(_segment(scene, part) for part in person),
+    )
+
+
+def _segment(scene: Scene, part: PersonPart) -> RegionInfo:
+    limits = part.limits
+    return RegionInfo(
+        name=part.name,
+        body=int(scene.model.body(part.name).id),
+        joint=-1,
+        quasi_static=limits.quasi_static_force,
+        transient=limits.transient_force,
+        mocap=int(scene.model.body(f"{part.name}_motion").mocapid[0]),
+        held=part.held,
+        stiffness=limits.stiffness,
+        radius=part.radius,
+        span=0.0,
+        speed=0.0,
+        unconfirmed=limits.unconfirmed,
+    )
+
+
 def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
     limits = proxy.limits
     slow = limits.mass > 5
@@ -191,10 +247,27 @@ def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
         joint=-1 if proxy.clamped else int(scene.model.joint(proxy.region).id),
         quasi_static=limits.quasi_static_force,
         transient=limits.transient_force,
+        mocap=-1,
+        held=proxy.clamped,
+        stiffness=limits.stiffness,
+        radius=proxy.radius,
         span=SPAN * reach,
         speed=BODY_SPEED if slow else HAND_SPEED,
         unconfirmed=limits.unconfirmed,
     )
+
+
+def region_pressure(world: World, force: Array) -> Array:
+    """Mean pressure on each body region [N/cm^2] under forces of shape (..., k) [N].
+
+    Over the setting ``contact_area`` where it is stated. Else over the circle that a flat surface
+    makes with a round region at the depth that its stiffness allows, area = pi radius F / k
+    (Hertz' geometry): an estimate, and a low one, since a robot's edge presses harder.
+    """
+    if world.settings.contact_area is not None:
+        return force / world.settings.contact_area
+    least = np.array([r.stiffness / (np.pi * r.radius) for r in world.regions]) / 1e4
+    return np.where(force > 0, least, 0.0)
 
 
 def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:

@@ -12,12 +12,14 @@ from tauguard.models.mismatch import Mismatch
 from tauguard.models.nominal import add_payload, compiled, pin_model
 from tauguard.models.obstacles import BodyProxy, Clamp, Striker, Table
 from tauguard.models.payload import set_payload
+from tauguard.models.person import STATURES, Person
 from tauguard.models.robot import Robot, RobotDrive
 from tauguard.models.scene import Scene, SceneSpec, compose, with_drive, without_losses
 
 __all__ = [
     "BODY_REGIONS",
     "ROBOTS",
+    "STATURES",
     "Arm",
     "BodyProxy",
     "BodyRegion",
@@ -28,6 +30,7 @@ __all__ = [
     "Friction",
     "LinkSurface",
     "Mismatch",
+    "Person",
     "Ripple",
     "Robot",
     "RobotDrive",

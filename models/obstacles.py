@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -100,6 +102,20 @@ class Table:
 Obstacle = Striker | Clamp | BodyProxy
 
 
+class Springy(Protocol):
+    """What a contact is as stiff as."""
+
+    @property
+    def stiffness(self) -> float:
+        """[N/m]."""
+        ...
+
+    @property
+    def damping(self) -> float:
+        """[N s/m]."""
+        ...
+
+
 def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle, name: str) -> None:
     """Add the body ``name`` to the world of ``spec``; its contacts come with :func:`add_pairs`."""
     world = spec.worldbody
@@ -157,7 +173,7 @@ def add_floor(spec: mujoco.MjSpec) -> None:
 
 
 def add_pairs(
-    spec: mujoco.MjSpec, shapes: list[mujoco.MjsGeom], obstacles: dict[str, Obstacle]
+    spec: mujoco.MjSpec, shapes: list[mujoco.MjsGeom], obstacles: Mapping[str, Springy]
 ) -> None:
     """One contact pair for every shape of the arm and every obstacle, as stiff as it says.
 

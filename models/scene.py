@@ -26,6 +26,7 @@ from tauguard.models.obstacles import (
     add_table,
 )
 from tauguard.models.payload import add_payload_body
+from tauguard.models.person import Person, PersonPart, add_person
 from tauguard.models.robot import Robot
 
 Array = NDArray[np.float64]
@@ -55,6 +56,7 @@ class SceneSpec:
     base_pose: tuple[tuple[float, ...], ...] | None = None  #: of the arm's world, (4, 4)
     integrator: str = "implicitfast"  #: one of :data:`INTEGRATORS`
     proxies: tuple[BodyProxy, ...] = ()  #: body regions of a person
+    person: Person | None = None
     region_labels: bool = False  #: a contact sensor on every body region, after the links
     table: Table | None = None
     cloth: Cloth | None = None
@@ -194,7 +196,7 @@ def lean_model(whole: mujoco.MjSpec) -> mujoco.MjModel:
 def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     """Add everything listed beside the arm; returns the names of the obstacles."""
     whole = arm.spec
-    obstacles: dict[str, Obstacle] = {}
+    obstacles: dict[str, Obstacle | PersonPart] = {}
     if spec.payload:
         add_payload_body(whole, arm.flange())
     if spec.striker is not None:
@@ -216,12 +218,19 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     if spec.labels:
         for i, link in enumerate(arm.links, start=1):
             _add_label(whole, link, f"contact_link{i}")
+    parts = obstacles if spec.person is None else obstacles | add_person(whole, spec.person)
     if spec.region_labels:
-        for proxy in spec.proxies:
-            _add_label(whole, proxy.region, f"contact_{proxy.region}")
-    if obstacles:
-        add_pairs(whole, arm.shapes(), obstacles)
+        for name in region_names(spec):
+            _add_label(whole, name, f"contact_{name}")
+    if parts:
+        add_pairs(whole, arm.shapes(), parts)
     return tuple(obstacles)
+
+
+def region_names(spec: SceneSpec) -> tuple[str, ...]:
+    """Bodies that are regions of people: the proxies, then the person's."""
+    person = () if spec.person is None else tuple(part.name for part in spec.person.parts())
+    return (*(proxy.region for proxy in spec.proxies), *person)
 
 
 def _drive(spec: SceneSpec, arm: Arm) -> Drive:

@@ -31,6 +31,8 @@ class Physics {
         xmat_(nb::cast<Held>(data.attr("xmat"))),
         xanchor_(nb::cast<Held>(data.attr("xanchor"))),
         xaxis_(nb::cast<Held>(data.attr("xaxis"))),
+        mocap_pos_(nb::cast<Held>(data.attr("mocap_pos"))),
+        mocap_quat_(nb::cast<Held>(data.attr("mocap_quat"))),
         step_(reinterpret_cast<Function>(step)),
         kinematics_(reinterpret_cast<Function>(kinematics)),
         model_address_(
@@ -49,6 +51,8 @@ class Physics {
   const double* quaternion(int body) const { return xquat_.data() + 4 * body; }
   const double* rotation(int body) const { return xmat_.data() + 9 * body; }
   const double* anchor(int joint) const { return xanchor_.data() + 3 * joint; }
+  double* mocap_position(int mocap) const { return mocap_pos_.data() + 3 * mocap; }
+  double* mocap_quaternion(int mocap) const { return mocap_quat_.data() + 4 * mocap; }
   const double* axis(int joint) const { return xaxis_.data() + 3 * joint; }
 
   void step() const { step_(model_address_, data_address_); }
@@ -69,7 +73,7 @@ class Physics {
   static constexpr double velocity_bound = 1e3;
 
   Held qpos_, qvel_, qfrc_applied_, xfrc_applied_, sensordata_, site_xpos_;
-  Held xpos_, xquat_, xmat_, xanchor_, xaxis_;
+  Held xpos_, xquat_, xmat_, xanchor_, xaxis_, mocap_pos_, mocap_quat_;
   Function step_, kinematics_;
   const void* model_address_;
   void* data_address_;

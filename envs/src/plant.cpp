@@ -145,6 +145,26 @@ void bind_joint(nb::module_& m) {
           "known_viscous"_a, "cycles"_a, "amplitude"_a, "phase"_a);
 }
 
+void bind_anatomy(nb::module_& m) {
+  nb::class_<Anatomy>(m, "Anatomy")
+      .def(
+          "__init__",
+          [](Anatomy* self, double hip_height, double trunk, double shoulder, double hip_half,
+             double neck, double head, double upper_arm, double lower_arm, double hand, double grip,
+             double thigh, double shank, double floor, double facing, double hand_speed,
+             double walk_speed, double reaction_time, bool seated, bool hanging, bool reacts) {
+            new (self)
+                Anatomy{hip_height, trunk,      shoulder,      hip_half, neck,    head,  upper_arm,
+                        lower_arm,  hand,       grip,          thigh,    shank,   floor, facing,
+                        hand_speed, walk_speed, reaction_time, seated,   hanging, reacts};
+          },
+          nb::kw_only(), "hip_height"_a, "trunk"_a, "shoulder"_a, "hip_half"_a, "neck"_a, "head"_a,
+          "upper_arm"_a, "lower_arm"_a, "hand"_a, "grip"_a, "thigh"_a, "shank"_a, "floor"_a,
+          "facing"_a, "hand_speed"_a, "walk_speed"_a, "reaction_time"_a, "seated"_a, "hanging"_a,
+          "reacts"_a)
+      .def(nb::init<>());
+}
+
 void bind_surroundings(nb::module_& m) {
   nb::class_<Link>(m, "Link").def(
       "__init__",
@@ -160,40 +180,46 @@ void bind_surroundings(nb::module_& m) {
   nb::class_<Region>(m, "Region")
       .def(
           "__init__",
-          [](Region* self, int body, int joint, int qpos, int dof, int sensor, double quasi_static,
-             double transient, double span, double speed) {
-            new (self)
-                Region{body, joint, qpos, dof, sensor, quasi_static, transient, span, speed, 0.0};
+          [](Region* self, int body, int joint, int qpos, int dof, int mocap, bool held, int sensor,
+             double quasi_static, double transient, double span, double speed) {
+            new (self) Region{body,   joint,        qpos,      dof,  mocap, held,
+                              sensor, quasi_static, transient, span, speed};
           },
-          nb::kw_only(), "body"_a, "joint"_a, "qpos"_a, "dof"_a, "sensor"_a, "quasi_static"_a,
-          "transient"_a, "span"_a, "speed"_a);
+          nb::kw_only(), "body"_a, "joint"_a, "qpos"_a, "dof"_a, "mocap"_a, "held"_a, "sensor"_a,
+          "quasi_static"_a, "transient"_a, "span"_a, "speed"_a);
   nb::class_<Surroundings>(m, "Surroundings")
       .def(
           "__init__",
           [](Surroundings* self, std::vector<Link> links, Numbers gravity, std::vector<Tool> tools,
-             std::vector<Region> regions, int sensor_begin, Numbers low, Numbers high) {
+             std::vector<Region> regions, int person_begin, const Anatomy& person, int sensor_begin,
+             Numbers low, Numbers high) {
             if (gravity.size() != 3) throw nb::value_error("gravity: expected three numbers");
             new (self) Surroundings{
                 Kinematics{nullptr, std::move(links), Vec3{gravity[0], gravity[1], gravity[2]}},
                 std::move(tools),
                 std::move(regions),
+                person_begin,
+                Person(person),
                 std::move(low),
                 std::move(high),
                 sensor_begin};
           },
-          nb::kw_only(), "links"_a, "gravity"_a, "tools"_a, "regions"_a, "sensor_begin"_a, "low"_a,
-          "high"_a);
+          nb::kw_only(), "links"_a, "gravity"_a, "tools"_a, "regions"_a, "person_begin"_a,
+          "person"_a, "sensor_begin"_a, "low"_a, "high"_a);
 }
 
 void bind_outputs(nb::module_& m) {
   nb::class_<Rows>(m, "Rows").def(
       "__init__",
       [](Rows* self, Held observation, Held figure, Held tau_ext, Held target, Held q, Held qd,
-         Held current, Held tau, Held contact, Held region) {
-        new (self) Rows{observation, figure, tau_ext, target, q, qd, current, tau, contact, region};
+         Held current, Held tau, Held contact, Held region, Held tau_peak, Held peak, Held reaches,
+         Held walks) {
+        new (self) Rows{observation, figure,  tau_ext, target,   q,    qd,      current,
+                        tau,         contact, region,  tau_peak, peak, reaches, walks};
       },
       nb::kw_only(), "observation"_a, "figure"_a, "tau_ext"_a, "target"_a, "q"_a, "qd"_a,
-      "current"_a, "tau"_a, "contact"_a, "region"_a);
+      "current"_a, "tau"_a, "contact"_a, "region"_a, "tau_peak"_a, "peak"_a, "reaches"_a,
+      "walks"_a);
   nb::class_<Track>(m, "Track")
       .def(
           "__init__",
@@ -258,6 +284,13 @@ void bind_plant(nb::module_& m) {
       .def("finish", &Plant::finish)
       .def("refresh", &Plant::refresh)
       .def(
+          "aim",
+          [](Plant& p, Vector place, double hold) {
+            if (place.shape(0) != 3) throw nb::value_error("place: expected three numbers");
+            p.aim(load(place.data()), hold);
+          },
+          "place"_a, "hold"_a)
+      .def(
           "override",
           [](Plant& p, int kind, Vector speed) {
             if (speed.shape(0) != p.joints()) throw nb::value_error("speed: one number a joint");
@@ -280,6 +313,7 @@ void bind_plant(nb::module_& m) {
 
 NB_MODULE(_plant, m) {
   bind_joint(m);
+  bind_anatomy(m);
   bind_surroundings(m);
   bind_outputs(m);
   bind_plant(m);
@@ -287,6 +321,10 @@ NB_MODULE(_plant, m) {
   m.def("poses", &poses, "physics"_a, "qpos"_a, "q"_a, "bodies"_a, "joints"_a, nb::kw_only(),
         "position"_a, "rotation"_a, "anchor"_a, "axis"_a);
   m.attr("CONTACT_WIDTH") = contact_width;
+  m.attr("PEAK_WIDTH") = peak_width;
+  m.attr("REACH_WIDTH") = reach_width;
+  m.attr("WALK_WIDTH") = walk_width;
+  m.attr("PERSON_SEGMENTS") = person_segments;
   m.attr("SENSOR_WIDTH") = sensor_width;
   m.attr("FIGURES") = static_cast<int>(figures);
 }

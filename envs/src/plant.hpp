@@ -13,6 +13,7 @@
 #include "control.hpp"
 #include "drive.hpp"
 #include "kinematics.hpp"
+#include "person.hpp"
 #include "physics.hpp"
 #include "regions.hpp"
 
@@ -40,6 +41,8 @@ struct Surroundings {
   Kinematics arms;
   std::vector<Tool> tools;
   std::vector<Region> regions;
+  int person_begin = -1;  // the first of a person's regions; -1: nobody is there
+  Person person;
   std::vector<double> low, high;  // of the observation
   int sensor_begin = -1;          // of the links' contact sensors; -1: none
 };
@@ -48,7 +51,9 @@ struct Surroundings {
 struct Rows {
   Held observation, figure, tau_ext, target;
   Held q, qd, current, tau;  // physics steps x joints
-  Held contact, region;      // physics steps x contact_width, physics steps x regions x 3
+  Held contact, region;      // physics steps x contact_width, physics steps x regions x 7
+  Held tau_peak, peak;       // joints; regions x peak_width
+  Held reaches, walks;       // the person's script: hands x rows x reach_width, rows x walk_width
 };
 
 // Where a run along a table of references is written to: row k belongs to the state before step k.
@@ -81,6 +86,7 @@ class Plant {
     around_ = std::move(around);
     around_.arms.physics = &physics_;
     rows_ = std::move(rows);
+    if (peopled()) around_.person.bind(script());
   }
 
   std::size_t joints() const { return drives_.size(); }
@@ -89,7 +95,7 @@ class Plant {
   void relax() {
     drives_.relax();
     contact_ = Contact{};
-    for (Region& r : around_.regions) r.touching = 0;
+    for (Region& r : around_.regions) r.touching = r.force = 0;
     count_ = 0;
     sound_ = true;
   }
@@ -99,6 +105,12 @@ class Plant {
   void reset() {
     relax();
     std::fill_n(rows_.tau_ext.data(), joints(), 0.0);
+    clear_peaks();
+    speeds_.assign(around_.regions.size(), Vec3{});
+    if (peopled()) {
+      around_.person.reset(script());
+      show_person();
+    }
     for (std::size_t i = 0; i < joints(); ++i) q_[i] = physics_.qpos()[drives_.joints[i].qpos];
     controls.reset(q_);
     finish();
@@ -106,6 +118,7 @@ class Plant {
 
   void begin(const double* action) {
     contact_.begin_step();
+    clear_peaks();
     row_ = 0;
     for (std::size_t i = 0; i < joints(); ++i) q_[i] = physics_.qpos()[drives_.joints[i].qpos];
     controls.take(around_.arms, drives_.joints, around_.tools, q_.data(), action);
@@ -119,16 +132,24 @@ class Plant {
       advance(rows_.q.data() + row_ * n, rows_.qd.data() + row_ * n,
               rows_.current.data() + row_ * n);
       if (sound_) label();
-      double* place = rows_.region.data() + 3 * row_ * around_.regions.size();
-      for (const Region& r : around_.regions)
+      double* place = rows_.region.data() + 7 * row_ * around_.regions.size();
+      for (const Region& r : around_.regions) {
         place = std::copy_n(physics_.position(r.body), 3, place);
+        place = std::copy_n(physics_.quaternion(r.body), 4, place);
+      }
     }
+  }
+
+  // The person's nearer hand goes to a place [m] now and stays there for `hold` [s].
+  void aim(Vec3 place, double hold) {
+    if (peopled()) around_.person.aim(place, hold, static_cast<double>(count_) * drives_.dt);
   }
 
   void finish() {
     if (sound_) {
       physics_.kinematics();
       controls.advance();
+      measure_speeds();
       observe();
     }
     report();
@@ -188,14 +209,18 @@ class Plant {
   Rows rows_;
   Contact contact_;
   std::vector<double> q_;
-  std::int64_t count_ = 0;  // physics steps since the reset
-  std::size_t row_ = 0;     // of the action or table
+  std::vector<Vec3> speeds_;  // of the regions, after the action [m/s]
+  std::int64_t count_ = 0;    // physics steps since the reset
+  std::size_t row_ = 0;       // of the action or table
   bool sound_ = true;
 
   template <class Visitor>
   void visit(Visitor&& each) {
     for (JointState& s : drives_.states) each(s.current), each(s.bristle);
-    for (Region& r : around_.regions) each(r.touching);
+    for (Region& r : around_.regions) each(r.touching), each(r.force);
+    speeds_.resize(around_.regions.size());
+    for (Vec3& v : speeds_) each(v.x), each(v.y), each(v.z);
+    if (peopled()) around_.person.visit(each);
     Contact& c = contact_;
     each(c.force), each(c.cost), each(c.ratio), each(c.region_force), each(c.link), each(c.region);
     each(c.onset), each(c.onset_time), each(c.last);
@@ -220,9 +245,50 @@ class Plant {
       physics_.applied()[j.dof] = drives_.apply(i, wanted, q[i], qd[i]) + held;
       current[i] = drives_.states[i].current;
     }
+    if (peopled()) move_person();
     physics_.step();
     sound_ = physics_.sound();
     ++count_;
+  }
+
+  bool peopled() const { return around_.person_begin >= 0; }
+
+  Script script() const {
+    return {rows_.reaches.data(), rows_.walks.data(), rows_.reaches.shape(1), rows_.walks.shape(0)};
+  }
+
+  void move_person() {
+    Person& person = around_.person;
+    const double t = static_cast<double>(count_) * drives_.dt;
+    for (int k = 0; k < person_segments; ++k)
+      person.touch(k, around_.regions[around_.person_begin + k].force, t);
+    person.advance(t, drives_.dt);
+    show_person();
+  }
+
+  void show_person() {
+    for (int k = 0; k < person_segments; ++k) {
+      const int mocap = around_.regions[around_.person_begin + k].mocap;
+      const Vec3 c = around_.person.centre[k];
+      double* place = physics_.mocap_position(mocap);
+      place[0] = c.x, place[1] = c.y, place[2] = c.z;
+      std::copy_n(around_.person.quat_wxyz[k].data(), 4, physics_.mocap_quaternion(mocap));
+    }
+  }
+
+  void clear_peaks() {
+    std::fill_n(rows_.tau_peak.data(), joints(), 0.0);
+    std::fill_n(rows_.peak.data(), peak_width * around_.regions.size(), 0.0);
+  }
+
+  // Over the last physics step; the row has where the regions were before it.
+  void measure_speeds() {
+    if (row_ == 0) return;
+    const std::size_t width = 7 * around_.regions.size();
+    const double* before = rows_.region.data() + width * (row_ - 1);
+    for (std::size_t i = 0; i < around_.regions.size(); ++i)
+      speeds_[i] = (1.0 / drives_.dt) *
+                   (load(physics_.position(around_.regions[i].body)) - load(before + 7 * i));
   }
 
   // Sensors and poses are those of the state before the step: mj_step evaluates them there.
@@ -246,7 +312,10 @@ class Plant {
                static_cast<double>(count_ - 1) * drives_.dt, contact_, tau,
                rows_.contact.data() + row_ * contact_width);
     std::copy_n(tau, n, rows_.tau_ext.data());
-    read_regions(around_.regions, physics_.sensors(), drives_.dt, contact_);
+    double* peak = rows_.tau_peak.data();
+    for (std::size_t i = 0; i < n; ++i)
+      if (std::fabs(tau[i]) > std::fabs(peak[i])) peak[i] = tau[i];
+    read_regions(around_.regions, physics_.sensors(), drives_.dt, contact_, rows_.peak.data());
   }
 
   // A region that has left its span comes back at its own speed: a hand that goes to and fro.
@@ -275,9 +344,10 @@ class Plant {
       away = std::max(away, norm(way));
       put(way);
     }
-    for (const Region& r : around_.regions) {
+    for (std::size_t i = 0; i < around_.regions.size(); ++i) {
+      const Region& r = around_.regions[i];
       put(load(physics_.position(r.body)));
-      put(r.joint >= 0 ? physics_.qvel()[r.dof] * load(physics_.axis(r.joint)) : Vec3{});
+      put(r.joint >= 0 ? physics_.qvel()[r.dof] * load(physics_.axis(r.joint)) : speeds_[i]);
     }
     double* seen = rows_.observation.data();
     for (std::size_t k = 0; k < around_.low.size(); ++k)

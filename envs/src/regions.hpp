@@ -15,11 +15,17 @@ namespace tauguard::envs {
 // A body region in the scene; -1 where it has no joint (held in place).
 struct Region {
   int body = -1, joint = -1, qpos = -1, dof = -1;
+  int mocap = -1;                          // of the frame that a person moves; -1: no person's
+  bool held = false;                       // cannot move away
   int sensor = -1;                         // address of its ten contact numbers
   double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no blow is allowed
   double span = 0, speed = 0;  // it turns back this far from its origin [m], at this speed [m/s]
   double touching = 0;         // unbroken contact so far [s]
+  double force = 0;            // at the last physics step [N]
 };
+
+// A row of a region's peak over an action: force [N], point [m], direction of the force on it.
+constexpr int peak_width = 7;
 
 // The largest values over one control step, and what lasts longer.
 struct Contact {
@@ -86,23 +92,31 @@ inline void read_links(const Kinematics& arms, const double* sensor, double t, C
 // Reads the regions' contact sensors. A blow counts against the transient limit, unbroken contact
 // beyond half a second and a region that cannot move away against the quasi-static one. Where no
 // blow is allowed the whole force is cost, and the ratio is against the quasi-static limit.
-inline void read_regions(std::vector<Region>& regions, const double* sensors, double dt,
-                         Contact& c) {
+inline void read_regions(std::vector<Region>& regions, const double* sensors, double dt, Contact& c,
+                         double* peaks) {
   double cost = 0;
   for (std::size_t i = 0; i < regions.size(); ++i) {
     Region& r = regions[i];
     const double* s = sensors + r.sensor;
     const double force = s[0] == 0 ? 0.0 : norm(load(s + 1));
+    r.force = force;
     if (force == 0) {
       r.touching = 0;
       continue;
     }
     r.touching += dt;
-    const bool blow = r.joint >= 0 && r.touching <= transient_time;
+    const bool blow = !r.held && r.touching <= transient_time;
     const double limit = blow ? r.transient : r.quasi_static;
     const double ratio = force / (limit > 0 ? limit : r.quasi_static);
     cost += std::max(0.0, force - limit);
     c.region_force = std::max(c.region_force, force);
+    double* peak = peaks + peak_width * i;
+    if (force > peak[0]) {
+      const Vec3 direction = (-1.0 / force) * load(s + 1);
+      peak[0] = force;
+      std::copy(s + 7, s + 10, peak + 1);
+      peak[4] = direction.x, peak[5] = direction.y, peak[6] = direction.z;
+    }
     if (ratio > c.ratio) {
       c.ratio = ratio;
       c.region = static_cast<int>(i) + 1;

@@ -187,7 +187,7 @@ def test_cartesian_mode_moves_the_tool_along_the_axis(axis):
 
 
 def test_observation_agrees_with_mujoco():
-    env = gym.make(REACH).unwrapped
+    env = gym.make(REACH, obstacles=("hand", "lower_arm", "chest")).unwrapped
     env.reset(seed=2)
     rng = np.random.default_rng(0)
     for _ in range(30):

@@ -1,0 +1,384 @@
+// A person's motion: reaches along minimum-jerk paths (Flash & Hogan 1985), walks between places,
+// draws back after a touch. It depends on a script, the time and the touches alone; the result is a
+// pose of every capsule of tauguard.models.person, in that order.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "tauguard/geometry/vec3.hpp"
+
+namespace tauguard::envs {
+
+using geometry::cross;
+using geometry::dot;
+using geometry::load;
+using geometry::mix;
+using geometry::norm;
+using geometry::Vec3;
+
+enum Segment { skull, neck, chest, abdomen, pelvis, limbs };
+// Of a limb, after `limbs`; the left ones come first.
+enum Limb { upper_arm, lower_arm, hand, thigh, lower_leg, per_side };
+constexpr int person_segments = limbs + 2 * per_side;
+
+// Lengths [m], place and habits; see tauguard.models.Person.
+struct Anatomy {
+  double hip_height, trunk, shoulder, hip_half, neck, head;
+  double upper_arm, lower_arm, hand, grip, thigh, shank;
+  double floor, facing, hand_speed, walk_speed, reaction_time;
+  bool seated, hanging, reacts;
+};
+
+// What happens when: a row a reach of a hand (wait [s], place [m], hold [s]), a row a walk (wait
+// [s], place [m]; the first is where they start). It begins anew at its end.
+struct Script {
+  const double *reaches = nullptr, *walks = nullptr;
+  std::size_t reach_rows = 0, walk_rows = 0;
+};
+
+constexpr int reach_width = 5, walk_width = 3;
+// Peak over mean speed of a minimum-jerk path.
+constexpr double peak_over_mean = 1.875;
+// Drawing back: so many times the usual speed; the hand keeps away for so long [s]. A step back:
+// how far [m], how long it takes and lasts [s].
+constexpr double startle = 1.6, quiet = 1.0;
+constexpr double step_back = 0.3, step_time = 0.6, step_lasts = 2.0;
+// Who sits leans back instead, by this much a metre of a step [rad/m]; a trunk leans at most so
+// fast [rad/s].
+constexpr double lean_back = 1.2, lean_rate = 1.2;
+// A touch that is felt [N]; how fast they turn [rad/s]; the body leans towards what is farther than
+// this share of the arm's length; the arm stretches up to this share.
+constexpr double felt = 1.0, turn_rate = 3.0, comfort = 0.95, stretch = 0.985, most_lean = 0.7;
+
+inline double minimum_jerk(double u) {
+  u = std::min(std::max(u, 0.0), 1.0);
+  return u * u * u * (10.0 + u * (6.0 * u - 15.0));
+}
+
+// Going from one value to another; done at `began + lasts`.
+struct Course {
+  double from = 0, to = 0, began = 0, lasts = 1;
+  double at(double t) const { return from + (to - from) * minimum_jerk((t - began) / lasts); }
+  bool done(double t) const { return t - began >= lasts; }
+  template <class Each>
+  void visit(Each&& each) {
+    each(from), each(to), each(began), each(lasts);
+  }
+};
+
+// A hand rests beside the body, goes to a place in the world, stays there and comes back.
+struct Reach {
+  enum Phase { resting, going, holding, returning };
+  int phase = resting, next = 0;
+  double until = 0, hold = 0, began = 0, lasts = 1;  // [s]
+  Vec3 from, goal;
+};
+
+class Person {
+ public:
+  Person() = default;
+  explicit Person(const Anatomy& anatomy) : body_(anatomy) {}
+
+  std::array<Vec3, person_segments> centre;
+  std::array<std::array<double, 4>, person_segments> quat_wxyz;
+
+  // At the script's beginning.
+  void reset(const Script& script) {
+    script_ = script;
+    from_ = to_ = walk_place(0);
+    way_ = Course{};
+    walking_ = false;
+    next_walk_ = 0;
+    until_ = script_.walks[0];
+    turned_ = body_.facing;
+    stride_ = swing_ = back_until_ = 0;
+    lowered_ = body_.hanging;
+    back_ = Course{};
+    touched_.fill(-1.0);
+    for (int side = 0; side < 2; ++side) {
+      hands_[side] = Reach{};
+      hands_[side].until = reach_row(side, 0)[0];
+    }
+    lean_ = 0;
+    pose(0.0, 0.0);
+  }
+
+  void bind(const Script& script) { script_ = script; }
+
+  // The state at time t [s], dt after the last one.
+  void advance(double t, double dt) {
+    react(t);
+    walk(t, dt);
+    for (int side = 0; side < 2; ++side) move_hand(side, t);
+    pose(t, dt);
+  }
+
+  // A region was touched by this force [N] at time t [s].
+  void touch(int segment, double force, double t) {
+    if (body_.reacts && force > felt && touched_[segment] < 0) touched_[segment] = t;
+  }
+
+  // The nearer hand goes to a place now, whatever it was about to do.
+  void aim(Vec3 place, double hold, double t) {
+    if (walking_ || body_.hanging) return;
+    const auto away = [&](int side) { return norm(place - grip_[side]); };
+    start(away(0) <= away(1) ? 0 : 1, place, hold, t);
+  }
+
+  template <class Each>
+  void visit(Each&& each) {
+    for (Reach& h : hands_) {
+      each(h.phase), each(h.next), each(h.until), each(h.hold), each(h.began), each(h.lasts);
+      visit(h.from, each), visit(h.goal, each);
+    }
+    visit(from_, each), visit(to_, each);
+    way_.visit(each), back_.visit(each);
+    each(walking_), each(next_walk_), each(until_), each(back_until_);
+    each(turned_), each(stride_), each(swing_), each(lowered_), each(lean_);
+    for (double& t : touched_) each(t);
+    for (Vec3& g : grip_) visit(g, each);
+  }
+
+ private:
+  Anatomy body_{};
+  Script script_;
+  std::array<Reach, 2> hands_;
+  std::array<Vec3, 2> grip_;  // where the hands are
+  Vec3 from_, to_;            // of a walk
+  Course way_, back_;
+  bool walking_ = false;
+  int next_walk_ = 0;
+  double until_ = 0, back_until_ = 0;
+  double turned_ = 0, stride_ = 0, swing_ = 0;  // yaw [rad], phase of the gait [rad], swing [rad]
+  double lean_ = 0;                             // of the trunk, forward [rad]
+  double lowered_ = 0;                          // the hands: 0 in front, 1 beside the body
+  std::array<double, person_segments> touched_{};  // when [s]; -1: not
+
+  template <class Each>
+  static void visit(Vec3& v, Each&& each) {
+    each(v.x), each(v.y), each(v.z);
+  }
+
+  const double* reach_row(int side, int row) const {
+    return script_.reaches + reach_width * (side * script_.reach_rows + row);
+  }
+  Vec3 walk_place(int row) const {
+    const double* w = script_.walks + walk_width * row;
+    return {w[1], w[2], body_.floor + body_.hip_height};
+  }
+
+  double path_time(double far, double speed) const {
+    return std::max(0.4, peak_over_mean * far / speed);
+  }
+
+  void start(int side, Vec3 place, double hold, double t) {
+    Reach& h = hands_[side];
+    const double far = norm(place - grip_[side]);
+    h.phase = Reach::going;
+    h.hold = hold;
+    h.began = t;
+    h.lasts = path_time(far, body_.hand_speed);
+    h.from = grip_[side];
+    h.goal = place;
+  }
+
+  void withdraw(int side, double t, double speed, double rest) {
+    Reach& h = hands_[side];
+    h.until = std::max(h.until, t + rest);
+    if (h.phase == Reach::resting || h.phase == Reach::returning) return;
+    h.phase = Reach::returning;
+    h.began = t;
+    h.lasts = path_time(norm(h.goal - rest_place(side)), speed);
+    h.from = grip_[side];
+    h.until = t + h.lasts + rest;
+  }
+
+  void move_hand(int side, double t) {
+    Reach& h = hands_[side];
+    if (h.phase == Reach::resting) {
+      if (t < h.until || walking_ || body_.hanging || script_.reach_rows == 0) return;
+      const double* row = reach_row(side, h.next);
+      h.next = (h.next + 1) % static_cast<int>(script_.reach_rows);
+      start(side, load(row + 1), row[4], t);
+    } else if (h.phase == Reach::going && t - h.began >= h.lasts) {
+      h.phase = Reach::holding;
+      h.until = t + h.hold;
+    } else if (h.phase == Reach::holding && t >= h.until) {
+      withdraw(side, t, body_.hand_speed, reach_row(side, h.next)[0]);
+    } else if (h.phase == Reach::returning && t - h.began >= h.lasts) {
+      h.phase = Reach::resting;
+    }
+  }
+
+  void walk(double t, double dt) {
+    if (!walking_ && t >= until_ && script_.walk_rows > 1) {
+      next_walk_ = (next_walk_ + 1) % static_cast<int>(script_.walk_rows);
+      from_ = to_;
+      to_ = walk_place(next_walk_);
+      way_ = {0.0, 1.0, t, path_time(norm(to_ - from_), body_.walk_speed)};
+      walking_ = true;
+      for (int side = 0; side < 2; ++side) withdraw(side, t, body_.hand_speed, way_.lasts);
+    } else if (walking_ && way_.done(t)) {
+      walking_ = false;
+      until_ = t + script_.walks[walk_width * next_walk_];
+    }
+    const Vec3 way = to_ - from_;
+    const bool far = walking_ && norm(way) > 0.5 && way_.done(t + 0.6) == false;
+    turn(far ? std::atan2(way.y, way.x) : body_.facing, dt);
+    lowered_ += std::min(std::max((walking_ || body_.hanging) - lowered_, -2.0 * dt), 2.0 * dt);
+    const double speed = walking_ ? norm(way) * (way_.at(t) - way_.at(t - dt)) / dt : 0.0;
+    swing_ = 0.4 * std::min(1.0, speed / 1.0);
+    stride_ += speed * dt * 4.0;  // [rad/m]: a step of 0.8 m
+  }
+
+  void turn(double wanted, double dt) {
+    const double error = std::remainder(wanted - turned_, 2.0 * M_PI), most = turn_rate * dt;
+    turned_ += std::min(std::max(error, -most), most);
+  }
+
+  // A touch is felt, and after the reaction time the hand, or the body, draws back.
+  void react(double t) {
+    for (int k = 0; k < person_segments; ++k) {
+      if (touched_[k] < 0 || t - touched_[k] < body_.reaction_time) continue;
+      touched_[k] = -1.0;
+      const int limb = (k - limbs) % per_side, side = (k - limbs) / per_side;
+      if (k >= limbs && limb <= hand) {
+        withdraw(side, t, startle * body_.hand_speed, quiet);
+        continue;
+      }
+      for (int h = 0; h < 2; ++h) withdraw(h, t, startle * body_.hand_speed, quiet);
+      if (back_.to < step_back) back_ = {back_.at(t), step_back, t, step_time};
+      back_until_ = t + step_time + step_lasts;
+    }
+    if (back_.to > 0 && t >= back_until_) back_ = {back_.at(t), 0.0, t, 2 * step_time};
+  }
+
+  // ---- where everything is ------------------------------------------------
+
+  struct Axes {
+    Vec3 forward, left, hip;  // hip: between the hip joints
+  };
+  Axes axes_{};
+
+  void place(int segment, Vec3 a, Vec3 b) {
+    centre[segment] = mix(a, b, 0.5);
+    const Vec3 way = b - a;
+    const Vec3 d = (1.0 / norm(way)) * way;
+    // The turn that takes -z to d; no capsule points straight up.
+    std::array<double, 4>& q = quat_wxyz[segment];
+    q = {1.0 - d.z, d.y, -d.x, 0.0};
+    const double size = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+    for (double& c : q) c /= size;
+  }
+
+  // In front of the body, or hanging beside it.
+  Vec3 rest_place(int side) const {
+    const double sign = side == 0 ? 1.0 : -1.0, reach = body_.upper_arm + body_.lower_arm;
+    const Vec3 up{0, 0, 1};
+    const double down = minimum_jerk(lowered_);
+    const double ahead = (0.75 - 0.8 * down) * reach;
+    const double aside = (0.9 + 0.35 * down) * body_.shoulder;
+    const double height = body_.trunk - (0.7 + 0.3 * down) * reach;
+    return axes_.hip + ahead * axes_.forward + sign * aside * axes_.left + height * up;
+  }
+
+  Vec3 hand_place(int side, double t) const {
+    const Reach& h = hands_[side];
+    const double u = minimum_jerk((t - h.began) / h.lasts);
+    switch (h.phase) {
+      case Reach::going:
+        return mix(h.from, h.goal, u);
+      case Reach::holding:
+        return h.goal;
+      case Reach::returning:
+        return mix(h.from, rest_place(side), u);
+      default:
+        return rest_place(side);
+    }
+  }
+
+  void pose(double t, double dt) {
+    const double back = back_.at(t);
+    axes_.forward = {std::cos(turned_), std::sin(turned_), 0};
+    axes_.left = {-std::sin(turned_), std::cos(turned_), 0};
+    axes_.hip = mix(from_, to_, walking_ ? way_.at(t) : 1.0);
+    if (!body_.seated) axes_.hip += -back * axes_.forward;
+    const Vec3 goals[2] = {hand_place(0, t), hand_place(1, t)};
+    double lean = 0.0;
+    for (int side = 0; side < 2; ++side) {
+      const double sign = side == 0 ? 1.0 : -1.0;
+      const Vec3 upright =
+          axes_.hip + Vec3{0, 0, 0.96 * body_.trunk} + sign * body_.shoulder * axes_.left;
+      const double far =
+          norm(goals[side] - upright) - comfort * (body_.upper_arm + body_.lower_arm + body_.grip);
+      lean = std::max(lean, std::min(most_lean, far / body_.trunk));
+    }
+    if (body_.seated) lean -= lean_back * back;
+    lean_ += std::min(std::max(lean - lean_, -lean_rate * dt), lean_rate * dt);
+    const Vec3 up = std::sin(lean_) * axes_.forward + std::cos(lean_) * Vec3{0, 0, 1};
+    const Vec3 ahead = std::cos(lean_) * axes_.forward - std::sin(lean_) * Vec3{0, 0, 1};
+    trunk_and_head(up, ahead);
+    const Vec3 neck_base = axes_.hip + body_.trunk * up;
+    for (int side = 0; side < 2; ++side) {
+      const double sign = side == 0 ? 1.0 : -1.0;
+      arm(side, neck_base + sign * body_.shoulder * axes_.left - 0.04 * body_.trunk * up,
+          goals[side], sign);
+      leg(side, sign);
+    }
+  }
+
+  void trunk_and_head(Vec3 up, Vec3 ahead) {
+    const auto across = [&](int segment, double height) {
+      const Vec3 middle = axes_.hip + height * body_.trunk * up;
+      place(segment, middle - 0.1 * axes_.left, middle + 0.1 * axes_.left);
+    };
+    across(pelvis, 0.02);
+    across(abdomen, 0.42);
+    across(chest, 0.78);
+    const Vec3 base = axes_.hip + body_.trunk * up, chin = base + body_.neck * up;
+    place(neck, chin, base);
+    const Vec3 shift = 0.02 * ahead;
+    place(skull, chin + body_.head * up + shift, chin + shift);
+  }
+
+  // Two links to the goal of the palm, the elbow down and outwards.
+  void arm(int side, Vec3 shoulder, Vec3 goal, double sign) {
+    const double first = body_.upper_arm, second = body_.lower_arm + body_.grip;
+    const Vec3 way = goal - shoulder;
+    const double size = norm(way);
+    const Vec3 direction = size > 1e-6 ? (1.0 / size) * way : axes_.forward;
+    const double least = std::fabs(first - second) + 0.1 * second;
+    const double r = std::min(std::max(size, least), stretch * (first + second));
+    const double c = (first * first + r * r - second * second) / (2.0 * first * r);
+    const Vec3 pole = 0.6 * sign * axes_.left - 0.3 * axes_.forward - Vec3{0, 0, 1};
+    Vec3 bend = pole - dot(pole, direction) * direction;
+    bend = norm(bend) > 1e-6 ? (1.0 / norm(bend)) * bend : axes_.left;
+    const Vec3 elbow = shoulder + first * c * direction + first * std::sqrt(1.0 - c * c) * bend;
+    grip_[side] = shoulder + r * direction;
+    const Vec3 along = (1.0 / second) * (grip_[side] - elbow);
+    const Vec3 wrist = elbow + body_.lower_arm * along;
+    const int at = limbs + side * per_side;
+    place(at + upper_arm, shoulder, elbow);
+    place(at + lower_arm, elbow, wrist);
+    place(at + hand, wrist, wrist + body_.hand * along);
+  }
+
+  void leg(int side, double sign) {
+    const Vec3 joint = axes_.hip + sign * body_.hip_half * axes_.left;
+    const double phase = stride_ + (side == 0 ? 0.0 : M_PI);
+    const double turn = body_.seated ? M_PI / 2 : swing_ * std::sin(phase);
+    const double bend = body_.seated ? M_PI / 2 : 1.2 * swing_ * std::max(0.0, std::cos(phase));
+    const auto along = [&](double angle) {
+      return std::sin(angle) * axes_.forward - std::cos(angle) * Vec3{0, 0, 1};
+    };
+    const Vec3 knee = joint + body_.thigh * along(turn);
+    const int at = limbs + side * per_side;
+    place(at + thigh, joint, knee);
+    place(at + lower_leg, knee, knee + body_.shank * along(turn - bend));
+  }
+};
+
+}  // namespace tauguard::envs

@@ -1,0 +1,181 @@
+"""A person in the environments: motion, what they feel, and the same bits from the same seed."""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.vector import SyncVectorEnv
+
+from tauguard.environments import ENVIRONMENTS
+from tauguard.envs.people import draw_script
+from tauguard.models import Person
+from tauguard.models.person import SEGMENTS
+
+REACH = "tauguard:tauguard/Reach-v0"
+FAR = Person(position=(4.0, 0.0))
+
+
+def moved(person, seconds, seed=0, control_rate=100):
+    """Centres of every capsule (T, 15, 3), positions of the frames, at every action."""
+    env = gym.make(REACH, obstacles=(person,), control_rate=control_rate).unwrapped
+    env.reset(seed=seed)
+    rows = []
+    for _ in range(round(seconds * control_rate)):
+        env.step(np.zeros(6))
+        rows.append(env.data.mocap_pos.copy())
+    return env, np.array(rows)
+
+
+def ends(env, name):
+    """Both ends of a capsule's straight part [m]."""
+    geom = env.data.geom(name)
+    half = env.model.geom(name).size[1] * geom.xmat.reshape(3, 3)[:, 2]
+    return geom.xpos - half, geom.xpos + half
+
+
+@pytest.mark.parametrize("posture", ["standing", "seated"])
+def test_limbs_keep_their_lengths_and_hang_together(posture):
+    person = Person(position=(4.0, 0.0), posture=posture)
+    env, _ = moved(person, 1.0)
+    for _ in range(40):
+        for _ in range(7):
+            env.step(np.zeros(6))
+        for side in ("left", "right"):
+            parts = [ends(env, f"person_{side}_{part}") for part in ("upper_arm", "lower_arm")]
+            gap = min(np.linalg.norm(a - b) for a in parts[0] for b in parts[1])
+            assert gap < 1e-6
+            legs = [ends(env, f"person_{side}_{part}") for part in ("thigh", "lower_leg")]
+            assert min(np.linalg.norm(a - b) for a in legs[0] for b in legs[1]) < 1e-6
+        shoulders = [ends(env, f"person_{side}_upper_arm") for side in ("left", "right")]
+        width = min(np.linalg.norm(a - b) for a in shoulders[0] for b in shoulders[1])
+        assert width <= 2 * person.length("shoulder") + 1e-6
+
+
+def test_motion_is_smooth_and_no_faster_than_people_work():
+    person = Person(position=(4.0, 0.0), hand_speed=1.0, walk_speed=1.0)
+    _, rows = moved(person, 25.0)
+    speed = np.linalg.norm(np.diff(rows, axis=0), axis=2) * 100
+    hands = [k for k, s in enumerate(SEGMENTS) if s.region == "hand"]
+    assert speed.max() < 3.0
+    assert np.quantile(speed[:, hands], 0.95) < 1.6
+    assert speed[:, hands].max() > 0.5
+    pelvis = rows[:, 4]
+    assert np.linalg.norm(pelvis - pelvis[0], axis=1).max() > 0.3  # walked
+    feet = [k for k, s in enumerate(SEGMENTS) if s.region == "lower_leg"]
+    assert (rows[:, feet, 2] > person.floor).all()
+
+
+def test_who_stands_still_stands_still():
+    _, rows = moved(Person(position=(4.0, 0.0), motion="still"), 3.0)
+    assert np.ptp(rows, axis=0).max() < 1e-12
+
+
+def struck(**keywords):
+    """The arm runs into a person who stands in front of it; infos of every action."""
+    standing = gym.make("tauguard/React-v0", obstacles=("person",)).unwrapped.world.person
+    someone = replace(standing, **keywords)
+    env = gym.make(
+        "tauguard/React-v0", obstacles=(someone,), approach=False, detector="observer"
+    ).unwrapped
+    env.reset(seed=3)
+    infos = []
+    for speeds in np.diff(env.task.swing[0], axis=0) * 100:
+        env.cell.plants[0].override(1, speeds)
+        infos.append(env.step(np.zeros(6))[4])
+    env.cell.plants[0].override(1, np.zeros(6))
+    for _ in range(80):
+        infos.append(env.step(np.zeros(6))[4])
+    return env, infos
+
+
+def test_info_says_where_how_hard_and_how_late():
+    env, infos = struck(reacts=False)
+    worst = max(infos, key=lambda info: info["region_force"].max())
+    k = int(worst["region_force"].argmax())
+    name = env.regions[k].name
+    assert name.startswith("person_")
+    assert worst["region_force"][k] == pytest.approx(worst["force"], rel=0.5)
+    direction = worst["region_direction"][k]
+    assert np.linalg.norm(direction) == pytest.approx(1.0)
+    assert direction[1] > 0.5  # the swing goes along y
+    away = np.linalg.norm(worst["region_point"][k] - env.data.body(name).xpos)
+    assert away < 0.4
+    assert worst["region_pressure"][k] > 0
+    peak = max(np.abs(info["tau_ext_peak"]).max() for info in infos)
+    assert peak >= max(np.abs(info["tau_ext"]).max() for info in infos)
+    onset = next(i for i, info in enumerate(infos) if info["onset"])
+    alarm = next(i for i in range(onset, len(infos)) if infos[i]["alarm"])
+    delay = infos[alarm]["alarm_delay"]
+    assert (alarm - onset - 1) * 0.01 <= delay <= (alarm - onset + 1) * 0.01
+    assert infos[onset - 1]["alarm_delay"] == -1
+
+
+def test_a_touched_person_steps_back_after_their_reaction_time():
+    env, infos = struck(reacts=True, reaction_time=0.2)
+    onset = next(i for i, info in enumerate(infos) if info["onset"])
+    assert onset < len(infos) - 60
+    body = env.data.body("person_chest_motion").xpos
+    assert body[1] > env.world.person.position[1] + 0.1
+    still, others = struck(reacts=False)
+    assert still.data.body("person_chest_motion").xpos[1] == pytest.approx(
+        still.world.person.position[1]
+    )
+    # Before the reaction time both are the same.
+    for a, b in zip(infos[: onset + 19], others, strict=False):
+        assert a["force"] == b["force"]
+
+
+@pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
+def test_native_and_single_have_the_same_bits_with_a_person(name):
+    keywords = {"obstacles": ("person",), "max_episode_steps": 9}
+    sync = SyncVectorEnv([lambda: gym.make(name, **keywords)] * 2)
+    vector = gym.make_vec(name, num_envs=2, threads=2, **keywords)
+    first, again = sync.reset(seed=4), vector.reset(seed=4)
+    assert np.array_equal(first[0], again[0])
+    vector.action_space.seed(0)
+    for _ in range(24):
+        actions = vector.action_space.sample()
+        a, b = sync.step(actions), vector.step(actions)
+        assert np.array_equal(a[0], b[0])
+        for key in ("region_force", "region_point", "tau_ext_peak", "cost"):
+            assert np.array_equal(a[4][key], b[4][key]), key
+
+
+def test_a_script_is_the_seeds():
+    a, b, c = (draw_script(FAR, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
+    assert not np.array_equal(a[0], c[0])
+
+
+def test_forces_on_a_person_are_the_engines():
+    env = gym.make(REACH, control="cartesian", control_rate=1000).unwrapped
+    env.reset(seed=1)
+    model, data, found = env.model, env.data, 0
+    for _ in range(6000):
+        way = env.cell.observation[0, 21:24]
+        _, _, _, _, info = env.step(np.append(np.clip(way / 0.02, -1, 1), np.zeros(3)))
+        total = {}
+        for c in range(data.ncon):
+            local = np.zeros(6)
+            mujoco.mj_contactForce(model, data, c, local)
+            frame = data.contact[c].frame.reshape(3, 3)
+            for side, sign in ((0, -1), (1, 1)):
+                body = int(model.geom_bodyid[data.contact[c].geom[side]])
+                total[body] = total.get(body, 0) + sign * frame.T @ local[:3]
+        for k, region in enumerate(env.regions):
+            force = total.get(region.body, np.zeros(3))
+            ours = info["region_force"][k] * info["region_direction"][k]
+            assert ours == pytest.approx(force, abs=1e-9 + 1e-9 * np.linalg.norm(force))
+            found += np.linalg.norm(force) > 1
+        if found > 50:
+            break
+    assert found > 50
+
+
+def test_obstacles_say_what_would_work():
+    with pytest.raises(ValueError, match="person, skull"):
+        gym.make(REACH, obstacles=("persn",))
+    with pytest.raises(ValueError, match="at most one"):
+        gym.make(REACH, obstacles=("person", FAR))
