@@ -135,7 +135,8 @@ class Picture:
         """From beside the first arm's front; two arms from the side, so that neither hides one."""
         world, reach = self._world, self._world.reach
         if world.person is not None:
-            x, y = np.mean([*[base[:2] for base in _bases(world)], world.person.position], axis=0)
+            places = np.array([*_bases(world), [*world.person.position, 0.0]])
+            x, y = places[:, :2].mean(axis=0)
             camera.lookat[:] = (x, y, world.person.floor + 0.5 * world.person.stature)
             camera.distance, camera.azimuth, camera.elevation = 2.9, 130.0, -12.0
         elif world.arms == 1:

@@ -18,6 +18,7 @@ from tauguard.models.obstacles import (
     BodyProxy,
     Clamp,
     Obstacle,
+    Springy,
     Striker,
     Table,
     add_floor,
@@ -26,7 +27,7 @@ from tauguard.models.obstacles import (
     add_table,
 )
 from tauguard.models.payload import add_payload_body
-from tauguard.models.person import Person, PersonPart, add_person
+from tauguard.models.person import Person, add_person
 from tauguard.models.robot import Robot
 
 Array = NDArray[np.float64]
@@ -196,7 +197,7 @@ def lean_model(whole: mujoco.MjSpec) -> mujoco.MjModel:
 def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     """Add everything listed beside the arm; returns the names of the obstacles."""
     whole = arm.spec
-    obstacles: dict[str, Obstacle | PersonPart] = {}
+    obstacles: dict[str, Obstacle] = {}
     if spec.payload:
         add_payload_body(whole, arm.flange())
     if spec.striker is not None:
@@ -218,7 +219,9 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     if spec.labels:
         for i, link in enumerate(arm.links, start=1):
             _add_label(whole, link, f"contact_link{i}")
-    parts = obstacles if spec.person is None else obstacles | add_person(whole, spec.person)
+    parts: dict[str, Springy] = {**obstacles}
+    if spec.person is not None:
+        parts |= add_person(whole, spec.person)
     if spec.region_labels:
         for name in region_names(spec):
             _add_label(whole, name, f"contact_{name}")
