@@ -44,6 +44,10 @@ STUDIES: dict[str, Study] = {
         "simulation.arms",
         "any arm: servo, residual, divergences, false alarms and a strike, arm by arm",
     ),
+    "datasets": Study(
+        "datasets.study",
+        "generation: rate beside mujoco.rollout, bytes, reading, memory, kills",
+    ),
     "rigid": Study(
         "rigid.study",
         "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from tauguard.contacts import registered
 from tauguard.datasets.workers import in_processes, terminable
 from tauguard.envs import Episode, simulate
 from tauguard.traces import Trace, read_mcap, write_mcap
@@ -71,6 +70,8 @@ def write_dataset(
         ValueError: an unknown checker; a file of that name holds another episode or other checkers
             (nothing is overwritten).
     """
+    from tauguard.contacts import registered  # and its room, which takes long to import
+
     for name in checkers:
         if name not in registered():
             raise ValueError(f"checkers {name!r}: expected some of {', '.join(registered())}")

@@ -165,18 +165,8 @@ def _write_episodes(
 ) -> list[dict[str, Any]]:
     """Write the samples, a row group an episode; returns the episodes' lines."""
     like = schema(len(cura6.JOINTS), configuration.residual)
-    floats = [field.name for field in like if pa.types.is_floating(field.type)]
-    others = [field.name for field in like if field.name not in floats]
     lines, groups = [], 0
-    with pq.ParquetWriter(
-        stream,
-        like,
-        compression="zstd",
-        compression_level=ZSTD_LEVEL,
-        use_dictionary=others,
-        use_byte_stream_split=floats,
-        write_page_checksum=True,
-    ) as writer:
+    with pq.ParquetWriter(stream, like, **writing(like)) as writer:
         for one, trace, residual, outcome in _simulated(configuration, episodes):
             line = _line(one, trace, outcome)
             line["key"] = one.key(configuration, code_hash)
@@ -188,6 +178,18 @@ def _write_episodes(
         text = json.dumps({"format": 1, "episodes": lines}, sort_keys=True)
         writer.add_key_value_metadata({"tauguard": text})
     return lines
+
+
+def writing(like: pa.Schema) -> dict[str, Any]:
+    """How a shard of this schema is written: options of pyarrow's ``ParquetWriter``."""
+    floats = [field.name for field in like if pa.types.is_floating(field.type)]
+    return {
+        "compression": "zstd",
+        "compression_level": ZSTD_LEVEL,
+        "use_dictionary": [name for name in like.names if name not in floats],
+        "use_byte_stream_split": floats,
+        "write_page_checksum": True,
+    }
 
 
 def _simulated(

@@ -6,15 +6,14 @@ import hashlib
 import importlib.metadata
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.contacts import Checker, registered
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import labels
-from tauguard.envs.checking import checked
 from tauguard.envs.episode import CollisionPlan, Episode, PayloadPick
 from tauguard.envs.loop import Recording, SimulationLoop
 from tauguard.envs.motions import Workspace, random_motion
@@ -32,7 +31,10 @@ from tauguard.models import (
     set_payload,
     without_losses,
 )
-from tauguard.traces import Trace, Truth
+from tauguard.traces import CheckedContacts, Trace, Truth
+
+if TYPE_CHECKING:
+    from tauguard.contacts import Checker
 
 Array = NDArray[np.float64]
 
@@ -197,6 +199,13 @@ class Simulation:
             self._recording.rows(start, stop),
         )
 
+    def _contacts(self, recording: Recording) -> tuple[CheckedContacts, ...]:
+        if not self._checkers:
+            return ()
+        from tauguard.envs.checking import checked
+
+        return checked(self.scene, self.motion.t, recording, self._checkers)
+
     def _trace(
         self, recording: Recording, payload: Array, injected: list[tuple[float, str]]
     ) -> Trace:
@@ -225,7 +234,7 @@ class Simulation:
             qd_des=motion.qd,
             qdd_des=motion.qdd,
             truth=truth,
-            contacts=checked(scene, motion.t, recording, self._checkers),
+            contacts=self._contacts(recording),
             meta={
                 "seed": str(episode.seed),
                 "config_sha256": episode.config_hash,
@@ -312,6 +321,8 @@ def simulate(
 
 def _known(name: str | Checker) -> str | Checker:
     """``name``, or ``ValueError`` before anything is simulated."""
+    from tauguard.contacts import registered  # and its room, which takes long to import
+
     if isinstance(name, str) and name not in registered():
         raise ValueError(f"checker {name!r}: there are {', '.join(registered())}")
     return name

@@ -16,7 +16,7 @@ import pytest
 
 from tauguard.datasets import inspection
 from tauguard.datasets.configuration import load
-from tauguard.datasets.dataset_folder import HEAD, lines, read_head
+from tauguard.datasets.dataset_folder import HEAD, claimed, lines, read_head
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import read
 from tauguard.datasets.shard import simulated
@@ -199,10 +199,9 @@ def test_a_full_disk_leaves_no_part_and_the_old_file(tmp_path):
 
 
 def test_two_runs_do_not_write_one_folder(tiny, tiny_toml):
-    process = generate(tiny_toml, "--out", tiny, "--workers", 1)
-    from tauguard.datasets.dataset_folder import claimed
-
-    with claimed(tiny, load(tiny_toml)):
-        _, err = process.communicate(timeout=240)
-    assert process.returncode == 2
-    assert "another process is generating" in err
+    configuration = load(tiny_toml)
+    with (
+        claimed(tiny, configuration),
+        pytest.raises(OSError, match="another process is generating"),
+    ):
+        generate_dataset(configuration, tiny, workers=1)

@@ -1,0 +1,141 @@
+"""Generation killed (SIGKILL) at random moments: the same bytes when it goes on.
+
+``python -m tauguard.benchmarks.datasets.kills --count 20 --workers 1 2 --ray local`` prints a line
+a kind; the exit code is 1 where bytes differ.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import textwrap
+import time
+from pathlib import Path
+
+import numpy as np
+
+from tauguard.datasets.configuration import load
+from tauguard.datasets.generation import generate_dataset
+from tauguard.report import Row
+
+#: A dataset of many small shards: most moments are in the middle of one.
+SMALL = """
+    name = "small"
+    seed = {seed}
+    rate = 500
+    episodes_per_shard = 1
+    residual = true
+    [episodes]
+    seconds = 6.6
+    arms = ["cura6", "cura6-long"]
+    individuals = [0, 1]
+    speeds = [20, 50]
+    payloads_g = [0, 1000]
+    severities = [[8, 64]]
+    [[splits]]
+    name = "train"
+    episodes = 6
+"""
+
+
+def kill_rows(quick: bool, seed: int) -> list[Row]:
+    """A row a number of workers."""
+    return [killed(["--workers", str(n)], 2 if quick else 20, seed) for n in (1, 2)]
+
+
+def killed(how: list[str], count: int, seed: int) -> Row:
+    """Kill a command ``count`` times, each in a folder of its own, and let it go on.
+
+    Args:
+        how: options of ``tauguard generate`` that say who computes.
+        count: kills.
+        seed: of the dataset and of the moments.
+    """
+    rng = np.random.default_rng([seed, 81])
+    same, midway = 0, 0
+    with tempfile.TemporaryDirectory() as place:
+        config = Path(place) / "small.toml"
+        config.write_text(textwrap.dedent(SMALL.format(seed=seed)))
+        wanted = Path(place) / "wanted"
+        generate_dataset(load(config), wanted, workers=1)
+        begun, ended = _timed(config, Path(place) / "timed", how)
+        assert contents(Path(place) / "timed") == contents(wanted), "differs without a kill"
+        for number in range(count):
+            folder = Path(place) / f"killed-{number}"
+            command = _start(config, folder, how)
+            _wait(folder, command)
+            time.sleep(rng.uniform(0, 1.1 * (ended - begun)))
+            os.killpg(command.pid, signal.SIGKILL)
+            midway += command.wait() != 0
+            generate_dataset(load(config), folder, workers=1)
+            same += contents(folder) == contents(wanted)
+    return {
+        "study": "kills",
+        "who": " ".join(how).removeprefix("--"),
+        "kills": count,
+        "before it ended": midway,
+        "same bytes": same,
+    }
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file by its name in the folder."""
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def _start(config: Path, folder: Path, how: list[str]) -> subprocess.Popen[bytes]:
+    program = "from tauguard.cli import main; main()"
+    return subprocess.Popen(
+        [sys.executable, "-c", program, "generate", str(config), "--out", str(folder), *how],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def _wait(folder: Path, command: subprocess.Popen[bytes]) -> None:
+    """Until the dataset is begun: before that there is nothing to lose."""
+    while not (folder / "dataset.json").exists() and command.poll() is None:
+        time.sleep(0.002)
+
+
+def _timed(config: Path, folder: Path, how: list[str]) -> tuple[float, float]:
+    """When the dataset is begun and when the command ends, of a run that is left alone."""
+    command = _start(config, folder, how)
+    _wait(folder, command)
+    begun = time.monotonic()
+    if command.wait() != 0:
+        raise RuntimeError(f"tauguard generate {' '.join(how)} failed")
+    return begun, time.monotonic()
+
+
+def main() -> None:
+    """The command."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--count", type=int, default=20)
+    options.add_argument("--workers", type=int, nargs="*", default=[1, 2])
+    options.add_argument("--ray", help="address of a cluster, or local")
+    options.add_argument("--seed", type=int, default=0)
+    given = options.parse_args()
+    kinds = [["--workers", str(n)] for n in given.workers]
+    kinds += [["--ray", given.ray]] if given.ray else []
+    rows = []
+    for how in kinds:
+        rows.append(killed(how, given.count, given.seed))
+        print(json.dumps(rows[-1]), flush=True)
+    if any(row["same bytes"] != row["kills"] for row in rows):
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()
