@@ -66,6 +66,12 @@ def test_no_page_is_lost():
     """Every page can be reached from the README."""
     told = (ROOT / "README.md").read_text()
     site = {"index.md", "reference.md"}  # of the site alone
-    pages = [page for page in PAGES[1:] if page.name not in site]
-    lost = [page.name for page in pages if os.path.relpath(page, ROOT) not in told]
+    theory = (ROOT / "docs" / "theory" / "index.md").read_text()
+    pages = [page for page in PAGES[1:] if page.name not in site or page.parent.name == "theory"]
+    lost = [
+        page.name
+        for page in pages
+        if os.path.relpath(page, ROOT) not in told
+        and not (page.parent.name == "theory" and f"({page.name})" in theory)
+    ]
     assert not lost
