@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers, make_detector, train
 from tauguard.detectors.faults import UsualInput
 from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
-from tauguard.envs import simulate
+from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
 from tauguard.traces.trace import Trace
 
@@ -29,6 +29,19 @@ class Watched:
     name: str
     alarm: CollisionAlarm
     logs: dict[str, Trace]
+    contacts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    """Onset and end [s] of each contact of a log, where the truth is known."""
+
+    @classmethod
+    def struck(cls, name: str, alarm: CollisionAlarm, episodes: Sequence[Episode]) -> Watched:
+        """With simulated episodes as its logs."""
+        logs, contacts = {}, {}
+        for k, episode in enumerate(episodes):
+            trace = simulate(episode)
+            assert trace.truth is not None
+            logs[f"struck_{k}"] = thinned(trace)
+            contacts[f"struck_{k}"] = [(c.onset, c.end) for c in trace.truth.collisions]
+        return cls(name, alarm, logs, contacts)
 
 
 def arms(quick: bool, seed: int) -> Iterator[Watched]:
@@ -51,9 +64,7 @@ def simulated(quick: bool, seed: int) -> Watched:
     arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
     training = [thinned(simulate(episode)) for episode in free]
     alarm = train(make_detector("moving-thresholds"), training, arm, 5.0)
-    return Watched(
-        "simulated", alarm, {f"struck_{k}": thinned(simulate(e)) for k, e in enumerate(struck)}
-    )
+    return Watched.struck("simulated", alarm, struck)
 
 
 def thinned(trace: Trace) -> Trace:

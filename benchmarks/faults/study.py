@@ -96,8 +96,9 @@ class Tally:
     untold: float = 0.0
     early: int = 0  #: moments with a reason before the fault
 
-    def add(self, watched: Watched, trace: Trace, name: str, start: float) -> None:
+    def add(self, watched: Watched, log: str, name: str, start: float) -> None:
         """The fault at one moment, beside the same stretch without it."""
+        trace = watched.logs[log]
         settle = watched.alarm.settle
         whole = Packets.of(trace)
         inside = (whole.due >= start - settle - 1.5) & (whole.due < start + LASTS + settle + AFTER)
@@ -112,7 +113,10 @@ class Tally:
         self.delays += [1e3 * (times[0] - start)] if times else []
         said = [s.start for s in b.spans.of(COLLISION)]
         true = [s.start for s in a.spans.of(COLLISION)]
-        self.false += sum(t >= start and all(abs(t - u) > 0.3 for u in true) for t in said)
+        near = [(s.start, s.end) for s in a.spans.of(COLLISION)] + watched.contacts.get(log, [])
+        self.false += sum(
+            t >= start and not any(u - 0.3 <= t <= v + 0.3 for u, v in near) for t in said
+        )
         late = [t for t in true if t > start + LASTS + settle + 0.2]
         self.after += len(late)
         self.found += sum(any(abs(t - u) < 0.1 for u in said) for t in late)
@@ -148,28 +152,26 @@ def run(quick: bool, seed: int) -> list[Row]:
         rows += [clean(watched, name, trace) for name, trace in watched.logs.items()]
         for name in tqdm(FAULTS, desc=watched.name, disable=None, leave=False):
             tally = Tally()
-            for trace, start in moments(watched, rng, MOMENTS[quick]):
-                tally.add(watched, trace, name, start)
+            for log, start in moments(watched, rng, MOMENTS[quick]):
+                tally.add(watched, log, name, start)
             rows.append(tally.row(watched.name, name))
     rows.sort(key=lambda row: row["study"])
     return rows + others(known)
 
 
-def moments(watched: Watched, rng: np.random.Generator, count: int) -> list[tuple[Trace, float]]:
+def moments(watched: Watched, rng: np.random.Generator, count: int) -> list[tuple[str, float]]:
     """Logs that are long enough, and random starts in them, in motion."""
-    need = 2 * watched.alarm.settle + LASTS + AFTER + 2
-    long = [t for t in watched.logs.values() if t.t[-1] - t.t[0] > need and moving(t).any()]
-    chosen: list[tuple[Trace, float]] = []
-    while long and len(chosen) < count:
-        trace = long[rng.integers(len(long))]
+    margin = watched.alarm.settle
+    starts = {}
+    for name, trace in watched.logs.items():
         since, whole = trace.t - trace.t[0], trace.t[-1] - trace.t[0]
-        margin = watched.alarm.settle
         fits = moving(trace) & (since > margin + 1.5) & (since < whole - margin - LASTS - AFTER)
-        if not fits.any():
-            long = [other for other in long if other is not trace]
-            continue
-        chosen.append((trace, float(rng.choice(since[fits]))))
-    return chosen
+        if fits.any():
+            starts[name] = since[fits]
+    if not starts:
+        return []
+    names = [str(name) for name in rng.choice(list(starts), count)]
+    return [(name, float(rng.choice(starts[name]))) for name in names]
 
 
 def moving(trace: Trace) -> np.ndarray:

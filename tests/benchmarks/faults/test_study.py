@@ -17,12 +17,11 @@ def watched():
     free = [thinned(simulate(e)) for e in free_episodes(9, 3, 8.0, (40.0,), (0.0,), drawn)]
     arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
     alarm = train(make_detector("residual-thresholds"), free, arm, 5.0)
-    log = thinned(simulate(struck_episodes(2, 1, 3, (40.0,), (0.0,), drawn)[0]))
-    return Watched("small", alarm, {"log": log})
+    return Watched.struck("small", alarm, struck_episodes(2, 1, 3, (40.0,), (0.0,), drawn))
 
 
 def test_a_log_without_a_fault_has_none_and_the_alarms_of_detect(watched):
-    row = clean(watched, "log", watched.logs["log"])
+    row = clean(watched, "struck_0", watched.logs["struck_0"])
     assert row["false_fault_s"] == 0
     assert row["alarms"] == row["alarms_of_detect"] > 0
 
@@ -32,11 +31,12 @@ def test_a_fault_is_seen_and_leaves_nothing_untold(watched, name):
     tally = Tally()
     chosen = moments(watched, np.random.default_rng(1), 2)
     assert len(chosen) == 2
-    for trace, start in chosen:
-        tally.add(watched, trace, name, start)
+    for log, start in chosen:
+        tally.add(watched, log, name, start)
     row = tally.row("small", name)
     assert row["seen"]["value"] == 1
     assert row["untold_s"] == 0
+    assert row["false_alarms"] == 0
     assert row["longest_ms"] <= 100.001
 
 
