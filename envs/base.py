@@ -24,6 +24,7 @@ from tauguard.envs.cell import (
     TIME,
     Cell,
 )
+from tauguard.envs.randomization import check_options
 from tauguard.envs.rendering import Picture
 from tauguard.envs.settings import Settings, one_of
 from tauguard.envs.world import World, build_world, crossing, opposite, region_pressure
@@ -96,13 +97,13 @@ class ArmEnv(gymnasium.Env[Array, Array]):
 
     Every ``info`` has the same keys and shapes: ``time`` [s], ``distance`` to the target [m],
     ``success``, ``force`` (peak on a link [N]), ``cost`` (peak force on body regions beyond their
-    limits [N]), ``pressure`` (peak mean pressure [N/cm^2], where the keyword ``contact_area`` says
-    the area; a point contact has none, else it is 0), ``limit_ratio`` (peak force over the region's
-    transient limit, or its quasi-static one after 0.5 s of contact or where the region cannot
-    move), ``region`` (of that ratio, 1-based, 0 for none; names in :attr:`regions`), ``tau_ext``
-    [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the detector (what is wrong with its
-    samples, "" for nothing; see ``docs/live.md``), ``onset`` (a collision began in this step),
-    ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
+    limits [N]), ``cost_sum`` (of the episode [N]), ``pressure`` (peak mean pressure [N/cm^2], where
+    the keyword ``contact_area`` says the area; else it is 0), ``limit_ratio`` (peak force over the
+    region's transient limit, or its quasi-static one after 0.5 s of contact or where the region
+    cannot move), ``region`` (of that ratio, 1-based, 0 for none; names in :attr:`regions`),
+    ``tau_ext`` [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the detector (what is wrong
+    with its samples, "" for nothing; see ``docs/live.md``), ``onset`` (a collision began in this
+    step), ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
     0: none), ``tau_ext_peak`` (by joint, of the largest size [N m]), ``alarm_delay`` of the latest
     collision [s] (-1: no alarm, or none yet), and ``reason``, why an episode was cut short (""
     where it was not). Peaks are over the physics steps of the action.
@@ -153,12 +154,17 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     @property
     def model(self) -> Any:
         """The compiled ``mujoco.MjModel``."""
-        return self.world.scene.model
+        return self.cell.model(0)
 
     @property
     def data(self) -> Any:
         """The ``mujoco.MjData`` that is stepped; to look at, not to write to."""
         return self.cell.datas[0]
+
+    @property
+    def drawn(self) -> dict[str, Array]:
+        """What the keyword ``randomize`` gave this episode, by name."""
+        return dict(self.cell.drawn[0])
 
     @property
     def regions(self) -> tuple[Any, ...]:
@@ -170,13 +176,20 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     ) -> tuple[Array, dict[str, Any]]:
         """Begin an episode.
 
+        Args:
+            seed: of everything that is random.
+            options: values for this episode of what the keyword ``randomize`` names, instead of a
+                draw.
+
         Raises:
-            ValueError: ``options``: there are none.
+            ValueError: ``options`` that the keyword ``randomize`` does not name, or values that
+                cannot be.
         """
-        if options:
-            raise ValueError(f"options: unknown {', '.join(map(repr, options))}; there are none")
+        check_options(options or {}, self.world.settings.randomize or {})
         super().reset(seed=seed)
+        self.cell.draw(0, self.np_random, options or {})
         self.task.start(0, self.np_random)
+        self.cell.cost_sum[0] = 0.0
         self._begun = True
         if self.render_mode == "human":
             self.render()
@@ -252,6 +265,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "success": success,
             "force": figure[FORCE],
             "cost": figure[COST],
+            "cost_sum": cell.cost_sum.item(0),
             "pressure": figure[REGION_FORCE] / area if area else 0.0,
             "limit_ratio": figure[RATIO],
             "region": int(figure[REGION]),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -12,10 +14,12 @@ from tauguard.envs import _plant
 from tauguard.envs.actions import Entry, action_scale, action_table, observation_table
 from tauguard.envs.people import REACHES, WALKS, anatomy, draw_script
 from tauguard.envs.plant import make_plant
+from tauguard.envs.randomization import Variant, draw, own_model, vary
 from tauguard.envs.sensing import Sensing, listening
 from tauguard.envs.settings import CONTROLS
 from tauguard.envs.watching import Watching
 from tauguard.envs.world import RegionInfo, World
+from tauguard.models import Person
 
 Array = NDArray[np.float64]
 
@@ -46,7 +50,7 @@ DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata
 ROWS = (
     "observation", "figure", "tau_ext", "residual", "alarm", "target", "contacts",
     "q", "qd", "current", "tau", "contact", "region", "tau_peak", "peak", "alarm_delay",
-    "alarm_last", "reaches", "walks",
+    "alarm_last", "cost_sum", "reaches", "walks",
 )  # fmt: skip
 #: An alarm later than this after the onset does not detect it [s].
 LATEST = 0.5
@@ -74,6 +78,8 @@ class Cell:
         tau_peak: external torque of the largest size over the action, by joint [N m], (rows, n).
         peak: of each body region over the action: force [N], point [m], direction of the force on
             the person, shape (rows, regions, 7); zero without a touch.
+        cost_sum: of the episode's actions so far [N], shape (rows,).
+        drawn: what differs from the world in each copy's episode, by name.
         alarm_delay: of the latest collision's alarm [s], -1 where there is none, shape (rows,).
         reaches, walks: what a person does, see :func:`tauguard.envs.people.draw_script`.
     """
@@ -97,8 +103,11 @@ class Cell:
         self.peak = np.zeros((rows, regions, _plant.PEAK_WIDTH))
         self.alarm_delay = np.full(rows, -1.0)
         self.alarm_last = np.zeros(rows, dtype=np.bool_)
+        self.cost_sum = np.zeros(rows)
+        self.drawn: list[dict[str, Array]] = [{} for _ in range(rows)]
         self.reaches = np.zeros((rows, 2, REACHES, _plant.REACH_WIDTH))
         self.walks = np.zeros((rows, WALKS, _plant.WALK_WIDTH))
+        self._variants: list[Variant | None] = [None] * rows
         self.datas = [mujoco.MjData(world.scene.model) for _ in range(rows)]
         self.plants = [self._make_plant(i) for i in range(rows)]
         self.sensing: list[Sensing] | None = None
@@ -114,20 +123,48 @@ class Cell:
         self.sensing = [Sensing(self.world, make) for _ in range(self.rows)] if needed else None
         self.residual[:], self.alarm[:] = 0.0, False
 
+    def model(self, i: int) -> mujoco.MjModel:
+        """What copy ``i`` simulates."""
+        variant = self._variants[i]
+        return self.world.scene.model if variant is None else variant.model
+
+    def person(self, i: int) -> Person | None:
+        """The person of copy ``i``."""
+        variant = self._variants[i]
+        return self.world.person if variant is None else variant.person
+
+    def draw(self, i: int, rng: np.random.Generator, stated: Mapping[str, Any]) -> None:
+        """Draw what the setting ``randomize`` names for the next episode of copy ``i``."""
+        known = self.world.settings.randomize
+        if known:
+            self._become(i, draw(known, self.world, rng, stated))
+
+    def _become(self, i: int, drawn: dict[str, Array]) -> None:
+        """Make copy ``i`` what was drawn."""
+        if not drawn:
+            return
+        model = self.model(i) if self._variants[i] else own_model(self.world)
+        self._variants[i] = variant = vary(self.world, model, drawn)
+        self.drawn[i] = drawn
+        self.plants[i] = self._make_plant(i)
+        if self.sensing is not None:
+            self.sensing[i].sensors = variant.drive.sensors
+
     def place(self, i: int, q: Array) -> None:
         """Put copy ``i`` at rest at ``q`` [rad], shape (n,), everything else where it began."""
         data = self.datas[i]
-        mujoco.mj_resetData(self.world.scene.model, data)
+        mujoco.mj_resetData(self.model(i), data)
         data.qpos[self.world.scene.qpos_adr] = q
 
     def send_person(self, i: int, rng: np.random.Generator) -> None:
         """Draw what the person of copy ``i`` does in the next episode, if there is one."""
-        if self.world.person is not None:
-            self.reaches[i], self.walks[i] = draw_script(self.world.person, rng)
+        person = self.person(i)
+        if person is not None:
+            self.reaches[i], self.walks[i] = draw_script(person, rng)
 
     def start(self, i: int) -> None:
         """Begin an episode of copy ``i`` from the state in its data."""
-        mujoco.mj_forward(self.world.scene.model, self.datas[i])
+        mujoco.mj_forward(self.model(i), self.datas[i])
         self.plants[i].reset()
         self.residual[i], self.alarm[i], self.contacts[i] = 0.0, False, 0
         self.alarm_delay[i], self.alarm_last[i] = -1.0, False
@@ -136,7 +173,7 @@ class Cell:
 
     def get_state(self, i: int) -> dict[str, Any]:
         """Everything that copy ``i`` depends on: physics, drives, rows, detector, checkers."""
-        data, model = self.datas[i], self.world.scene.model
+        data, model = self.datas[i], self.model(i)
         physics = np.empty(mujoco.mj_stateSize(model, STATE))
         mujoco.mj_getState(model, data, physics, STATE)
         listener = self.sensing[i].detector if self.sensing else None
@@ -148,6 +185,7 @@ class Cell:
             "plant": np.array(self.plants[i].state()),
             "rows": {name: getattr(self, name)[i].copy() for name in ROWS},
             "detector": listener.get_state() if listener else None,
+            "drawn": {name: values.copy() for name, values in self.drawn[i].items()},
         }
 
     def set_state(self, i: int, state: dict[str, Any]) -> None:
@@ -156,7 +194,8 @@ class Cell:
         Raises:
             ValueError: a state of another scene.
         """
-        data, model = self.datas[i], self.world.scene.model
+        self._become(i, {name: values.copy() for name, values in state["drawn"].items()})
+        data, model = self.datas[i], self.model(i)
         if len(state["physics"]) != mujoco.mj_stateSize(model, STATE):
             raise ValueError("state: of another scene")
         self.plants[i].restore(state["plant"].tolist())
@@ -177,6 +216,7 @@ class Cell:
             self._watched(i, action)
         else:
             self.plants[i].step(action)
+        self.cost_sum[i] += self.figure[i, COST]
         if self.sensing is not None:
             self._sense(i, rng)
 
@@ -189,6 +229,7 @@ class Cell:
                 self._watched(int(i), actions[i])
         else:
             _plant.step_all(self.plants, actions, mask, threads)
+        self.cost_sum[mask] += self.figure[mask, COST]
         if self.sensing is not None:
             for i in np.flatnonzero(mask):
                 self._sense(int(i), rngs[i])
@@ -237,8 +278,11 @@ class Cell:
         plant.finish()
 
     def _make_plant(self, i: int) -> _plant.Plant:
-        world, data = self.world, self.datas[i]
-        plant = make_plant(world.scene, world.nominal, world.gains, data)
+        world, data, variant = self.world, self.datas[i], self._variants[i]
+        scene = world.scene
+        if variant is not None:
+            scene = replace(scene, model=variant.model, drive=variant.drive)
+        plant = make_plant(scene, world.nominal, world.gains, data)
         rows = _plant.Rows(
             observation=self.observation[i],
             figure=self.figure[i],
@@ -255,7 +299,7 @@ class Cell:
             reaches=self.reaches[i],
             walks=self.walks[i],
         )
-        around = _surroundings(world, self.observations)
+        around = _surroundings(world, self.observations, self.person(i))
         plant.surround(around, _controls(world), rows, substeps=world.settings.substeps)
         return plant
 
@@ -275,7 +319,9 @@ def _controls(world: World) -> _plant.Controls:
     )
 
 
-def _surroundings(world: World, observations: list[Entry]) -> _plant.Surroundings:
+def _surroundings(
+    world: World, observations: list[Entry], person: Person | None
+) -> _plant.Surroundings:
     model, scene = world.scene.model, world.scene
     each = len(scene.joint_names) // world.arms
     links = [
@@ -296,7 +342,7 @@ def _surroundings(world: World, observations: list[Entry]) -> _plant.Surrounding
         tools=[_plant.Tool(site=site, body=body, first=first) for site, body, first in world.tools],
         regions=[_region(world, region) for region in world.regions],
         person_begin=next((k for k, r in enumerate(world.regions) if r.mocap >= 0), -1),
-        person=anatomy(world.person),
+        person=anatomy(person),
         sensor_begin=_sensor(model, "contact_link1") if labels else -1,
         low=[entry.low for entry in observations],
         high=[entry.high for entry in observations],

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -86,52 +87,22 @@ def _bases(world: World) -> list[NDArray[np.float64]]:
     return [model.body_pos[model.body_rootid[body]] for _, body, _ in world.tools]
 
 
-class Picture:
-    """A camera on one copy of a world: off-screen, or a window."""
+class Stage:
+    """The scene as it is shown, and its own state, which follows the simulated one."""
 
-    def __init__(self, world: World, data: mujoco.MjData, mode: str) -> None:
-        """Open it.
+    def __init__(self, world: World, data: mujoco.MjData) -> None:
+        """Set the lights and place the camera."""
+        self._world, self._data = world, data
+        self.model = _staged(world)
+        self.drawn = mujoco.MjData(self.model)
+        vis = self.model.vis
+        vis.quality.offsamples = 8
+        vis.quality.shadowsize = 2048
+        vis.map.shadowclip = SHADOW_REACH / self.model.stat.extent
+        vis.headlight.ambient[:] = AMBIENT
+        vis.headlight.diffuse[:] = DIFFUSE
 
-        Raises:
-            RuntimeError: there is nothing to draw with; the message says what would help.
-        """
-        self._world, self._data, self._mode = world, data, mode
-        #: The scene as it is shown, and its own state, which follows the simulated one.
-        self._model = _staged(world)
-        self._drawn = mujoco.MjData(self._model)
-        self._window: Any = None
-        self._renderer: Any = None
-        model = self._model
-        model.vis.global_.offwidth = max(model.vis.global_.offwidth, WIDTH)
-        model.vis.global_.offheight = max(model.vis.global_.offheight, HEIGHT)
-        model.vis.quality.offsamples = 8
-        model.vis.quality.shadowsize = 2048
-        model.vis.map.shadowclip = SHADOW_REACH / model.stat.extent
-        model.vis.headlight.ambient[:] = AMBIENT
-        model.vis.headlight.diffuse[:] = DIFFUSE
-        self._camera = mujoco.MjvCamera()
-        self._look(self._camera)
-        self._options = mujoco.MjvOption()
-        self._options.geomgroup[:] = [int(group in SHOWN) for group in range(6)]
-        if mode == "human":
-            _need_display()
-        try:
-            if mode == "human":
-                from mujoco import viewer
-
-                self._window = viewer.launch_passive(
-                    model, self._drawn, show_left_ui=False, show_right_ui=False
-                )
-                self._look(self._window.cam)
-            else:
-                self._renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
-        except Exception as error:
-            raise RuntimeError(
-                f"no picture: {error}; without a display use render_mode='rgb_array' and set "
-                "MUJOCO_GL=egl (or osmesa) before Python starts"
-            ) from error
-
-    def _look(self, camera: Any) -> None:
+    def look(self, camera: Any) -> None:
         """From beside the first arm's front; two arms from the side, so that neither hides one."""
         world, reach = self._world, self._world.reach
         if world.person is not None:
@@ -143,35 +114,20 @@ class Picture:
             camera.lookat[:] = (0.35 * reach, 0.0, 0.4 * reach)
             camera.distance, camera.azimuth, camera.elevation = 1.9 * reach, 140.0, -20.0
         else:
-            base = self._model.body_pos[self._model.body_rootid[world.tools[-1][1]]]
+            base = self.model.body_pos[self.model.body_rootid[world.tools[-1][1]]]
             camera.lookat[:] = (base[0] / 2, base[1] / 2, 0.35 * reach)
             camera.distance, camera.azimuth, camera.elevation = 2.4 * reach, 100.0, -20.0
 
-    def show(self, targets: NDArray[np.float64]) -> NDArray[np.uint8] | None:
-        """Draw the state and a ball at each target, shape (arms, 3)."""
-        if self._window is not None:
-            with self._window.lock():
-                self._follow()
-                scene = self._window.user_scn
-                scene.ngeom = 0
-                self._mark(scene, targets)
-            self._window.sync()
-            return None
-        self._follow()
-        self._renderer.update_scene(self._drawn, self._camera, self._options)
-        self._mark(self._renderer.scene, targets)
-        pixels: NDArray[np.uint8] = self._renderer.render()
-        return pixels
-
-    def _follow(self) -> None:
-        model, drawn = self._model, self._drawn
+    def follow(self) -> None:
+        """Take over the simulated state."""
+        model, drawn = self.model, self.drawn
         for name in ("qpos", "qvel", "mocap_pos", "mocap_quat"):
             getattr(drawn, name)[:] = getattr(self._data, name)
         drawn.time = self._data.time
         for place in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex):
             place(model, drawn)
 
-    def _mark(self, scene: Any, targets: NDArray[np.float64]) -> None:
+    def mark(self, scene: Any, targets: NDArray[np.float64]) -> None:
         """A ball at each target."""
         for target in targets:
             if scene.ngeom >= scene.maxgeom:
@@ -186,9 +142,116 @@ class Picture:
             )
             scene.ngeom += 1
 
+
+class Camera(Stage):
+    """An off-screen camera on one copy of a world."""
+
+    def __init__(
+        self, world: World, data: mujoco.MjData, height: int = HEIGHT, width: int = WIDTH
+    ) -> None:
+        """Open it.
+
+        Raises:
+            RuntimeError: there is nothing to draw with; the message says what would help.
+        """
+        super().__init__(world, data)
+        size = self.model.vis.global_
+        size.offwidth, size.offheight = max(size.offwidth, width), max(size.offheight, height)
+        self._camera = mujoco.MjvCamera()
+        self.look(self._camera)
+        self._options = mujoco.MjvOption()
+        self._options.geomgroup[:] = [int(group in SHOWN) for group in range(6)]
+        with _no_picture():
+            self._renderer = mujoco.Renderer(self.model, height, width)
+
+    def colours(self, targets: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """The state and a ball at each target, shape (arms, 3): a picture (height, width, 3)."""
+        pixels: NDArray[np.uint8] = self._render(targets)
+        return pixels
+
+    def depths(self, targets: NDArray[np.float64]) -> NDArray[np.float32]:
+        """How far everything is along the optical axis [m], shape (height, width)."""
+        self._renderer.enable_depth_rendering()
+        try:
+            depth: NDArray[np.float32] = self._render(targets)
+        finally:
+            self._renderer.disable_depth_rendering()
+        return depth
+
+    def _render(self, targets: NDArray[np.float64]) -> Any:
+        self.follow()
+        self._renderer.update_scene(self.drawn, self._camera, self._options)
+        self.mark(self._renderer.scene, targets)
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Close the renderer."""
+        self._renderer.close()
+
+
+class Window(Stage):
+    """A window on one copy of a world."""
+
+    def __init__(self, world: World, data: mujoco.MjData) -> None:
+        """Open it.
+
+        Raises:
+            RuntimeError: there is nothing to draw with; the message says what would help.
+        """
+        super().__init__(world, data)
+        _need_display()
+        with _no_picture():
+            from mujoco import viewer
+
+            self._window: Any = viewer.launch_passive(
+                self.model, self.drawn, show_left_ui=False, show_right_ui=False
+            )
+            self.look(self._window.cam)
+
+    def show(self, targets: NDArray[np.float64]) -> None:
+        """Draw the state and a ball at each target, shape (arms, 3)."""
+        with self._window.lock():
+            self.follow()
+            scene = self._window.user_scn
+            scene.ngeom = 0
+            self.mark(scene, targets)
+        self._window.sync()
+
+    def close(self) -> None:
+        """Close the window."""
+        self._window.close()
+
+
+class Picture:
+    """What ``render`` shows: a picture, or a window that follows."""
+
+    def __init__(self, world: World, data: mujoco.MjData, mode: str) -> None:
+        """Open it.
+
+        Raises:
+            RuntimeError: there is nothing to draw with; the message says what would help.
+        """
+        self._view = Window(world, data) if mode == "human" else Camera(world, data)
+
+    def show(self, targets: NDArray[np.float64]) -> NDArray[np.uint8] | None:
+        """Draw the state and a ball at each target, shape (arms, 3)."""
+        if isinstance(self._view, Camera):
+            return self._view.colours(targets)
+        self._view.show(targets)
+        return None
+
     def close(self) -> None:
         """Close window or renderer."""
-        for part in (self._window, self._renderer):
-            if part is not None:
-                part.close()
-        self._window = self._renderer = None
+        self._view.close()
+
+
+@contextmanager
+def _no_picture() -> Iterator[None]:
+    """Whatever keeps OpenGL from starting becomes one line that says what would help."""
+    try:
+        yield
+    except Exception as error:
+        raise RuntimeError(
+            f"no picture: {error}; without a display use render_mode='rgb_array' and set "
+            "MUJOCO_GL=egl (or osmesa) before Python starts"
+        ) from error

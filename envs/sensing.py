@@ -279,11 +279,12 @@ class Sensing:
         measured: q, qd and current at every physics step of the last action, (substeps, n) each.
         residuals: of the detector [N m], shape (substeps, n).
         alarms: shape (substeps,).
+        sensors: what measures; None: without errors.
     """
 
     def __init__(self, world: World, make: Callable[[], Listener] | None) -> None:
         """Keep the parts; ``make`` gives a fresh detector, ``None``: there is none."""
-        self._sensors = world.scene.drive.sensors
+        self.sensors = world.scene.drive.sensors
         self._gain = world.nominal.gain
         self._make = make
         self.detector = make() if make else None
@@ -320,9 +321,7 @@ class Sensing:
     ) -> tuple[Array, Array, Array]:
         """What the sensors say of true signals, shape (substeps, n) each."""
         self.measured = (
-            (q, qd, current)
-            if self._sensors is None
-            else self._sensors.measure(rng, q, qd, current)
+            (q, qd, current) if self.sensors is None else self.sensors.measure(rng, q, qd, current)
         )
         return self.measured
 

@@ -117,7 +117,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
 
     def _pair(self, geom: int, target: int) -> tuple[float, float]:
         """Distance of an arm's geom from a region [m], and the arm's speed at that point [m/s]."""
-        model, data = self._arm.world.scene.model, self._arm.cell.datas[0]
+        model, data = self._arm.cell.model(0), self._arm.cell.datas[0]
         ends = np.zeros(6)
         distance = mujoco.mj_geomDistance(model, data, geom, target, FAR, ends)
         if distance >= FAR:

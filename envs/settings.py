@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tauguard.envs.randomization import distributions
 from tauguard.models import BODY_REGIONS, BodyProxy, Cloth, Mismatch, Person, Robot, Table
 from tauguard.models.scene import INTEGRATORS
 
@@ -41,6 +42,7 @@ class Settings:
     noise: bool = False  #: observe measured instead of true positions, velocities and currents
     ideal_drive: bool = False  #: no friction, ripple, lag or sensor errors
     max_speed: float | None = None  #: of every joint [rad/s]; default: the arm's own, else 2
+    randomize: Mapping[str, Any] | None = None  #: drawn each episode: see ``envs.randomization``
     contact_area: float | None = None  #: of the robot's striking surface [cm^2], where known
 
     def __post_init__(self) -> None:
@@ -69,6 +71,7 @@ class Settings:
             one = isinstance(value, str | BodyProxy | Person)
             object.__setattr__(self, name, (value,) if one else tuple(value))
         _check_obstacles(self.obstacles)
+        object.__setattr__(self, "randomize", distributions(self.randomize or {}))
         if isinstance(self.detector, os.PathLike):
             object.__setattr__(self, "detector", os.fspath(self.detector))
         named = isinstance(self.detector, str) and self.detector not in DETECTORS

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import gymnasium
@@ -33,6 +35,7 @@ from tauguard.envs.cell import (
     REGION_FORCE,
     TIME,
 )
+from tauguard.envs.randomization import check_options
 from tauguard.envs.rendering import Picture
 from tauguard.envs.settings import one_of
 
@@ -97,11 +100,14 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
 
         Args:
             seed: of copy i: ``seed + i``, or entry i of a list.
-            options: ``reset_mask``, a bool array of shape (num_envs,).
+            options: ``reset_mask``, a bool array of shape (num_envs,), and values for these
+                episodes of what the keyword ``randomize`` names.
         """
-        unknown = [key for key in options or {} if key != "reset_mask"]
-        if unknown:
-            raise ValueError(f"options: unknown {unknown}; expected reset_mask or none")
+        stated = {key: value for key, value in (options or {}).items() if key != "reset_mask"}
+        try:
+            check_options(stated, self.world.settings.randomize or {})
+        except ValueError as error:
+            raise ValueError(f"{error}; reset_mask always works") from None
         if isinstance(seed, list):
             seeds = seed
         else:
@@ -114,7 +120,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         self._seeded = True
         mask = self._chosen((options or {}).get("reset_mask"))
         for k in np.flatnonzero(mask):
-            self._begin(int(k))
+            self._begin(int(k), stated)
         return self.cell.observation.copy(), self._infos(np.zeros_like(mask), mask)
 
     def _chosen(self, mask: Any) -> Bools:
@@ -124,8 +130,10 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             raise ValueError(f"reset_mask: expected a bool array of shape ({self.num_envs},)")
         return mask.astype(np.bool_)
 
-    def _begin(self, i: int) -> None:
+    def _begin(self, i: int, stated: Mapping[str, Any] = MappingProxyType({})) -> None:
+        self.cell.draw(i, self._rngs[i], stated)
         self.task.start(i, self._rngs[i])
+        self.cell.cost_sum[i] = 0.0
         self._elapsed[i], self._over[i] = 0, False
 
     def step(  # type: ignore[override]
@@ -204,6 +212,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "success": success.copy(),
             "force": figure[FORCE],
             "cost": figure[COST],
+            "cost_sum": cell.cost_sum.copy(),
             "pressure": figure[REGION_FORCE] / area if area else np.zeros(self.num_envs),
             "limit_ratio": figure[RATIO],
             "region": figure[REGION].astype(np.int64),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.envs.plant import Gains
+from tauguard.envs.randomization import check_names
 from tauguard.envs.settings import PERSON, Settings
 from tauguard.envs.two_arms_scene import add_second_arm, both_drives
 from tauguard.models import (
@@ -123,7 +124,7 @@ def build_world(
         timestep=settings.timestep,
         integrator=settings.integrator,
         mismatch=settings.mismatch if isinstance(settings.mismatch, Mismatch) else None,
-        payload=settings.payload_g > 0,
+        payload=settings.payload_g > 0 or "payload_g" in (settings.randomize or {}),
         labels=settings.labels,
         region_labels=settings.labels,
         arm=settings.robot,
@@ -136,6 +137,7 @@ def build_world(
     )
     reach = arm_reach(bare)
     proxies, person = _people(settings, bare, reach, placing or crossing, standing or opposite)
+    check_names(settings.randomize or {}, person, settings.checkers)
     scene = compose(replace(spec, proxies=proxies, person=person), visuals=False)
     if arms == 2:
         scene = add_second_arm(scene)

@@ -34,6 +34,13 @@ def add_payload_body(spec: mujoco.MjSpec, flange: mujoco.MjsSite) -> None:
     )
 
 
+def load_body(model: mujoco.MjModel, body: int, mass: float) -> None:
+    """Mass [kg] and inertia of the payload body alone; derived constants are left as they are."""
+    load = max(mass, _NO_MASS)
+    model.body_mass[body] = load
+    model.body_inertia[body] = max(load * 0.4 * _RADIUS**2, _NO_INERTIA)
+
+
 def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: float) -> None:
     """Give the payload body a mass [kg], from now on; a compact load in front of the flange.
 
@@ -54,9 +61,7 @@ def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: flo
     if not (np.isfinite(mass) and mass >= 0):
         raise ValueError(f"payload {mass} kg: expected 0 or more")
     before = pair_weights(model)
-    load = max(mass, _NO_MASS)
-    model.body_mass[body] = load
-    model.body_inertia[body] = max(load * 0.4 * _RADIUS**2, _NO_INERTIA)
+    load_body(model, body, mass)
     mujoco.mj_setConst(model, mujoco.MjData(model))
     direct = model.pair_solref[:, 0] < 0
     ratio = pair_weights(model)[direct] / before[direct]
