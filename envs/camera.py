@@ -22,7 +22,7 @@ FARTHEST = 10.0
 MODES = ("rgb", "depth", "rgbd")
 
 
-class CameraObservation(gymnasium.Wrapper[Pictures, Array, Array, Array], RecordConstructorArgs):
+class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """The observation becomes a dictionary of ``state``, ``rgb`` and ``depth``.
 
     | key | shape | type | unit |
@@ -37,7 +37,7 @@ class CameraObservation(gymnasium.Wrapper[Pictures, Array, Array, Array], Record
 
     def __init__(
         self,
-        env: gymnasium.Env[Array, Array],
+        env: gymnasium.Env[Any, Any],
         mode: str = "rgbd",
         height: int = 64,
         width: int = 64,

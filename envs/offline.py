@@ -78,7 +78,7 @@ def _episode(
     seen, infos, actions, outcomes = [observation], [info], [], []
     over = False
     while not over:
-        action = np.clip(np.asarray(policy(observation), dtype=np.float32), -1.0, 1.0)
+        action: Any = np.clip(np.asarray(policy(observation), dtype=np.float32), -1.0, 1.0)
         observation, reward, terminated, truncated, info = env.step(action)
         seen.append(observation)
         infos.append(info)

@@ -218,7 +218,7 @@ def vary(world: World, model: mujoco.MjModel, drawn: Mapping[str, Array]) -> Var
     _weigh(world.scene, base, model, drawn)
     person = world.person
     if person is not None:
-        own = {name: float(drawn[name][0]) for name in _OF_PERSON if name in drawn}
+        own: dict[str, Any] = {name: float(drawn[name][0]) for name in _OF_PERSON if name in drawn}
         person = replace(person, **own)
         _resize(model, person)
     return Variant(model, _drive(world.scene.drive, drawn), person)

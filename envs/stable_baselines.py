@@ -18,7 +18,7 @@ from tauguard.envs.vector import VectorArmEnv
 KEYS = ("cost", "cost_sum", "success", "force", "limit_ratio")
 
 
-class NativeVecEnv(VecEnv):
+class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
     """``num_envs`` copies of an environment, stepped natively, as Stable-Baselines3 wants them.
 
     A finished copy begins anew at once; its last observation is in
