@@ -104,6 +104,7 @@ class Plant {
   // is.
   void reset() {
     relax();
+    row_ = 0;
     std::fill_n(rows_.tau_ext.data(), joints(), 0.0);
     clear_peaks();
     speeds_.assign(around_.regions.size(), Vec3{});

@@ -143,6 +143,17 @@ def test_native_and_single_have_the_same_bits_with_a_person(name):
             assert np.array_equal(a[4][key], b[4][key]), key
 
 
+def test_an_episode_knows_nothing_of_the_one_before():
+    env = gym.make(REACH).unwrapped
+    first, _ = env.reset(seed=2)
+    for _ in range(30):
+        env.step(np.full(6, 0.5))
+    again, info = env.reset(seed=2)
+    assert np.array_equal(first, again)
+    assert not info["region_force"].any()
+    assert not info["tau_ext_peak"].any()
+
+
 def test_a_script_is_the_seeds():
     a, b, c = (draw_script(FAR, np.random.default_rng(seed)) for seed in (1, 1, 2))
     assert all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
