@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
-from scipy.spatial.transform import Rotation
 
 from tauguard.contacts.pairs import geom_flex_pairs, geom_pairs
 
@@ -38,7 +37,7 @@ class Poses:
 
     time: float
     body: Array  #: origins, shape (B, 3) [m]
-    body_mat: Array  #: shape (B, 3, 3)
+    body_quat: Array  #: orientations, w first, shape (B, 4)
     turn: Array  #: rotation vectors from the poses before, shape (B, 3) [rad]
     geom: Array  #: middles, shape (G, 3) [m]
     geom_mat: Array  #: shape (G, 3, 3)
@@ -63,8 +62,6 @@ class Deep:
         pairs, soft = geom_pairs(model), geom_flex_pairs(model)
         self._core = {g: core(model, g) for g in {*pairs.first, *pairs.second, *soft.first}}
         self._bound = np.where(model.geom_rbound > 0, model.geom_rbound, np.inf)
-        balls = model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE
-        self._bound[balls] *= LEFT
         self._reach = np.linalg.norm(model.geom_pos, axis=1) + model.geom_rbound
         self._soft = [
             (int(g), int(f), simplices(model, int(f)))
@@ -73,26 +70,27 @@ class Deep:
         self.passed: list[tuple[str, str]] = []
         self._poses = self._read(data, None)
         rows = np.stack([pairs.first, pairs.second], axis=1)
-        apart = [
-            row
-            for row in rows.tolist()
-            if not self._meets(row[0], row[1], self._poses, self._poses)
-        ]
-        self._pairs = np.array(apart, dtype=int).reshape(-1, 2)
+        gaps = np.array([self._meets(a, b, self._poses, self._poses) for a, b in rows.tolist()])
+        self._pairs, self._gaps = rows[gaps > 0], gaps[gaps > 0]
 
     def look(self, data: Any) -> None:
-        """Follow the way from the state seen last to this one."""
+        """Follow the way from the state seen last to this one; not once something has passed."""
+        if self.passed:
+            return
         before, self._poses = self._poses, self._read(data, self._poses)
         after, body = self._poses, self._model.geom_bodyid
         turned = np.linalg.norm(after.turn[body], axis=1) * self._reach
-        sweep = self._bound + np.linalg.norm(after.geom - before.geom, axis=1) + turned
+        moved = np.linalg.norm(after.body[body] - before.body[body], axis=1) + turned
         a, b = self._pairs.T
-        near = np.linalg.norm(before.geom[a] - before.geom[b], axis=1) < sweep[a] + sweep[b]
-        for one, other in self._pairs[near].tolist():
-            if self._meets(one, other, before, after):
+        self._gaps -= moved[a] + moved[b]
+        for k in np.flatnonzero(self._gaps <= 0).tolist():
+            one, other = self._pairs[k].tolist()
+            self._gaps[k] = self._meets(one, other, before, after)
+            if self._gaps[k] <= 0:
                 self.passed.append((self._model.geom(one).name, self._model.geom(other).name))
         for geom, flex, elements in self._soft:
-            if self._meets_flex(geom, flex, elements, sweep[geom], before, after):
+            sweep = self._bound[geom] + moved[geom]
+            if self._meets_flex(geom, flex, elements, sweep, before, after):
                 self.passed.append((self._model.geom(geom).name, "flex"))
 
     def _read(self, data: Any, last: Poses | None) -> Poses:
@@ -100,25 +98,28 @@ class Deep:
         own.qpos[:], own.qvel[:], own.time = data.qpos, data.qvel, data.time
         own.mocap_pos[:], own.mocap_quat[:] = data.mocap_pos, data.mocap_quat
         mujoco.mj_kinematics(model, own)
-        mujoco.mj_comPos(model, own)
-        mujoco.mj_comVel(model, own)
         if model.nflex:
+            mujoco.mj_comPos(model, own)
             mujoco.mj_flex(model, own)
-        mat, turn = own.xmat.reshape(-1, 3, 3).copy(), np.zeros((model.nbody, 3))
+        turn = np.zeros((model.nbody, 3))
         if last is not None:
-            apart = Rotation.from_matrix(mat) * Rotation.from_matrix(last.body_mat).inv()
-            turn = _whole_turns(apart.as_rotvec(), own.cvel[:, :3] * (own.time - last.time))
+            turn = _turn(last.body_quat, own.xquat)
+            if np.abs(own.qvel).max() * (own.time - last.time) > 1.0:
+                mujoco.mj_comPos(model, own)
+                mujoco.mj_comVel(model, own)
+                turn = _whole_turns(turn, own.cvel[:, :3] * (own.time - last.time))
         return Poses(
             float(own.time),
             own.xpos.copy(),
-            mat,
+            own.xquat.copy(),
             turn,
             own.geom_xpos.copy(),
             own.geom_xmat.reshape(-1, 3, 3).copy(),
             own.flexvert_xpos.copy() if model.nflex else np.zeros((0, 3)),
         )
 
-    def _meets(self, one: int, other: int, before: Poses, after: Poses) -> bool:
+    def _meets(self, one: int, other: int, before: Poses, after: Poses) -> float:
+        """How far apart both cores are at the end; not above 0 if they meet on the way [m]."""
         moving = [
             _Body(self._model, g, self._core[g], self._reach, before, after) for g in (one, other)
         ]
@@ -136,22 +137,22 @@ class Deep:
         near &= (self._model.flex_vertbodyid[elements] != self._model.geom_bodyid[geom]).all(axis=1)
         body = _Body(self._model, geom, self._core[geom], self._reach, before, after)
         return any(
-            self._closes(body, _Simplex(before.vertices[e], after.vertices[e]), radius)
+            self._closes(body, _Simplex(before.vertices[e], after.vertices[e]), radius) <= 0
             for e in elements[near]
         )
 
-    def _closes(self, a: _Body | _Simplex, b: _Body | _Simplex, radius: float) -> bool:
-        """Conservative advancement: whether two movers come within ``radius`` of one another."""
+    def _closes(self, a: _Body | _Simplex, b: _Body | _Simplex, radius: float) -> float:
+        """Conservative advancement: the gap beyond ``radius`` at the end, or 0 if it closes [m]."""
         speed, t = float(np.linalg.norm(a.way - b.way)) + a.own_speed + b.own_speed, 0.0
         for _ in range(MOST):
             self._result.clear()
             gap = coal.distance(*a.at(t), *b.at(t), self._request, self._result) - radius
             if gap <= MEET:
-                return True
+                return 0.0
             if t >= 1 or t + gap / max(speed, 1e-300) >= 1:
-                return False
+                return max(float(gap - (1 - t) * speed), 1e-12)
             t += gap / speed
-        return True
+        return 0.0
 
 
 class _Body:
@@ -172,10 +173,19 @@ class _Body:
         """Shape and place at a share of the way."""
         if not self._turns:
             return self._shape, coal.Transform3s(self._mat, self._from + t * self.way + self._arm)
-        turn = Rotation.from_rotvec(t * self._turn).as_matrix()
+        turn = _matrix(t * self._turn)
         return self._shape, coal.Transform3s(
             turn @ self._mat, self._from + t * self.way + turn @ self._arm
         )
+
+
+def _matrix(turn: Array) -> Array:
+    """Of a rotation vector (Rodrigues)."""
+    quat, mat = np.zeros(4), np.zeros(9)
+    angle = float(np.linalg.norm(turn))
+    mujoco.mju_axisAngle2Quat(quat, turn / angle if angle else np.array([1.0, 0, 0]), angle)
+    mujoco.mju_quat2Mat(mat, quat)
+    return mat.reshape(3, 3)
 
 
 class _Simplex:
@@ -200,6 +210,17 @@ def simplices(model: Any, flex: int) -> Any:
     begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
     own = model.flex_elem[begin : begin + corners * count].reshape(-1, corners)
     return own + model.flex_vertadr[flex]
+
+
+def _turn(before: Array, after: Array) -> Array:
+    """Rotation vectors from one set of quaternions (N, 4) to another [rad]."""
+    w, x = after[:, :1], after[:, 1:]
+    v, y = before[:, :1], -before[:, 1:]
+    real = w * v - (x * y).sum(axis=1, keepdims=True)
+    axis = w * y + v * x + np.cross(x, y)
+    sine = np.linalg.norm(axis, axis=1, keepdims=True)
+    angle = 2 * np.arctan2(sine, np.abs(real)) * np.where(real < 0, -1, 1)
+    return np.asarray(axis / np.where(sine > 0, sine, 1) * angle)
 
 
 def _whole_turns(turn: Array, expected: Array) -> Array:

@@ -1,7 +1,7 @@
 """Guarded steps on scenes drawn at random, beside plain steps, MuJoCo's own modes and fine steps.
 
-Studies. ``thrown``: families of scenes (:mod:`tauguard.benchmarks.contacts.thrown`), each scene at
-one timestep of 1, 2 or 5 ms, by every method, judged from outside
+Studies. ``thrown``: families of scenes (:mod:`tauguard.benchmarks.contacts.draws`), each scene at
+one timestep of 0.5 to 10 ms, by every method, judged from outside
 (:mod:`tauguard.benchmarks.contacts.referee`). ``overhead``: scenes in which nothing is to be
 guarded. Which scenes come follows from the seed alone; none of them was chosen.
 """
@@ -10,38 +10,35 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from tauguard.benchmarks.contacts.draws import FAMILIES, Thrown, scenes
-from tauguard.benchmarks.contacts.referee import Referee
+from tauguard.benchmarks.contacts.draws import FAMILIES
+from tauguard.benchmarks.contacts.play import Line, Played, lines
 from tauguard.benchmarks.harness import answer
 from tauguard.contacts import GuardedStepper
 from tauguard.contacts.scenes import arm_boxes, arm_cloth
-from tauguard.contacts.scenes.impacts import MODES
 from tauguard.report import Row, rate
 
 #: Scenes of each family: in a full run, in a quick one.
 COUNTS = {
-    "plate": (300, 16),
-    "pair": (160, 12),
+    "plate": (400, 16),
+    "pair": (250, 12),
     "chain": (70, 4),
-    "cup": (15, 1),
-    "arm": (70, 4),
-    "cloth": (40, 2),
-    "composite": (120, 8),
+    "cup": (8, 1),
+    "arm": (40, 4),
+    "cloth": (20, 2),
+    "composite": (150, 8),
     "stack": (80, 4),
     "joined": (80, 4),
     "spin": (60, 4),
-    "soft": (30, 2),
+    "soft": (20, 2),
 }
 #: Fixed steps that are tried, with stiff contacts [s].
 FIXED = (5e-4, 2e-4, 1e-4, 5e-5)
-#: With steps below that the referee looks only this often [s].
-LOOK = 2e-4
 #: Energy that counts as added: more than this times what there was.
 ADDED = 1.02
 
@@ -57,94 +54,28 @@ NOTES = {
 }
 
 
-@dataclass(frozen=True)
-class Played:
-    """One scene by one method."""
+def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
+    """Rows of both studies and of what they say together.
 
-    held: bool
-    exhausted: bool
-    arrested: bool
-    energy: float
-    seconds: float  #: of the processor, for stepping alone
-    calls: float  #: of ``mj_step`` for each step
-    velocity: Any  #: of the first body at the end, shape (3,) [m/s]
-
-
-def run(quick: bool, seed: int) -> list[Row]:
-    """Rows of both studies and of what they say together."""
+    Scenes that the folder ``keep`` holds are not played again.
+    """
     rows: list[Row] = []
     for family, counts in COUNTS.items():
-        rows += _family_rows(family, seed, counts[quick], quick)
+        rows += _family_rows(family, seed, counts[quick], quick, Path(keep) if keep else None)
     return [*rows, *_overhead_rows(quick), *_summary(rows)]
 
 
-def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> Played:
-    """Play ``scene`` to its end: ``method`` is ``guarded`` or one of MuJoCo's modes."""
-    model, data = scene.start(timestep, MODES.get(method, 0), stiff)
-    referee = Referee(model, data)
-    guard = GuardedStepper(model, data) if method == "guarded" else None
-    every = max(1, round(LOOK / timestep))
-    steps = round(scene.seconds / timestep) + 1
-    spent, begin, calls, exhausted, arrested = 0.0, 0.0, 0, False, False
-
-    def each() -> None:
-        nonlocal begin
-        paused = time.process_time()
-        referee.look()
-        begin += time.process_time() - paused
-
-    for k in range(steps):
-        begin = time.process_time()
-        if guard is None:
-            mujoco.mj_step(model, data)
-        else:
-            report = guard.step(each)
-            calls += report.steps
-            exhausted |= report.exhausted
-            arrested |= bool(report.arrested)
-        spent += time.process_time() - begin
-        if k % every == every - 1 or k == steps - 1:
-            referee.look()
-            if not np.isfinite(referee.energy):
-                break
-    velocity = np.zeros(6)
-    mujoco.mj_objectVelocity(
-        model, data, mujoco.mjtObj.mjOBJ_GEOM, model.geom(scene.geom).id, velocity, 0
-    )
-    held = not referee.passed
-    return Played(held, exhausted, arrested, referee.energy, spent, calls / steps, velocity[3:])
-
-
-def _family_rows(family: str, seed: int, count: int, quick: bool) -> list[Row]:
+def _family_rows(
+    family: str, seed: int, count: int, quick: bool, keep: Path | None = None
+) -> list[Row]:
     """One row a method and timestep, and one of all timesteps."""
     methods = ["plain", "speculative", "guarded"]
     if family in ("cloth", "soft"):
         methods.insert(2, "ipc")
     fixed = FIXED[1:3] if quick else FIXED
-    table: list[dict[str, Any]] = []
-    for scene in scenes(family, seed, count):
-        runs = {method: played(scene, method, scene.timestep) for method in methods}
-        fine = _fine(scene, fixed)
-        table.append({"scene": scene, "runs": runs, "fine": fine, "first": _first(fine)})
-    groups = [*sorted({line["scene"].timestep for line in table}), None]
-    return [
-        _row(family, seed, method, group, fixed, table) for method in methods for group in groups
-    ]
-
-
-def _fine(scene: Thrown, fixed: tuple[float, ...]) -> dict[float, Played]:
-    """Stiff fixed steps, from the finest on, up to the first that does not hold."""
-    out: dict[float, Played] = {}
-    for step in sorted(fixed):
-        out[step] = played(scene, "plain", step, stiff=True)
-        if not out[step].held:
-            break
-    return out
-
-
-def _first(fine: dict[float, Played]) -> float | None:
-    """The largest of the fixed steps that holds with all finer ones."""
-    return max((step for step, run in fine.items() if run.held), default=None)
+    table = list(lines(family, seed, count, methods, fixed, keep))
+    groups = [*sorted({line.timestep for line in table}), None]
+    return [_row(family, seed, method, group, table) for method in methods for group in groups]
 
 
 def _row(
@@ -152,13 +83,13 @@ def _row(
     seed: int,
     method: str,
     timestep: float | None,
-    fixed: tuple[float, ...],
-    table: list[dict[str, Any]],
+    table: list[Line],
 ) -> Row:
-    lines = [t for t in table if timestep is None or t["scene"].timestep == timestep]
-    runs: list[Played] = [t["runs"][method] for t in lines]
-    known = [t for t in lines if t["first"] is not None]
+    chosen = [t for t in table if timestep is None or t.timestep == timestep]
+    runs: list[Played] = [t.runs[method] for t in chosen]
+    known = [t for t in chosen if t.first is not None]
     lost = [r for r in runs if not r.held]
+    redone = [r for r in runs if r.touched]
     return {
         "study": "thrown",
         "family": family,
@@ -171,23 +102,21 @@ def _row(
         "arrested": sum(r.arrested for r in runs),
         "energy": max(r.energy for r in runs),
         "energy_above": sum(r.energy > ADDED for r in runs),
+        "energy_redone": max((r.energy for r in redone), default=None),
+        "redone_above": sum(r.energy > ADDED for r in redone) if method == "guarded" else None,
         "calls": float(np.mean([r.calls for r in runs])) if method == "guarded" else None,
-        "over_plain": _median(
-            t["runs"][method].seconds / t["runs"]["plain"].seconds for t in lines
-        ),
-        "over_fixed": _median(
-            t["runs"][method].seconds / t["fine"][t["first"]].seconds for t in known
-        ),
-        "fixed_ms": _median(1e3 * t["first"] for t in known),
-        "unknown": len(lines) - len(known),
-        "error": _median(_error(t, method) for t in known if t["scene"].speed > 0),
+        "over_plain": _median(t.runs[method].seconds / t.runs["plain"].seconds for t in chosen),
+        "over_fixed": _median(t.runs[method].seconds / t.fine[t.first].seconds for t in known),
+        "fixed_ms": _median(1e3 * t.first for t in known),
+        "unknown": sum(bool(t.fine) and t.first is None for t in chosen),
+        "error": _median(_error(t, method) for t in known if t.speed > 0),
     }
 
 
-def _error(line: dict[str, Any], method: str) -> float:
+def _error(line: Line, method: str) -> float:
     """Of the first body's velocity at the end, over the speed of the thrown body at the start."""
-    apart = line["runs"][method].velocity - line["fine"][min(line["fine"])].velocity
-    return float(np.linalg.norm(apart) / line["scene"].speed)
+    apart = np.subtract(line.runs[method].velocity, line.fine[min(line.fine)].velocity)
+    return float(np.linalg.norm(apart) / line.speed)
 
 
 def _median(values: Iterable[float]) -> float | None:

@@ -56,7 +56,14 @@ class Referee:
         """Potential and elastic, and kinetic energy [J]."""
         model, scratch = self._model, self._scratch
         scratch.qpos[:], scratch.qvel[:] = self._data.qpos, self._data.qvel
-        mujoco.mj_fwdPosition(model, scratch)
+        scratch.mocap_pos[:], scratch.mocap_quat[:] = self._data.mocap_pos, self._data.mocap_quat
+        mujoco.mj_kinematics(model, scratch)
+        mujoco.mj_comPos(model, scratch)
+        if model.nflex:
+            mujoco.mj_flex(model, scratch)
+        if model.ntendon:
+            mujoco.mj_tendon(model, scratch)
+        mujoco.mj_makeM(model, scratch)
         mujoco.mj_energyPos(model, scratch)
         mujoco.mj_energyVel(model, scratch)
         stretch = sum(sheet.energy(scratch.flexvert_xpos) for sheet in self._sheets)

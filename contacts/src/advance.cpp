@@ -17,9 +17,6 @@ namespace {
 
 // A guard against creeping along a resting gap: the time reached is still never late.
 constexpr int most_steps = 500;
-// Shapes closer than this share of their size touch. Smaller costs steps, larger is early by as
-// much.
-constexpr double touching = 1e-10;
 
 class Lower {
  public:
@@ -104,7 +101,7 @@ Touch describe(const Mover& a, const Mover& b, const Distance& d, const Vec& n, 
   return touch;
 }
 
-Touch first_touch(Mover& a, Mover& b, double threshold, double start) {
+Touch first_touch(Mover& a, Mover& b, double threshold, double start, double touching) {
   const double radii = a.radius() + b.radius(), offset = radii + threshold;
   const double margin = 128 * unit_roundoff * (a.magnitude() + b.magnitude());
   const double close = offset + 2 * margin + touching * (a.reach() + b.reach() + radii);

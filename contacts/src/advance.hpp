@@ -12,8 +12,10 @@ struct Touch {
   Vec point{}, normal{};  // relative to the movers' origin; the normal from a to b
 };
 
-// Advances from `start` to 1 while the surfaces are further apart than `threshold` >= 0.
-Touch first_touch(Mover& a, Mover& b, double threshold, double start);
+// Advances from `start` to 1 while the surfaces are further apart than `threshold` >= 0. Shapes
+// closer than the share `touching` of their size touch: smaller costs steps, larger is early by as
+// much.
+Touch first_touch(Mover& a, Mover& b, double threshold, double start, double touching = 1e-10);
 
 // What is touched at the movers' present time t; `n` is the last direction in which they were
 // apart, or zero.

@@ -8,7 +8,8 @@ namespace {
 
 // Shapes nearer than this share of their size count as touching at the start: above what
 // first_touch takes for a touch, so that a pair that parts from there is no hit.
-constexpr double resting = 1e-9;
+constexpr double resting = 1e-5;
+constexpr double touching = 1e-6;
 
 bool apart_at(Mover& a, Mover& b, double t) {
   a.move_to(t), b.move_to(t);
@@ -22,37 +23,39 @@ bool apart_at(Mover& a, Mover& b, double t) {
 // What is known of a pair from earlier steps: nothing, that some cores were apart, or none.
 enum : char { unknown, apart, sunk };
 
-// `a_at(level)` and `b_at(level)` make the movers of a pair.
+// `a_at(level)` and `b_at(level)` make the movers of a pair. A deeper core never touches before a
+// shallower one does, so that each sweep goes on where the last one ended.
 template <class MakeA, class MakeB>
 bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* hit) {
-  const auto touch = [&](int level) {
+  const auto touch = [&](int level, double from) {
     Mover a = a_at(level), b = b_at(level);
-    return first_touch(a, b, 0, 0);
+    return first_touch(a, b, 0, from, touching);
   };
   const auto separate = [&](int level, double t) {
     Mover a = a_at(level), b = b_at(level);
     return apart_at(a, b, t);
   };
-  int start = 0;
-  while (start < levels && !separate(start, 0)) ++start;
-  const bool lost = start == levels && *known == apart;
-  *known = start == levels ? sunk : apart;
-  if (lost) hit->level = hit->deepest = levels;
-  if (start == levels) return lost;
-  const int trigger = std::max(start, 1);
-  hit->level = hit->deepest = trigger;
-  if (!touch(trigger).hit) {
-    if (start > 0 || !separate(0, 1)) return false;
-    const Touch brushed = touch(0);
-    if (!brushed.hit) return false;
-    hit->level = hit->deepest = 0, hit->t = brushed.t;
-    return true;
+  int level = 0;
+  while (level < levels && !separate(level, 0)) ++level;
+  const bool lost = level == levels && *known == apart;
+  *known = level == levels ? sunk : apart;
+  hit->level = hit->deepest = level, hit->t = 0;
+  if (level == levels) return lost;
+  double from = 0;
+  if (level == 0) {
+    const Touch whole = touch(0, 0);
+    if (!whole.hit) return false;
+    from = hit->t = whole.t;
+    level = 1;
   }
-  for (int level = levels - 1; level > trigger && hit->deepest == trigger; --level)
-    if (touch(level).hit) hit->deepest = level;
-  hit->t = start == 0 ? touch(0).t : 0;
-  if (!(hit->t >= 0)) hit->t = 0;
-  return true;
+  const int trigger = level;
+  for (; level < levels; ++level) {
+    const Touch deeper = touch(level, from);
+    if (!deeper.hit) break;
+    hit->deepest = level, from = deeper.t;
+  }
+  if (level > trigger) return hit->level = trigger, true;
+  return hit->level == 0 && separate(0, 1);  // touched and parted again, or only came close
 }
 
 void include(Box* box, const double* p) {
