@@ -15,6 +15,7 @@ def command(
     seed: int = 0,
     detector: str | None = None,
     robot: str | None = None,
+    keep: Path | None = None,
     json: Path | None = None,
     figure: Path | None = None,
     out: Path = Path("bench"),
@@ -30,6 +31,7 @@ def command(
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
         robot: arms of the study `arms`, by name or file, parted by commas.
+        keep: folder of the scenes of the study `guard`; those it holds are not played again.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
@@ -46,7 +48,9 @@ def command(
         raise ValueError(f"--detector goes with the study detection, not with {name}")
     if robot is not None and name != "arms":
         raise ValueError(f"--robot goes with the study arms, not with {name}")
-    given = {"detector": detector, "robot": robot}
+    if keep is not None and name != "guard":
+        raise ValueError(f"--keep goes with the study guard, not with {name}")
+    given = {"detector": detector, "robot": robot, "keep": None if keep is None else str(keep)}
     more = {key: value for key, value in given.items() if value is not None}
     if name == "all":
         if json is not None or figure is not None:

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tauguard.benchmarks.contacts import guard
+from tauguard.benchmarks.contacts import guard, play
+from tauguard.benchmarks.contacts.deep import Deep
 from tauguard.benchmarks.contacts.draws import FAMILIES, scenes
 from tauguard.benchmarks.contacts.referee import Referee
 
@@ -47,21 +48,78 @@ def test_the_referee_counts_energy():
 def test_plain_steps_lose_what_guarded_steps_hold():
     lost = 0
     for scene in scenes("plate", 5, 12):
-        lost += not guard.played(scene, "plain", scene.timestep).held
-        mine = guard.played(scene, "guarded", scene.timestep)
+        lost += not play.played(scene, "plain", scene.timestep).held
+        mine = play.played(scene, "guarded", scene.timestep)
         assert mine.held
         assert mine.energy < guard.ADDED
     assert lost > 2
 
 
 def test_a_step_that_holds_by_luck_is_not_the_first_that_holds(monkeypatch):
-    def play(scene, method, step, stiff):
-        return guard.Played(step in scene, False, False, 1.0, 1.0, 1.0, np.zeros(3))
+    def played(scene, method, step, stiff):
+        return play.Played(step in scene, False, False, False, 1.0, 1.0, 1.0, [0.0] * 3)
 
-    monkeypatch.setattr(guard, "played", play)
-    fixed = (4.0, 3.0, 2.0, 1.0)
-    assert guard._first(guard._fine({4.0, 2.0, 1.0}, fixed)) == 2.0
-    assert guard._first(guard._fine({4.0, 3.0}, fixed)) is None
+    monkeypatch.setattr(play, "played", played)
+
+    def first(held):
+        fine = play.fine_runs(held, (4.0, 3.0, 2.0, 1.0))
+        return play.Line(1.0, 1.0, {}, fine).first
+
+    assert first({4.0, 2.0}) == 2.0
+    assert first({4.0, 3.0}) is None
+    assert first({4.0, 1.0}) == 1.0
+
+
+def test_a_study_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
+    def read(count):
+        rows = play.lines("plate", 7, count, ["plain", "guarded"], (5e-4,), tmp_path)
+        return [(line.timestep, line.runs["guarded"].velocity) for line in rows]
+
+    whole = read(3)
+    monkeypatch.setattr(play, "played", None)
+    assert read(3) == whole
+    assert read(2) == whole[:2]
+
+
+def _two(shapes, offset, speed, turn=0.0):
+    """Two free geoms without contacts, one flying past the other and turning, seen once."""
+    bodies = "".join(
+        f'<body pos="{x} {y} 0"><freejoint/><geom name="{name}" {shape}/></body>'
+        for name, shape, x, y in (("a", shapes[0], 0, 0), ("b", shapes[1], 1, offset))
+    )
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><option gravity='0 0 0' timestep='0.01'/><worldbody>{bodies}</worldbody></mujoco>"
+    )
+    data = mujoco.MjData(model)
+    deep = Deep(model, data)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    data.qvel[6], data.qvel[11] = -speed, turn
+    mujoco.mj_step(model, data)
+    deep.look(data)
+    return bool(deep.passed)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "offset", "passes"),
+    [
+        (('size=".1"', 'size=".1"'), 0.0, True),
+        (('size=".1"', 'size=".1"'), 0.005, True),  # cores of 3 mm each
+        (('size=".1"', 'size=".1"'), 0.007, False),
+        (('type="box" size=".1 .2 .1"', 'size=".1"'), 0.105, True),  # its core reaches to .103
+        (('type="box" size=".1 .2 .1"', 'size=".1"'), 0.11, False),
+        (('type="capsule" size=".1 .2" euler="90 0 0"', 'size=".1"'), 0.205, True),
+        (('type="capsule" size=".1 .2" euler="90 0 0"', 'size=".1"'), 0.207, False),
+    ],
+)
+def test_the_referee_sees_cores_that_meet_between_two_looks(shapes, offset, passes):
+    assert _two(shapes, offset, 200.0) is passes
+
+
+@pytest.mark.parametrize(("turn", "passes"), [(0.0, False), (400.0, False), (500.0, True)])
+def test_the_referee_counts_whole_turns(turn, passes):
+    """A rod reaches the ball at 4.7 rad; 5 rad look at both ends like 1.3 the other way."""
+    rod = 'type="capsule" fromto="0 0 0 0 -1 0" size=".01"'
+    assert _two(('size=".1"', rod), 0.0, 1e-9, turn) is passes
 
 
 def test_the_study_draws_what_it_has():

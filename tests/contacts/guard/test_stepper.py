@@ -1,5 +1,7 @@
 """Guarded steps hold what plain steps pass by, and change nothing where nothing is missed."""
 
+import weakref
+
 import mujoco
 import numpy as np
 import pytest
@@ -284,6 +286,57 @@ def test_a_contact_pair_or_a_geom_is_stiffened_and_put_back(explicit):
     assert not guard.stiffened
     for name in names:
         np.testing.assert_array_equal(getattr(model, name), before[name])
+
+
+def test_what_may_touch_and_is_not_covered_is_named():
+    model = mujoco.MjModel.from_xml_string("""<mujoco><asset>
+      <hfield name="hills" nrow="2" ncol="2" size="1 1 .1 .1" elevation="0 0 0 0"/></asset>
+      <worldbody><geom name="hills" type="hfield" hfield="hills"/>
+      <body pos="0 0 1"><freejoint/><geom name="ball" size=".1"/></body>
+      <flexcomp name="rope" type="grid" dim="1" count="4 1 1" spacing=".1 .1 .1" radius=".01"
+        mass=".1"><edge equality="true"/><contact selfcollide="auto"/></flexcomp>
+      </worldbody></mujoco>""")
+    guard = GuardedStepper(model, mujoco.MjData(model))
+    hills, ball, rope = ("geom", 0), ("geom", 1), ("flex", 0)
+    assert guard.pairs == ((rope, ball),)
+    assert set(guard.uncovered) == {(hills, ball), (rope, hills), (rope, rope)}
+    rigid = GuardedStepper(model, mujoco.MjData(model), ["rigid"])
+    assert rigid.pairs == ()
+    assert (rope, ball) in rigid.uncovered
+
+
+def test_a_step_that_mujoco_resets_names_every_pair():
+    """A number that is not finite: MuJoCo starts the scene anew, and nothing is known of it."""
+    model, data = sphere_plate().start()
+    guard = GuardedStepper(model, data)
+    assert not guard.step().exhausted
+    data.qvel[0] = np.nan
+    report = guard.step()
+    assert report.exhausted
+    assert report.passed == guard.pairs
+
+
+def test_a_rotor_that_turns_more_than_half_a_turn_a_step_does_not_skip_a_wall():
+    """5 rad a step: by the shortest way it would turn back 1.3 rad, away from the wall."""
+    model = mujoco.MjModel.from_xml_string("""<mujoco><option timestep="5e-3" gravity="0 0 0"
+      integrator="implicitfast"/><worldbody>
+      <body><joint axis="0 0 1"/><geom type="capsule" fromto="0 0 0 .2 0 0" size=".005"/></body>
+      <geom type="box" pos="0 .1 0" size=".002 .05 .05"/></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    data.qvel[0] = 1000
+    guard = GuardedStepper(model, data)
+    for _ in range(20):
+        assert not guard.step().exhausted
+        assert data.qpos[0] < np.pi / 2
+
+
+def test_a_guard_is_freed_with_its_last_name():
+    model, data = sphere_plate().start()
+    guard = GuardedStepper(model, data)
+    guard.step()
+    gone = weakref.ref(guard)
+    del guard
+    assert gone() is None
 
 
 def test_the_stretch_energy_has_mujocos_spring_force_as_its_gradient():
