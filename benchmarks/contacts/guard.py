@@ -87,7 +87,7 @@ def _row(
 ) -> Row:
     chosen = [t for t in table if timestep is None or t.timestep == timestep]
     runs: list[Played] = [t.runs[method] for t in chosen]
-    known = [t for t in chosen if t.first is not None]
+    known = [(t, t.first) for t in chosen if t.first is not None]
     lost = [r for r in runs if not r.held]
     redone = [r for r in runs if r.touched]
     return {
@@ -106,10 +106,10 @@ def _row(
         "redone_above": sum(r.energy > ADDED for r in redone) if method == "guarded" else None,
         "calls": float(np.mean([r.calls for r in runs])) if method == "guarded" else None,
         "over_plain": _median(t.runs[method].seconds / t.runs["plain"].seconds for t in chosen),
-        "over_fixed": _median(t.runs[method].seconds / t.fine[t.first].seconds for t in known),
-        "fixed_ms": _median(1e3 * t.first for t in known),
+        "over_fixed": _median(t.runs[method].seconds / t.fine[first].seconds for t, first in known),
+        "fixed_ms": _median(1e3 * first for _, first in known),
         "unknown": sum(bool(t.fine) and t.first is None for t in chosen),
-        "error": _median(_error(t, method) for t in known if t.speed > 0),
+        "error": _median(_error(t, method) for t, _ in known if t.speed > 0),
     }
 
 
