@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 Column = str | int
@@ -38,6 +39,7 @@ class ColumnMap:
     separator: str = ","
     joint_names: tuple[str, ...] = ()  #: what the joints are called, if the map knows
     width: int | None = None  #: how many columns every row has, if the map knows
+    headerless: bool = False  #: its files have no header line; one that has is refused
     repair: frozenset[str] = field(default_factory=frozenset)
     """Faults whose rows may be dropped, of "repeat" (a row with the time of the one before), "tail"
     (a last row that is cut off) and "nan" (a row with a number that is missing or not finite)."""
@@ -83,6 +85,7 @@ PRESETS = {
         current=tuple(range(13, 19)),
         joint_names=UR_JOINTS,
         width=31,
+        headerless=True,
         repair=frozenset({"repeat", "tail"}),
     ),
     # What the recorder of Universal Robots' real-time data exchange (RTDE) writes.
@@ -113,3 +116,13 @@ PRESETS = {
         repair=frozenset({"repeat", "tail"}),
     ),
 }
+
+
+def presets_of(header: Collection[str]) -> list[str]:
+    """Names of the presets whose columns a header line has."""
+    found = []
+    for name, preset in PRESETS.items():
+        wanted = [preset.t, *(c for group in preset.groups().values() for c in group)]
+        if all(isinstance(c, str) and c in header for c in wanted):
+            found.append(name)
+    return found

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.datasets.columns import PRESETS, Column, ColumnMap
+from tauguard.datasets.columns import PRESETS, Column, ColumnMap, presets_of
 from tauguard.datasets.log_checks import checked
 from tauguard.strangers import reading
 from tauguard.traces.trace import Array, Trace
@@ -76,10 +76,8 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
     with open(path, newline="") as stream:
         first = next(csv.reader(stream), [])
     names = {cell.strip() for cell in first}
-    for preset in PRESETS.values():
-        wanted = [preset.t, *(c for group in preset.groups().values() for c in group)]
-        if all(isinstance(c, str) and c in names for c in wanted):
-            return preset
+    for name in presets_of(names):
+        return PRESETS[name]
     raise ValueError(f"no column map: give one, or a preset: {', '.join(PRESETS)}")
 
 
@@ -93,6 +91,13 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
         raise ValueError("empty file")
     header = [cell.strip() for cell in rows[0][1]]
     if any(number(cell) is None and cell for cell in header):
+        if columns.headerless:
+            fitting = presets_of(header)
+            raise ValueError(
+                f"the first line names columns ({', '.join(header)[:60]}, ...), files of these "
+                "columns have no such line: "
+                + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
+            )
         rows = rows[1:]
     else:
         header = []
@@ -100,7 +105,9 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
         name: [position(column, header, columns) for column in group]
         for name, group in {"t": (columns.t,), **columns.groups()}.items()
     }
-    width = columns.width or (len(header) or len(rows[0][1]) if rows else 0)
+    if not rows:
+        raise ValueError("a header line without rows of numbers")
+    width = columns.width or len(header) or len(rows[0][1])
     table, lines, notes = parse(
         rows, [i for group in where.values() for i in group], width, columns
     )

@@ -33,7 +33,13 @@ def drive_torque(arm: ArmModel, trace: Trace) -> Array:
 
 
 def plausible(
-    robot: RobotNumbers, trace: Trace, tau: Array, residual: Array, rows: Bools, rate: float
+    robot: RobotNumbers,
+    trace: Trace,
+    tau: Array,
+    residual: Array,
+    rows: Bools,
+    rate: float,
+    touched: bool = False,
 ) -> tuple[str, ...]:
     """Notes on torques that the motion hardly explains.
 
@@ -44,10 +50,13 @@ def plausible(
         residual: what an observer makes of them [N m], shape (T, n).
         rows: in which nothing touches the arm, shape (T,).
         rate: of that observer [1/s].
+        touched: contacts may be in these rows after all.
 
     Raises:
         ValueError: more than ``REFUSED`` of the torque is left over.
     """
+    if not rows.any():
+        return ()
     n, dt = robot.joints, intervals(trace.t, len(trace.t))
     rates, nothing = np.full(n, rate), np.zeros_like(trace.q)
     needed = low_pass(rates, dt, *momentum_terms(robot, trace.q, trace.qd))
@@ -58,10 +67,11 @@ def plausible(
         return ()  # gravity asks for nothing: friction may be all there is
     sizes = [float(np.sqrt((x[rows] ** 2).sum(axis=1).mean())) for x in (residual, needed, given)]
     share = sizes[0] / max(*sizes[1:], most)
+    where = "contacts included" if touched else "where nothing touches the arm"
     said = (
-        f"where nothing should touch the arm, {100 * share:.0f} % of the torque is not explained "
-        f"(the motion needs {sizes[1]:.3g} N m, the drives give {sizes[2]:.3g} N m, root mean "
-        "square over all joints)"
+        f"{where}, {100 * share:.0f} % of the torque is not explained (the motion "
+        f"needs {sizes[1]:.3g} N m, the drives give {sizes[2]:.3g} N m, root mean square over all "
+        "joints)"
     )
     if share > REFUSED:
         raise ValueError(

@@ -23,6 +23,7 @@ FACTOR = 1.5  # threshold over the largest residual of the quiet seconds
 STRANGE = 0.2  # share of a log in alarm that says that the log is another arm's
 SERIES = 0.2  # [s]: alarms of a trained detector that are nearer to each other are one
 BEFORE = 0.2  # [s] before an alarm from which residuals count as changed
+AROUND = 1.0  # [s] around an alarm in which a contact may change the torques
 SETTLING = 3.0  # time constants of the observer that are not looked at
 
 
@@ -140,11 +141,13 @@ def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
     arm, rows = alarm.detector.arm, trace.t >= settled
     tau = drive_torque(arm, trace)
     residual = observe(arm.robot, trace.t, trace.q, trace.qd, tau, GAIN)
-    notes = list(plausible(arm.robot, trace, tau, residual, rows, GAIN))
     monitored = detect_with_faults(alarm, trace)
     detection = replace(monitored.detection, residual=residual)
     detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
-    if detection.alarm[rows].mean() > STRANGE:
+    strange = bool(detection.alarm[rows].mean() > STRANGE)
+    judged = rows if strange else rows & ~_near(detection)
+    notes = list(plausible(arm.robot, trace, tau, residual, judged, GAIN, touched=strange))
+    if strange:
         notes.append(
             "alarms fill much of this log: it carries a load that no training log carried, it is "
             "held all the time, or this is not the arm, the joints' order, the sign or the unit of "
@@ -158,6 +161,14 @@ def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
         monitored.faults,
         monitored.fault_seconds,
     )
+
+
+def _near(detection: Detection) -> Bools:
+    """Rows within :data:`AROUND` of an alarm, shape (T,)."""
+    near = np.zeros(len(detection.t), dtype=np.bool_)
+    for alarm in detection.alarms:
+        near |= (detection.t > alarm.start - AROUND) & (detection.t < alarm.end + AROUND)
+    return near
 
 
 def loudest_joint(found: Watch, start: float, end: float) -> int:

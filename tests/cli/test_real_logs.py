@@ -102,6 +102,42 @@ def test_a_model_refuses_strange_currents_too(folder, calibrated, capsys):
     assert "0 alarms" in capsys.readouterr().out
 
 
+def test_what_does_not_belong_to_a_model_is_named(folder, calibrated, tmp_path, capsys):
+    model = str(folder / "own.skops")
+    robot = flags(folder, calibrated.name)
+    main(["train", "--free", str(folder / "log0.csv"), *robot, "--model", model])
+    log = written(folder, "seen.csv", record(8))
+    longer = folder / "longer.xml"
+    longer.write_text(XML.replace('body pos=".4 0 0"', 'body pos=".5 0 0"'))
+    line = fails(capsys, "detect", log, *flags(folder, longer.name), "--model", model)
+    assert "longer.xml is not the arm that" in line
+    assert "c stands 100 mm from where it stood" in line
+    line = fails(capsys, "detect", log, *robot, "--model", model, "--payload", "heavy")
+    assert "--payload heavy: expected KG or KG,X,Y,Z, 0 for nothing" in line
+    line = fails(capsys, "detect", str(tmp_path / "none.csv"), *robot, "--model", model)
+    assert line.endswith("none.csv: no such file or directory\n")
+    main(["detect", log, *robot, "--model", model, "--payload", "0"])
+    assert "alarms mean little" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["calibrate", "train"])
+def test_logs_of_another_arm_are_refused(folder, tmp_path, capsys, command):
+    named = {"calibrate": ["calibrate"], "train": ["train", "--free"]}[command]
+    gains = ["--gains", *GAINS]
+    if command == "train":
+        gains += ["--model", str(tmp_path / "m.skops")]
+    wrong = record(5)
+    wrong.current[:, 1] *= -1
+    mixed = [str(folder / "log0.csv"), written(folder, "mixed.csv", wrong)]
+    line = fails(capsys, *named, *mixed, *flags(folder), *gains)
+    assert "mixed.csv: friction would push b: the sign" in line
+    light = folder / "light.xml"
+    light.write_text(XML.replace('mass="4"', 'mass="1"').replace('mass="2"', 'mass=".5"'))
+    logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
+    line = fails(capsys, *named, *logs, *flags(folder, "light.xml"), *gains)
+    assert "the file of another arm, gains that are wrong" in line
+
+
 def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
     logs = [written(folder, f"held{seed}.csv", held_joint(seed)) for seed in range(3)]
     model = str(folder / "held.skops")

@@ -79,6 +79,7 @@ def test_indices_units_and_names(tmp_path):
         (TEXT.replace("12", "1e999"), "line 3, column 6: 1e999, not finite"),
         (TEXT.replace("10,11,12", "10"), "line 3: 5 columns, expected 7"),
         (TEXT[:-6], "line 4: 5 columns, expected 7"),
+        (TEXT.split("\n")[0] + "\n", "a header line without rows of numbers"),
         (TEXT.split("\n")[0] + "\n0,1,2,3,4,5,6\n", "1 rows of numbers, expected at least 2"),
     ],
 )
@@ -118,6 +119,11 @@ def test_presets(tmp_path):
     np.testing.assert_array_equal(trace.t, rows[:, 0])
     np.testing.assert_array_equal(trace.current, rows[:, 13:19])
     assert trace.joint_names == UR_JOINTS
+    ur5 = PRESETS["ur5"]
+    named = ",".join(["t", *ur5.q, *ur5.qd, *ur5.current, *(f"x{k}" for k in range(12))])
+    headed = write(tmp_path, f"{named}\n{text}", "headed.csv")
+    with pytest.raises(ValueError, match=r"files of these columns have no such line: use ur5$"):
+        read_log(headed, "ur10e")
     preset = PRESETS["ur_rtde"]
     header = ["timestamp", *preset.q, *preset.qd, "other", *preset.current]
     text = "\n".join([",".join(header), *(",".join(map(str, r[:20])) for r in rows)])

@@ -73,7 +73,14 @@ def main(argv: Sequence[str] | None = None) -> None:
         print(f"tauguard {name}: stopped", file=sys.stderr)
         raise SystemExit(143 if type(stop) is not KeyboardInterrupt else 130) from None
     except (ValueError, OSError) as error:
-        fail(f"{name}: {error}")
+        fail(f"{name}: {said(error)}")
+
+
+def said(error: Exception) -> str:
+    """What went wrong in words: a system's error by its file, not by its number."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror.lower()}"
+    return str(error)
 
 
 def fail(message: str) -> None:

@@ -10,6 +10,8 @@ import tyro
 if TYPE_CHECKING:
     from tauguard.detectors.calibration.identification import Identified
 
+#: Gains of geared joints are larger [N m/A].
+SMALL_GAIN = 2.0
 SOURCES = {
     "torques": "the logs' torques",
     "gains": "the gains that were given",
@@ -38,7 +40,8 @@ def command(
     output says which. Each log is also predicted by a calibration from the others.
 
     Args:
-        logs: CSV or MCAP files, or a folder of them; 40 s of motion are good, 65 s are plenty.
+        logs: CSV or MCAP files, or a folder of them; 20 s of motion are the least, two minutes are
+            good.
         robot: URDF or MJCF file of the arm alone.
         out: the calibrated robot file (default: beside ROBOT, with .calibrated in its name).
         columns: of CSV files: a preset (ur10e, ur_rtde, ur5, ur3) or a JSON file (see `tauguard
@@ -55,6 +58,7 @@ def command(
     from tauguard.cli.real_logs import doubts, loaded, read_logs, start
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import left_out
+    from tauguard.detectors.calibration.belongs import check_signs, check_weight
     from tauguard.detectors.calibration.identification import identify
     from tauguard.report import write_json
 
@@ -64,7 +68,16 @@ def command(
     recordings = loaded(traces, payload)
     arm, source = start(numbers, recordings, columns, gains, scale)
     chosen = "gains" if source in ("preset", "torques") else source
+    for name, trace in traces.items():
+        check_signs(arm, name, trace)
     found = identify(arm, recordings, scale=chosen)
+    if chosen == "gains":
+        check_weight(numbers, found.arm.robot, list(traces.values()))
+    elif (abs(found.arm.drive_gain) < SMALL_GAIN).all():
+        print(
+            f"note: all gains are below {SMALL_GAIN:g} N m/A, as those of joint torques told as "
+            "currents: if the columns hold N m, say --torque"
+        )
     held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
     for note in doubts(found.arm, traces, recordings, held):
         print(f"note: {note}")

@@ -128,7 +128,7 @@ def watched(
     if payload is not None:
         alarm = carrying(alarm, carried(payload))
     arm = alarm.detector.arm
-    check_robot(robot, arm.robot.joint_names, model)
+    check_robot(robot, arm.robot, model)
     trace = matched(trace, arm.robot.joint_names)
     if is_torque(trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"the log holds torques, {model} was trained on currents")

@@ -81,7 +81,7 @@ def command(
     alarm = told(load_model(model), model, payload, torque)
     if alarm.inputs is None:
         raise ValueError(f"{model}: does not say what samples look like; train the detector anew")
-    check_robot(robot, alarm.detector.arm.robot.joint_names, model)
+    check_robot(robot, alarm.detector.arm.robot, model)
     with ExitStack() as stack:
         print(DISCLAIMER, flush=True)
         source = stack.enter_context(opened(ur, port, play, columns, stdin, ros, reconnect, alarm))

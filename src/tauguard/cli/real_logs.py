@@ -18,24 +18,43 @@ if TYPE_CHECKING:
 
 #: No load of an arm's is told heavier than this [kg]: it would be grams.
 HEAVIEST = 100.0
+#: Lengths of one arm's robot files differ by no more [m], nor do its rotations.
+SAME_PLACE = 1e-3
 
 
-def check_robot(robot: Path, trained: tuple[str, ...], model: Path) -> None:
-    """Refuse a robot file that is none, or that lacks joints that a model was trained on.
+def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
+    """Refuse a robot file that is none, or that is not of the arm that a model was trained on.
+
+    Its joints must be those, and stand where they did: calibration changes masses, not lengths.
 
     Raises:
         ValueError: one line that names both files.
     """
+    import numpy as np
+
+    from tauguard.detectors import RobotNumbers
+    from tauguard.detectors.calibration.held_joints import holding
     from tauguard.models import pin_model
 
     try:
-        own = tuple(pin_model(robot).names[1:])
+        numbers = RobotNumbers.from_pin(pin_model(robot))
     except ValueError as error:
         name = "" if str(robot) in str(error) else f"{robot}: "
         raise ValueError(f"{name}{error}") from None
-    if not set(trained) <= set(own):
+    own, names = numbers.joint_names, trained.joint_names
+    if not set(names) <= set(own):
         raise ValueError(
-            f"{robot} has the joints {', '.join(own)}; {model} was trained on {', '.join(trained)}"
+            f"{robot} has the joints {', '.join(own)}; {model} was trained on {', '.join(names)}"
+        )
+    held = holding(numbers, [name for name in own if name not in names])
+    order = [held.joint_names.index(name) for name in names]
+    moved = np.abs(held.translation[order] - trained.translation).max(axis=1)
+    turned = np.abs(held.rotation[order] - trained.rotation).max(axis=(1, 2))
+    if (moved > SAME_PLACE).any() or (turned > SAME_PLACE).any():
+        joint = int(np.argmax(np.maximum(moved, turned)))
+        raise ValueError(
+            f"{robot} is not the arm that {model} was trained on: {names[joint]} stands "
+            f"{1e3 * moved[joint]:.0f} mm from where it stood; give the robot file of training"
         )
 
 
@@ -218,7 +237,7 @@ def _log_named(name: str, text: str, logs: list[str]) -> str:
     return found[0]
 
 
-def _load(text: str, value: str) -> Load | None:
+def _load(text: str, value: str, form: str = "LOG=KG, LOG=KG,X,Y,Z or LOG=unknown") -> Load | None:
     from tauguard.detectors.calibration.recording import Load
 
     if value == "unknown":
@@ -228,7 +247,7 @@ def _load(text: str, value: str) -> Load | None:
     except ValueError:
         parts = []
     if len(parts) not in (1, 4):
-        raise ValueError(f"--payload {text}: expected LOG=KG, LOG=KG,X,Y,Z or LOG=unknown")
+        raise ValueError(f"--payload {text}: expected {form}")
     if parts[0] > HEAVIEST:
         raise ValueError(
             f"--payload {text}: {parts[0]:g} kg, expected at most {HEAVIEST:g}; "
@@ -244,7 +263,7 @@ def carried(text: str) -> Load:
     Raises:
         ValueError: not KG or KG,X,Y,Z.
     """
-    load = _load(text, text)
+    load = _load(text, text, "KG or KG,X,Y,Z, 0 for nothing")
     if load is None:
         raise ValueError("--payload unknown: leave it out instead")
     return load

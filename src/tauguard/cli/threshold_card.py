@@ -38,9 +38,9 @@ def _lines(card: ThresholdCard) -> list[str]:
     lines = [
         f"at the tool: {half[0]:.0f} N standing and {half[1]:.0f} N moving, in half of all poses "
         f"and directions; {most[0]:.0f} N and {most[1]:.0f} N in 95 % of them",
-        f"false alarms: {card.alarms} in {card.seconds / 60:.1f} min that the calibration had not "
-        f"seen, so at most {rate['high']:.0f} per hour (95 %) on motion like this"
-        + ("; longer logs would say more" if card.seconds < 1800 else ""),
+        f"false alarms: {card.alarms} in {card.seconds / 60:.1f} min, each part under "
+        f"calibration and bounds from the others, so at most {rate['high']:.0f} per hour (95 %) "
+        "on motion like this" + ("; longer logs would say more" if card.seconds < 1800 else ""),
     ]
     if card.unseen:
         parts = "; ".join(

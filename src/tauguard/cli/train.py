@@ -31,8 +31,9 @@ def command(
     With --traces: on labelled recordings, some with collisions; a third of the collision-free ones
     is kept for the threshold. With --calibration the threshold is guaranteed instead: no more than
     the false alarms per hour that you name, on motion like that.
-    With --free and --robot: a detector of a real arm from logs in which nothing touched it, 30 s or
-    more in all. A card says what it can find, and which regimes the logs do not show.
+    With --free and --robot: a detector of a real arm from logs in which nothing touched it; 20 s of
+    motion are the least, two minutes are good. A card says what it can find, and which regimes the
+    logs do not show.
 
     Args:
         traces: folder of MCAP recordings with truth (`tauguard simulate` writes such), or a
@@ -149,6 +150,7 @@ def free_motion(
     from tauguard.cli.real_logs import doubts, is_torque, loaded, read_logs, start
     from tauguard.detectors import CollisionAlarm, save_model
     from tauguard.detectors.calibration.arm_file import load_arm
+    from tauguard.detectors.calibration.belongs import check_signs, check_weight
     from tauguard.detectors.faults import UsualInput
     from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
 
@@ -159,7 +161,10 @@ def free_motion(
         arm, _ = start(numbers, recordings, columns, gains, "gains")
     elif is_torque(recordings[0].trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"{robot.name} was calibrated on currents, the logs hold torques")
+    for name, trace in traces.items():
+        check_signs(arm, name, trace)
     detector = FreeMotion().fit(recordings, arm)
+    check_weight(arm.robot, detector.arm.robot, list(traces.values()))
     unmoved = never_moved(list(traces.values()))
     for note in (*doubts(detector.arm, traces, recordings, ()), *unmoved):
         print(f"note: {note}")

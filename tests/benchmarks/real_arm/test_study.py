@@ -15,6 +15,7 @@ def trace(seconds=10.0, dt=0.01):
 
 def test_says_so_where_there_are_no_logs(tmp_path, monkeypatch):
     monkeypatch.setenv("TAUGUARD_DATA", str(tmp_path))
+    monkeypatch.setattr(study.trained_with, "rows", lambda quick, seed: [])
     (row,) = study.run(quick=True, seed=0)
     assert "TAUGUARD_DATA" in row["log"]
 

@@ -1,0 +1,98 @@
+"""Whether logs can be those of the arm: the sign of each current, and the arm's own weight."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.calibration.recording import moves, moving_span
+from tauguard.detectors.dynamics.robot import RobotNumbers, gravity_torque, momentum_terms
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.estimation.observer import intervals, low_pass
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: A joint is judged where it is faster than this [rad/s], and changes direction over that.
+FAST, REVERSAL = 0.05, 0.05
+#: Drag below this many deviations of what is left: of another sign. Three real arms have 0.6 at
+#: least in every log and 2 to 8 as a rule; a current of the other sign has the negative of that.
+AGAINST = -1.0
+#: Seconds of motion of a joint that say something.
+ENOUGH = 3.0
+#: Gravity torque of the calibrated arm over the robot file's. The right files of three real arms
+#: give 0.9 to 1.5, files of the other two 0.2 to 0.5 and 1.9 to 6.5.
+LIGHTEST, HEAVIEST = 0.55, 1.8
+
+
+def check_signs(arm: ArmModel, name: str, trace: Trace) -> None:
+    """Refuse a log in which a joint's torque drives its friction instead of being braked by it.
+
+    Args:
+        arm: its gains' signs count.
+        name: of the log.
+        trace: collision-free.
+
+    Raises:
+        ValueError: names log and joints.
+    """
+    if not moves(trace):
+        return
+    against = [
+        arm.robot.joint_names[j]
+        for j, value in enumerate(drag(arm.robot, trace, np.sign(arm.drive_gain)))
+        if value < AGAINST
+    ]
+    if against:
+        raise ValueError(
+            f"{name}: friction would push {', '.join(against)}: the sign of the current or torque, "
+            "or of the velocity, is the other one than the robot file's"
+        )
+
+
+def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> Array:
+    """What of each joint's current follows the direction of motion, shape (n,).
+
+    In deviations of what neither that nor the rigid-body torque explains; above 0 for friction;
+    NaN for a joint that moves for less than :data:`ENOUGH`.
+    """
+    n, dt = robot.joints, intervals(trace.t, len(trace.t))
+    rates, nothing = np.full(n, rate), np.zeros_like(trace.q)
+    torque = low_pass(rates, dt, *momentum_terms(robot, trace.q, trace.qd))
+    direction = -low_pass(rates, dt, nothing, nothing, np.tanh(trace.qd / REVERSAL))
+    current = -low_pass(rates, dt, nothing, nothing, np.ascontiguousarray(trace.current * sign))
+    rows, found = moving_span(trace), np.full(n, np.nan)
+    for j in range(n):
+        on = rows & (np.abs(trace.qd[:, j]) > FAST)
+        if on.sum() * trace.dt < ENOUGH:
+            continue
+        x = np.column_stack([torque[on, j], direction[on, j], np.ones(on.sum())])
+        scale = np.maximum(np.abs(x).max(axis=0), 1e-9)
+        weight = np.linalg.lstsq(x / scale, current[on, j], rcond=None)[0] / scale
+        left = float((current[on, j] - x @ weight).std())
+        found[j] = weight[1] * x[:, 1].std() / max(left, 1e-9)
+    return found
+
+
+def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace]) -> None:
+    """Refuse a robot file whose arm needs other torques against gravity than the logs show.
+
+    Args:
+        file: the numbers of the robot file.
+        found: those that were identified, with the scale of the torques given.
+        traces: for poses.
+
+    Raises:
+        ValueError: an arm of another weight.
+    """
+    poses = np.concatenate([trace.q[:: max(1, len(trace.q) // 100)] for trace in traces])
+    need, has = (float(np.sqrt((gravity_torque(r, poses) ** 2).mean())) for r in (file, found))
+    if has < 1e-6 or LIGHTEST < has / max(need, 1e-9) < HEAVIEST:
+        return
+    raise ValueError(
+        f"the logs show {has:.3g} N m against gravity (root mean square), the robot file's arm "
+        f"needs {need:.3g} N m: the file of another arm, gains that are wrong, or torques told as "
+        "currents (--torque)"
+    )
