@@ -43,8 +43,8 @@ def _row(
 
 _UR_SOURCE = {"home": "elbow up, tool down; the keyframe of mujoco-menagerie's UR arms"}
 _UR_SIZES = {
-    "torque_limit": "Universal Robots, maximum joint torques of the e-Series (article 17260)",
-    "max_speed": "data sheets of the UR e-Series: 180 deg/s, UR10e's base and shoulder 120",
+    "torque_limit": "Universal Robots' own ROS 2 description, joint_limits.yaml",
+    "max_speed": "Universal Robots' own ROS 2 description, joint_limits.yaml",
 }
 
 #: The table; ``cura6`` is not in it, its description is :mod:`tauguard.models.cura6`.
@@ -69,7 +69,9 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
                 "universal_robots_ur10e",
                 _UR_SOURCE
                 | _UR_SIZES
-                | {"drive": "gains and friction of a UR10e: Mamedov et al. 2020; gear 101"},
+                | {
+                    "drive": "estimate: a UR10e's gains and friction, after Mamedov et al. 2020; gear 101"
+                },
                 home=_UR_HOME,
                 torque_limit=(330.0, 330.0, 150.0, 56.0, 56.0, 56.0),
                 max_speed=(2.0944, 2.0944, 3.1416, 3.1416, 3.1416, 3.1416),
@@ -86,9 +88,9 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
                 "franka_emika_panda",
                 {
                     "home": "Franka's ready pose",
-                    "torque_limit": "Franka Robotics, robot and interface specifications",
-                    "max_speed": "Franka Robotics, robot and interface specifications",
-                    "drive": "Coulomb level: half of the sigmoid's height in Gaz et al. 2019",
+                    "torque_limit": "libfranka's limits",
+                    "max_speed": "libfranka's limits",
+                    "drive": "Coulomb level: half of the sigmoid's height in Gaz et al. 2019, as their code has it",
                 },
                 home=_READY,
                 torque_limit=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
@@ -101,8 +103,8 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
                 "kuka_iiwa_14",
                 {
                     "home": "the keyframe of mujoco-menagerie",
-                    "torque_limit": "KUKA LBR iiwa, data sheet",
-                    "max_speed": "KUKA LBR iiwa 14 R820, data sheet",
+                    "torque_limit": "estimate: KUKA's data sheet from memory, not checked",
+                    "max_speed": "estimate: KUKA's data sheet from memory, not checked",
                 },
                 home=(0.0, 0.7854, 0.0, -1.5708, 0.0, 0.0, 0.0),
                 torque_limit=(320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0),
@@ -121,8 +123,8 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
                 "kinova_gen3",
                 {
                     "home": "the keyframe of mujoco-menagerie",
-                    "torque_limit": "effort limits of Kinova's own URDF (ros2_kortex)",
-                    "max_speed": "velocity limits of Kinova's own URDF (ros2_kortex)",
+                    "torque_limit": "Kinova's own gen3_macro.xacro (ros2_kortex)",
+                    "max_speed": "Kinova's own gen3_macro.xacro (ros2_kortex)",
                 },
                 home=(0.0, 0.2618, 3.1416, -2.2689, 0.0, 0.9599, 1.5708),
                 torque_limit=(39.0, 39.0, 39.0, 39.0, 9.0, 9.0, 9.0),

@@ -31,6 +31,8 @@ ARMS = ("cura6", "ur3", "ur5", "ur10", "ur10e", "panda", "xarm7", "z1", "j2s6s20
 SPEEDS = (20.0, 50.0, 100.0)
 #: A joint moves above this speed [rad/s]: below it static friction hides what it may.
 MOVING = 0.1
+#: A blow's peak torque [N m], at most these shares of the strongest joint's limit; links to try.
+BLOW, BLOW_SHARE, LINKS = (15.0, 60.0), (0.1, 0.4), (4, 3, 5, 2)
 #: Actions an episode of random actions.
 ACTIONS = 100
 #: Where a user keeps robot files of the list, as NAME/NAME.urdf.
@@ -162,13 +164,24 @@ def _random(source: str, quick: bool, seed: int) -> Row:
 
 
 def _strike(world: World, source: str, seed: int) -> Row:
-    """One blow of 15 to 60 N m against the fourth link."""
-    plan = CollisionPlan("strike", 2.0, min(4, len(world.scene.joint_names)), (15.0, 60.0))
-    episode = Episode(seed=seed, seconds=6.0, speed=40.0, arm=source, collisions=(plan,))
-    trace = Simulation(episode).run()
-    _, alarms = _judged(world, trace)
-    found = trace.truth.collisions if trace.truth else ()
-    if not found:
+    """One blow, scaled by the arm's torque, against the fourth link or the next that has a surface.
+
+    A link may lie wholly within another's shape: the Z1's fourth does.
+    """
+    limits = world.torque_limit[:4][np.isfinite(world.torque_limit[:4])]
+    low, high = (
+        min(b, s * max(limits, default=np.inf)) for b, s in zip(BLOW, BLOW_SHARE, strict=True)
+    )
+    links = [link for link in LINKS if link <= len(world.scene.joint_names)]
+    for link in links:
+        plan = CollisionPlan("strike", 2.0, link, (low, high))
+        episode = Episode(seed=seed, seconds=6.0, speed=40.0, arm=source, collisions=(plan,))
+        trace = Simulation(episode).run()
+        found = trace.truth.collisions if trace.truth else ()
+        if found:
+            break
+    else:
         return {"strike": "no target"}
+    _, alarms = _judged(world, trace)
     after = np.flatnonzero(alarms & (trace.t >= found[0].onset) & (trace.t < found[0].onset + 0.5))
     return {"strike": float(trace.t[after[0]] - found[0].onset) if len(after) else "missed"}

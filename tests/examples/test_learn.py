@@ -4,6 +4,7 @@ import importlib.util
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tauguard.traces import read_mcap
@@ -23,6 +24,19 @@ def test_the_cross_entropy_method_reaches_targets(tmp_path):
     path, _, worst = example.record(weights, tmp_path, steps=50)
     assert len(read_mcap(path)[0].t) == 500
     assert worst >= 0
+
+
+def test_a_budget_ranks_those_who_keep_it_first():
+    example = runpy.run_path(str(SOURCE.with_name("learn_safely.py")))
+    value, cost = np.array([3.0, 2.0, 1.0, 0.0]), np.array([90.0, 5.0, 0.0, 30.0])
+    ranked = example["ranked"]
+    assert ranked(value, cost, None).tolist() == [0, 1, 2, 3]
+    assert ranked(value, cost, 10.0).tolist()[:2] == [1, 2]
+    assert ranked(value, cost + 100, 10.0).tolist() == [2, 1, 3, 0]
+    still = np.append(np.zeros(36), -3.0)
+    rows = example["compare"]([still, still], episodes=1, steps=10)
+    assert rows[0] == rows[1]
+    assert rows[0]["targets"] == 0
 
 
 def test_stable_baselines_trains(monkeypatch, capsys):
