@@ -69,9 +69,7 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
                 "universal_robots_ur10e",
                 _UR_SOURCE
                 | _UR_SIZES
-                | {
-                    "drive": "estimate: a UR10e's gains and friction, after Mamedov et al. 2020; gear 101"
-                },
+                | {"drive": "estimate: a UR10e's, after Mamedov et al. 2020; gear 101"},
                 home=_UR_HOME,
                 torque_limit=(330.0, 330.0, 150.0, 56.0, 56.0, 56.0),
                 max_speed=(2.0944, 2.0944, 3.1416, 3.1416, 3.1416, 3.1416),
@@ -90,7 +88,7 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
                     "home": "Franka's ready pose",
                     "torque_limit": "libfranka's limits",
                     "max_speed": "libfranka's limits",
-                    "drive": "Coulomb level: half of the sigmoid's height in Gaz et al. 2019, as their code has it",
+                    "drive": "Coulomb level: half the sigmoid's height in the code of Gaz et al. 2019",
                 },
                 home=_READY,
                 torque_limit=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
