@@ -88,7 +88,7 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
                     "home": "Franka's ready pose",
                     "torque_limit": "libfranka's limits",
                     "max_speed": "libfranka's limits",
-                    "drive": "Coulomb level: half the sigmoid's height in the code of Gaz et al. 2019",
+                    "drive": "Coulomb level: half the sigmoid's height in Gaz et al. 2019",
                 },
                 home=_READY,
                 torque_limit=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
