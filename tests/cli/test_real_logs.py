@@ -149,6 +149,18 @@ def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
     assert never_moved([held_joint(0), record(0)]) == []
 
 
+def test_logs_of_a_standing_arm_are_left_out_of_calibration(folder, tmp_path, capsys):
+    still = record(4, seconds=8.0)
+    still.q[:], still.qd[:], still.current[:] = still.q[0], 0.0, still.current[0]
+    logs = [str(folder / "log0.csv"), written(folder, "still.csv", still)]
+    out, model = str(tmp_path / "own.xml"), str(tmp_path / "own.skops")
+    main(["calibrate", *logs, *flags(folder), "--gains", *GAINS, "--out", out])
+    assert "note: still.csv: no joint moves in it" in capsys.readouterr().out
+    columns = ["--columns", str(folder / "columns.json")]
+    main(["train", "--free", *logs, "--robot", out, *columns, "--model", model])
+    assert "trained on 2 collision-free logs" in capsys.readouterr().out
+
+
 def test_payloads_by_file_name_or_stem():
     traces = {"a.csv": record(0, 12.0), "b.x.csv": record(1, 12.0), "b.x.mcap": record(2, 12.0)}
     found = real_logs.loaded(traces, ("a=2.6", "b.x.mcap=unknown"))

@@ -55,7 +55,7 @@ def command(
             may; a column map says so by its field "torque".
         json: write the figures here as JSON.
     """
-    from tauguard.cli.real_logs import doubts, loaded, read_logs, start
+    from tauguard.cli.real_logs import doubts, loaded, moving, read_logs, start
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import left_out
     from tauguard.detectors.calibration.belongs import check_signs, check_weight
@@ -65,7 +65,9 @@ def command(
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
     traces, numbers = read_logs(logs, columns, robot, torque)
-    recordings = loaded(traces, payload)
+    told = dict(zip(traces, loaded(traces, payload), strict=True))
+    traces = moving(traces)
+    recordings = [told[name] for name in traces]
     arm, source = start(numbers, recordings, columns, gains, scale)
     chosen = "gains" if source in ("preset", "torques") else source
     for name, trace in traces.items():

@@ -210,6 +210,16 @@ def read_logs(
     return traces, numbers
 
 
+def moving(traces: dict[str, Trace]) -> dict[str, Trace]:
+    """The logs in which some joint moves; prints a note on each of the others."""
+    from tauguard.detectors.calibration.recording import moves
+
+    for name, trace in traces.items():
+        if not moves(trace):
+            print(f"note: {name}: no joint moves in it; calibration leaves it out")
+    return {name: trace for name, trace in traces.items() if moves(trace)} or traces
+
+
 # -- loads and gains ------------------------------------------------------------------------------
 
 
@@ -289,9 +299,9 @@ def doubts(
         explained,
         outlier,
     )
-    from tauguard.detectors.calibration.recording import Load
+    from tauguard.detectors.calibration.recording import Load, moves
 
-    bare = [k for k, r in enumerate(recordings) if r.load == Load()]
+    bare = [k for k, r in enumerate(recordings) if r.load == Load() and moves(r.trace)]
     names, refused = list(traces), ""
     notes: tuple[str, ...] = ()
     try:
