@@ -65,8 +65,9 @@ class Estimator:
         noise: list[float],
         clip: float,
         every: int,
-        doubt: float,
+        payload_weight: float,
         fusion: list[float],
+        plain_gain: float,
     ) -> None: ...
     @property
     def started(self) -> bool: ...
@@ -79,8 +80,9 @@ class Estimator:
         qd: Array,
         current: Array,
         residual: Array,
-        left: Array,
+        unexplained: Array,
         acceleration: Array,
+        plain: Array,
         theta: Array,
     ) -> None: ...
     def step(
@@ -90,7 +92,7 @@ class Estimator:
         current: Array,
         dt: float,
         residual: Array,
-        left: Array,
+        unexplained: Array,
         acceleration: Array,
     ) -> None: ...
 

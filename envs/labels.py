@@ -34,6 +34,12 @@ class Wrenches:
         """From the scene's contact sensors: found, force by the link, torque, position."""
         return cls(-contact[:, :, 1:4], -contact[:, :, 4:7], contact[:, :, 7:10].copy())
 
+    def rows(self) -> NDArray[np.intp]:
+        """The samples at which something pushes or turns a link, shape (K,)."""
+        pushed = (self.force != 0).any(axis=(1, 2))
+        pushed |= (self.torque != 0).any(axis=(1, 2))
+        return np.flatnonzero(pushed)
+
 
 def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
     """``tau_ext``: the sum of J^T w over the links [N m], shape (T, n).
@@ -44,8 +50,10 @@ def external_torque(poses: Poses, q: Array, wrenches: Wrenches) -> Array:
         wrenches: what pushes the links; rows without any cost nothing.
     """
     tau = np.zeros_like(q)
+    touched = wrenches.rows()
+    if not len(touched):
+        return tau
     pushed = (wrenches.force != 0).any(axis=2) | (wrenches.torque != 0).any(axis=2)
-    touched = np.flatnonzero(pushed.any(axis=1))
     anchor, axis = poses.joints(q[touched])
     for link, moving in enumerate(poses.moving):
         here = np.flatnonzero(pushed[touched, link])
@@ -75,7 +83,11 @@ def collisions(
         kinds: (time, kind) of what was injected; a collision takes the kind of the latest one that
             began before it.
     """
-    strength = np.linalg.norm(wrenches.force, axis=2)
+    rows = wrenches.rows()
+    if not len(rows):
+        return ()
+    strength = np.zeros(wrenches.force.shape[:2])
+    strength[rows] = np.linalg.norm(wrenches.force[rows], axis=2)
     touched = np.flatnonzero((strength > 0).any(axis=1))
     if not touched.size:
         return ()

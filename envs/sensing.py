@@ -19,7 +19,7 @@ from tauguard.detectors import (
     Unknowns,
 )
 from tauguard.detectors.detector import same_rate
-from tauguard.detectors.estimation.observer import PLAIN_GAIN
+from tauguard.detectors.estimation.gains import ENVIRONMENT_GAIN, PLAIN_GAIN
 from tauguard.detectors.faults.monitor import Monitor
 from tauguard.envs.actions import observation_table
 from tauguard.envs.joint_ends import JointEnds
@@ -85,7 +85,7 @@ class ObserverListener:
         robot: RobotNumbers,
         drive: Drive,
         dt: float,
-        gain: float = 50.0,
+        gain: float = ENVIRONMENT_GAIN,
         ranges: Array | None = None,
     ) -> None:
         """Take the nominal numbers.

@@ -96,12 +96,20 @@ def scene_for(episode: Episode, visuals: bool = True) -> Scene:
         ),
         visuals,
     )
+    if not can_touch(scene.model):
+        scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     drive = scene.drive
     if episode.ideal_drive:
         return without_losses(scene)
     if episode.temperature is not None and drive.friction is not None:
         drive = replace(drive, friction=replace(drive.friction, temperature=episode.temperature))
     return replace(scene, drive=drive)
+
+
+def can_touch(model: mujoco.MjModel) -> bool:
+    """Whether any two geoms of the scene may be in contact."""
+    makes, takes = model.geom_contype[:, None], model.geom_conaffinity
+    return bool(model.npair or model.nflex or (makes & takes).any())
 
 
 class Simulation:
@@ -211,8 +219,9 @@ class Simulation:
     ) -> Trace:
         scene, episode, motion = self.scene, self.episode, self.motion
         wrenches = labels.Wrenches.from_contacts(recording.contact)
-        if not recording.contact.shape[1]:
-            wrenches = labels.Wrenches.empty(len(motion.t), len(scene.link_bodies))
+        if not recording.contact.shape[1]:  # links are listed where something pushes one
+            links = len(scene.link_bodies) if self._windows else 0
+            wrenches = labels.Wrenches.empty(len(motion.t), links)
         for window in self._windows:
             rows = slice(window.begin, window.begin + len(window.recording.q))
             wrenches.force[rows] = window.wrenches.force
@@ -260,18 +269,25 @@ def _truth(
     payload: Array,
     injected: list[tuple[float, str]],
 ) -> Truth:
-    size = np.linalg.norm(wrenches.force, axis=2)
-    strongest = size.argmax(axis=1)
-    rows = np.arange(len(t))
-    touched = size[rows, strongest] > 0
+    force, where, link = np.zeros(len(t)), np.full((len(t), 3), np.nan), np.zeros(len(t), np.int64)
+    vector, rows = np.zeros((len(t), 3)), wrenches.rows()
+    if len(rows):
+        pushed = wrenches.force[rows]
+        size = np.linalg.norm(pushed, axis=2)
+        strongest = size.argmax(axis=1)
+        touched = size.max(axis=1) > 0
+        force[rows] = np.linalg.norm(pushed.sum(axis=1), axis=1)
+        link[rows[touched]] = strongest[touched] + 1
+        where[rows[touched]] = wrenches.point[rows[touched], strongest[touched]]
+        vector[rows[touched]] = pushed[touched, strongest[touched]]
     return Truth(
         tau_ext=tau_ext,
-        contact_force=np.linalg.norm(wrenches.force.sum(axis=1), axis=1),
+        contact_force=force,
         collisions=labels.collisions(t, wrenches, tau_ext, injected),
         payload=payload,
-        contact_link=np.where(touched, strongest + 1, 0).astype(np.int64),
-        contact_point=np.where(touched[:, None], wrenches.point[rows, strongest], np.nan),
-        contact_vector=np.where(touched[:, None], wrenches.force[rows, strongest], 0.0),
+        contact_link=link,
+        contact_point=where,
+        contact_vector=vector,
         obstacle_names=tuple(scene.obstacle_names),
         obstacle_poses=_matrices(recording.poses),
     )

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from tauguard.detectors.dynamics.robot import momentum_regressor
 from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel, Estimate, Estimator
+from tauguard.detectors.estimation.gains import DETECTION_GAIN
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
-#: Rate of the observer [1/s]: 5 ms of lag; slower logs get a fifth of their rate.
-GAIN, PER_SAMPLE = 200.0, 0.2
+#: Slower logs get an observer of this share of their rate.
+PER_SAMPLE = 0.2
 #: What was known this long before the alarm is held [s].
 BEFORE = 0.02
 #: The residual is followed this long after the alarm [s], longer where the observer lags more.
@@ -41,7 +42,7 @@ class Aftermath:
     residual: Array  #: that came with the alarm [N m], shape (M, n)
     envelope: Array  #: its standard deviation in free motion [N m], shape (M, n)
     payload: Array  #: residual per unit of payload mass [kg] and moment [kg m], shape (M, n, 4)
-    lag: float = 1 / GAIN  #: of the observer [s]
+    lag: float = 1 / DETECTION_GAIN  #: of the observer [s]
 
     @property
     def level(self) -> Array:
@@ -63,7 +64,7 @@ class AftermathOf:
         assert arm.noise is not None
         self.arm, self.trace = arm, trace
         self._envelope = envelope or Envelope.constant(arm.noise)
-        self._gain = min(GAIN, PER_SAMPLE / trace.dt)
+        self._gain = min(DETECTION_GAIN, PER_SAMPLE / trace.dt)
         self._estimate: Estimate = Estimator(arm, self._gain, trace.dt).run(
             trace.t, trace.q, trace.qd, trace.current, keep=True
         )

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers, same_rows
+from tauguard.detectors.estimation.gains import PLAIN_GAIN
 from tauguard.detectors.estimation.observer import intervals, per_joint
 from tauguard.detectors.estimation.velocity import SensorNoise
 from tauguard.detectors.features.envelope import Envelope
@@ -114,6 +115,7 @@ class Estimate:
     residual: Array  #: the observer's estimate of tau_ext [N m], shape (T, n)
     unexplained: Array  #: what the unknowns do not explain of it [N m], shape (T, n)
     acceleration: Array  #: velocity differentiated at 30/s [rad/s^2], shape (T, n)
+    plain: Array  #: residual of the plain observer, with no unknowns [N m], shape (T, n)
     unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
 
 
@@ -123,7 +125,7 @@ class Estimator:
     def __init__(
         self,
         arm: ArmModel,
-        gain: ArrayLike = 100.0,
+        gain: ArrayLike = PLAIN_GAIN,
         dt: float = 1e-3,
         unknowns: Unknowns | None = None,
     ) -> None:
@@ -154,6 +156,7 @@ class Estimator:
             max(1, round(self.unknowns.every / self.dt)),
             self.unknowns.payload_weight,
             arm.sensors.fusion_gains(self.dt) if arm.sensors else [],
+            PLAIN_GAIN,
         )
 
     def run(
@@ -170,11 +173,12 @@ class Estimator:
         """
         joints = self.arm.robot.joints
         q, qd, current = same_rows(joints, q=q, qd=qd, current=current)
-        residual, unexplained, acceleration = (np.empty_like(q) for _ in range(3))
+        residual, unexplained, acceleration, plain = (np.empty_like(q) for _ in range(4))
         tracked = np.empty((len(q) if keep else 0, PAYLOAD + PER_JOINT * joints))
         dt = intervals(t, len(q))
-        self._native.run(dt, q, qd, current, residual, unexplained, acceleration, tracked)
-        return Estimate(residual, unexplained, acceleration, tracked if keep else None)
+        out = residual, unexplained, acceleration, plain
+        self._native.run(dt, q, qd, current, *out, tracked)
+        return Estimate(*out, tracked if keep else None)
 
     def reset(self) -> None:
         """Forget: the next sample is the first."""

@@ -15,11 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms, rows, same_rows
+from tauguard.detectors.estimation.gains import PLAIN_GAIN
 
 Array = NDArray[np.float64]
-
-#: Rate of the plain observer whose residual reports and recordings show [1/s].
-PLAIN_GAIN = 100.0
 
 
 def per_joint(name: str, value: ArrayLike, joints: int) -> Array:
@@ -83,7 +81,7 @@ def observe(
     q: ArrayLike,
     qd: ArrayLike,
     tau: ArrayLike,
-    gain: ArrayLike = 100.0,
+    gain: ArrayLike = PLAIN_GAIN,
     *,
     threads: int = 0,
 ) -> Array:
@@ -113,7 +111,7 @@ def observe(
 class MomentumObserver:
     """The observer online: a few microseconds a sample."""
 
-    def __init__(self, robot: RobotNumbers, gain: ArrayLike = 100.0, dt: float = 1e-3) -> None:
+    def __init__(self, robot: RobotNumbers, gain: ArrayLike = PLAIN_GAIN, dt: float = 1e-3) -> None:
         """Bind the numbers.
 
         Args:

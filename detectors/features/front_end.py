@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tauguard.detectors.calibration.calibrate import calibrate, free_rows
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
+from tauguard.detectors.estimation.gains import DETECTION_GAIN, PLAIN_GAIN
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.frozen import Frozen
@@ -27,7 +28,7 @@ THIN = 5
 class FrontEndSettings:
     """How the residual is estimated."""
 
-    gain: float = 200.0  #: of the observer [1/s]
+    gain: float = DETECTION_GAIN  #: of the observer [1/s]
     adapt: bool = True  #: track payload, offsets and friction errors
     settle: float = 3.0  #: until the payload is found [s]
     joints: tuple[int, ...] = (1, 2, 3, 4)  #: that are used, 1-based; those that exist
@@ -160,6 +161,18 @@ def _remember(trace: Trace, front: FrontEnd, estimate: Estimate) -> None:
     if id(trace) not in _ESTIMATES:
         weakref.finalize(trace, _ESTIMATES.pop, id(trace), None)
     _ESTIMATES[id(trace)] = front, estimate
+
+
+def plain_residual(arm: ArmModel, trace: Trace) -> Array:
+    """The residual of the plain observer, without unknowns [N m], shape (T, n).
+
+    A front end of this arm that has just estimated the trace has it already.
+    """
+    front, known = _ESTIMATES.get(id(trace), (None, None))
+    if front is not None and known is not None and front.arm is arm:
+        return known.plain
+    estimator = Estimator(arm, PLAIN_GAIN, trace.dt, Unknowns.none())
+    return estimator.run(trace.t, trace.q, trace.qd, trace.current).residual
 
 
 class OnFrontEnd(Frozen):

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.estimation.observer import PLAIN_GAIN
+from tauguard.detectors.estimation.gains import PLAIN_GAIN
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.methods.per_joint import FittedPerJoint, PerJoint

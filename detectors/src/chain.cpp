@@ -70,6 +70,17 @@ Projection project(const Joint& joint, const Link& link) {
                               dot(a, cross(link.moment, link.gravity))};
 }
 
+Mat3 identity() { return {{1, 0, 0, 0, 1, 0, 0, 0, 1}}; }
+
+Mat3 operator*(const Mat3& a, const Mat3& b) {
+  Mat3 c;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      c.m[3 * i + j] =
+          a.m[3 * i] * b.m[j] + a.m[3 * i + 1] * b.m[3 + j] + a.m[3 * i + 2] * b.m[6 + j];
+  return c;
+}
+
 Inertial unit(int parameter) {
   Inertial one;
   double* slots[inertial_numbers] = {&one.mass, &one.moment.x, &one.moment.y, &one.moment.z,
@@ -133,12 +144,38 @@ void Chain::column(int body, int parameter, double* p, double* beta, std::size_t
 void Chain::link_regressor(int body, int count, const double* q, const double* qd, double* p,
                            double* beta, Workspace& work) const {
   velocities(q, qd, work);
-  link_regressor_again(body, count, p, beta, work);
+  for (int c = 0; c < count; ++c) column(body, c, p + c, beta + c, count, work);
 }
 
-void Chain::link_regressor_again(int body, int count, double* p, double* beta,
-                                 Workspace& work) const {
-  for (int c = 0; c < count; ++c) column(body, c, p + c, beta + c, count, work);
+void Chain::load_columns(int body, double* p, double* beta, const Workspace& work) const {
+  for (int i = 0; i < 4 * size(); ++i) p[i] = beta[i] = 0.0;
+  const Link& last = work.links[body];
+  Mat3 turn = identity();  // the link's axes in those of link i
+  Vec3 away;               // the link's origin in the frame of link i
+  for (int i = body; i >= 0; i = joints[i].parent) {
+    const Joint& joint = joints[i];
+    const Link& link = work.links[i];
+    const Vec3 a = joint.axis;
+    Vec3 aw, av = a, bw, bv = cross(link.w, a);
+    if (!joint.prismatic) {
+      aw = transposed(turn, a);
+      av = cross(a, away);
+      bw = bv;
+      bv = cross(link.v, a) + cross(bw, away);
+      bw = transposed(turn, bw);
+    }
+    av = transposed(turn, av);
+    bv = transposed(turn, bv);
+    const Vec3 moment = cross(last.v, aw) + cross(av, last.w);
+    const Vec3 change = cross(last.v, bw) + cross(bv, last.w) + cross(last.gravity, aw);
+    const double own[] = {dot(av, last.v), moment.x, moment.y, moment.z};
+    const double rate[] = {dot(bv, last.v) + dot(av, last.gravity), change.x, change.y, change.z};
+    std::copy(own, own + 4, p + 4 * i);
+    std::copy(rate, rate + 4, beta + 4 * i);
+    if (joint.parent < 0) break;
+    away = link.origin + link.rotation * away;
+    turn = link.rotation * turn;
+  }
 }
 
 void Chain::regressor(const double* q, const double* qd, double* p, double* beta,

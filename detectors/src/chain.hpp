@@ -83,8 +83,9 @@ class Chain {
   // count.
   void link_regressor(int link, int count, const double* q, const double* qd, double* p,
                       double* beta, Workspace& work) const;
-  // The same for the state that `work` holds from the call before.
-  void link_regressor_again(int link, int count, double* p, double* beta, Workspace& work) const;
+  // The same for mass and first moment of link `link`, n x 4, at the state that `work` holds from
+  // the call before: each joint's motion and what it does to the velocities, seen from the link.
+  void load_columns(int link, double* p, double* beta, const Workspace& work) const;
 
   // Inverse dynamics: tau = M qdd + C qd + g.
   void rnea(const double* q, const double* qd, const double* qdd, double* tau,

@@ -12,10 +12,12 @@
 // An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is,
 // the less it says about the model, and the sooner it is a collision.
 //
-// What is left counts less where the payload is still a guess: with s the deviation that its
-// covariance gives the residual, `doubt` times the variance s^2 is added to the noise's. More than
-// 1, because errors of the model last longer than the time between two corrections, each of which
-// takes them for news.
+// What the unknowns do not explain counts less where the payload is still uncertain: with s the
+// deviation that its covariance gives the residual, `payload_weight` times the variance s^2 is
+// added to the noise's. More than 1, because errors of the model last longer than the time between
+// two corrections, each of which takes them for news.
+//
+// The plain residual is that of an observer of rate `plain_gain` that tracks nothing.
 #pragma once
 
 #include <cmath>
@@ -40,9 +42,10 @@ struct EstimatorSettings {
   std::vector<double> persistence;  // time constants of the unknowns [s], 4 + 3 n
   std::vector<double> noise;        // standard deviation of the residual [N m], n
   double clip = 3.0;
-  int every = 10;              // samples between two corrections
-  double doubt = 0.0;          // see above; 0: all of what is left counts
-  std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
+  int every = 10;               // samples between two corrections
+  double payload_weight = 0.0;  // see above; 0: all of the unexplained residual counts
+  std::vector<double> fusion;   // of position and velocity, 6 n; empty: velocity as measured
+  double plain_gain = 100.0;    // [1/s]
 };
 
 class Estimator {
@@ -61,8 +64,8 @@ class Estimator {
         covariance_(m_ * m_),
         gathered_(m_),
         row_(m_) {
-    for (auto* v :
-         {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_, &decay_})
+    for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_,
+                    &decay_, &plain_, &plain_tau_, &plain_tau_before_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
       v->resize(payload_numbers * n_);
@@ -75,32 +78,33 @@ class Estimator {
   std::size_t unknowns() const { return m_; }
   bool started() const { return started_; }
   const std::vector<double>& theta() const { return theta_; }
+  const std::vector<double>& plain() const { return plain_; }
 
   void reset() {
     started_ = false;
     decay_dt_ = -1.0;
   }
 
-  // One sample: residual r of the observer, what is left of it after the unknowns' share, in
-  // `left`, and an acceleration (velocity differentiated at the rate acceleration_rate).
+  // One sample: residual r of the observer, what the unknowns do not explain of it, and an
+  // acceleration (velocity differentiated at the rate acceleration_rate).
   void step(const double* q, const double* qd, const double* current, double dt, double* residual,
-            double* left, double* acceleration) {
+            double* unexplained, double* acceleration) {
     if (!started_) begin(q, qd);
     if (fusion_.active()) qd = started_ ? fusion_.step(q, qd, dt) : fusion_.last();
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
     if (adapts_)
-      chain_.link_regressor_again(static_cast<int>(n_) - 1, payload_numbers, load_p_.data(),
-                                  load_beta_.data(), work_);
+      chain_.load_columns(static_cast<int>(n_) - 1, load_p_.data(), load_beta_.data(), work_);
     drive(q, qd, current);
     if (started_) filter(dt);
     remember();
     for (std::size_t j = 0; j < n_; ++j) {
-      residual[j] = left[j] = residual_[j];
+      residual[j] = unexplained[j] = residual_[j];
       if (started_) smooth_[j] += smooth_decay_ * (qd[j] - smooth_[j]);
       acceleration[j] = acceleration_rate * (qd[j] - smooth_[j]);
     }
     if (adapts_) {
-      for (std::size_t j = 0; j < n_; ++j) left[j] = (left[j] - expected(j)) * certainty(j);
+      for (std::size_t j = 0; j < n_; ++j)
+        unexplained[j] = (residual_[j] - expected(j)) * certainty(j);
       if (started_ && ++since_ >= set_.every) correct(dt * since_);
     }
     started_ = true;
@@ -111,7 +115,7 @@ class Estimator {
     smooth_.assign(qd, qd + n_);
     fusion_.reset(q, qd);
     for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
-    for (auto* v : {&residual_, &load_, &own_, &theta_, &covariance_})
+    for (auto* v : {&residual_, &plain_, &load_, &own_, &theta_, &covariance_})
       std::fill(v->begin(), v->end(), 0.0);
     for (std::size_t a = 0; a < m_; ++a)
       covariance_[a * m_ + a] = set_.deviation[a] * set_.deviation[a];
@@ -131,6 +135,12 @@ class Estimator {
       for (std::size_t c = FrictionBasis::first_at; c < smooth; ++c) coulomb += w[c] * column_[c];
       for (std::size_t c = smooth; c < columns; ++c) other += w[c] * column_[c];
       tau_[j] = tau - (viscous + coulomb + other);
+      plain_tau_[j] = tau_[j];
+      if (basis_.modelled && load != 0.0) {
+        double grows = 0.0;  // friction that is proportional to the load, here without the payload
+        for (std::size_t c = basis_.loaded_at(); c < smooth; ++c) grows += w[c] * column_[c];
+        plain_tau_[j] += grows * (1.0 - std::fabs(beta_[j] / load));
+      }
       own_now_[per_joint * j] = 1.0;
       own_now_[per_joint * j + 1] = viscous;
       own_now_[per_joint * j + 2] = coulomb;
@@ -151,11 +161,14 @@ class Estimator {
     if (dt != decay_dt_) {
       for (std::size_t j = 0; j < n_; ++j) decay_[j] = observer_decay(set_.gain[j], dt);
       smooth_decay_ = observer_decay(acceleration_rate, dt);
+      plain_decay_ = observer_decay(set_.plain_gain, dt);
       decay_dt_ = dt;
     }
     for (std::size_t j = 0; j < n_; ++j) {
       residual_[j] = observer_step(residual_[j], decay_[j], dt, p_[j], p_before_[j], beta_[j],
                                    beta_before_[j], tau_before_[j]);
+      plain_[j] = observer_step(plain_[j], plain_decay_, dt, p_[j], p_before_[j], beta_[j],
+                                beta_before_[j], plain_tau_before_[j]);
       if (!adapts_) continue;
       for (std::size_t a = j * payload_numbers; a < (j + 1) * payload_numbers; ++a)
         load_[a] = observer_step(load_[a], decay_[j], dt, load_p_[a], load_p_before_[a],
@@ -171,6 +184,7 @@ class Estimator {
     load_p_.swap(load_p_before_);
     load_beta_.swap(load_beta_before_);
     tau_before_ = tau_;
+    plain_tau_before_ = plain_tau_;
     own_before_ = own_now_;
   }
 
@@ -183,13 +197,13 @@ class Estimator {
   }
 
   double certainty(std::size_t j) const {
-    if (!(set_.doubt > 0)) return 1.0;
+    if (!(set_.payload_weight > 0)) return 1.0;
     const double* h = &load_[payload_numbers * j];
     const double noise = set_.noise[j] * set_.noise[j];
     double payload = 0.0;
     for (int a = 0; a < payload_numbers; ++a)
       for (int b = 0; b < payload_numbers; ++b) payload += h[a] * covariance_[a * m_ + b] * h[b];
-    return payload > 0 ? std::sqrt(noise / (noise + set_.doubt * payload)) : 1.0;
+    return payload > 0 ? std::sqrt(noise / (noise + set_.payload_weight * payload)) : 1.0;
   }
 
   // The Kalman filter: time update over `elapsed` seconds, then one scalar update per joint.
@@ -241,7 +255,8 @@ class Estimator {
   std::vector<double> p_, beta_, p_before_, beta_before_, tau_, tau_before_, residual_, decay_;
   std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_;
   std::vector<double> own_now_, own_before_, own_, smooth_;
-  double decay_dt_ = -1.0, smooth_decay_ = 0.0;
+  std::vector<double> plain_, plain_tau_, plain_tau_before_;
+  double decay_dt_ = -1.0, smooth_decay_ = 0.0, plain_decay_ = 0.0;
   int since_ = 0;
   bool started_ = false, adapts_ = false;
 };

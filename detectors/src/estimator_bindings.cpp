@@ -52,12 +52,12 @@ void friction_columns(const FrictionBasis& basis, In2 q, In2 qd, In2 tau, In2 lo
     }
 }
 
-void run(Estimator& estimator, In1 dt, In2 q, In2 qd, In2 current, Out2 residual, Out2 left,
-         Out2 acceleration, Out2 theta) {
+void run(Estimator& estimator, In1 dt, In2 q, In2 qd, In2 current, Out2 residual, Out2 unexplained,
+         Out2 acceleration, Out2 plain, Out2 theta) {
   const std::size_t rows = q.shape(0), n = estimator.joints(), m = estimator.unknowns();
   for (const auto& a : {q, qd, current})
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
-  for (const auto& a : {residual, left, acceleration})
+  for (const auto& a : {residual, unexplained, acceleration, plain})
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
   const bool wanted = theta.shape(0) > 0;
   require(dt.shape(0) + 1 >= rows && (!wanted || (theta.shape(0) == rows && theta.shape(1) == m)),
@@ -67,7 +67,9 @@ void run(Estimator& estimator, In1 dt, In2 q, In2 qd, In2 current, Out2 residual
   for (std::size_t t = 0; t < rows; ++t) {
     const double step = t ? dt.data()[t - 1] : 0.0;
     estimator.step(q.data() + n * t, qd.data() + n * t, current.data() + n * t, step,
-                   residual.data() + n * t, left.data() + n * t, acceleration.data() + n * t);
+                   residual.data() + n * t, unexplained.data() + n * t,
+                   acceleration.data() + n * t);
+    std::copy(estimator.plain().begin(), estimator.plain().end(), plain.data() + n * t);
     if (wanted) std::copy(estimator.theta().begin(), estimator.theta().end(), theta.data() + m * t);
   }
 }
@@ -92,7 +94,8 @@ void bind_estimator(nb::module_& m) {
            [](Estimator* self, const Chain& chain, const FrictionBasis& basis,
               const Numbers& drive_gain, const Numbers& gain, const Numbers& weights,
               const Numbers& deviation, const Numbers& persistence, const Numbers& noise,
-              double clip, int every, double doubt, const Numbers& fusion) {
+              double clip, int every, double payload_weight, const Numbers& fusion,
+              double plain_gain) {
              const std::size_t n = chain.joints.size(), unknown = payload_numbers + per_joint * n;
              require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
                          weights.size() == n * basis.columns() && deviation.size() == unknown &&
@@ -102,7 +105,7 @@ void bind_estimator(nb::module_& m) {
                      "Estimator: array lengths differ");
              new (self) Estimator(chain, basis,
                                   {drive_gain, gain, weights, deviation, persistence, noise, clip,
-                                   every, doubt, fusion});
+                                   every, payload_weight, fusion, plain_gain});
            })
       .def_prop_ro("started", &Estimator::started)
       .def(
@@ -114,17 +117,18 @@ void bind_estimator(nb::module_& m) {
           nb::arg().noconvert())
       .def("reset", &Estimator::reset)
       .def("run", &run, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(),
-           nb::arg().noconvert(), nb::arg().noconvert(), nb::arg().noconvert())
+           nb::arg().noconvert(), nb::arg().noconvert(), nb::arg().noconvert(),
+           nb::arg().noconvert())
       .def(
           "step",
-          [](Estimator& estimator, In1 q, In1 qd, In1 current, double dt, Out1 residual, Out1 left,
-             Out1 acceleration) {
+          [](Estimator& estimator, In1 q, In1 qd, In1 current, double dt, Out1 residual,
+             Out1 unexplained, Out1 acceleration) {
             check_sample(estimator.joints(), q, qd, current, "current");
-            for (const auto& a : {residual, left, acceleration})
+            for (const auto& a : {residual, unexplained, acceleration})
               require(a.shape(0) == estimator.joints(), "outputs: one entry a joint");
             require(!estimator.started() || (dt > 0 && std::isfinite(dt)), "dt: must be above 0");
-            estimator.step(q.data(), qd.data(), current.data(), dt, residual.data(), left.data(),
-                           acceleration.data());
+            estimator.step(q.data(), qd.data(), current.data(), dt, residual.data(),
+                           unexplained.data(), acceleration.data());
           },
           nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(),
           nb::arg().noconvert());

@@ -103,8 +103,7 @@ class FreeMotion {
     if (!started_)
       for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
-    chain_.link_regressor_again(static_cast<int>(n_) - 1, SlowErrors::load, load_p_.data(),
-                                load_beta_.data(), work_);
+    chain_.load_columns(static_cast<int>(n_) - 1, load_p_.data(), load_beta_.data(), work_);
     drive(q, qd);
     if (started_) filter(qd, dt);
     started_ = true;

@@ -44,6 +44,9 @@ class FrictionBasis {
            loaded.size();
   }
 
+  // Columns [loaded_at, smooth()) are those of them that are proportional to the load.
+  std::size_t loaded_at() const { return smooth() - 1 - loaded.size(); }
+
   // Numbers of memory a joint: the followed position, the bristles, the stops' rests.
   std::size_t memory() const { return 1 + bristles.size() + stops.size(); }
 

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.detectors.detector import FittedDetector, same_rate
-from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
-from tauguard.detectors.estimation.observer import PLAIN_GAIN
 from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.faults.inputs import UsualInput
+from tauguard.detectors.features.front_end import plain_residual
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.thresholds.confirmation import (
     CONFIRMATION,
@@ -174,9 +173,3 @@ class AlarmStream:
             score = self._levels.one(score, self._speed.step(qd))
         self.score = score
         return self._confirmation.step(score > self._threshold and self._time > self._settle)
-
-
-def plain_residual(arm: ArmModel, trace: Trace) -> Array:
-    """The momentum observer's estimate of tau_ext at 100/s with no unknowns [N m], shape (T, n)."""
-    estimator = Estimator(arm, PLAIN_GAIN, trace.dt, Unknowns.none())
-    return estimator.run(trace.t, trace.q, trace.qd, trace.current).residual

@@ -9,6 +9,7 @@ import numpy as np
 
 from tauguard.detectors.calibration.plausible import drive_torque, plausible
 from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.detectors.estimation.gains import LOG_GAIN
 from tauguard.detectors.estimation.observer import observe
 from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.faults.detection import detect_with_faults
@@ -17,7 +18,6 @@ from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
 from tauguard.traces.trace import Array, Bools, Detection, Trace
 
-GAIN = 20.0  # [1/s] of the observer: what 100 Hz and a real arm's friction allow
 CONFIRMATION = 0.05  # [s]
 FACTOR = 1.5  # threshold over the largest residual of the quiet seconds
 STRANGE = 0.2  # share of a log in alarm that says that the log is another arm's
@@ -47,7 +47,7 @@ def watch(
     tau: Array,
     quiet: float,
     *,
-    gain: float = GAIN,
+    gain: float = LOG_GAIN,
     confirmation: float = CONFIRMATION,
     factor: float = FACTOR,
     joints: Sequence[int] | None = None,
@@ -140,13 +140,13 @@ def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
         )
     arm, rows = alarm.detector.arm, trace.t >= settled
     tau = drive_torque(arm, trace)
-    residual = observe(arm.robot, trace.t, trace.q, trace.qd, tau, GAIN)
+    residual = observe(arm.robot, trace.t, trace.q, trace.qd, tau, LOG_GAIN)
     monitored = detect_with_faults(alarm, trace)
     detection = replace(monitored.detection, residual=residual)
     detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
     strange = bool(detection.alarm[rows].mean() > STRANGE)
     judged = rows if strange else rows & ~_near(detection)
-    notes = list(plausible(arm.robot, trace, tau, residual, judged, GAIN, touched=strange))
+    notes = list(plausible(arm.robot, trace, tau, residual, judged, LOG_GAIN, touched=strange))
     if strange:
         notes.append(
             "alarms fill much of this log: it carries a load that no training log carried, it is "
