@@ -33,6 +33,10 @@ STUDIES: dict[str, Study] = {
         "detection.conformal",
         "false alarms per hour: what calibration promises, and what is counted",
     ),
+    "false_alarms": Study(
+        "detection.false_alarms",
+        "thresholds for a rate of false alarms, on ten arms of fresh seeds",
+    ),
     "detection_online": Study(
         "detection.online", "observer and SVR a sample: microseconds, and fewer support vectors"
     ),

@@ -41,7 +41,8 @@ def _there(path: Path, quick: bool, seed: int) -> bool:
         found: dict[str, Any] = json.loads(path.read_text())
     except (OSError, ValueError):
         return False
-    return (found["quick"], found["seed"], found["versions"]) == (quick, seed, versions())
+    same = (found["quick"], found["seed"], found["versions"]) == (quick, seed, versions())
+    return same and "incomplete" not in found
 
 
 def _study(folder: Path, name: str, quick: bool, seed: int) -> str | None:

@@ -10,6 +10,17 @@ import numpy as np
 from tauguard.report import Row
 
 
+class Incomplete(RuntimeError):
+    """A part of a study failed; ``rows`` holds what the other parts found."""
+
+    def __init__(self, rows: list[Row], reasons: Mapping[str, BaseException]) -> None:
+        """Keep the rows; ``reasons`` is by part."""
+        lines = (f"{part}: {type(error).__name__}: {error}" for part, error in reasons.items())
+        super().__init__("parts of the study failed, the others are kept; " + "; ".join(lines))
+        self.rows = rows
+        self.__cause__ = next(iter(reasons.values()))
+
+
 def timed(met: bool, quick: bool) -> bool | str:
     """Whether a timing meets its bar; few repeats of small cases can say yes, but not no."""
     return "full run" if quick and not met else bool(met)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from tauguard.benchmarks import STUDIES
+from tauguard.benchmarks.harness import Incomplete
 from tauguard.report import Row, machine, table, versions, write_json
 
 
@@ -25,11 +27,13 @@ def run_study(
 
     Raises:
         ValueError: no such study; the message lists those there are.
+        Incomplete: parts of the study failed; what the others found was printed and written.
+        RuntimeError: the study failed by a defect.
     """
     if name not in STUDIES:
         raise ValueError(f"no study {name!r}: there are {', '.join(STUDIES) or 'none yet'}")
     study = importlib.import_module(f"tauguard.benchmarks.{STUDIES[name].module}")
-    rows: list[Row] = study.run(quick=quick, seed=seed, **(more or {}))
+    rows, broken = _rows(study, quick, seed, more or {})
     shown: Callable[[list[Row]], list[Row]] | None = getattr(study, "shown", None)
     print(table(shown(rows) if shown else rows, notes=getattr(study, "NOTES", {})))
 
@@ -53,8 +57,35 @@ def run_study(
                 "machine": machine(),
                 "versions": versions(),
                 "seed": seed,
+                **({"incomplete": str(broken)} if broken else {}),
                 "rows": rows,
             },
         )
         print(f"json: {json_path}")
+    if broken is not None:
+        raise broken
     return rows
+
+
+def _rows(
+    study: Any, quick: bool, seed: int, more: Mapping[str, str]
+) -> tuple[list[Row], Incomplete | None]:
+    """The study's rows, and why there are not all of them."""
+    try:
+        return study.run(quick=quick, seed=seed, **more), None
+    except Incomplete as stop:
+        return stop.rows, stop
+    except ValueError as error:
+        if _of_our_own(error):
+            raise  # bad input, in our words
+        raise RuntimeError(f"{type(error).__name__}: {error}") from error
+
+
+def _of_our_own(error: BaseException) -> bool:
+    """Whether our code raised it, in this process: workers start when the input is known to do."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    module = trace.tb_frame.f_globals.get("__name__", "") if trace is not None else ""
+    remote = type(error.__cause__).__name__ == "RemoteTraceback"
+    return not remote and module.partition(".")[0] == "tauguard"

@@ -32,8 +32,9 @@ NOTES = {
     "conformal": "a threshold from calibration motion promises asked_per_hour; "
     "false_alarms_per_hour counts what came in fresh_hours of fresh motion, drawn alike. kept: the "
     "rate asked lies in or above its exact 95 % interval; draws_kept: in how many other splits of "
-    "the same motion. Motion that is not drawn alike is promised nothing, and missed collisions "
-    "are not in it.",
+    "the same motion. refused: the calibration motion cannot guarantee the rate, since this "
+    "detector's alarms come in crowds. Motion that is not drawn alike is promised nothing, and "
+    "missed collisions are not in it.",
 }
 
 
@@ -118,10 +119,18 @@ def _row(name: str, levels: Sequence[FreeScores], asked: float, plan: Plan, seed
 
     rng = np.random.default_rng([seed, 8])
     outcomes = []
+    hours = sum(episode.seconds for episode in levels[: plan.calibration]) / 3600
+    row: Row = {"study": "conformal", "detector": name, "asked_per_hour": asked}
+    row |= {"calibration_hours": hours}
     for draw in range(1 + plan.draws):
         order = np.arange(len(levels)) if draw == 0 else rng.permutation(len(levels))
         picked = [levels[i] for i in order]
-        promise = guaranteed_threshold(picked[: plan.calibration], asked, plan.confidence)
+        try:
+            promise = guaranteed_threshold(picked[: plan.calibration], asked, plan.confidence)
+        except ValueError as refusal:
+            if draw == 0:
+                return {**row, "refused": str(refusal)}
+            continue
         fresh = picked[plan.calibration :]
         alarms = sum(episode.alarms(promise.threshold) for episode in fresh)
         counted = poisson_rate(alarms, sum(episode.seconds for episode in fresh) / 3600)
@@ -129,20 +138,17 @@ def _row(name: str, levels: Sequence[FreeScores], asked: float, plan: Plan, seed
     promise, counted, kept = outcomes[0]
     rates = [c["value"] for _, c, _ in outcomes[1:]]
     return {
-        "study": "conformal",
-        "detector": name,
-        "asked_per_hour": asked,
-        "calibration_hours": promise.hours,
+        **row,
         "alarms_an_episode": promise.alarms_an_episode,
         "allowed": promise.allowed,
         "score_threshold": promise.threshold,
         "fresh_hours": counted["hours"],
         "false_alarms_per_hour": counted,
         "kept": kept,
-        "draws": plan.draws,
+        "draws": len(rates),
         "draws_kept": sum(k for *_, k in outcomes[1:]),
         "draws_at_or_below": sum(r <= asked for r in rates),
-        "draws_mean_per_hour": float(np.mean(rates)),
+        "draws_mean_per_hour": float(np.mean(rates)) if rates else None,
     }
 
 
@@ -176,6 +182,7 @@ def run(quick: bool, seed: int) -> list[Row]:
 def draw(rows: list[Row], figure: Figure) -> None:
     """Rate counted on fresh motion, with its interval, against the rate asked for."""
     axes = figure.add_subplot()
+    rows = [row for row in rows if "refused" not in row]
     names = list(dict.fromkeys(row["detector"] for row in rows))
     asked = sorted({row["asked_per_hour"] for row in rows})
     for k, name in enumerate(names):

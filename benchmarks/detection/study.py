@@ -7,7 +7,7 @@ arm, and are judged on motions with payloads that no slice had and nobody tells.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +35,7 @@ from tauguard.benchmarks.detection.pool import (
     struck_pool,
 )
 from tauguard.benchmarks.detection.thresholds import Fleet, Free, operated
+from tauguard.benchmarks.harness import Incomplete
 from tauguard.benchmarks.workers import Workers
 from tauguard.detectors import FittedDetector, make_detector
 from tauguard.envs import simulate
@@ -151,7 +152,23 @@ def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
         }
         rows = report.rows(by_speed, report.spread(list(fleets.values())))
         rows += detection_table.headline(rows)
-        return rows + [row for found in more for row in found]
+        return rows + _kept(rows, (part for part, *_ in parts), more)
+
+
+def _kept(rows: list[Row], parts: Iterable[str], more: Iterator[list[Row]]) -> list[Row]:
+    """The rows of the variations; one that fails does not take the others along."""
+    found: list[Row] = []
+    failed: dict[str, BaseException] = {}
+    for part in parts:
+        try:
+            found += next(more)
+        except StopIteration:
+            break
+        except Exception as error:
+            failed[part] = error
+    if failed:
+        raise Incomplete(rows + found, failed)
+    return found
 
 
 def _trained(size: Size, seed: int, arms: Sequence[int], each: Each) -> Trained:

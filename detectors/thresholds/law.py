@@ -8,10 +8,11 @@ alarms that is accepted (:mod:`.rates`), or the one that a calibration set guara
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauguard.detectors.detector import Detector, FittedDetector
 from tauguard.detectors.estimation.estimator import ArmModel
@@ -20,13 +21,17 @@ from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
-from tauguard.detectors.thresholds.rates import tail_level
+from tauguard.detectors.thresholds.rates import peaks_above, tail_level
 from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
 
 #: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
 TAIL = 0.02
 #: Share of the collision-free training traces that the threshold comes from.
 HELD_OUT = 0.34
+#: How often episodes are drawn again to see how far a rate can be trusted.
+BOOTSTRAP = 200
 
 
 def held_out(traces: Sequence[Trace], share: float = HELD_OUT) -> tuple[list[Trace], list[Trace]]:
@@ -113,20 +118,73 @@ def with_guarantee(
     return replace(alarm, threshold=guarantee.threshold), guarantee
 
 
-def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
+def threshold_for_rate(
+    scores: Sequence[FreeScores], per_hour: float, confidence: float | None = None
+) -> float:
     """The threshold that collision-free motion exceeds ``per_hour`` times an hour.
 
     Alarms are counted as blocks of the merge gap that exceed the threshold; rarer alarms than the
     motion shows are extrapolated along a generalised Pareto tail of the blocks' peaks.
+
+    Args:
+        scores: an episode each.
+        per_hour: false alarms to accept.
+        confidence: take the threshold that would have been enough in this share of all sets of as
+            many episodes (bootstrap); ``None``: the one expected.
 
     Raises:
         ValueError: no scores, or a rate that is not above 0.
     """
     if not per_hour > 0:
         raise ValueError(f"per_hour: {per_hour}, expected above 0")
+
+    def level(peaks: Array, hours: float) -> float:
+        return tail_level(peaks, per_hour * hours, _tail_of(peaks))
+
+    if confidence is None:
+        return level(*_peaks(scores))
+    levels = [level(*_peaks(again)) for again in _drawn_again(scores)]
+    return float(np.quantile(levels, confidence))
+
+
+def rate_interval(
+    scores: Sequence[FreeScores], threshold: float, confidence: float = 0.95
+) -> tuple[float, float]:
+    """How many false alarms an hour a threshold may give, as far as these episodes can tell.
+
+    Episodes are drawn again with replacement, since the moments of one are alike.
+
+    Args:
+        scores: collision-free motion, an episode each.
+        threshold: of the same scores.
+        confidence: of the interval.
+
+    Returns:
+        The lowest and the highest rate [1/h].
+    """
+
+    def rate(peaks: Array, hours: float) -> float:
+        return peaks_above(peaks, threshold, _tail_of(peaks)) / hours
+
+    rates = [rate(*_peaks(again)) for again in _drawn_again(scores)]
+    low, high = np.quantile(rates, ((1 - confidence) / 2, (1 + confidence) / 2))
+    return float(low), float(high)
+
+
+def _drawn_again(scores: Sequence[FreeScores]) -> Iterator[list[FreeScores]]:
+    rng = np.random.default_rng(0)
+    for _ in range(BOOTSTRAP):
+        yield [scores[k] for k in rng.integers(len(scores), size=len(scores))]
+
+
+def _peaks(scores: Sequence[FreeScores]) -> tuple[Array, float]:
+    """Peaks of all blocks in descending order, and the hours."""
     peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
-    hours = sum(one.seconds for one in scores) / 3600
-    return tail_level(peaks, per_hour * hours, max(2, round(TAIL * len(peaks))))
+    return peaks, sum(one.seconds for one in scores) / 3600
+
+
+def _tail_of(peaks: Array) -> int:
+    return max(2, round(TAIL * len(peaks)))
 
 
 def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:

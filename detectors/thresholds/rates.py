@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,36 +27,67 @@ def block_maxima(level: Array, rows: int) -> tuple[Array, NDArray[np.intp]]:
     return level[where], where
 
 
-def followed(peaks: Array, allowed: float, count: int) -> float:
-    """The level that ``allowed`` peaks exceed, or are expected to where that is fewer than one.
-
-    Then it lies on an exponential tail through the ``count`` largest; never below the largest.
-
-    Args:
-        peaks: in descending order, shape (N,), N >= 1.
-        allowed: above 0.
-        count: at most N - 1 are used.
-    """
-    if allowed >= 1:
-        return float(peaks[min(int(allowed), len(peaks) - 1)])
-    count = min(count, len(peaks) - 1)
-    base = float(peaks[count])
-    mean_excess = float(np.mean(peaks[:count] - base)) if count else 0.0
-    level = base + mean_excess * float(np.log(max(count, 1) / allowed))
-    return max(level, float(np.nextafter(peaks[0], np.inf)))
-
-
 #: Bounds of the tail's shape: no finite end closer than that of a triangle's, no heavier tail than
 #: a few dozen peaks can tell from an exponential.
 SHAPES = (-0.5, 0.2)
 
 
-def tail_level(peaks: Array, allowed: float, count: int) -> float:
-    """The level that ``allowed`` peaks are expected to exceed, along a generalised Pareto tail.
+@dataclass(frozen=True)
+class Tail:
+    """A generalised Pareto tail of peaks: how many are expected above a level.
 
-    The excesses of the ``count`` largest peaks over the next one tell scale and shape by
-    probability-weighted moments (Hosking & Wallis 1987). Unlike an exponential tail it can end: a
-    score that has a highest value is not extrapolated far beyond it.
+    Unlike an exponential tail it can end: a score that has a highest value is not extrapolated far
+    beyond it.
+    """
+
+    base: float  #: level where the tail begins
+    scale: float  #: 0: nothing is known beyond the base
+    shape: float
+    count: int  #: peaks above the base
+
+    @classmethod
+    def of(cls, peaks: Array, count: int) -> Tail:
+        """From the ``count`` largest peaks and the next one.
+
+        Their excesses tell scale and shape by probability-weighted moments (Hosking & Wallis 1987).
+
+        Args:
+            peaks: in descending order, shape (N,), N >= 1.
+            count: at most N - 1 are used.
+        """
+        count = min(count, len(peaks) - 1)
+        if count < 2:
+            return cls(float(peaks[0]), 0.0, 0.0, 0)
+        excess = peaks[:count] - peaks[count]
+        mean = float(excess.mean())
+        # The largest comes first: its probability of being exceeded is the smallest.
+        exceeded = (np.arange(1, count + 1) - 0.65) / count
+        weighted = float(np.mean(excess * exceeded))
+        if not mean - 2 * weighted > 1e-12 * max(mean, 1e-300):
+            return cls(float(peaks[0]), 0.0, 0.0, 0)
+        shape = float(np.clip(2 - mean / (mean - 2 * weighted), *SHAPES))
+        return cls(float(peaks[count]), mean * (1 - shape), shape, count)
+
+    def level(self, allowed: float) -> float:
+        """The level that ``allowed`` peaks, fewer than ``count``, are expected to exceed."""
+        if not self.scale:
+            return self.base
+        ratio, shape = self.count / allowed, self.shape
+        grown = np.log(ratio) if abs(shape) < 1e-9 else (ratio**shape - 1) / shape
+        return self.base + self.scale * float(grown)
+
+    def above(self, level: float) -> float:
+        """How many peaks are expected above a level, which is not below the base."""
+        if not self.scale:
+            return 0.0
+        far = (level - self.base) / self.scale
+        if abs(self.shape) < 1e-9:
+            return self.count * float(np.exp(-far))
+        return self.count * max(1 + self.shape * far, 0.0) ** (-1 / self.shape)
+
+
+def tail_level(peaks: Array, allowed: float, count: int) -> float:
+    """The level that ``allowed`` peaks are expected to exceed, along their :class:`Tail`.
 
     Args:
         peaks: in descending order, shape (N,), N >= 1.
@@ -66,20 +99,12 @@ def tail_level(peaks: Array, allowed: float, count: int) -> float:
     """
     if not (len(peaks) and allowed > 0):
         raise ValueError(f"{len(peaks)} peaks, {allowed} allowed: expected some, and above 0")
-    count = min(count, len(peaks) - 1)
-    if allowed >= max(count, 1):
+    if allowed >= max(min(count, len(peaks) - 1), 1):
         return float(peaks[min(int(allowed), len(peaks) - 1)])
-    if count < 2:
-        return float(peaks[0])
-    base = float(peaks[count])
-    excess = peaks[:count] - base
-    mean = float(excess.mean())
-    # The largest comes first: its probability of being exceeded is the smallest.
-    exceeded = (np.arange(1, count + 1) - 0.65) / count
-    weighted = float(np.mean(excess * exceeded))
-    if not mean - 2 * weighted > 1e-12 * max(mean, 1e-300):
-        return float(peaks[0])
-    shape = float(np.clip(2 - mean / (mean - 2 * weighted), *SHAPES))
-    scale, ratio = mean * (1 - shape), count / allowed
-    grown = np.log(ratio) if abs(shape) < 1e-9 else (ratio**shape - 1) / shape
-    return base + scale * float(grown)
+    return Tail.of(peaks, count).level(allowed)
+
+
+def peaks_above(peaks: Array, level: float, count: int) -> float:
+    """How many peaks are expected above ``level``: counted, or along their :class:`Tail`."""
+    tail = Tail.of(peaks, count)
+    return tail.above(level) if level > tail.base else float(np.sum(peaks > level))

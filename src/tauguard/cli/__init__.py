@@ -34,7 +34,7 @@ COMMANDS = {
 
 EPILOG = """\
 `tauguard COMMAND --help` explains a command.
-Exit codes: 0 done, 1 a defect of tauguard, 2 bad input.
+Exit codes: 0 done, 1 a defect of tauguard, 2 bad input; --debug shows the traceback of an error.
 tauguard is a research tool, not a certified safety function."""
 
 
@@ -48,6 +48,8 @@ def usage() -> str:
 def main(argv: Sequence[str] | None = None) -> None:
     """Entry point of ``tauguard``: find the command, parse its flags, run it."""
     args = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in args
+    args = [arg for arg in args if arg != "--debug"]
     if not args or args[0] in ("-h", "--help"):
         print(usage())
         return
@@ -72,9 +74,13 @@ def main(argv: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt as stop:
         print(f"tauguard {name}: stopped", file=sys.stderr)
         raise SystemExit(143 if type(stop) is not KeyboardInterrupt else 130) from None
-    except (ValueError, OSError) as error:
-        fail(f"{name}: {said(error)}")
-
+    except Exception as error:
+        if debug:
+            raise
+        if isinstance(error, ValueError | OSError):
+            fail(f"{name}: {said(error)}")
+        kind = type(error).__name__
+        fail(f"{name}: a defect of tauguard, --debug shows where: {kind}: {error}", 1)
 
 def said(error: Exception) -> str:
     """What went wrong in words: a system's error by its file, not by its number."""
@@ -83,8 +89,8 @@ def said(error: Exception) -> str:
     return str(error)
 
 
-def fail(message: str) -> None:
-    """One line on the standard error stream, exit code 2."""
+def fail(message: str, code: int = 2) -> None:
+    """One line on the standard error stream, and an exit code."""
     line = " ".join(message.split())
     print("tauguard " + (line if len(line) <= 2000 else line[:2000] + " ..."), file=sys.stderr)
-    raise SystemExit(2)
+    raise SystemExit(code)

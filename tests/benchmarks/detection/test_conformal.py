@@ -35,3 +35,10 @@ def test_episodes_are_drawn_alike_and_again_the_same():
     assert len({episode.seed for episode in one}) == 40
     assert all(10 <= e.speed <= 60 and 0 <= e.payload_g <= 4500 for e in one)
     assert {e.payload_g == 0 for e in one} == {True, False}
+
+
+def test_a_rate_that_the_motion_cannot_guarantee_is_said_in_its_row():
+    plan = dataclasses.replace(study.QUICK, seconds=4.0, asked=(1.0,), calibration=3, fresh=2)
+    (row,) = study.promise_rows([Loudness()], Mismatch(seed=3), plan, 2)
+    assert "3 episodes" in row["refused"]
+    assert "kept" not in row

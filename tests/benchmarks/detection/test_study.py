@@ -9,11 +9,15 @@ import pytest
 
 from tauguard.benchmarks.detection import chart as detection_chart
 from tauguard.benchmarks.detection import rows as report
+from tauguard.benchmarks.detection import study as detection_study
 from tauguard.benchmarks.detection.fleet import (
     CALIBRATE,
     TEST,
     TRAIN,
+    Training,
+    calibration_scores,
     stream,
+    train,
     training_groups,
 )
 from tauguard.benchmarks.detection.judge import (
@@ -28,6 +32,7 @@ from tauguard.benchmarks.detection.pool import (
     FORCES,
     SPEEDS,
     Conditions,
+    Struck,
     free_pool,
     struck_pool,
     wishes,
@@ -41,13 +46,37 @@ from tauguard.benchmarks.detection.thresholds import (
     operated,
 )
 from tauguard.benchmarks.detection.variations import every
+from tauguard.benchmarks.harness import Incomplete
 from tauguard.detectors import CollisionAlarm, FreeScores
 from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.thresholds.free_scores import CASE, PIECE
 from tauguard.envs import simulate
-from tauguard.traces import STRATA, Collision, Trace
+from tauguard.traces import STRATA, Collision, Trace, Truth
 
 DT = 1e-3
+#: A detector of somebody else's: the largest current.
+MINE = """
+from dataclasses import dataclass
+from types import SimpleNamespace
+import numpy as np
+
+@dataclass(frozen=True)
+class Size:
+    name: str = "size"
+    def fit(self, traces, arm):
+        return Fitted(self.name, arm, traces[0].dt)
+
+@dataclass(frozen=True)
+class Fitted:
+    name: str
+    arm: object
+    dt: float
+    settle: float = 0.0
+    def scores(self, trace):
+        return np.abs(trace.current).max(axis=1)
+    def stream(self):
+        return SimpleNamespace(step=lambda q, qd, i, dt=None: np.abs(i).max())
+"""
 
 
 def outcome(torque: float, delay: float | None, onset: float = 1.0) -> Outcome:
@@ -281,3 +310,51 @@ def test_the_cura6_rate_keeps_truth_and_times():
     assert len(slow.truth.payload) == len(slow.t)
     assert find_alarms(slow.t, np.zeros(len(slow.t), bool)) == ()
     assert every(trace, 1) is trace
+
+
+def test_a_touch_between_two_samples_of_a_slow_log_counts_as_missed():
+    t = np.arange(0, 8, 0.042)
+    names, rows = ("j1",), np.zeros((len(t), 1))
+    point = np.zeros(3)
+    touch = Collision("clamp", t[100] + 0.01, t[100] + 0.02, 3, point, np.ones(3), 5.0)
+    nothing = np.zeros(len(t))
+    still = np.zeros((len(t), 3))
+    truth = Truth(rows, nothing, (touch,), nothing, nothing.astype(np.int64), still, still)
+    trace = Trace(names, t, rows, rows, rows, truth=truth)
+    given = Given(np.full(len(t), 0.5))
+    own = Operated(given, dict.fromkeys(POINTS, CollisionAlarm(given, 1.0)))
+    tally = judge_struck({"d": own}, Struck(1, 0.0, trace, (True,)))["d", "hourly"]
+    assert [(o.delay, o.peak) for o in tally.outcomes] == [(None, -np.inf)]
+
+
+def test_one_failed_variation_keeps_the_rows_of_the_others():
+    class Each:
+        found = iter(([{"study": "sigma"}], ZeroDivisionError("in a worker"), [{"study": "rate"}]))
+
+        def __next__(self):
+            one = next(self.found)
+            if isinstance(one, Exception):
+                raise one
+            return one
+
+    with pytest.raises(Incomplete, match="size: ZeroDivisionError: in a worker") as stop:
+        detection_study._kept([{"study": "speed"}], ("sigma", "size", "rate"), Each())
+    assert [row["study"] for row in stop.value.rows] == ["speed", "sigma", "rate"]
+
+
+def test_a_detector_of_ones_own_is_judged_beside_ours(tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text(MINE)
+    monkeypatch.syspath_prepend(tmp_path)
+    asked = []
+    monkeypatch.setattr(detection_study, "study", lambda size, seed: asked.append(size) or [])
+    detection_study.run(True, 0, "mine:Size")
+    assert asked[0].detectors == (*detection_study.QUICK.detectors, "mine:Size")
+    with pytest.raises(ValueError, match="no_such_module"):
+        detection_study.run(True, 0, "no_such_module:Size")
+    little = Training(slices=1, collisions=1, free=1, free_seconds=4.0)
+    own = train(0, 7, ("mine:Size",), little)
+    free = calibration_scores(0, 7, own, 30.0, 0.001)
+    fleet = operated(own, {30.0: free}, None, 30.0)
+    (_, episode), *_ = free_pool(5, 30.0, (7,), 0.001, seconds=8.0)
+    tally = judge_free(fleet, simulate(episode))["mine:Size", "hourly"]
+    assert tally.free_seconds == pytest.approx(4.999)

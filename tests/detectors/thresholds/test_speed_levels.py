@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauguard.detectors.thresholds.law import with_rate
-from tauguard.detectors.thresholds.rates import block_maxima, tail_level
+from tauguard.detectors.thresholds.free_scores import FreeScores
+from tauguard.detectors.thresholds.law import rate_interval, threshold_for_rate, with_rate
+from tauguard.detectors.thresholds.rates import Tail, block_maxima, peaks_above, tail_level
 from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels, recent_speed
 from tauguard.traces import Trace
 
@@ -113,3 +114,29 @@ def test_a_tail_of_too_few_peaks_is_the_largest():
     assert tail_level(np.array([2.0, 2.0, 2.0, 2.0]), 0.5, 3) == 2.0
     with pytest.raises(ValueError, match="0 allowed"):
         tail_level(np.array([1.0]), 0.0, 1)
+
+
+def test_a_tail_says_how_many_peaks_to_expect_above_the_level_that_it_gives():
+    peaks = np.sort(np.random.default_rng(3).exponential(size=5000))[::-1]
+    tail = Tail.of(peaks, 100)
+    for allowed in (0.1, 1.0, 30.0):
+        assert tail.above(tail.level(allowed)) == pytest.approx(allowed)
+    # An exponential's level that 0.1 of 5,000 exceed is log(50,000).
+    assert tail.level(0.1) == pytest.approx(np.log(50_000), rel=0.25)
+    assert peaks_above(peaks, 1.0, 100) == np.sum(peaks > 1.0)
+
+
+def test_the_rate_of_a_threshold_lies_in_the_interval_that_its_calibration_states():
+    rng = np.random.default_rng(5)
+
+    def episodes(count):
+        return [FreeScores(rng.exponential(size=3000), np.ones(3000), 60.0) for _ in range(count)]
+
+    known = episodes(45)
+    threshold = threshold_for_rate(known, 1.0)
+    low, high = rate_interval(known, threshold)
+    # Blocks of 25 pieces exceed u with probability 25 exp(-u): 7,200 blocks an hour.
+    true = 7200 * 25 * np.exp(-threshold)
+    assert low < true < high
+    assert low < 1.0 < high
+    assert threshold_for_rate(known, 1.0, confidence=0.9) > threshold
