@@ -83,7 +83,7 @@ class Tail:
         far = (level - self.base) / self.scale
         if abs(self.shape) < 1e-9:
             return self.count * float(np.exp(-far))
-        return self.count * max(1 + self.shape * far, 0.0) ** (-1 / self.shape)
+        return float(self.count * max(1 + self.shape * far, 0.0) ** (-1 / self.shape))
 
 
 def tail_level(peaks: Array, allowed: float, count: int) -> float:
