@@ -82,6 +82,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         kind = type(error).__name__
         fail(f"{name}: a defect of tauguard, --debug shows where: {kind}: {error}", 1)
 
+
 def said(error: Exception) -> str:
     """What went wrong in words: a system's error by its file, not by its number."""
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
