@@ -80,6 +80,18 @@ STUDIES: dict[str, Study] = {
         "faults.study",
         "faults of samples: which are seen, how soon, false alarms, and what goes untold",
     ),
+    "mutants": Study(
+        "trust.mutants",
+        "damaged files of every format: an answer or one line, and no wrong answer",
+    ),
+    "kills": Study(
+        "trust.kills",
+        "runs that are killed, interrupted or out of disk: what is there afterwards",
+    ),
+    "endurance": Study(
+        "trust.endurance",
+        "ten simulated hours and 100,000 resets: memory, drift, latency",
+    ),
     "detection": Study(
         "detection.study",
         "the dissertation's experiment: detectors, speeds, operating points, false alarms",

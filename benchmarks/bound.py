@@ -14,6 +14,7 @@ from tauguard.benchmarks.panels import panels
 from tauguard.report import Row, machine, versions
 from tauguard.report.page import folded, page, picture, tables
 from tauguard.report.pareto import svg
+from tauguard.whole_file import write_whole
 
 
 def bind(folder: Path, cases: Sequence[Row], failed: Mapping[str, str]) -> Path:
@@ -37,9 +38,7 @@ def bind(folder: Path, cases: Sequence[Row], failed: Mapping[str, str]) -> Path:
         **{f"Study: {name}": _study(folder, name, one) for name, one in found.items()},
     }
     target = folder / "index.html"
-    part = target.with_suffix(".part")
-    part.write_text(page("tauguard: speed against error", sections))
-    part.replace(target)
+    write_whole(target, page("tauguard: speed against error", sections))
     return target
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from tauguard.benchmarks import STUDIES
 from tauguard.benchmarks.harness import Incomplete
 from tauguard.report import Row, machine, table, versions, write_json
+from tauguard.whole_file import whole_file
 
 
 def run_study(
@@ -45,7 +46,8 @@ def run_study(
     figure_path = figure_path or Path(f"bench-{name}.png")
     figure = plt.figure(figsize=(11, 7), layout="constrained")
     study.draw(rows, figure)
-    figure.savefig(figure_path, dpi=120)
+    with whole_file(figure_path) as stream:
+        figure.savefig(stream, dpi=120, format=figure_path.suffix[1:] or "png")
     plt.close(figure)
     print(f"figure: {figure_path}")
     if json_path is not None:

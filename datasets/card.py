@@ -15,7 +15,7 @@ from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import configuration_in, lines, read_head
 from tauguard.datasets.inspection import SplitSummary, summarised
 from tauguard.models import cura6
-from tauguard.traces.whole_file import write_whole
+from tauguard.whole_file import write_whole
 
 CARD, CROISSANT = "README.md", "croissant.json"
 LICENSE, LICENSE_URL = "apache-2.0", "https://www.apache.org/licenses/LICENSE-2.0"

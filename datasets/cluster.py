@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from typing import Any, TypeVar
 
 Task = TypeVar("Task")
@@ -16,7 +16,7 @@ WAITING = 2
 
 def on_cluster(
     work: Callable[[Task], Result], tasks: Iterable[Task], address: str
-) -> Iterator[Result]:
+) -> Generator[Result]:
     """The results of ``work`` in the order in which they are ready.
 
     A task whose node or process is lost is done again elsewhere. All nodes see the folder that the

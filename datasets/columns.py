@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from pathlib import Path
+
+from tauguard.strangers import read_json, reading
 
 Column = str | int
 Unit = str
 
+#: Fields of a map that name a column a joint.
+SIGNALS = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")
 UR_JOINTS = (
     "shoulder_pan_joint",
     "shoulder_lift_joint",
@@ -50,6 +56,7 @@ class ColumnMap:
         Raises:
             ValueError: different numbers of columns, an unknown kind of repair.
         """
+        self._check_types()
         joints = len(self.q)
         if joints == 0:
             raise ValueError("columns.q: name at least one joint's column")
@@ -64,10 +71,24 @@ class ColumnMap:
         if unknown:
             raise ValueError(f"columns.repair: {sorted(unknown)}; known: repeat, tail, nan")
 
+    def _check_types(self) -> None:
+        """A text such as "false" for a flag would be taken for true."""
+        columns = [self.t, *(c for name in SIGNALS for c in getattr(self, name))]
+        for column in columns:
+            if isinstance(column, bool) or not isinstance(column, str | int):
+                raise ValueError(f"column {column!r}: expected a name or a number from 0")
+        if not isinstance(self.degrees, bool):
+            raise ValueError(f"columns.degrees: {self.degrees!r}, expected true or false")
+        one = self.current_scale
+        for scale in (self.time_scale, *(one if isinstance(one, tuple | list) else (one,))):
+            if isinstance(scale, bool) or not (isinstance(scale, float | int) and abs(scale) > 0):
+                raise ValueError(f"columns: {scale!r} as a scale, expected a number, not 0")
+        if not (isinstance(self.separator, str) and len(self.separator) == 1):
+            raise ValueError(f"columns.separator: {self.separator!r}, expected one character")
+
     def groups(self) -> dict[str, tuple[Column, ...]]:
         """The columns of the signals that have any, by the trace's field."""
-        names = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")
-        return {n: getattr(self, n) for n in names if n == "q" or getattr(self, n)}
+        return {n: getattr(self, n) for n in SIGNALS if n == "q" or getattr(self, n)}
 
 
 def numbered(prefix: str, joints: int = 6, first: int = 0) -> tuple[str, ...]:
@@ -126,3 +147,29 @@ def presets_of(header: Collection[str]) -> list[str]:
         if all(isinstance(c, str) and c in header for c in wanted):
             found.append(name)
     return found
+
+
+def column_map(columns: str | None) -> ColumnMap | str | None:
+    """A preset's name as it is; a map from a JSON file.
+
+    Raises:
+        ValueError: no such file, or not the fields of a :class:`ColumnMap`.
+    """
+    if columns is None or not columns.endswith(".json"):
+        return columns
+    if not Path(columns).is_file():
+        raise ValueError(f"{columns}: no such file; presets are {', '.join(PRESETS)}")
+    fields = read_json(columns)
+    known = [field.name for field in dataclasses.fields(ColumnMap)]
+    fields_are = f"its fields are {', '.join(known)}"
+    if not isinstance(fields, dict):
+        raise ValueError(f"{columns}: expected an object; {fields_are}")
+    if strange := sorted(set(fields) - set(known)):
+        raise ValueError(f"{columns}: unknown {', '.join(strange)}; {fields_are}")
+    if missing := [name for name in ("t", "q") if name not in fields]:
+        raise ValueError(f"{columns}: {', '.join(missing)} missing; {fields_are}")
+    with reading(columns, fields_are):
+        fields = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
+        if "repair" in fields:
+            fields["repair"] = frozenset(fields["repair"])
+        return ColumnMap(**fields)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import math
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.schedule import stated_balance
 from tauguard.datasets.shard import fault, manifest_path, read_lines
 from tauguard.models import cura6
-from tauguard.traces.whole_file import PART, remove_parts, write_whole
+from tauguard.whole_file import PART, remove_parts, write_whole
 
 #: Of the folder's layout; a reader refuses newer ones.
 FORMAT = 1
@@ -42,7 +43,14 @@ def read_head(folder: Path) -> dict[str, Any]:
                 "install a newer one"
             )
         Configuration.from_json(json.dumps(head["configuration"]))
-    except (KeyError, TypeError, AttributeError, json.JSONDecodeError, UnicodeDecodeError):
+    except (
+        LookupError,
+        TypeError,
+        AttributeError,
+        json.JSONDecodeError,
+        UnicodeDecodeError,
+        RecursionError,
+    ):
         raise ValueError(
             f"{path}: damaged; `tauguard generate` with the same configuration into another "
             "folder makes the same bytes"
@@ -124,14 +132,45 @@ def head_of(configuration: Configuration) -> dict[str, Any]:
         "hours": configuration.hours,
         "shards": {s.name: shard_count(configuration, s.name) for s in configuration.splits},
         "planned": stated_balance(configuration),
+        "arms_sha256": {arm: _sha256(cura6.arm_xml(arm)) for arm in arms_of(configuration)},
         "configuration": json.loads(configuration.to_json()),
     }
+
+
+def arms_of(configuration: Configuration, splits: tuple[str, ...] | None = None) -> tuple[str, ...]:
+    """The arms of these splits (default: of all), by name."""
+    chosen = [s for s in configuration.splits if splits is None or s.name in splits]
+    return tuple(sorted({arm for split in chosen for arm in split.arms}))
+
+
+def arm_xml(folder: Path, arm: str) -> str:
+    """The nominal arm that a dataset was made with, as MJCF.
+
+    Raises:
+        ValueError: the file is missing or not the one that was written.
+    """
+    path = folder / "arms" / f"{arm}.xml"
+    wanted = read_head(folder).get("arms_sha256", {})
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (FileNotFoundError, UnicodeDecodeError):
+        text = ""
+    if not text or wanted.get(arm, _sha256(text)) != _sha256(text):
+        raise ValueError(
+            f"{path}: missing or damaged; the same `tauguard generate` that made the dataset "
+            "writes it again"
+        )
+    return text
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _begin(folder: Path, head: dict[str, Any]) -> None:
     for name in ("data", "manifest", "arms"):
         (folder / name).mkdir(exist_ok=True)
-    for arm in sorted({arm for s in head["configuration"]["splits"] for arm in s["arms"]}):
+    for arm in head["arms_sha256"]:
         _write_once(folder / "arms" / f"{arm}.xml", cura6.arm_xml(arm))
     _write_once(folder / HEAD, json.dumps(head, indent=1, sort_keys=True) + "\n")
 

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from tauguard.datasets.workers import in_processes, terminable
 from tauguard.envs import Episode, simulate
 from tauguard.traces import Trace, read_mcap, write_mcap
-from tauguard.traces.whole_file import remove_parts
+from tauguard.whole_file import remove_parts
 
 
 def simulate_all(

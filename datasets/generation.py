@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +16,8 @@ from tauguard.datasets.code_identity import code
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import claimed
 from tauguard.datasets.shard import Done, ShardTask, make_shard
-from tauguard.datasets.workers import in_processes, terminable
-from tauguard.traces.whole_file import remove_parts
+from tauguard.datasets.workers import terminable, writing
+from tauguard.whole_file import remove_parts
 
 
 @dataclass
@@ -49,23 +50,19 @@ def generate_dataset(
     """
     count = workers or os.cpu_count() or 1
     done = Built()
-    with terminable(), claimed(folder, configuration):
-        todo = tasks(configuration, folder)
+    todo = tasks(configuration, folder)
+    with terminable(), claimed(folder, configuration), contextlib.ExitStack() as stack:
         if ray is None:
-            results: Iterator[Done] = in_processes(make_shard, todo, count)
+            results: Iterator[Done] = stack.enter_context(writing(make_shard, todo, count, folder))
         else:
             from tauguard.datasets.cluster import on_cluster
 
-            results = on_cluster(make_shard, todo, ray)
-        try:
-            with _progress(configuration) as bar:
-                for one in results:
-                    _count(done, one, bar)
-            write_cards(folder)
-        finally:
-            if isinstance(results, Generator):
-                results.close()  # no worker is left that could still be writing
-            remove_parts(folder)
+            stack.callback(remove_parts, folder)
+            results = stack.enter_context(contextlib.closing(on_cluster(make_shard, todo, ray)))
+        with _progress(configuration) as bar:
+            for one in results:
+                _count(done, one, bar)
+        write_cards(folder)
     return done
 
 

@@ -12,7 +12,15 @@ import numpy as np
 
 from tauguard.datasets.columns_of_shards import collision_line, stored
 from tauguard.datasets.configuration import Configuration
-from tauguard.datasets.dataset_folder import configuration_in, faults, lines, read_head, shards
+from tauguard.datasets.dataset_folder import (
+    arm_xml,
+    arms_of,
+    configuration_in,
+    faults,
+    lines,
+    read_head,
+    shards,
+)
 from tauguard.datasets.reader import episodes_of
 from tauguard.datasets.schedule import Balance, Planned
 from tauguard.datasets.shard import PHYSICS_RATE, data_path, manifest_path, simulated
@@ -136,12 +144,18 @@ def missing(folder: Path) -> list[str]:
 
 
 def verified(folder: Path) -> list[tuple[str, str]]:
-    """Damaged or missing shards and what is wrong with each; reads every byte."""
-    return [
+    """Damaged or missing shards and arms, and what is wrong with each; reads every byte."""
+    found = [
         (data_path(split, number), wrong)
         for split, number, wrong in faults(folder)
         if wrong is not None
     ]
+    for arm in arms_of(configuration_in(folder)):
+        try:
+            arm_xml(folder, arm)
+        except ValueError as error:
+            found.append((f"arms/{arm}.xml", str(error)))
+    return found
 
 
 def off_balance(stated: Balance, one: SplitSummary) -> list[str]:

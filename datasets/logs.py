@@ -89,18 +89,15 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
         ]
     if not rows:
         raise ValueError("empty file")
-    header = [cell.strip() for cell in rows[0][1]]
-    if any(number(cell) is None and cell for cell in header):
-        if columns.headerless:
-            fitting = presets_of(header)
-            raise ValueError(
-                f"the first line names columns ({', '.join(header)[:60]}, ...), files of these "
-                "columns have no such line: "
-                + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
-            )
-        rows = rows[1:]
-    else:
-        header = []
+    header = header_of(rows[0][1])
+    if header and columns.headerless:
+        fitting = presets_of(header)
+        raise ValueError(
+            f"the first line names columns ({', '.join(header)[:60]}, ...), files of these "
+            "columns have no such line: "
+            + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
+        )
+    rows = rows[1:] if header else rows
     where = {
         name: [position(column, header, columns) for column in group]
         for name, group in {"t": (columns.t,), **columns.groups()}.items()
@@ -152,6 +149,20 @@ def differentiated(t: Array, q: Array) -> Array:
     before = np.maximum(rows - 3, 0)
     span = np.maximum(t[rows] - t[before], 1e-9)[:, None]
     return np.asarray((q[rows] - q[before]) / span)
+
+
+def header_of(first: Sequence[str]) -> list[str]:
+    """The names in a first line, empty if it is a line of numbers.
+
+    Raises:
+        ValueError: mostly numbers, but not all: a line that is damaged.
+    """
+    cells = [cell.strip() for cell in first]
+    names = [cell for cell in cells if cell and number(cell) is None]
+    if names and 2 * len(names) < len([cell for cell in cells if cell]):
+        at = cells.index(names[0])
+        raise ValueError(f"line 1, column {at}: {names[0][:40]!r} is not a number")
+    return cells if names else []
 
 
 def named(names: Sequence[str], joints: int) -> tuple[str, ...]:

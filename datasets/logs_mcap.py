@@ -39,7 +39,8 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
             stream.seek(0)
             reader = make_reader(stream, validate_crcs=True)
             if any(record.name == "tauguard.trace" for record in reader.iter_metadata()):
-                return Log(read_mcap(path)[0], ())
+                own = read_mcap(path)[0]
+                return Log(own, checked(own, lambda row: f"sample {row}"))
             summary = reader.get_summary()
             channels = summary.channels.values() if summary is not None else ()
             schemas = summary.schemas if summary is not None else {}

@@ -9,7 +9,8 @@ from typing import Any
 import pyarrow.parquet as pq
 
 from tauguard.datasets.columns_of_shards import RESIDUAL, trace_of
-from tauguard.datasets.dataset_folder import HEAD, configuration_in, shards
+from tauguard.datasets.dataset_folder import HEAD, arm_xml, configuration_in, shards
+from tauguard.datasets.dataset_folder import arms_of as arms_in
 from tauguard.datasets.logs import read_log
 from tauguard.datasets.shard import data_path, manifest_path, read_lines
 from tauguard.traces import Trace
@@ -70,9 +71,7 @@ def splits_of(folder: Path, wanted: Sequence[str] | None) -> tuple[str, ...]:
 def arms_of(folder: Path, splits: Sequence[str] | None = None) -> tuple[str, ...]:
     """The arms of a dataset's splits, by name."""
     chosen = splits_of(folder, splits)
-    return tuple(
-        sorted({a for s in configuration_in(folder).splits if s.name in chosen for a in s.arms})
-    )
+    return arms_in(configuration_in(folder), chosen)
 
 
 def read_residuals(folder: Path, line: dict[str, Any]) -> Any:
@@ -109,11 +108,13 @@ def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trac
     if not wanted:
         return
     path = folder / wanted[0]["shard"]
+    arms = {arm: arm_xml(folder, arm) for arm in {line["arm"] for line in wanted}}
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             for line in wanted:
-                arm_xml = (folder / "arms" / f"{line['arm']}.xml").read_text()
-                yield trace_of(file.read_row_group(line["row_group"]), line, {"arm.xml": arm_xml})
+                yield trace_of(
+                    file.read_row_group(line["row_group"]), line, {"arm.xml": arms[line["arm"]]}
+                )
     except FileNotFoundError:
         raise
     except (OSError, ValueError, KeyError) as error:

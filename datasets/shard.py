@@ -30,7 +30,7 @@ from tauguard.envs import Simulation, SimulationDiverged
 from tauguard.envs.plant import untimed
 from tauguard.models import Drive, cura6, pin_model
 from tauguard.traces import Trace
-from tauguard.traces.whole_file import whole_file, write_whole
+from tauguard.whole_file import whole_file, write_whole
 
 Array = NDArray[np.float64]
 
@@ -131,7 +131,7 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
         if json.loads(last) != {"sha256_of_lines": check}:
             raise ValueError("its checksum differs")
         found = [json.loads(line) for line in lines]
-    except (ValueError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"{path.name}: {error}") from None
     if not found:
         raise ValueError(f"{path.name}: no lines")

@@ -12,8 +12,11 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from types import FrameType
 from typing import Any, TypeVar
+
+from tauguard.whole_file import remove_parts
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -42,6 +45,23 @@ def terminable() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+@contextlib.contextmanager
+def writing(
+    work: Callable[[Task], Result], tasks: Iterable[Task], workers: int, folder: Path
+) -> Iterator[Generator[Result]]:
+    """The results of tasks that write files into ``folder``, see :func:`in_processes`.
+
+    However the block ends, by SIGTERM too, no worker and no part of a file is left.
+    """
+    with terminable():
+        results = in_processes(work, tasks, workers)
+        try:
+            yield results
+        finally:
+            results.close()  # no worker is left that could still be writing
+            remove_parts(folder)
 
 
 def in_processes(

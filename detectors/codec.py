@@ -11,6 +11,8 @@ import numpy as np
 
 #: Nesting of a file's content: no detector is deeper.
 DEEPEST = 20
+#: No number of a detector is larger, in whatever unit: larger ones overflow in products.
+LARGEST = 1e15
 _TYPE, _FIELDS, _TUPLE = "type", "fields", "tuple"
 
 
@@ -61,12 +63,12 @@ def decode(content: Any, known: Callable[[str], type], depth: int = 0) -> Any:
             raise ValueError(f"{kind.__name__} with a part missing or added: {different}")
         return kind(**{name: decode(own, known, depth + 1) for name, own in given.items()})
     if isinstance(content, np.ndarray):
-        if content.dtype.kind not in "fiub" or not np.isfinite(content).all():
-            raise ValueError("an array with numbers that are not finite")
+        if content.dtype.kind not in "fiub" or not (np.abs(content) <= LARGEST).all():
+            raise ValueError(f"an array with numbers that are not finite, or beyond {LARGEST:g}")
         return content
     if content is None or isinstance(content, bool | int | str):
         return content
-    if isinstance(content, float) and np.isfinite(content):
+    if isinstance(content, float) and abs(content) <= LARGEST:
         return content
     raise ValueError(f"unexpected {content!r:.40}")
 

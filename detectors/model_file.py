@@ -20,7 +20,11 @@ import skops.io
 
 from tauguard.detectors.codec import checksum, decode, encode
 from tauguard.detectors.registry import file_type
+from tauguard.detectors.self_check import check_alarms, check_ranges
+from tauguard.detectors.signature import check_signature, key_of_user, signed
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
+from tauguard.strangers import reading
+from tauguard.whole_file import write_whole
 
 FORMAT, VERSION = "tauguard model", 1
 #: The kind of file that holds a trained detector with its threshold.
@@ -55,46 +59,41 @@ def load_model(path: str | os.PathLike[str]) -> CollisionAlarm:
 
     Raises:
         ValueError: missing, damaged or of another kind or version (the message says what would
-            do), or a detector that gives no finite score for an arm at rest.
+            do), with numbers that no arm has, or a detector that no blow moves or that is never
+            silent.
     """
     alarm = read_model(path, ALARM)
     if not isinstance(alarm, CollisionAlarm):
         raise ValueError(f"{path}: holds a {type(alarm).__name__}, not a detector; {ANEW}")
-    try:
-        rest = np.zeros(alarm.detector.arm.robot.joints)
-        stream = alarm.stream()
-        finite = all(np.isfinite((stream.step(rest, rest, rest), stream.score)[1]) for _ in "12")
-    except (ValueError, TypeError, AttributeError, IndexError) as error:
-        raise ValueError(f"{path}: a detector that gives no score ({error})") from None
-    if not finite:
-        raise ValueError(f"{path}: a detector whose score at rest is not a number; {ANEW}")
+    with reading(Path(path), ANEW), np.errstate(all="ignore"):
+        check_ranges(alarm)
+        check_alarms(alarm)
     return alarm
 
 
 def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
     """Write ``value`` (see :func:`tauguard.detectors.codec.encode`); the whole file or nothing.
 
+    It is signed if the user has a key (see :mod:`tauguard.detectors.signature`).
+
     Raises:
         ValueError: it cannot be in a file, or the folder cannot be written.
     """
-    content = encode(value)
+    content, key = encode(value), key_of_user()
+    own = checksum(content)
     container = {
         "format": FORMAT,
         "version": VERSION,
         "kind": kind,
         "made_with": {name: importlib.metadata.version(name) for name in MADE_WITH},
-        "checksum": checksum(content),
+        "checksum": own,
+        "signature": None if key is None else signed(own, key),
         "content": content,
     }
-    target = Path(path)
-    part = target.with_name(target.name + ".part")
     try:
-        with open(part, "wb") as file:
-            file.write(skops.io.dumps(container))
-        os.replace(part, target)
+        write_whole(Path(path), skops.io.dumps(container))
     except OSError as error:
-        part.unlink(missing_ok=True)
-        raise ValueError(f"{target}: cannot be written ({error.strerror})") from None
+        raise ValueError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def read_model(path: str | os.PathLike[str], kind: str) -> Any:
@@ -110,10 +109,13 @@ def read_model(path: str | os.PathLike[str], kind: str) -> Any:
         raise ValueError(f"{path}: version {version} of the format, expected {VERSION}; {ANEW}")
     if own != kind or own not in READERS:
         raise ValueError(f"{path}: a file of the kind {own!r}, expected {kind!r}")
-    content = container.get("content")
+    content, key = container.get("content"), key_of_user()
     try:
-        if checksum(content) != container.get("checksum"):
+        own = checksum(content)
+        if own != container.get("checksum"):
             raise ValueError("its content does not fit its checksum: it was damaged or changed")
+        if key is not None:
+            check_signature(own, container.get("signature"), key)
         return READERS[kind](content)
     except (ValueError, TypeError, KeyError, AttributeError, IndexError, RecursionError) as error:
         raise ValueError(f"{path}: {_line(error)}") from None

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.models.mjcf import SpecText, compiled
-from tauguard.models.robot_check import checked_robot
+from tauguard.models.robot_check import checked_robot, checked_text
 
 Array = NDArray[np.float64]
 
@@ -155,7 +155,7 @@ def _urdf_spec(path: Path) -> mujoco.MjSpec:
         root.remove(old)
     extension = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(extension, "compiler", {"strippath": "false", "fusestatic": "false"})
-    return mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    return mujoco.MjSpec.from_string(checked_text(ElementTree.tostring(root, encoding="unicode")))
 
 
 def _mesh_file(urdf: Path, name: str) -> Path | None:

@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.models.checks import rigid_pose
-from tauguard.models.robot_check import checked_robot
+from tauguard.models.robot_check import checked_robot, checked_text
 from tauguard.strangers import read_text
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def compiled(source: str | Path | mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjMo
         if not path.is_file():
             raise FileNotFoundError(f"{path}: no such robot file")
         if path.suffix.lower() == ".urdf" or "<robot" in _beginning(path):
-            return mujoco.MjModel.from_xml_string(_without_shapes(read_text(path)))
+            return mujoco.MjModel.from_xml_string(checked_text(_without_shapes(read_text(path))))
         return mujoco.MjModel.from_xml_path(str(checked_robot(path)))
     except ValueError as error:
         raise ValueError(f"robot: {' '.join(str(error).split())}") from None

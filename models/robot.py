@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.strangers import read_text, reading
+
 Array = NDArray[np.float64]
 Numbers = tuple[float, ...]
 
@@ -106,16 +108,14 @@ class Robot:
             FileNotFoundError: no such file.
         """
         path = Path(path)
-        try:
-            values: dict[str, Any] = tomllib.loads(path.read_text())
+        with reading(path):
+            values: dict[str, Any] = tomllib.loads(read_text(path))
             if "file" not in values:
                 raise ValueError('no file; expected file = "arm.xml" (MJCF or URDF)')
             beside = path.parent / str(values["file"])
             if beside.is_file():
                 values["file"] = str(beside)
             return cls.from_mapping(values)
-        except (ValueError, TypeError) as error:
-            raise ValueError(f"{path}: {error}") from None
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Robot:

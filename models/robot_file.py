@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tauguard.models.robot_check import checked_robot
 from tauguard.strangers import read_text
+from tauguard.whole_file import write_whole
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def write_robot_file(
         text = _urdf(root, joints, inertial, note)
     else:
         text = _mjcf(Path(source), joints, inertial, note)
-    Path(target).write_text(text)
+    write_whole(Path(target), text)
 
 
 def read_note(source: str | Path) -> str | None:

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
+from tauguard.whole_file import write_whole
+
 
 def write_json(path: Path, payload: Mapping[str, object]) -> None:
-    """Write ``payload`` so that a reader never sees half a file (temporary file, then rename)."""
+    """Write ``payload`` to a file, whole or not at all."""
     text = json.dumps(payload, indent=2, default=_plain, allow_nan=False) + "\n"
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
-    part = path.with_name(path.name + ".part")
-    part.write_text(text)
-    part.replace(path)
+    write_whole(path, text)
 
 
 def _plain(value: object) -> object:

@@ -20,11 +20,12 @@ import numpy as np
 from tauguard.strangers import reading
 from tauguard.traces import mcap_contacts
 from tauguard.traces.mcap_cdr import Anything, Layout
-from tauguard.traces.mcap_container import Contents, Group, Topic, Writer
+from tauguard.traces.mcap_container import Contents, Group, Topic
 from tauguard.traces.mcap_schemas import SCHEMAS
 from tauguard.traces.mcap_time import nanoseconds, stamp
+from tauguard.traces.mcap_writer import Writer
 from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
-from tauguard.traces.whole_file import whole_file
+from tauguard.whole_file import whole_file
 
 FORMAT = "1"
 LIBRARY = f"tauguard traces {FORMAT}"
@@ -245,6 +246,7 @@ def decode(contents: Contents) -> tuple[Trace, Detection | None]:
                 "some were filtered out"
             )
         values |= table
+    contents.check_sum()
     truth = None
     if form["truth"]:
         truth = decode_truth(form, values, tables["/truth/collisions"])

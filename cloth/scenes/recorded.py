@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import warnings
 from collections.abc import Iterator
@@ -11,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tauguard.cloth.scenes.mesh_file import load_mesh
 
 Points = NDArray[np.float64]
 
@@ -78,23 +79,7 @@ def read_mesh(path: str | Path) -> tuple[Points, NDArray[np.int32]]:
 
     Warns where vertices belong to no face.
     """
-    import trimesh
-
-    path = Path(path)
-    kind = path.suffix.lower().lstrip(".")
-    try:
-        content = path.read_bytes()
-        if kind == "obj":
-            content = _geometry_of_obj(content)
-        mesh = trimesh.load_mesh(
-            io.BytesIO(content), file_type=kind, process=False, maintain_order=True
-        )
-        vertices = np.array(mesh.vertices, dtype=np.float64)
-        faces = np.array(mesh.faces, dtype=np.int32)
-    except Exception as error:
-        raise ValueError(f"{path}: cannot be read as a triangle mesh ({error})") from error
-    if faces.ndim != 2 or faces.shape[1:] != (3,) or len(faces) == 0:
-        raise ValueError(f"{path}: has no triangles")
+    vertices, faces = load_mesh(path)
     unused = len(vertices) - len(np.unique(faces))
     if unused:
         warnings.warn(
@@ -103,12 +88,6 @@ def read_mesh(path: str | Path) -> tuple[Points, NDArray[np.int32]]:
             stacklevel=2,
         )
     return vertices, faces
-
-
-def _geometry_of_obj(content: bytes) -> bytes:
-    """Positions and faces alone: texture and normal indices would renumber the vertices."""
-    lines = [line for line in content.splitlines() if line[:2] in (b"v ", b"f ")]
-    return re.sub(rb"/\S*", b"", b"\n".join(lines))
 
 
 def _order(path: Path) -> tuple[int, str]:

@@ -13,6 +13,7 @@ from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import Table
 from tauguard.models.obstacles import add_table
 from tauguard.models.scene import INTEGRATORS
+from tauguard.strangers import reading
 
 Array = NDArray[np.float64]
 
@@ -61,8 +62,12 @@ def bunny_table(mesh: str | Path | None = None, speed: float = 1.0) -> ContactSc
 def _load(path: Path) -> tuple[Array, NDArray[np.int32]]:
     if not path.is_file():
         raise FileNotFoundError(f"mesh {path}: no such file")
-    loaded = trimesh.load_mesh(path)
-    return np.asarray(loaded.vertices, dtype=np.float64), np.asarray(loaded.faces, dtype=np.int32)
+    with reading(path, "expected a triangle mesh"):
+        loaded = trimesh.load_mesh(path)
+        points, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int32)
+        if len(faces) == 0 or not np.isfinite(points).all():
+            raise ValueError("no triangles, or vertices that are not finite")
+    return points, faces
 
 
 def _lumpy_ball() -> tuple[Array, NDArray[np.int32]]:

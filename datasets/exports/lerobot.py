@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from tauguard.traces import Trace
-from tauguard.traces.whole_file import whole_file, write_whole
+from tauguard.whole_file import whole_file, write_whole
 
 Array = NDArray[Any]
 

@@ -11,6 +11,9 @@ import numpy as np
 
 from tauguard.datasets.live.sample import Closing, Sample, SourceClosed
 
+#: Bytes of the longest line.
+LONGEST = 1 << 16
+
 
 class LineSource(Closing):
     """One sample a line: the time, then all q, all qd and all currents, separated by commas.
@@ -26,7 +29,7 @@ class LineSource(Closing):
         self._names, self._rate = tuple(joint_names), rate
         self.events: list[str] = []
         self._file, self._pending, self._lines = stream, b"", 0
-        self._ready = selectors.DefaultSelector()
+        self._ready = selectors.SelectSelector()  # a file can be waited for, too
         self._ready.register(stream, selectors.EVENT_READ)
 
     @property
@@ -54,6 +57,10 @@ class LineSource(Closing):
             if not data:
                 raise SourceClosed("the input has ended")
             self._pending += data
+            if len(self._pending) > LONGEST and b"\n" not in self._pending:
+                raise ValueError(
+                    f"line {self._lines + 1}: more than {LONGEST} bytes without an end"
+                )
         arrived = time.monotonic_ns()
         line, _, self._pending = self._pending.partition(b"\n")
         self._lines += 1

@@ -21,7 +21,7 @@ from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import read
 from tauguard.datasets.shard import simulated
 from tauguard.datasets.workers import WorkerDied, in_processes
-from tauguard.traces.whole_file import whole_file
+from tauguard.whole_file import whole_file
 
 from .conftest import contents
 
@@ -89,9 +89,9 @@ def test_two_workers_killed_and_one_that_goes_on_give_the_same_bytes(tiny, tiny_
     assert contents(folder) == contents(tiny)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stopped_run_ends_at_once_with_one_line(tiny_toml, tmp_path, number):
-    folder = tmp_path / "stopped"
+def test_a_stopped_run_ends_at_once_with_one_line(tiny_toml, tmp_path):
+    # Ctrl-C, dead workers and full disks in number: `tauguard bench kills`, and its test.
+    folder, number = tmp_path / "stopped", signal.SIGTERM
     process = generate(tiny_toml, "--out", folder, "--workers", 2)
     wait_for(lambda: (folder / HEAD).exists())
     began = time.monotonic()
@@ -205,3 +205,15 @@ def test_two_runs_do_not_write_one_folder(tiny, tiny_toml):
         pytest.raises(OSError, match="another process is generating"),
     ):
         generate_dataset(configuration, tiny, workers=1)
+
+
+def test_a_damaged_arm_is_named_and_written_again(tiny, tiny_toml, tmp_path):
+    folder = tmp_path / "damaged"
+    shutil.copytree(tiny, folder)
+    arm = folder / "arms" / "cura6.xml"
+    arm.write_text(arm.read_text().replace("mass", "Mass", 1))
+    assert [name for name, _ in inspection.verified(folder)] == ["arms/cura6.xml"]
+    with pytest.raises(ValueError, match=r"cura6\.xml: missing or damaged"):
+        list(read(folder))
+    generate_dataset(load(tiny_toml), folder, workers=1)
+    assert contents(folder) == contents(tiny)

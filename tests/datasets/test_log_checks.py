@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tauguard.datasets import read_log
 from tauguard.datasets.log_checks import checked, saturated
-from tauguard.traces import Trace
+from tauguard.traces import Trace, write_mcap
 
 
 def log(rows=600, dt=0.01, seed=0):
@@ -92,3 +93,17 @@ def test_standing_still_is_not_saturation():
     trace = log()
     still = dataclasses.replace(trace, current=np.full_like(trace.current, 2.24))
     assert saturated(still) == []
+
+
+def test_recordings_of_our_own_pass_the_same_checks(tmp_path):
+    trace = log()
+    gone = dataclasses.replace(trace, t=trace.t + np.where(np.arange(600) >= 200, 3600.0, 0.0))
+    path = tmp_path / "gap.mcap"
+    write_mcap(path, gone)
+    with pytest.raises(ValueError, match=r"gap\.mcap: sample 200: nothing for 3\.6e\+03 s before"):
+        read_log(path)
+    write_mcap(path, changed(q=57.3, qd=57.3))
+    with pytest.raises(ValueError, match=r"gap\.mcap: sample \d+: the velocity of . is"):
+        read_log(path)
+    write_mcap(path, trace)
+    assert read_log(path).notes == ()

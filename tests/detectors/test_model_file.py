@@ -180,3 +180,70 @@ def test_archives_that_unpack_to_too_much_are_refused(tmp_path, monkeypatch):
         archive.writestr("a.npy", header.getvalue())
     with pytest.raises(ValueError, match="declares a shape"):
         load_model(path)
+
+
+def of(*names):
+    """A change of one number deep in a file: the names on the way, then what becomes of it."""
+    *way, change = names
+
+    def changed(content):
+        *outer, last = way
+        for name in outer:
+            content = content[name]["fields"]
+        content[last] = change(content[last])
+
+    return changed
+
+
+MACHINE, FRONT = ("detector", "regressor"), ("detector", "front")
+EDITS = {
+    "weights to nothing": of(*MACHINE, "weights", lambda w: w * 0),
+    "weights tiny": of(*MACHINE, "weights", lambda w: w * 1e-9),
+    "weights huge": of(*MACHINE, "weights", lambda w: w * 1e300),
+    "intercept low": of(*MACHINE, "intercept", lambda v: v - 1e3),
+    "intercept high": of(*MACHINE, "intercept", lambda v: v + 1e3),
+    "sigma tiny": of(*MACHINE, "sigma", lambda v: 1e-150),
+    "sigma huge": of(*MACHINE, "sigma", lambda v: 1e150),
+    "vectors far away": of(*MACHINE, "vectors", lambda v: v + 1e6),
+    "threshold high": of("threshold", lambda v: 1e9),
+    "threshold low": of("threshold", lambda v: -1e9),
+    "confirmation of hours": of("confirmation", lambda v: 1e4),
+    "factor tiny": of("detector", "scaling", "factor", lambda v: 1e-12),
+    "observer that sleeps": of(*FRONT, "gain", lambda v: 1e-9),
+    "settles in a year": of(*FRONT, "settle", lambda v: 3e7),
+    "samples every nanosecond": of(*FRONT, "dt", lambda v: 1e-9),
+    "gains tiny": of(*FRONT, "arm", "drive_gain", lambda v: v * 1e-9),
+    "masses huge": of(*FRONT, "arm", "robot", "inertial", lambda v: v * 1e30),
+    "gravity huge": of(*FRONT, "arm", "robot", "gravity", lambda v: v * 1e9),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_edits_under_a_fitting_checksum_that_blind_or_deafen_it_are_refused(edit, alarm, tmp_path):
+    path = tmp_path / "model.skops"
+    alarm.save(path)
+    rewritten(path, EDITS[edit])
+    with pytest.raises(ValueError, match=r"^[^\n]*model\.skops: [^\n]*$"):
+        load_model(path)
+
+
+def test_a_key_signs_and_nothing_else_is_read_with_it(small, named, tmp_path, monkeypatch):
+    make_detector("mypackage:CurrentSize")
+    unsigned, path, key = (tmp_path / name for name in ("unsigned.skops", "model.skops", "key"))
+    small.save(unsigned)
+    key.write_bytes(b"sixteen bytes or more")
+    monkeypatch.setenv("TAUGUARD_MODEL_KEY", str(key))
+    small.save(path)
+    assert load_model(path).threshold == small.threshold
+    with pytest.raises(ValueError, match="not signed, and a key is set"):
+        load_model(unsigned)
+    rewritten(path, lambda c: c.update(threshold=1.01))
+    with pytest.raises(ValueError, match="signed with another key, or changed since"):
+        load_model(path)
+    key.write_bytes(b"another key of bytes")
+    small.save(unsigned)
+    key.write_bytes(b"short")
+    with pytest.raises(ValueError, match="a key of 5 bytes, expected 16 or more"):
+        load_model(unsigned)
+    monkeypatch.delenv("TAUGUARD_MODEL_KEY")
+    assert load_model(unsigned).threshold == small.threshold  # without a key nothing is asked

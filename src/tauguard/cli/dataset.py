@@ -63,12 +63,13 @@ def same_arm(folder: Path, robot: RobotNumbers) -> str | None:
     """Which arm of the dataset has the geometry that a detector believes in."""
     import numpy as np
 
+    from tauguard.datasets.dataset_folder import arm_xml
     from tauguard.datasets.reader import arms_of
     from tauguard.detectors import RobotNumbers
     from tauguard.models import pin_model
 
     for arm in arms_of(folder):
-        own = RobotNumbers.from_pin(pin_model((folder / "arms" / f"{arm}.xml").read_text()))
+        own = RobotNumbers.from_pin(pin_model(arm_xml(folder, arm)))
         parts = ("translation", "axis", "armature")  # masses are identified in training
         if all(np.array_equal(getattr(own, name), getattr(robot, name)) for name in parts):
             return arm

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tauguard.whole_file import whole_file
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -31,7 +33,8 @@ def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
     _collision(axes[1, 1], folder, every)
     splits = ", ".join(f"{k} {v['hours']:.3g} h" for k, v in report["splits"].items())
     figure.suptitle(f"{report['name']}: {splits}")
-    figure.savefig(path, dpi=110)
+    with whole_file(path) as stream:
+        figure.savefig(stream, dpi=110, format=path.suffix[1:] or "png")
     plt.close(figure)
 
 

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tauguard.strangers import read_json, reading
-
 if TYPE_CHECKING:
     from tauguard.datasets import ColumnMap
     from tauguard.detectors import ArmModel, RobotNumbers
@@ -94,27 +92,9 @@ def unnamed(count: int) -> tuple[str, ...]:
 
 def column_map(columns: str | None) -> ColumnMap | str | None:
     """A preset's name as it is; a map from a JSON file."""
-    if columns is None or not columns.endswith(".json"):
-        return columns
-    from tauguard.datasets import ColumnMap
-    from tauguard.datasets.columns import PRESETS
+    from tauguard.datasets.columns import column_map as read
 
-    if not Path(columns).is_file():
-        raise ValueError(f"{columns}: no such file; presets are {', '.join(PRESETS)}")
-    fields = read_json(columns)
-    known = [field.name for field in dataclasses.fields(ColumnMap)]
-    fields_are = f"its fields are {', '.join(known)}"
-    if not isinstance(fields, dict):
-        raise ValueError(f"{columns}: expected an object; {fields_are}")
-    if strange := sorted(set(fields) - set(known)):
-        raise ValueError(f"{columns}: unknown {', '.join(strange)}; {fields_are}")
-    if missing := [name for name in ("t", "q") if name not in fields]:
-        raise ValueError(f"{columns}: {', '.join(missing)} missing; {fields_are}")
-    with reading(columns, fields_are):
-        fields = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
-        if "repair" in fields:
-            fields["repair"] = frozenset(fields["repair"])
-        return ColumnMap(**fields)
+    return read(columns)
 
 
 def read_one(log: Path, columns: str | None, torque: bool = False) -> Trace:

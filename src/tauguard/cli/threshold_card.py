@@ -6,6 +6,8 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tauguard.whole_file import whole_file
+
 if TYPE_CHECKING:
     from tauguard.detectors.evaluation.threshold_card import ThresholdCard
 
@@ -95,5 +97,6 @@ def draw(target: Path, card: ThresholdCard) -> None:
     words.axis("off")
     lines = [line for part in _lines(card) for line in _wrapped(part)]
     words.text(0, 1, "\n".join(lines), va="top", fontsize=8.5, family="monospace")
-    figure.savefig(target, dpi=130)
+    with whole_file(target) as stream:
+        figure.savefig(stream, dpi=130, format=target.suffix[1:] or "png")
     plt.close(figure)

@@ -1,0 +1,1 @@
+"""What keeps working when files, disks, processes and hours are bad."""

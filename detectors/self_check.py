@@ -1,0 +1,78 @@
+"""Whether a detector from a file can be one: silent while an arm stands, loud when it is struck.
+
+Numbers that are each in their range can still make a detector that never raises an alarm, or always
+one. What is asked here is the least that every detector does; it says nothing of how well.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tauguard.detectors.dynamics.robot import gravity_torque
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.thresholds.alarm import CollisionAlarm
+from tauguard.traces.trace import Trace
+
+#: Sample intervals [s] and settling times [s] that a recording of an arm can have.
+INTERVALS, LONGEST_SETTLE = (1e-5, 1.0), 600.0
+#: Torque per ampere [N m/A], mass of a link [kg] and gravity [m/s^2] that an arm can have.
+GAINS, HEAVIEST, GRAVITY = (1e-4, 1e4), 1e4, 100.0
+#: Blows that one of has to be noticed: torques at all joints [N m], their length and pause [s].
+BLOWS, BLOW, PAUSE = (5.0, 20.0, 80.0, 320.0), 0.3, 0.5
+
+
+def check_ranges(alarm: CollisionAlarm) -> None:
+    """Refuse numbers that no arm and no recording has.
+
+    Raises:
+        ValueError: says which.
+    """
+    detector, arm = alarm.detector, alarm.detector.arm
+    if not INTERVALS[0] <= detector.dt <= INTERVALS[1]:
+        raise ValueError(f"dt {detector.dt:g} s: expected {INTERVALS[0]:g} to {INTERVALS[1]:g}")
+    if not 0 <= detector.settle <= LONGEST_SETTLE:
+        raise ValueError(f"settle {detector.settle:g} s: expected 0 to {LONGEST_SETTLE:g}")
+    size = np.abs(arm.drive_gain)
+    if not ((size >= GAINS[0]) & (size <= GAINS[1])).all():
+        raise ValueError(f"drive_gain {arm.drive_gain}: expected {GAINS[0]:g} to {GAINS[1]:g}")
+    mass = arm.robot.inertial[:, 0]
+    if not ((mass >= -1e-9) & (mass <= HEAVIEST)).all():
+        raise ValueError(f"masses {mass} kg: expected 0 to {HEAVIEST:g}")
+    if np.abs(arm.robot.gravity).max() > GRAVITY:
+        raise ValueError(f"gravity {arm.robot.gravity} m/s^2: expected {GRAVITY:g} at most")
+
+
+def check_alarms(alarm: CollisionAlarm) -> None:
+    """Refuse a detector that no blow moves, or that calls an arm at rest struck all the time.
+
+    Raises:
+        ValueError: says which, or that a score is not a number.
+    """
+    trace, first = standing_and_struck(alarm.detector.arm, alarm.detector.dt, alarm.settle)
+    up = alarm.detect(trace).alarm
+    if not up[first:].any():
+        raise ValueError(f"it raises no alarm at any blow up to {BLOWS[-1]:g} N m")
+    standing = up[(trace.t > alarm.settle + PAUSE / 2) & (np.arange(len(up)) < first)]
+    if len(standing) and standing.all() and up[first:].all():
+        raise ValueError("it calls an arm that stands still struck, all the time")
+
+
+def standing_and_struck(arm: ArmModel, dt: float, settle: float) -> tuple[Trace, int]:
+    """An arm that stands at zero as its model says, then is struck harder and harder.
+
+    Returns:
+        The trace, and the row of the first blow.
+    """
+    seconds = settle + PAUSE + len(BLOWS) * (BLOW + PAUSE)
+    # Windows and confirmation need some samples even where these are rare.
+    slow = max(1.0, dt / 0.01)
+    t = np.arange(round(seconds * slow / dt), dtype=np.float64) * dt
+    begin, period = settle + PAUSE * slow, (BLOW + PAUSE) * slow
+    number = np.floor((t - begin) / period).astype(int)
+    struck = (t >= begin) & ((t - begin) % period < BLOW * slow) & (number < len(BLOWS))
+    torque = np.where(struck, np.array(BLOWS)[np.clip(number, 0, len(BLOWS) - 1)], 0.0)
+    n = arm.robot.joints
+    rest = np.zeros((len(t), n))
+    held = gravity_torque(arm.robot, np.zeros((1, n)))
+    current = (held - torque[:, None]) / arm.drive_gain
+    return Trace(arm.robot.joint_names, t, rest, rest.copy(), current), int(struck.argmax())

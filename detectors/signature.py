@@ -1,0 +1,51 @@
+"""Signatures of model files, for who keeps a key: a checksum finds damage, not intent."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import os
+from pathlib import Path
+
+#: Names a file with the key; its bytes are the key.
+KEY_FILE = "TAUGUARD_MODEL_KEY"
+#: Fewer bytes are no key.
+SHORTEST = 16
+
+
+def key_of_user() -> bytes | None:
+    """The key in the file that the environment variable ``TAUGUARD_MODEL_KEY`` names.
+
+    Raises:
+        ValueError: it cannot be read, or is shorter than 16 bytes.
+    """
+    name = os.environ.get(KEY_FILE)
+    return None if not name else read_key(Path(name))
+
+
+def read_key(path: Path) -> bytes:
+    """The key in a file; errors as for :func:`key_of_user`."""
+    try:
+        key = path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: the key cannot be read ({error.strerror})") from None
+    if len(key) < SHORTEST:
+        raise ValueError(f"{path}: a key of {len(key)} bytes, expected {SHORTEST} or more")
+    return key
+
+
+def signed(checksum: str, key: bytes) -> str:
+    """HMAC-SHA256 of a content's checksum."""
+    return hmac.new(key, checksum.encode(), hashlib.sha256).hexdigest()
+
+
+def check_signature(checksum: str, signature: object, key: bytes) -> None:
+    """Refuse what this key has not signed.
+
+    Raises:
+        ValueError: no signature, or another key's.
+    """
+    if not isinstance(signature, str):
+        raise ValueError("not signed, and a key is set: sign it by writing it with the key")
+    if not hmac.compare_digest(signed(checksum, key), signature):
+        raise ValueError("signed with another key, or changed since")

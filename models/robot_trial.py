@@ -1,0 +1,148 @@
+"""MuJoCo compiles a stranger's robot in a process of its own first, of limited memory and time.
+
+One process is kept for a while: it has loaded MuJoCo, and forks a child for each robot.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from select import select
+
+#: Limits of one trial beyond what MuJoCo takes by itself [bytes, s].
+MOST_MEMORY, MOST_SECONDS = 1 << 30, 10.0
+#: Longest time in which MuJoCo is loaded, on a busy machine [s].
+LOADING = 60.0
+#: A process that nobody asks ends after so long [s].
+IDLE = 20
+
+#: What a trial does with the content of a request, its file's path or its text.
+COMPILE = """
+spec = mujoco.MjSpec.from_string(what["text"]) if "text" in what else \\
+    mujoco.MjSpec.from_file(what["path"])
+spec.compile()
+"""
+_SERVER = """
+import json, os, signal, sys
+import mujoco
+memory, idle, work = int(sys.argv[1]), int(sys.argv[2]), compile(sys.argv[3], "trial", "exec")
+def limit():
+    import resource
+    with open("/proc/self/statm") as statm:
+        most = int(statm.read().split()[0]) * resource.getpagesize() + memory
+    for kind, soft in ((resource.RLIMIT_AS, most), (resource.RLIMIT_CPU, 20)):
+        hard = resource.getrlimit(kind)[1]
+        resource.setrlimit(kind, (soft if hard < 0 else min(soft, hard), hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+def trial(what):
+    try:
+        exec(work, {"mujoco": mujoco, "what": what, "os": os, "signal": signal})
+    except ValueError:
+        pass
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+print("ready", flush=True)
+while True:
+    signal.alarm(idle)
+    line = sys.stdin.readline()
+    signal.alarm(0)
+    if not line:
+        os._exit(0)
+    child = os.fork()
+    if child == 0:
+        os.dup2(2, 1)
+        try:
+            if os.path.exists("/proc/self/statm"):
+                limit()
+            trial(json.loads(line))
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    print(os.waitpid(child, 0)[1], flush=True)
+"""
+
+
+class Trial:
+    """What tries robots; safe to ask from several threads, and after a fork.
+
+    A system without ``fork`` (Windows) tries nothing; one without ``/proc`` (macOS) has no limit of
+    memory.
+
+    Args:
+        work: Python that gets ``what``, a request, and ``mujoco``.
+        seconds: for one robot.
+    """
+
+    def __init__(self, work: str = COMPILE, seconds: float = MOST_SECONDS) -> None:
+        """Nothing is started before the first question."""
+        self._work, self.seconds = work, seconds
+        self._lock, self._owner = threading.Lock(), 0
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def of(self, **what: str) -> str | None:
+        """None if MuJoCo compiles or refuses it, else what happened.
+
+        Args:
+            what: ``path`` of a file, or its ``text``.
+        """
+        if not hasattr(os, "fork"):
+            return None
+        line = json.dumps(what).encode() + b"\n"
+        if self._owner != os.getpid():  # the process of a parent is not ours
+            self._lock, self._process, self._owner = threading.Lock(), None, os.getpid()
+        with self._lock:
+            for _ in range(2):  # an idle one may have ended this moment
+                process = self._running()
+                if process is None or process.stdin is None:
+                    break
+                with contextlib.suppress(BrokenPipeError):
+                    process.stdin.write(line)
+                    process.stdin.flush()
+                    return self._answer(process)
+                self._end()
+        return "its process does not start"
+
+    def _answer(self, process: subprocess.Popen[bytes]) -> str | None:
+        assert process.stdout is not None
+        if not select([process.stdout], [], [], self.seconds)[0]:
+            self._end()
+            return f"MuJoCo needs more than {self.seconds:g} s for it"
+        answer = process.stdout.readline().strip()
+        if answer == b"0":
+            return None
+        if not answer:
+            self._end()
+        return (
+            f"MuJoCo does not survive it (a crash, or more than {MOST_MEMORY >> 30} GiB of memory)"
+        )
+
+    def _running(self) -> subprocess.Popen[bytes] | None:
+        if self._process is None or self._process.poll() is not None:
+            command = [sys.executable, "-c", _SERVER, str(MOST_MEMORY), str(IDLE), self._work]
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+            out = self._process.stdout
+            if out is None or not select([out], [], [], LOADING)[0] or not out.readline():
+                self._end()
+        return self._process
+
+    def _end(self) -> None:
+        process, self._process = self._process, None
+        if process is None:
+            return
+        with contextlib.suppress(OSError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):
+                    pipe.close()
