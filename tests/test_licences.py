@@ -10,8 +10,8 @@ import pytest
 
 #: Licences of what is needed: none asks more than a notice, weak copyleft in libraries included.
 ALLOWED = re.compile(
-    r"apache|bsd|boost|qhull|\bmit\b|expat|python software|psf|isc\b|0bsd|zlib|unlicense|hpnd|public domain"
-    r"|mozilla|mpl|cc0|lgpl",
+    r"apache|bsd|boost|qhull|\bmit\b|expat|python software|psf|isc\b|0bsd|zlib|unlicense|hpnd"
+    r"|public domain|mozilla|mpl|cc0|lgpl",
     re.IGNORECASE,
 )
 REFUSED = re.compile(r"\bA?GPL", re.IGNORECASE)

@@ -68,14 +68,18 @@ class Run:
     def __init__(self, folder: Path, workers: int) -> None:
         """Start it."""
         self.log = Path(tempfile.mkstemp(prefix="kills-")[1])
+        ready, begun = os.pipe()
         self.pid = os.fork()
         if self.pid == 0:
-            self._child(folder, workers)
+            self._child(folder, workers, begun)
+        os.close(begun)
+        os.read(ready, 1)  # the command has begun, or there is none
+        os.close(ready)
         with contextlib.suppress(OSError):
             os.setpgid(self.pid, self.pid)
         self.code: int | None = None
 
-    def _child(self, folder: Path, workers: int) -> None:
+    def _child(self, folder: Path, workers: int, begun: int) -> None:
         code = 1
         try:
             os.setpgid(0, 0)
@@ -84,7 +88,7 @@ class Run:
             os.dup2(handle, 1)
             os.dup2(handle, 2)
             sys.stderr = os.fdopen(2, "w", closefd=False)
-            code = command(folder, workers)
+            code = command(folder, workers, lambda: os.close(begun))
         except BaseException:
             import traceback
 
@@ -223,6 +227,7 @@ def judged(kind: str, run: Run, folder: Path, truth: Path, count: Count) -> None
     lines = run.log.read_text().splitlines()
     if run.code != 0 and (len(lines) != 1 or run.code not in (2, 130)):
         count.add("wrong lines")
+        print(f"exit code {run.code}:", *lines[-8:], sep="\n", flush=True)
 
 
 def mounting() -> bool:

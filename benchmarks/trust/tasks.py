@@ -6,6 +6,7 @@ Nothing heavy is imported here: workers start in a fraction of a second.
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +32,11 @@ def write_one(task: tuple[str, int]) -> int:
     return number
 
 
-def command(folder: Path, workers: int) -> int:
-    """What a command does with such tasks; its exit code."""
-    todo = [(str(folder), number) for number in range(FILES)]
+def command(folder: Path, workers: int, begun: Callable[[], None] = lambda: None) -> int:
+    """What a command does with such tasks; its exit code. ``begun`` is called at its beginning."""
     try:
+        begun()
+        todo = [(str(folder), number) for number in range(FILES)]
         with writing(write_one, todo, workers, folder) as results:
             for _ in results:
                 pass
