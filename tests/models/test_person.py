@@ -80,12 +80,14 @@ def test_the_peak_of_a_blow_is_that_of_the_two_mass_model(region, mass, tmp_path
         if other.name != part.name:
             data.mocap_pos[frame, 1] = 40.0
     speed = 0.5
-    data.qpos[scene.qpos_adr], data.qvel[scene.dof_adr] = -0.25, speed
+    data.qpos[scene.qpos_adr], data.qvel[scene.dof_adr] = -0.12 - part.radius, speed
     armature = float(model.dof_armature[scene.dof_adr[0]])
     model.dof_damping[scene.dof_adr] = 0.0
     peak = 0.0
     for _ in range(3000):
         mujoco.mj_step(model, data)
+        if peak and not data.ncon:
+            break
         force = np.zeros(6)
         for c in range(data.ncon):
             mujoco.mj_contactForce(model, data, c, force)
