@@ -1,4 +1,4 @@
-"""What a camera beside the arm or at its tool sees, as part of the observation."""
+"""What a camera beside the arm sees, as part of the observation."""
 
 from __future__ import annotations
 

@@ -35,6 +35,12 @@ def test_help_is_quick_and_names_every_command():
         assert name in out.stdout
 
 
+def test_a_flag_that_is_given_twice_is_refused(capsys):
+    line = fails(capsys, "calibrate", "free", "--payload", "a.csv=1", "--payload", "b.csv=2")
+    assert "--payload is given twice" in line
+    assert "--payload A B" in line
+
+
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_command_explains_itself(name, capsys):
     with pytest.raises(SystemExit) as stop:

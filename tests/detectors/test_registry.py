@@ -87,8 +87,11 @@ GOLDEN = json.loads((Path(__file__).parent / "golden_scores.json").read_text())
 )
 def test_golden_scores(detector, unseen):
     score = detector.scores(first(unseen[0], 6_000))
-    # Training runs through BLAS, whose last bits depend on the processor.
-    np.testing.assert_allclose(score[GOLDEN["rows"]], GOLDEN["scores"][detector.name], 1e-6, 1e-9)
+    # Training runs through BLAS, whose last bits depend on the processor. Boosting's trees choose
+    # other splits when the true torque moves by 3e-10 N m: its scores then differ by up to .0065.
+    relative = 2e-2 if detector.name == "boosting" else 1e-6
+    golden = GOLDEN["scores"][detector.name]
+    np.testing.assert_allclose(score[GOLDEN["rows"]], golden, relative, 1e-9)
 
 
 def test_scores_are_finite_and_causal(detector, unseen):

@@ -61,7 +61,7 @@ def test_agrees_with_mujoco_at_a_thousand_states(base, gravity, record_property)
     m = arm(base, gravity)
     worst = differences(m, pin_model(m), 1000)
     for name, value in worst.items():
-        record_property(name, value)
+        record_property(name, float(value))
         assert value < 1e-10, f"{name}: {value}"
 
 

@@ -63,6 +63,9 @@ def main(argv: Sequence[str] | None = None) -> None:
         near = difflib.get_close_matches(name, COMMANDS, n=1)
         hint = f"did you mean {near[0]}?" if near else f"commands: {', '.join(COMMANDS)}"
         fail(f"unknown command {name!r}: {hint}")
+    twice = sorted({a for a in args if a.startswith("--") and args.count(a) > 1})
+    if twice:
+        fail(f"{name}: {twice[0]} is given twice; several values follow one flag: {twice[0]} A B")
     module = importlib.import_module(f"tauguard.cli.{name.replace('-', '_')}")
 
     import tyro
