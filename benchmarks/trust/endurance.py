@@ -173,9 +173,10 @@ def draw(rows: list[Row], figure: Figure) -> None:
                 axes.semilogy(share, values, line, color=f"C{k}", label=f"{kind}p{p:g}")
         axes.axhline(PERIOD, color="black", linewidth=0.8, label="the action's 10 ms")
     top.set(xlabel="share of the run", ylabel="memory [MiB]")
-    top.set_ylim(bottom=0)
     middle.set(xlabel="simulated hours", ylabel="largest rms residual [N m]")
-    middle.set_ylim(bottom=0)
+    for axes in (top, middle):
+        axes.set_ylim(0, 1.25 * axes.get_ylim()[1])
     low.set(xlabel="simulated hours", ylabel="time of an action [us]")
+    low.set_ylim(top=30 * low.get_ylim()[1])  # room for the names of the lines
     for axes in (top, low):
-        axes.legend(frameon=False, ncols=5)
+        axes.legend(frameon=False, ncols=5, loc="upper center", fontsize="x-small")
