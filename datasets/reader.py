@@ -8,7 +8,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 
-from tauguard.datasets.columns_of_shards import RESIDUAL, trace_of
+from tauguard.datasets.columns_of_shards import trace_of
 from tauguard.datasets.dataset_folder import HEAD, arm_xml, configuration_in, shards
 from tauguard.datasets.dataset_folder import arms_of as arms_in
 from tauguard.datasets.logs import read_log
@@ -72,15 +72,6 @@ def arms_of(folder: Path, splits: Sequence[str] | None = None) -> tuple[str, ...
     """The arms of a dataset's splits, by name."""
     chosen = splits_of(folder, splits)
     return arms_in(configuration_in(folder), chosen)
-
-
-def read_residuals(folder: Path, line: dict[str, Any]) -> Any:
-    """The stored residuals of one episode [N m], shape (T, n)."""
-    import numpy as np
-
-    names = [f"{RESIDUAL}_{i}" for i in range(1, len(line["joints"]) + 1)]
-    rows = pq.ParquetFile(folder / line["shard"]).read_row_group(line["row_group"], names)
-    return np.stack([column.to_numpy() for column in rows.columns], axis=1).astype(np.float64)
 
 
 def _of_dataset(folder: Path, splits: Sequence[str] | None, arm: str | None) -> Iterator[Trace]:

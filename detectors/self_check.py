@@ -15,6 +15,8 @@ from tauguard.traces.trace import Trace
 
 #: Sample intervals [s] and settling times [s] that a recording of an arm can have.
 INTERVALS, LONGEST_SETTLE = (1e-5, 1.0), 600.0
+#: Samples of the settling time, at most: the check runs through all of them.
+MOST_SAMPLES = 100_000
 #: Torque per ampere [N m/A], mass of a link [kg] and gravity [m/s^2] that an arm can have.
 GAINS, HEAVIEST, GRAVITY = (1e-4, 1e4), 1e4, 100.0
 #: Blows that one of has to be noticed: torques at all joints [N m], their length and pause [s].
@@ -32,6 +34,11 @@ def check_ranges(alarm: CollisionAlarm) -> None:
         raise ValueError(f"dt {detector.dt:g} s: expected {INTERVALS[0]:g} to {INTERVALS[1]:g}")
     if not 0 <= detector.settle <= LONGEST_SETTLE:
         raise ValueError(f"settle {detector.settle:g} s: expected 0 to {LONGEST_SETTLE:g}")
+    if detector.settle / detector.dt > MOST_SAMPLES:
+        raise ValueError(
+            f"settle {detector.settle:g} s of dt {detector.dt:g} s: expected {MOST_SAMPLES:g} "
+            "samples at most"
+        )
     size = np.abs(arm.drive_gain)
     if not ((size >= GAINS[0]) & (size <= GAINS[1])).all():
         raise ValueError(f"drive_gain {arm.drive_gain}: expected {GAINS[0]:g} to {GAINS[1]:g}")

@@ -50,19 +50,11 @@ def record_policy(
     if dataset in minari.list_local_datasets():
         raise ValueError(f"{dataset}: Minari has a dataset of that name; name another version")
     env = gymnasium.make(name, **keywords)
-    written: Any = None
-    try:
-        for episode in range(episodes):
-            buffer = _episode(env, policy, episode, seed + episode)
-            if written is None:
-                written = minari.create_dataset_from_buffers(
-                    dataset,
-                    [buffer],
-                    env=env,
-                    algorithm_name=getattr(policy, "__name__", "policy"),
-                )
-            else:
-                written.update_dataset_from_buffer([buffer])
+    try:  # all of them first: what is there is whole
+        buffers = [_episode(env, policy, number, seed + number) for number in range(episodes)]
+        minari.create_dataset_from_buffers(
+            dataset, buffers, env=env, algorithm_name=getattr(policy, "__name__", "policy")
+        )
     finally:
         env.close()
     return episodes

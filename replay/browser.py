@@ -50,7 +50,11 @@ class BrowserReplay:
         viewer_port = _free_port()
         self._files.viewer = f"http://{HOST}:{viewer_port}"
         self._files.address = self.address
-        self._viewer = _start_viewer(viewer_port, self.address)
+        try:
+            self._viewer = _start_viewer(viewer_port, self.address)
+        except OSError:
+            self._close_files()
+            raise
 
     def url(self, name: str) -> str:
         """Where a browser sees the recording ``name`` of the folder."""
@@ -63,6 +67,9 @@ class BrowserReplay:
     def close(self) -> None:
         """Stop both servers."""
         _end(self._viewer)
+        self._close_files()
+
+    def _close_files(self) -> None:
         self._files.shutdown()
         self._files.server_close()
 
@@ -98,6 +105,10 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
             super().do_GET()
         else:
             self.send_error(http.HTTPStatus.NOT_FOUND)
+
+    def do_HEAD(self) -> None:
+        """Nobody asks for heads alone."""
+        self.send_error(http.HTTPStatus.METHOD_NOT_ALLOWED)
 
     def list_directory(self, path: str | os.PathLike[str]) -> None:
         """Nothing but what has a name is shown."""

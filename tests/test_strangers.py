@@ -152,7 +152,7 @@ def test_a_robot_file_on_which_mujoco_would_crash_is_one_line(tmp_path, monkeypa
 
 @pytest.mark.parametrize(("kind", "workers"), list(kills.TRIALS))
 def test_what_is_written_is_whole_however_a_run_ends(kind, workers, truth, tmp_path):
-    # `tauguard bench kills` does it 470 times.
+    # `tauguard bench kills` does it 520 times.
     if kind == "full disk" and not kills.mounting():
         pytest.skip("no small disk can be mounted here: only root can")
     count = kills.Count()

@@ -63,8 +63,8 @@ def lines(
     path = None
     if keep is not None:
         keep.mkdir(parents=True, exist_ok=True)
-        path = keep / f"guard-{family}-{seed}.jsonl"
-    done = path.read_text().splitlines() if path is not None and path.exists() else []
+        path = keep / f"guard-{family}-{seed}-{len(methods)}-{len(fixed)}.jsonl"
+    done = _whole_lines(path) if path is not None and path.exists() else []
     for text in done[:count]:
         yield _read(text)
     for k, scene in enumerate(scenes(family, seed, max(0, count - len(done)), len(done))):
@@ -77,8 +77,17 @@ def lines(
         yield line
 
 
+def _whole_lines(path: Path) -> list[str]:
+    """The file's lines; a last one that was cut off while it was written is taken away."""
+    text = path.read_text()
+    whole = text[: text.rfind("\n") + 1]
+    if whole != text:
+        path.write_text(whole)
+    return whole.splitlines()
+
+
 def _read(text: str) -> Line:
-    """A line of the file; one that was cut off while it was written is refused."""
+    """A line of the file."""
     values = json.loads(text)
     return Line(
         values["timestep"],

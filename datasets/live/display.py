@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -11,7 +10,7 @@ from typing import Self
 from tauguard.datasets.live.sample import Sample
 from tauguard.detectors.faults.monitor import Answer
 
-#: Answers that wait to be shown; older ones are dropped, changes of state last.
+#: Answers that wait to be shown; further ones are dropped, changes of state last.
 WAITING = 1000
 #: Seconds that the end waits for what has not been shown yet.
 PATIENCE = 1.0
@@ -57,6 +56,5 @@ class Behind:
         while not self._over or self._queue:
             self._wake.wait()
             self._wake.clear()
-            with contextlib.suppress(IndexError):
-                while True:
-                    self._show(*self._queue.popleft())
+            while self._queue:
+                self._show(*self._queue.popleft())

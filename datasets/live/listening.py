@@ -57,7 +57,9 @@ class Heard:
         self.spans.add(t, answer)
 
     def silent(self, seconds: float) -> None:
-        """Nothing came for ``seconds``."""
+        """Nothing came for ``seconds``; before the first sample that is no fault."""
+        if np.isnan(self.last):
+            return
         self.spans.mark(FAULT, True, self.last, f"silent: no sample for {seconds:.1f} s")
 
     def trace(self) -> Trace:

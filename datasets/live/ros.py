@@ -84,7 +84,8 @@ class RosSource(Closing):
             self._waiting.put_nowait(found)
         except queue.Full:
             self._lost += 1
-            self.events[-1:] = [f"{self._lost} samples lost: they came faster than they were read"]
+            if self._lost == 1:
+                self.events.append("samples are lost: they come faster than they are read")
 
     def read(self, timeout: float) -> Sample | None:
         """The next sample, or None if none came within ``timeout`` seconds.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,22 +57,6 @@ class ThresholdCard:
     def ur(self) -> dict[str, float]:
         """In the form of UR's safety settings: the tool force limit [N]."""
         return {"tool_force_limit_n": UPPER * self.tool["moving"][1]}
-
-    def as_json(self) -> dict[str, Any]:
-        """All numbers, ready for JSON."""
-        arrays = {k: getattr(self, k).tolist() for k in ("standing", "stopped", "moving")}
-        return {
-            "joints": list(self.joints),
-            **arrays,
-            "starting": self.starting.tolist(),
-            "tool_n": {k: list(v) for k, v in self.tool.items()},
-            "seconds": self.seconds,
-            "alarms": self.alarms,
-            "false_alarms_per_hour": self.false_alarms_per_hour,
-            "unseen": {k: list(v) for k, v in self.unseen.items()},
-            "franka": self.franka,
-            "ur": self.ur,
-        }
 
 
 def threshold_card(detector: FittedFreeMotion, traces: Sequence[Trace]) -> ThresholdCard:

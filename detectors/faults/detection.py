@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tauguard.detectors.detector import check_interval
 from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.faults.inputs import FaultCheck
 from tauguard.detectors.faults.monitor import FAULT, Answer, Monitor
@@ -35,6 +36,8 @@ def detect_with_faults(alarm: CollisionAlarm, trace: Trace) -> Monitored:
     """
     if alarm.inputs is None:
         return Monitored(alarm.detect(trace), (), 0.0)
+    if np.isfinite(trace.dt):
+        check_interval("the log", trace, alarm.detector.dt)
     if not np.isfinite(trace.dt) or _broken(alarm, trace):
         return _by_sample(alarm, trace)
     usual = alarm.inputs

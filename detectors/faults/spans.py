@@ -44,6 +44,8 @@ class Spans:
     def mark(self, state: str, up: bool, t: float, reason: str) -> None:
         """Open, prolong or close the span of one state."""
         span = self._open.get(state)
+        if up and span is None and not np.isfinite(t):
+            return  # it begins with the next time that is a number
         if up and span is None:
             last = next((span for span in reversed(self.found) if span.state == state), None)
             if last is not None and t - last.end < MERGED:

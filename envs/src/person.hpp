@@ -140,6 +140,7 @@ class Person {
     each(turned_), each(stride_), each(swing_), each(lowered_), each(lean_);
     for (double& t : touched_) each(t);
     for (Vec3& g : grip_) visit(g, each);
+    visit(axes_.forward, each), visit(axes_.left, each), visit(axes_.hip, each);
   }
 
  private:

@@ -110,7 +110,9 @@ def test_every_kind_of_mistake_has_its_recording_and_its_row(tmp_path):
     assert "1 missed, 2 late, 1 false alarm" in page
 
 
-def test_a_folder_of_other_things_is_not_written_into(tmp_path):
-    (tmp_path / "thesis.txt").write_text("keep")
+@pytest.mark.parametrize("name", ["thesis.txt", "episode-00000.rrd"])
+def test_a_folder_of_other_things_is_not_written_into(tmp_path, name):
+    (tmp_path / name).write_text("keep")
     with pytest.raises(ValueError, match="other files"):
         EventFolder(tmp_path, late=0.05)
+    assert (tmp_path / name).read_text() == "keep"

@@ -63,10 +63,11 @@ def main(argv: Sequence[str] | None = None) -> None:
         near = difflib.get_close_matches(name, COMMANDS, n=1)
         hint = f"did you mean {near[0]}?" if near else f"commands: {', '.join(COMMANDS)}"
         fail(f"unknown command {name!r}: {hint}")
-    twice = sorted({a for a in args if a.startswith("--") and args.count(a) > 1})
-    if twice:
-        fail(f"{name}: {twice[0]} is given twice; several values follow one flag: {twice[0]} A B")
     module = importlib.import_module(f"tauguard.cli.{name.replace('-', '_')}")
+    for flag, kind in module.command.__annotations__.items():
+        given = f"--{flag.replace('_', '-')}"
+        if str(kind).startswith("tuple") and args.count(given) > 1:  # the last would win
+            fail(f"{name}: {given} is given twice; several values follow one flag: {given} A B")
 
     import tyro
 

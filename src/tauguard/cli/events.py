@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,8 @@ BEFORE, LENGTH = 0.5, 10.0
 #: Recordings written of one kind of event, at most.
 MOST = 100
 KINDS = ("missed", "late", "false alarm")
+#: The names of the recordings.
+OWN = re.compile(r"(missed|late|false-alarm)-\d+\.rrd")
 
 
 @dataclass(frozen=True)
@@ -55,10 +58,10 @@ class EventFolder:
         Raises:
             ValueError: the folder holds something else.
         """
-        if folder.exists() and (not folder.is_dir() or _strange(folder)):
+        if folder.exists() and (not folder.is_dir() or not all(map(_own, folder.iterdir()))):
             raise ValueError(f"{folder}: holds other files; --events takes a folder of its own")
         folder.mkdir(parents=True, exist_ok=True)
-        for old in folder.glob("*.rrd"):
+        for old in filter(_own, folder.iterdir()):
             old.unlink()
         self._folder, self._late = folder, late
         self._rows: list[dict[str, Any]] = []
@@ -84,6 +87,7 @@ class EventFolder:
     def finish(self) -> Path:
         """Write the page; its path."""
         from tauguard.report.page import Link, page, tables
+        from tauguard.whole_file import write_whole
 
         counts = ", ".join(f"{count} {kind}" for kind, count in self._found.items())
         how = (
@@ -99,12 +103,14 @@ class EventFolder:
             for kind in KINDS
         }
         path = self._folder / "index.html"
-        path.write_text(page("What the detector got wrong", {"How to read": how, **sections}))
+        text = page("What the detector got wrong", {"How to read": how, **sections})
+        write_whole(path, text)
         return path
 
 
-def _strange(folder: Path) -> bool:
-    return any(p.suffix != ".rrd" and p.name != "index.html" for p in folder.iterdir())
+def _own(path: Path) -> bool:
+    """Whether this command writes files of that name."""
+    return path.name == "index.html" or bool(OWN.fullmatch(path.name))
 
 
 def _of(event: Event) -> dict[str, Any]:

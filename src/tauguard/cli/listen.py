@@ -99,12 +99,12 @@ def command(
         events = list(source.events)
     result = summary(heard, events, alarm)
     report(result)
+    if record is not None:
+        save(record, heard, alarm)
     if json is not None:
         from tauguard.report import write_json
 
         write_json(json, result)
-    if record is not None:
-        save(record, heard, alarm)
 
 
 def told(alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool) -> CollisionAlarm:
