@@ -72,7 +72,7 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     struck, free = tmp_path / "all", tmp_path / "all" / "free"
     common = ("--workers", "1", "--payloads-g", "0", "1000", "--speeds", "30")
     run("simulate", "--out", str(struck), "--episodes", "2", "--collisions", "5", *common)
-    free_flags = ("--episodes", "2", "--collisions", "0", "--seconds", "15", *common)
+    free_flags = ("--episodes", "2", "--collisions", "0", "--seconds", "40", *common)
     run("simulate", "--out", str(free), *free_flags)
     for path in free.glob("*.mcap"):
         path.rename(struck / f"free-{path.name}")

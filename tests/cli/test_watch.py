@@ -26,7 +26,10 @@ def entities(path):
 @pytest.mark.parametrize(
     ("arguments", "shown"),
     [
-        (["Reach-v0", "--set", "detector=observer"], ["/scene/link6", "/scene/person_left_hand", "/residual"]),
+        (
+            ["Reach-v0", "--set", "detector=observer"],
+            ["/scene/link6", "/scene/person_left_hand", "/residual"],
+        ),
         (["ClothReach-v0"], ["/scene/cloth_0"]),
         (["React-v0", "--policy", "still", "--reaction", "stop0"], ["/scene/chest"]),
         (["TwoArms-v0", "--policy", "random"], ["/scene/arm2_link6"]),

@@ -173,8 +173,8 @@ def explained(
 
     try:
         surface = link_surface(robot)
-    except ValueError:
-        return (), (f"{robot.name} has no collision shapes: links and forces are not looked for",)
+    except ValueError as error:
+        return (), (f"{error}: links and forces are not looked for",)
     return Diagnoser.of(detector.arm, surface).diagnose(trace, found.detection.alarms), ()
 
 
@@ -212,7 +212,11 @@ def summary(
         "watched_seconds": watched,
         "detector": found.detection.detector,
         "score_threshold": found.detection.threshold,
-        "thresholds_nm": [v if np.isfinite(v) else None for v in found.thresholds.tolist()],
+        # A trained detector has one threshold, of its score.
+        "thresholds_nm": [
+            v if np.isfinite(v) and found.detection.detector == "threshold" else None
+            for v in found.thresholds.tolist()
+        ],
         "faults": [{"start": f.start, "end": f.end, "reason": f.reason} for f in found.faults],
         "fault_seconds": found.fault_seconds,
         "alarms": len(events),

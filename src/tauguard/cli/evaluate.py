@@ -95,9 +95,16 @@ def judged_one_by_one(
 ) -> tuple[list[Matching], dict[str, Any]]:
     """Every recording judged, and the figures of what is said after its alarms; one in memory."""
     from tauguard.detectors import diagnosis_figures, match_detection
+    from tauguard.detectors.detector import check_interval
 
     matchings, said = [], []
     for number, trace in enumerate(recordings, start=1):
+        check_interval(f"recording {number}", trace, alarm.detector.dt)
+        if trace.joint_names != alarm.detector.arm.robot.joint_names:
+            raise ValueError(
+                f"recording {number} is of joints {', '.join(trace.joint_names)}, the model of "
+                f"{', '.join(alarm.detector.arm.robot.joint_names)}"
+            )
         found = alarm.detect(trace)
         matchings.append(match_detection(found, trace, alarm.settle))
         if wrong is not None:

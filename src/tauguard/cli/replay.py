@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -68,5 +69,6 @@ def serve(shown: Path, port: int) -> None:
         )
     with BrowserReplay(folder, port) as replay:
         address = f"{replay.address}/" if shown.is_dir() else replay.url(shown.name)
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the servers end with it
         print(f"open {address} in a browser; Ctrl-C ends this", flush=True)
         replay.wait()

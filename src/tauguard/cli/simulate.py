@@ -53,11 +53,12 @@ def command(
     if collisions < 0:
         raise ValueError(f"--collisions {collisions}: expected 0 or more")
     load_arm(robot)  # named before anything is simulated
+    first = 10_000  # smaller seeds are the demo's, whose model may be judged on these episodes
     arm = None if mismatch_seed is None else Mismatch(seed=mismatch_seed)
     planned = (
-        struck_episodes(seed, episodes, collisions, speeds, payloads_g, arm)
+        struck_episodes(first + seed, episodes, collisions, speeds, payloads_g, arm)
         if collisions
-        else free_episodes(seed, episodes, seconds, speeds, payloads_g, arm)
+        else free_episodes(first + seed, episodes, seconds, speeds, payloads_g, arm)
     )
     planned = [replace(episode, arm=robot) for episode in planned]
     paths = write_dataset(planned, out, workers, checkers)
