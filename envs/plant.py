@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from tauguard.envs import _plant
 from tauguard.models import Drive, Scene, derive
+from tauguard.models.mujoco_library import function_address, library
 
 Array = NDArray[np.float64]
 
@@ -67,29 +66,13 @@ def _home_inertia(scene: Scene) -> Array:
     return np.asarray(np.diag(mass)[scene.dof_adr])
 
 
-@functools.cache
-def _library() -> ctypes.CDLL:
-    """The MuJoCo library that the Python binding has loaded."""
-    folder = Path(mujoco.__file__).parent
-    names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib")]
-    if not names:
-        raise OSError(f"no MuJoCo library beside its Python binding in {folder.name}")
-    return ctypes.CDLL(str(names[0]))
-
-
-def _address(function: str) -> int:
-    address = ctypes.cast(getattr(_library(), function), ctypes.c_void_p).value
-    assert address is not None
-    return address
-
-
 @contextlib.contextmanager
 def untimed() -> Iterator[None]:
     """In this block MuJoCo does not look at the clock in every step (for ``MjData.timer``).
 
     That is a tenth of a small arm's step. It holds for the whole process.
     """
-    timer = ctypes.c_void_p.in_dll(_library(), "mjcb_time")
+    timer = ctypes.c_void_p.in_dll(library(), "mjcb_time")
     before, timer.value = timer.value, None
     try:
         yield
@@ -116,7 +99,7 @@ def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) 
 def make_physics(model: mujoco.MjModel, data: mujoco.MjData) -> _plant.Physics:
     """MuJoCo's step and kinematics of ``data`` for native code, which keeps both alive."""
     return _plant.Physics(
-        model, data, step=_address("mj_step"), kinematics=_address("mj_kinematics")
+        model, data, step=function_address("mj_step"), kinematics=function_address("mj_kinematics")
     )
 
 

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from pathlib import Path
 
 import mujoco
+
+from tauguard.models.mujoco_library import library
 
 #: Significant digits that identify every double.
 _DIGITS = 17
 
 
 @functools.cache
-def _library() -> ctypes.CDLL | None:
+def _precise_library() -> ctypes.CDLL | None:
     """The MuJoCo library, if it lets the digits of its XML be chosen."""
-    folder = Path(mujoco.__file__).parent
-    names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib")]
-    library = ctypes.CDLL(str(names[0])) if names else None
-    return library if hasattr(library, "_mjPRIVATE__set_xml_precision") else None
+    try:
+        found = library()
+    except OSError:
+        return None
+    return found if hasattr(found, "_mjPRIVATE__set_xml_precision") else None
 
 
 def xml_text(spec: mujoco.MjSpec) -> str:
@@ -27,15 +29,15 @@ def xml_text(spec: mujoco.MjSpec) -> str:
     MuJoCo writes six digits unless told otherwise, which moves a rotated base by micrometres. The
     switch is a private function of its library; where it is missing the text has six digits.
     """
-    library = _library()
-    if library is None:
+    switch = _precise_library()
+    if switch is None:
         return str(spec.to_xml())
-    before = library._mjPRIVATE__get_xml_precision()
-    library._mjPRIVATE__set_xml_precision(_DIGITS)
+    before = switch._mjPRIVATE__get_xml_precision()
+    switch._mjPRIVATE__set_xml_precision(_DIGITS)
     try:
         return str(spec.to_xml())
     finally:
-        library._mjPRIVATE__set_xml_precision(before)
+        switch._mjPRIVATE__set_xml_precision(before)
 
 
 class SpecText:

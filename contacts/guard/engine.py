@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from pathlib import Path
 from typing import Any
 
 import mujoco
 from mujoco.introspect import ast_nodes
 from mujoco.introspect.structs import STRUCTS
+
+from tauguard.models.mujoco_library import function_address
 
 FUNCTIONS = (
     "mj_step",
@@ -83,7 +84,7 @@ def addresses(model: Any, data: Any, end: Any) -> dict[str, int]:
     Raises:
         RuntimeError: the installed MuJoCo lays out its structs otherwise than it declares.
     """
-    out = {name: _function(name) for name in FUNCTIONS}
+    out = {name: function_address(name) for name in FUNCTIONS}
     out |= {name: _array(model, name) for name in _MODEL_ARRAYS}
     out |= {name: _array(data, name) for name in _DATA_ARRAYS}
     out |= {f"end_{name}": _array(end, name) for name in _END_ARRAYS}
@@ -132,23 +133,6 @@ def _compare(model: Any, data: Any, found: dict[str, int], qpos: int) -> None:
 
 def _array(owner: Any, name: str) -> int:
     return int(getattr(owner, name).ctypes.data)
-
-
-@functools.cache
-def _function(name: str) -> int:
-    address = ctypes.cast(getattr(_library(), name), ctypes.c_void_p).value
-    assert address is not None
-    return address
-
-
-@functools.cache
-def _library() -> ctypes.CDLL:
-    """The MuJoCo library that the Python binding has loaded."""
-    folder = Path(mujoco.__file__).parent
-    names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib")]
-    if not names:
-        raise OSError(f"no MuJoCo library beside its Python binding in {folder.name}")
-    return ctypes.CDLL(str(names[0]))
 
 
 @functools.cache

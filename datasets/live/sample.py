@@ -57,13 +57,13 @@ class LiveSource(Protocol):
 
 
 class Closing:
-    """``with`` for a source."""
+    """``with`` for what is closed: a source, a server."""
 
     def close(self) -> None:
-        """Overridden by the source."""
+        """Overridden."""
 
     def __enter__(self) -> Self:
-        """The source itself."""
+        """Itself."""
         return self
 
     def __exit__(

@@ -12,12 +12,12 @@ import socket
 import struct
 import threading
 import time
-from types import TracebackType
 
 import numpy as np
 
 from tauguard.datasets.live import rtde
 from tauguard.datasets.live.packets import Packets
+from tauguard.datasets.live.sample import Closing
 
 HOST = "127.0.0.1"
 #: Output variables, their types, and the field of :class:`Packets` that they come from ("" : 0).
@@ -34,7 +34,7 @@ OUTPUTS = {
 }
 
 
-class UrServer:
+class UrServer(Closing):
     """Plays packets to every client that connects, in real time, on 127.0.0.1.
 
     Args:
@@ -103,15 +103,6 @@ class UrServer:
     def __enter__(self) -> UrServer:
         """The server, serving."""
         return self.start()
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Stop."""
-        self.close()
 
     # -- one client -------------------------------------------------------------------------------
 

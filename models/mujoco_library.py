@@ -1,0 +1,31 @@
+"""The MuJoCo library that the Python binding has loaded, for code that calls it natively."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from pathlib import Path
+
+import mujoco
+
+
+@functools.cache
+def library() -> ctypes.CDLL:
+    """The library itself.
+
+    Raises:
+        OSError: there is none beside the binding.
+    """
+    folder = Path(mujoco.__file__).parent
+    names = [*folder.glob("libmujoco.so*"), *folder.glob("libmujoco*.dylib")]
+    if not names:
+        raise OSError(f"no MuJoCo library beside its Python binding in {folder.name}")
+    return ctypes.CDLL(str(names[0]))
+
+
+@functools.cache
+def function_address(name: str) -> int:
+    """Where one of its functions begins."""
+    address = ctypes.cast(getattr(library(), name), ctypes.c_void_p).value
+    assert address is not None
+    return address
