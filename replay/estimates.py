@@ -25,8 +25,8 @@ class Explained(Protocol):
         """A word; "payload" is no contact."""
 
     @property
-    def link(self) -> int:
-        """1-based."""
+    def said(self) -> str:
+        """All of it in a few words."""
 
     @property
     def force(self) -> Array:
@@ -35,13 +35,6 @@ class Explained(Protocol):
     @property
     def point(self) -> Array:
         """World frame [m], shape (3,)."""
-
-
-def what(one: Explained) -> str:
-    """An explanation in a few words."""
-    if one.kind == "payload":
-        return "payload change"
-    return f"{one.kind}, link {one.link}, {float(np.linalg.norm(one.force)):.0f} N"
 
 
 def during(explained: Sequence[Explained], frames: Array) -> list[Explained | None]:
@@ -75,6 +68,6 @@ def arrows(shown: Sequence[Explained | None], metres: float, longest: float) -> 
     return {
         "vectors": vectors,
         "origins": points - vectors,
-        "labels": [what(one) for one in some],
+        "labels": [one.said for one in some],
         "lengths": np.array([one is not None for one in shown], dtype=int),
     }

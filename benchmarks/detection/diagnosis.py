@@ -25,12 +25,17 @@ from tauguard.benchmarks.detection.diagnosis_pool import (
 )
 from tauguard.benchmarks.detection.fleet import CALIBRATE, TEST, Training, nominal, stream
 from tauguard.benchmarks.detection.pool import SPEEDS, free_pool
+from tauguard.benchmarks.detection.severity_rows import NOTE, severity_rows
 from tauguard.benchmarks.harness import measure
 from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
 from tauguard.detectors.diagnosis.aftermath import Aftermath, AftermathOf
 from tauguard.detectors.diagnosis.classification import KINDS
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
-from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors, contact_at
+from tauguard.detectors.diagnosis.diagnosis_metrics import (
+    ContactErrors,
+    TrueSeverity,
+    contact_at,
+)
 from tauguard.envs import simulate
 from tauguard.models import LinkSurface, cura6, link_surface
 from tauguard.report import Row, rate
@@ -63,6 +68,7 @@ NOTES = {
     "too: no person made one.",
     "payload": "loads that nobody told of, taken up and put down. mass_error_g: median, of those "
     "not called a collision.",
+    "severity": NOTE,
     "cost": "wall time of one alarm; aftermath_us is what the residual around it takes first.",
 }
 
@@ -107,10 +113,11 @@ class Judged:
     diagnosis: Diagnosis | None
     links: dict[str, int]  #: said by each method, 1-based, 0: none
     errors: dict[str, ContactErrors]
+    severity: TrueSeverity | None = None
 
 
 def run(quick: bool, seed: int) -> list[Row]:
-    """Rows of five studies: link, link_confusion, contact, kind, payload, cost."""
+    """Rows of the studies that :data:`NOTES` names."""
     size = QUICK if quick else FULL
     # Arms and streams of seeds that nothing was tuned on.
     arms = [31_000 + 100 * seed + k for k in range(size.arms)]
@@ -130,7 +137,7 @@ def run(quick: bool, seed: int) -> list[Row]:
                 sample = sample or (event if event.alarm is not None else None)
     contacts = [j for j in judged if j.collision is not None]
     rows = [*link_rows(contacts), *confusion_rows(contacts), *contact_rows(contacts)]
-    rows += [*kind_rows(judged), *payload_rows(judged)]
+    rows += [*sizes(contacts), *kind_rows(judged), *payload_rows(judged)]
     assert sample is not None
     return [*rows, cost_row(sample, watchers[sample.arm], surface)]
 
@@ -165,7 +172,8 @@ def judge(event: Event, watching: CollisionAlarm, surface: LinkSurface) -> Judge
     }
     truth = contact_at(event.trace, event.collision, found.time)
     errors = {n: ContactErrors.of(a.force, a.point, truth) for n, a in answers.items()}
-    return Judged(*known, found, {n: a.link for n, a in answers.items()}, errors)
+    true = TrueSeverity.of(event.trace, event.collision, found.looked)
+    return Judged(*known, found, {n: a.link for n, a in answers.items()}, errors, true)
 
 
 def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
@@ -252,6 +260,17 @@ def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
                 row[f"{name}_p95"] = float(np.percentile(column, 95))
             rows.append(row)
     return rows
+
+
+def sizes(contacts: Sequence[Judged]) -> list[Row]:
+    """What the intervals of impulse and peak force are worth."""
+    return severity_rows(
+        [
+            (j.kind, _link(j), j.diagnosis, j.severity)
+            for j in contacts
+            if j.diagnosis is not None and j.severity is not None
+        ]
+    )
 
 
 def kind_rows(judged: Sequence[Judged]) -> list[Row]:

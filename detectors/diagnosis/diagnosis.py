@@ -13,6 +13,7 @@ from tauguard.detectors.diagnosis.aftermath import AFTER, Aftermath, AftermathOf
 from tauguard.detectors.diagnosis.classification import Signs, signs
 from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
 from tauguard.detectors.diagnosis.isolation import Trust, isolate, last_joint, moments
+from tauguard.detectors.diagnosis.severity import Severity, severity
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
@@ -40,6 +41,9 @@ class Diagnosis:
     kind: str  #: the most likely of :data:`~tauguard.detectors.diagnosis.classification.KINDS`
     kinds: dict[str, float]  #: probability of each kind
     signs: Signs  #: what the kind was decided by
+    severity: Severity  #: impulse and peak force, each with an interval
+    looked: float  #: end of the look at it [s]
+    joints: tuple[str, ...]  #: their names
 
     @property
     def collision(self) -> bool:
@@ -50,6 +54,14 @@ class Diagnosis:
     def intended(self) -> bool:
         """Whether somebody meant to push."""
         return self.kind == "push"
+
+    @property
+    def said(self) -> str:
+        """The diagnosis in a few words, with intervals that hold 90 %."""
+        if not self.collision:
+            return f"payload changed by {self.signs.mass:+.2f} kg, no collision"
+        likely, size = self.links[self.link - 1], self.severity.text(self.kind, self.joints)
+        return f"{self.kind}, link {self.link} (probability {likely:.2f}), {size}"
 
 
 def diagnose(
@@ -138,6 +150,9 @@ class Diagnoser:
             max(shares, key=lambda kind: shares[kind]),
             shares,
             kinds,
+            severity(robot, self.surface, after, belief, len(rows), self.trust),
+            alarm.start + float(after.t[-1]),
+            robot.joint_names,
         )
 
     def _noise(self, after: Aftermath) -> Array:

@@ -62,12 +62,35 @@ class ContactErrors:
 
 
 @dataclass(frozen=True)
+class TrueSeverity:
+    """What a contact was until the end of the look at it."""
+
+    impulse: float  #: norm of the force's integral [N s]
+    peak: float  #: largest force [N]
+
+    @classmethod
+    def of(cls, trace: Trace, collision: Collision, until: float) -> TrueSeverity:
+        """From the truth, up to the time ``until`` [s].
+
+        Raises:
+            ValueError: the trace has no truth.
+        """
+        if trace.truth is None:
+            raise ValueError("trace has no truth to match a diagnosis with")
+        first, last = np.searchsorted(trace.t, (collision.onset, min(collision.end, until)))
+        force = trace.truth.contact_vector[first : last + 1]
+        size = np.linalg.norm(force, axis=1)
+        return cls(float(np.linalg.norm(force.sum(axis=0)) * trace.dt), float(size.max()))
+
+
+@dataclass(frozen=True)
 class MatchedDiagnosis:
     """A diagnosis and the collision that it is about; None for a false alarm."""
 
     diagnosis: Diagnosis
     collision: Collision | None
     errors: ContactErrors | None
+    severity: TrueSeverity | None = None
 
 
 def match_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[MatchedDiagnosis]:
@@ -92,7 +115,8 @@ def match_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[Matche
             used.add(about[0].onset)
             truth = contact_at(trace, about[0], diagnosis.time)
             errors = ContactErrors.of(diagnosis.force, diagnosis.point, truth)
-            matched.append(MatchedDiagnosis(diagnosis, about[0], errors))
+            true = TrueSeverity.of(trace, about[0], diagnosis.looked)
+            matched.append(MatchedDiagnosis(diagnosis, about[0], errors, true))
     return matched
 
 
@@ -103,14 +127,17 @@ def diagnosis_figures(matched: Iterable[MatchedDiagnosis]) -> dict[str, Any]:
         ``link_right``, ``link_or_neighbour``, ``last_joint_right`` (the usual rule), each a rate
         with its Wilson interval over the collisions found; ``force_error_n``, ``direction_deg``
         and ``point_cm`` (median, p95, n); ``called_payload`` over the collisions found and
-        ``false_alarms_called_payload`` over the false alarms, rates again.
+        ``false_alarms_called_payload`` over the false alarms, rates again; and those of
+        :func:`severity_figures`.
     """
     several = list(matched)
     found = [(j.diagnosis, j.collision) for j in several if j.collision is not None]
     errors = [j.errors for j in several if j.errors is not None]
     false = [j.diagnosis for j in several if j.collision is None]
     off = [abs(d.link - c.link) for d, c in found]
+    sizes = [(j.diagnosis, j.severity) for j in several if j.severity is not None]
     return {
+        **severity_figures(sizes),
         "link_right": wilson(sum(o == 0 for o in off), len(off)),
         "link_or_neighbour": wilson(sum(o <= 1 for o in off), len(off)),
         "last_joint_right": wilson(sum(d.last_joint == c.link for d, c in found), len(off)),
@@ -120,6 +147,25 @@ def diagnosis_figures(matched: Iterable[MatchedDiagnosis]) -> dict[str, Any]:
         "called_payload": wilson(sum(not d.collision for d, _ in found), len(found)),
         "false_alarms_called_payload": wilson(sum(not d.collision for d in false), len(false)),
     }
+
+
+def severity_figures(sizes: Sequence[tuple[Diagnosis, TrueSeverity]]) -> dict[str, Any]:
+    """How often the 90 % intervals of impulse and peak force hold the true value.
+
+    Returns:
+        ``impulse_held`` and ``peak_held``, rates; ``impulse_identifiable`` and
+        ``peak_identifiable``, rates; ``impulse_width`` and ``peak_width``, the upper end over the
+        lower one (median, p95, n).
+    """
+    figures: dict[str, Any] = {}
+    for name in ("impulse", "peak"):
+        pairs = [(getattr(d.severity, name), getattr(true, name)) for d, true in sizes]
+        held = sum(b.low <= value <= b.high for b, value in pairs)
+        figures[f"{name}_held"] = wilson(held, len(pairs))
+        identifiable = sum(b.identifiable for b, _ in pairs)
+        figures[f"{name}_identifiable"] = wilson(identifiable, len(pairs))
+        figures[f"{name}_width"] = spread([b.high / max(b.low, 1e-12) for b, _ in pairs])
+    return figures
 
 
 def spread(values: Sequence[float]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tauguard.detectors import Diagnosis
+    from tauguard.detectors.diagnosis.severity import Between, ContactTorque
     from tauguard.detectors.thresholds.quiet_start import Watch
     from tauguard.traces import Trace
 
@@ -98,16 +99,16 @@ def command(
         raise ValueError(f"{', '.join(plain.given())}: not beside --model, which brings its own")
     if model is None and payload is not None:
         raise ValueError("--payload goes with --model only")
-    said: Sequence[Diagnosis] = ()
+    causes: Sequence[dict[str, Any]] = ()
     trace = read_one(log, columns, torque)
     if model is not None:
         trace, detector, found = watched(model, trace, payload, robot)
-        said, notes = explained(detector, trace, found, robot)
+        causes, notes = explained(detector, trace, found, robot)
     else:
         trace, found, notes = plainly(log, trace, robot, columns, plain)
     for note in (*found.notes, *notes):
         print(f"note: {note}")
-    result = summary(log, trace, found, said)
+    result = summary(log, trace, found, causes)
     report(result)
     if json is not None:
         write_json(json, result)
@@ -166,20 +167,57 @@ def plainly(
 
 def explained(
     detector: Any, trace: Trace, found: Watch, robot: Path
-) -> tuple[Sequence[Diagnosis], tuple[str, ...]]:
-    """What each alarm was, where the robot's file has shapes to look for a contact on."""
+) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
+    """What each alarm was; its torques alone where the robot's file has no shapes."""
     from tauguard.detectors import Diagnoser
+    from tauguard.detectors.diagnosis.aftermath import AftermathOf
+    from tauguard.detectors.diagnosis.severity import ContactTorque
     from tauguard.models import link_surface
 
+    alarms = found.detection.alarms
     try:
         surface = link_surface(robot)
     except ValueError as error:
-        return (), (f"{error}: links and forces are not looked for",)
-    return Diagnoser.of(detector.arm, surface).diagnose(trace, found.detection.alarms), ()
+        looked = AftermathOf(detector.arm, detector.arm.envelope, trace)
+        felt = [ContactTorque.of(looked.at(alarm.start)) for alarm in alarms]
+        return [{"said": one.text(trace.joint_names), **torques(one)} for one in felt], (
+            f"{error}: links and forces are not looked for",
+        )
+    return [cause(one) for one in Diagnoser.of(detector.arm, surface).diagnose(trace, alarms)], ()
+
+
+def torques(felt: ContactTorque) -> dict[str, Any]:
+    """What a contact did at the joints, ready for JSON."""
+    return {
+        "contact_s": felt.seconds,
+        "peak_torque_nm": felt.peak.tolist(),
+        "joint_impulse_nms": felt.impulse.tolist(),
+    }
+
+
+def cause(one: Diagnosis) -> dict[str, Any]:
+    """A diagnosis, ready for JSON."""
+
+    def interval(value: Between) -> dict[str, Any]:
+        return {**dataclasses.asdict(value), "identifiable": value.identifiable}
+
+    return {
+        "said": one.said,
+        "kind": one.kind,
+        "kinds": one.kinds,
+        "link": one.link,
+        "links": one.links.tolist(),
+        "force_n": one.force.tolist(),
+        "point_m": one.point.tolist(),
+        "impulse_ns": interval(one.severity.impulse),
+        "peak_force_n": interval(one.severity.peak),
+        **torques(one.severity.torque),
+        "payload_kg": None if one.collision else one.signs.mass,
+    }
 
 
 def summary(
-    log: Path, trace: Trace, found: Watch, said: Sequence[Diagnosis] = ()
+    log: Path, trace: Trace, found: Watch, causes: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
     """The figures of a run, ready for JSON."""
     import numpy as np
@@ -194,16 +232,8 @@ def summary(
         joint = loudest_joint(found, alarm.start, alarm.end)
         name = trace.joint_names[joint]
         events.append({"start": alarm.start, "end": alarm.end, "joint": name})
-    for event, one in zip(events, said, strict=False):
-        event |= {
-            "kind": one.kind,
-            "kinds": one.kinds,
-            "link": one.link,
-            "links": one.links.tolist(),
-            "force_n": one.force.tolist(),
-            "point_m": one.point.tolist(),
-            "payload_kg": None if one.collision else one.signs.mass,
-        }
+    for event, one in zip(events, causes, strict=False):
+        event |= one
     return {
         "name": "detect",
         "log": log.name,
@@ -236,7 +266,7 @@ def report(result: dict[str, Any]) -> None:
         print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")
     for event in result["events"]:
         line = f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}"
-        print(line + what(event))
+        print(f"{line}: {event['said']}" if event.get("said") else line)
     for fault in result["faults"]:
         print(f"fault {fault['start']:.3f} s to {fault['end']:.3f} s: {fault['reason']}")
     if result["fault_seconds"]:
@@ -248,17 +278,6 @@ def report(result: dict[str, Any]) -> None:
         f"{result['alarms_per_hour_high']:.0f} per hour (95 %)"
         + (", a longer log would say more" if seconds < SHORT else "")
     )
-
-
-def what(event: dict[str, Any]) -> str:
-    """What an alarm was, if that is known."""
-    if "kind" not in event:
-        return ""
-    if event["payload_kg"] is not None:
-        return f": payload changed by {event['payload_kg']:+.2f} kg, no collision"
-    force = sum(value**2 for value in event["force_n"]) ** 0.5
-    likely = event["links"][event["link"] - 1]
-    return f": {event['kind']}, {force:.0f} N on link {event['link']} (probability {likely:.2f})"
 
 
 def leave(out: Path, trace: Trace, found: Watch, result: dict[str, Any], robot: Path) -> None:

@@ -83,6 +83,9 @@ def diagnosis_text(found: Mapping[str, Any]) -> str:
         lines.append(
             f"  {label:<26}  median {own['median']:.1f} {unit}, p95 {own['p95']:.1f} {unit}"
         )
+    for name, label in (("impulse", "impulse in its 90 %"), ("peak", "peak force in its 90 %")):
+        width = found[f"{name}_width"]["median"]
+        lines.append(f"  {label:<26}  {rate(found[f'{name}_held'])}, upper / lower {width:.1f}")
     if found["false_alarms_called_payload"]["n"]:
         lines.append(f"  false alarms, called load   {rate(found['false_alarms_called_payload'])}")
     return "\n".join(lines)

@@ -10,6 +10,7 @@ from tauguard.benchmarks.detection.fleet import Training
 from tauguard.detectors import Diagnosis
 from tauguard.detectors.diagnosis.classification import Signs
 from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors
+from tauguard.detectors.diagnosis.severity import Between, Severity
 from tauguard.traces import Alarm, Collision, Trace, Truth
 
 T = np.arange(0, 2, 1e-3)
@@ -31,8 +32,10 @@ def trace(pressed):
 def judged(link=3, said=3, kind="impact", called="impact", force=50.0, **event):
     alarm = Alarm(0.51, 0.6)
     signs = Signs(0.0, 0.0, 1.4, 0.1, 1e4, 1.0, 0.1)
+    size = Severity(Between(1.0, 0.9, 1.2), Between(70, 60, 400), None)
     found = Diagnosis(
-        alarm, said, np.ones(6) / 6, 1, 0.52, np.zeros(3), np.zeros(3), called, {}, signs
+        *(alarm, said, np.ones(6) / 6, 1, 0.52, np.zeros(3), np.zeros(3), called, {}, signs),
+        *(size, 0.8, ()),
     )
     errors = ContactErrors.of([force, 0, 0], np.zeros(3), ([50.0, 0, 0], np.array([0.1, 0, 0])))
     methods = diagnosis.METHODS
@@ -89,7 +92,7 @@ def test_a_small_run_fills_every_table(monkeypatch):
     monkeypatch.setattr(diagnosis, "QUICK", size)
     rows = diagnosis.run(True, 3)
     studies = {row["study"] for row in rows}
-    assert studies == {"link", "link_confusion", "contact", "kind", "payload", "cost"}
+    assert studies == set(diagnosis.NOTES)
     assert {row["method"] for row in rows if row["study"] == "link"} == set(diagnosis.METHODS)
     assert all(
         row["point_cm"] < 200 and row["force_error_n"] >= 0

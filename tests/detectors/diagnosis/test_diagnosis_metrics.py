@@ -3,10 +3,19 @@ import pytest
 
 from tauguard.detectors import Diagnosis, diagnosis_figures, match_diagnoses
 from tauguard.detectors.diagnosis.classification import Signs
-from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors, contact_at
+from tauguard.detectors.diagnosis.diagnosis_metrics import (
+    ContactErrors,
+    TrueSeverity,
+    contact_at,
+)
+from tauguard.detectors.diagnosis.severity import Between, ContactTorque, Severity
 from tauguard.traces import Alarm, Collision, Trace, Truth
 
 T = np.arange(0, 3, 1e-3)
+#: An impulse interval that holds 50 N for 21 ms, and a peak interval that does not hold 50 N.
+SIZE = Severity(
+    Between(1.0, 0.9, 1.2), Between(70, 60, 400), ContactTorque(0, 0.1, *np.ones((2, 1)), 1.0, 0.0)
+)
 SIGNS = Signs(0.0, 0.0, 0.0, np.inf, 1e3, 0.0, 0.1)
 
 
@@ -28,7 +37,10 @@ def make(collisions):
 def said(start, link, kind="impact"):
     force, point = np.array([0, 30.0, 0]), np.array([0.1, 0.2, 0.4])
     alarm = Alarm(start, start + 0.1)
-    return Diagnosis(alarm, link, np.ones(6) / 6, 1, start + 0.01, force, point, kind, {}, SIGNS)
+    return Diagnosis(
+        *(alarm, link, np.ones(6) / 6, 1, start + 0.01, force, point, kind, {}, SIGNS),
+        *(SIZE, start + 0.3, ("j",)),
+    )
 
 
 def test_each_collision_is_judged_by_its_first_alarm_and_other_alarms_are_false():
@@ -43,6 +55,9 @@ def test_each_collision_is_judged_by_its_first_alarm_and_other_alarms_are_false(
     assert found["force_error_n"]["median"] == pytest.approx(40.0)
     assert found["direction_deg"]["median"] == pytest.approx(np.degrees(np.arccos(0.6)))
     assert found["point_cm"]["median"] == pytest.approx(10.0)
+    assert (found["impulse_held"]["value"], found["peak_held"]["value"]) == (1.0, 0.0)
+    assert (found["impulse_identifiable"]["value"], found["peak_identifiable"]["value"]) == (1, 0)
+    assert found["peak_width"]["median"] == pytest.approx(400 / 60)
 
 
 def test_nothing_judged_is_none_and_not_a_crash():
@@ -63,3 +78,11 @@ def test_the_truth_behind_an_estimate_is_the_contact_just_before_it():
     bare = Trace(("j",), T, *(np.zeros((len(T), 1)),) * 3)
     with pytest.raises(ValueError, match="no truth"):
         match_diagnoses([], bare)
+
+
+def test_true_impulse_and_peak_end_with_the_look():
+    trace = make([collision(0.5, 3)])
+    whole = TrueSeverity.of(trace, trace.truth.collisions[0], 1.0)
+    assert (whole.impulse, whole.peak) == pytest.approx((50 * 0.021, 50), rel=0.06)
+    part = TrueSeverity.of(trace, trace.truth.collisions[0], 0.51)
+    assert part.impulse == pytest.approx(0.5 * whole.impulse, rel=0.1)

@@ -1,0 +1,180 @@
+"""How hard it was: impulse and peak force of a contact, each with an interval.
+
+The observer's residual r is tau_ext behind a first-order lag T: ``tau_ext = r + T dr/dt``. Over any
+time ``integral tau_ext = integral r + T (r_end - r_begin)``, so the impulse at the joints does not
+depend on the lag, where a force at one instant does. The mean torque of the contact gives draws of
+its mean force (:mod:`~tauguard.detectors.diagnosis.force_draws`). The peak is the mean times how
+far the torque's peak exceeds its mean; a blow shorter than what the samples resolve may have been
+higher.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.detectors.diagnosis.aftermath import Aftermath
+from tauguard.detectors.diagnosis.contact_force import ContactBelief
+from tauguard.detectors.diagnosis.force_draws import SEED, force_draws
+from tauguard.detectors.diagnosis.isolation import Trust
+from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.models.link_surface import LinkSurface
+
+Array = NDArray[np.float64]
+
+#: Share of the true values that the intervals are to hold.
+SURE = 0.9
+#: The torque is averaged over so many lags to either side before its peak is taken.
+SMOOTHED = 0.3
+#: The contact lasts while the torque is above this share of its peak.
+TOUCHES = 0.15
+#: Relative error besides noise and place (log): directions that turn, gains. Chosen on simulated
+#: arms and seeds that no study judges.
+SPREAD = 0.2
+#: An interval whose ends differ by more than this factor says nothing of the size.
+IDENTIFIABLE = 6.0
+#: What the samples do not resolve is no more than this share of a contact's time.
+UNRESOLVED = 0.9
+
+
+@dataclass(frozen=True)
+class Between:
+    """An estimate and the interval that holds the true value with probability :data:`SURE`."""
+
+    value: float  #: the median
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, draws: Array) -> Between:
+        """Of draws, shape (K,)."""
+        low, middle, high = np.quantile(draws, ((1 - SURE) / 2, 0.5, (1 + SURE) / 2))
+        return cls(float(middle), float(low), float(high))
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the interval says something of the size."""
+        return self.high <= IDENTIFIABLE * self.low
+
+    def text(self, unit: str) -> str:
+        """``120 N [90, 180]``; without the median where that says nothing."""
+        ends = f"[{_digits(self.low)}, {_digits(self.high)}]"
+        return f"{_digits(self.value)} {unit} {ends}" if self.identifiable else f"{ends} {unit}"
+
+
+def _digits(value: float) -> str:
+    """Two significant digits, without an exponent."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTorque:
+    """What a contact did at the joints, from its beginning to the end of the look at it."""
+
+    row: int  #: of the peak, among the look's samples
+    seconds: float  #: that it touched [s]
+    impulse: Array  #: integral of tau_ext [N m s], shape (n,)
+    peak: Array  #: tau_ext at its peak [N m], shape (n,)
+    shape: float  #: peak over mean
+    hidden: float  #: share of its time that the samples do not resolve
+
+    @property
+    def mean(self) -> Array:
+        """Mean tau_ext [N m], shape (n,)."""
+        value: Array = self.impulse / self.seconds
+        return value
+
+    def text(self, names: Sequence[str]) -> str:
+        """The joint that felt it most, in a few words."""
+        joint = int(np.abs(self.peak).argmax())
+        return f"{_digits(abs(float(self.peak[joint])))} N m at {names[joint]}"
+
+    @classmethod
+    def of(cls, after: Aftermath) -> ContactTorque:
+        """From the residual around an alarm."""
+        width, torque = _without_lag(after)
+        top = int(np.linalg.norm(torque / after.envelope, axis=1).argmax())
+        along = torque @ (torque[top] / after.envelope[top] ** 2)
+        first, last = _contact(along, top)
+        part = slice(first, last + 1)
+        seconds = float(after.t[last] - after.t[first])
+        step = after.residual[last] - after.residual[first]
+        whole = np.trapezoid(after.residual[part], after.t[part], axis=0) + after.lag * step
+        shape = along[top] / max(float(along[part].mean()), 1e-12)
+        hidden = min(width / seconds, UNRESOLVED)
+        return cls(top, seconds, whole, torque[top], float(shape), hidden)
+
+
+@dataclass(frozen=True, eq=False)
+class Severity:
+    """Of one contact, from its beginning to the end of the look at it."""
+
+    impulse: Between  #: norm of the force's integral [N s]
+    peak: Between  #: largest force [N]
+    torque: ContactTorque  #: which needs no place
+
+    def text(self, kind: str, names: Sequence[str]) -> str:
+        """In a few words; of an impact the impulse, too.
+
+        Args:
+            kind: of the contact.
+            names: of the joints.
+        """
+        force = f"peak force {self.peak.text('N')}"
+        if kind == "impact":
+            force = f"impulse {self.impulse.text('N s')}, {force}"
+        if self.peak.identifiable:
+            return force
+        return f"{force} (not identifiable; {self.torque.text(names)})"
+
+
+def severity(
+    robot: RobotNumbers,
+    surface: LinkSurface,
+    after: Aftermath,
+    belief: ContactBelief,
+    moments: int,
+    trust: Trust,
+) -> Severity:
+    """Impulse and peak force, over all points that may have been touched.
+
+    Args:
+        robot: the arm.
+        surface: its sampled surface.
+        after: the residual around the alarm.
+        belief: where it was touched.
+        moments: that the belief is the product of; as they share their errors, all count as one.
+        trust: how far a residual is believed.
+    """
+    felt = ContactTorque.of(after)
+    noise = trust.noise(felt.mean, after.envelope[felt.row])
+    place = belief.probability ** (1 / moments)
+    force = force_draws(robot, surface, after.q[felt.row], felt.mean, noise, place)
+    rng = np.random.default_rng(SEED)
+    size = np.linalg.norm(force, axis=1) * np.exp(SPREAD * rng.standard_normal(len(force)))
+    sharper = 1 / (1 - felt.hidden * rng.random(len(force)))
+    peak = size * felt.shape * sharper
+    return Severity(Between.of(size * felt.seconds), Between.of(peak), felt)
+
+
+def _without_lag(after: Aftermath) -> tuple[float, Array]:
+    """Time that is averaged over [s], and tau_ext without the observer's lag [N m], (M, n)."""
+    dt = float(np.median(np.diff(after.t)))
+    half = max(1, round(SMOOTHED * after.lag / dt))
+    raw = after.residual + after.lag * np.gradient(after.residual, after.t, axis=0)
+    kernel = np.full(2 * half + 1, 1 / (2 * half + 1))
+    padded = np.pad(raw, ((half, half), (0, 0)), mode="edge")
+    smooth = [np.convolve(column, kernel, "valid") for column in padded.T]
+    return (2 * half + 1) * dt, np.stack(smooth, axis=1)
+
+
+def _contact(along: Array, top: int) -> tuple[int, int]:
+    """First and last row of the contact whose torque is highest at row ``top``."""
+    weak = along < TOUCHES * along[top]
+    before, later = np.flatnonzero(weak[:top]), np.flatnonzero(weak[top:])
+    first = int(before[-1]) if len(before) else 0
+    last = top + int(later[0]) if len(later) else len(along) - 1
+    return first, max(last, first + 1)
