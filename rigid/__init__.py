@@ -3,6 +3,7 @@
 from tauguard.rigid.gap import Gaps, distance
 from tauguard.rigid.impact import MeshImpacts, time_of_impact
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
+from tauguard.rigid.mesh_bodies import MeshGaps
 from tauguard.rigid.motion import Motion
 from tauguard.rigid.plane_cache import PlaneCache
 from tauguard.rigid.queries import overlap, sweep
@@ -17,6 +18,7 @@ __all__ = [
     "Hulls",
     "Impacts",
     "MeshContacts",
+    "MeshGaps",
     "MeshImpacts",
     "MeshOverlap",
     "MeshTree",

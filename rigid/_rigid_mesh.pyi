@@ -24,14 +24,51 @@ class Mesh:
         faces: NDArray[np.int32],
         threads: int,
     ) -> None: ...
+    def meets(
+        self,
+        kind: int,
+        bodies: NDArray[np.float64],
+        offsets: NDArray[np.int64],
+        radius: NDArray[np.float64],
+        faces: NDArray[np.int32],
+        threads: int,
+    ) -> None: ...
+    def gaps(
+        self,
+        kind: int,
+        bodies: NDArray[np.float64],
+        offsets: NDArray[np.int64],
+        radius: NDArray[np.float64],
+        out: NDArray[np.float64],
+        faces: NDArray[np.int32],
+        threads: int,
+    ) -> None: ...
+    def time_of_impact_of_bodies(
+        self,
+        kind: int,
+        bodies: NDArray[np.float64],
+        offsets: NDArray[np.int64],
+        radius: NDArray[np.float64],
+        pose_mesh: NDArray[np.float64],
+        linear_mesh: NDArray[np.float64],
+        angular_mesh: NDArray[np.float64],
+        pose_body: NDArray[np.float64],
+        linear_body: NDArray[np.float64],
+        angular_body: NDArray[np.float64],
+        out: NDArray[np.float64],
+        faces: NDArray[np.int32],
+        threads: int,
+    ) -> None: ...
 
 def time_of_impact(
     kind_a: int,
     a: NDArray[np.float64],
     offsets_a: NDArray[np.int64],
+    radius_a: NDArray[np.float64],
     kind_b: int,
     b: NDArray[np.float64],
     offsets_b: NDArray[np.int64],
+    radius_b: NDArray[np.float64],
     pose_a: NDArray[np.float64],
     linear_a: NDArray[np.float64],
     angular_a: NDArray[np.float64],
@@ -51,6 +88,18 @@ def gaps(
     offsets_b: NDArray[np.int64],
     radius_b: NDArray[np.float64],
     out: NDArray[np.float64],
+    threads: int,
+) -> None: ...
+def meets(
+    kind_a: int,
+    a: NDArray[np.float64],
+    offsets_a: NDArray[np.int64],
+    radius_a: NDArray[np.float64],
+    kind_b: int,
+    b: NDArray[np.float64],
+    offsets_b: NDArray[np.int64],
+    radius_b: NDArray[np.float64],
+    hit: NDArray[np.uint8],
     threads: int,
 ) -> None: ...
 def triangles_overlap(pairs: NDArray[np.float64], out: NDArray[np.bool_]) -> None: ...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import overload
+from typing import cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +11,20 @@ from numpy.typing import NDArray
 from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid_mesh
 from tauguard.rigid.mesh import MeshTree
-from tauguard.rigid.motion import Motion
+from tauguard.rigid.mesh_bodies import first_contact
+from tauguard.rigid.motion import Motion, common_length
 from tauguard.rigid.queries import native, rows
 from tauguard.rigid.results import Impacts
-from tauguard.rigid.shapes import Bodies, Polygons
+from tauguard.rigid.rounded import Solid, solid_parts
 
 
 @dataclass(frozen=True, eq=False)
 class MeshImpacts(Impacts):
-    """First contact of two moving meshes, row by row.
+    """First contact of two moving meshes, or of one and convex bodies, row by row.
 
     Attributes:
-        faces: The triangles that touch first, (face of a, face of b); -1 where there is no hit.
-            Shape (N, 2).
+        faces: The triangles that touch first, (face of a, face of b); -1 where there is no hit, and
+            for a side that is no mesh. Shape (N, 2).
     """
 
     faces: NDArray[np.int32]
@@ -31,15 +32,19 @@ class MeshImpacts(Impacts):
 
 @overload
 def time_of_impact(
-    a: Bodies, b: Bodies, motion_a: Motion, motion_b: Motion, threads: int = 1
+    a: Solid, b: Solid, motion_a: Motion, motion_b: Motion, threads: int = 1
 ) -> Impacts: ...
 @overload
 def time_of_impact(
-    a: MeshTree, b: MeshTree, motion_a: Motion, motion_b: Motion, threads: int = 1
+    a: MeshTree, b: MeshTree | Solid, motion_a: Motion, motion_b: Motion, threads: int = 1
+) -> MeshImpacts: ...
+@overload
+def time_of_impact(
+    a: Solid, b: MeshTree, motion_a: Motion, motion_b: Motion, threads: int = 1
 ) -> MeshImpacts: ...
 def time_of_impact(
-    a: Bodies | MeshTree,
-    b: Bodies | MeshTree,
+    a: Solid | MeshTree,
+    b: Solid | MeshTree,
     motion_a: Motion,
     motion_b: Motion,
     threads: int = 1,
@@ -52,7 +57,8 @@ def time_of_impact(
     second derivative: it converges quadratically, from below.
 
     Args:
-        a: N convex bodies of one kind, or one; or a mesh, whose surface counts (not its inside).
+        a: N convex bodies of one kind, rounded or not, or one; or a mesh, whose surface counts (not
+            its inside).
         b: The same for the other side; two meshes may have different bounding volumes.
         motion_a: N motions, or one.
         motion_b: N motions, or one.
@@ -64,49 +70,44 @@ def time_of_impact(
         is common to both then too.
 
     Raises:
-        ValueError: lengths that do not match, a body against a mesh, polygons, or a coordinate
-            beyond 1e100, whose products would overflow.
+        ValueError: lengths that do not match, polygons, or a coordinate beyond 1e100, whose
+            products would overflow.
     """
     for name, motion in (("motion_a", motion_a), ("motion_b", motion_b)):
         _bounded(name, motion.pose_t0[:, :3, 3], motion.linear)
-    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
-        count = _lengths({"motion_a": len(motion_a), "motion_b": len(motion_b)})
-        out, faces = np.empty((count, 7)), np.empty((count, 2), dtype=np.int32)
-        a._mesh.time_of_impact(
-            b._mesh, *_packed(motion_a), *_packed(motion_b), out, faces, thread_count(threads)
-        )
-        return MeshImpacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7], faces)
     if isinstance(a, MeshTree) or isinstance(b, MeshTree):
-        raise ValueError("b: a mesh against convex bodies; give both as meshes")
-    if isinstance(a, Polygons) or isinstance(b, Polygons):
-        name = "a" if isinstance(a, Polygons) else "b"
-        raise ValueError(
-            f"{name}: Polygons, expected bodies in space; give them thickness as Hulls"
-        )
-    bodies = rows(a, b)
-    for name, body in (("a", a), ("b", b)):
-        _bounded(name, body.packed)
-    lengths = {"bodies": bodies, "motion_a": len(motion_a), "motion_b": len(motion_b)}
-    out = np.empty((_lengths(lengths), 7))
+        return _of_meshes(a, b, motion_a, motion_b, threads)
+    (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
+    lengths = {
+        "bodies": rows(core_a, core_b),
+        "motion_a": len(motion_a),
+        "motion_b": len(motion_b),
+    }
+    out = np.empty((common_length(lengths), 7))
     _rigid_mesh.time_of_impact(
-        *native(a), *native(b), *_packed(motion_a), *_packed(motion_b), out, thread_count(threads)
+        *(*native(core_a), radius_a, *native(core_b), radius_b),
+        *(*motion_a.packed, *motion_b.packed, out, thread_count(threads)),
     )
     return Impacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7])
+
+
+def _of_meshes(
+    a: Solid | MeshTree, b: Solid | MeshTree, motion_a: Motion, motion_b: Motion, threads: int
+) -> MeshImpacts:
+    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
+        count = common_length({"motion_a": len(motion_a), "motion_b": len(motion_b)})
+        out, faces = np.empty((count, 7)), np.empty((count, 2), dtype=np.int32)
+        a._mesh.time_of_impact(
+            b._mesh, *motion_a.packed, *motion_b.packed, out, faces, thread_count(threads)
+        )
+    elif isinstance(a, MeshTree):
+        out, faces = first_contact(a, cast(Solid, b), motion_a, motion_b, threads)
+    else:
+        mesh = cast(MeshTree, b)
+        out, faces = first_contact(mesh, a, motion_b, motion_a, threads, swapped=True)
+    return MeshImpacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7], faces)
 
 
 def _bounded(name: str, *values: NDArray[np.float64]) -> None:
     if max(np.abs(value).max(initial=0.0) for value in values) > 1e100:
         raise ValueError(f"{name}: a coordinate beyond 1e100; scale the scene down")
-
-
-def _packed(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    return motion.pose_t0, motion.linear, motion.angular
-
-
-def _lengths(lengths: dict[str, int]) -> int:
-    """The common length, each being that or 1."""
-    count = 0 if 0 in lengths.values() else max(lengths.values())
-    for name, length in lengths.items():
-        if length not in (1, count):
-            raise ValueError(f"{name}: {length} rows, expected {count} or 1")
-    return count

@@ -25,7 +25,7 @@ class MeshOverlap:
     Attributes:
         hit: True where the surfaces share a point (touching counts). Shape (N,).
         faces: A pair of faces that meet, (face of this mesh, face of the other); -1 where there is
-            none. Shape (N, 2).
+            none, and for convex bodies. Shape (N, 2).
     """
 
     hit: NDArray[np.bool_]
@@ -120,7 +120,10 @@ class MeshTree:
 
     def _check(self, other: MeshTree) -> None:
         if not isinstance(other, MeshTree):
-            raise ValueError(f"other: {type(other).__name__}, expected a MeshTree")
+            raise ValueError(
+                f"other: {type(other).__name__}, expected a MeshTree; for convex bodies there are "
+                "tauguard.rigid.overlap and distance"
+            )
         if other.volume != self.volume:
             raise ValueError(
                 f"other: its volume is {other.volume!r}, this tree's {self.volume!r}; "

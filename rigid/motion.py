@@ -80,6 +80,11 @@ class Motion(Rebuilt):
     def __len__(self) -> int:
         return len(self.pose_t0)
 
+    @property
+    def packed(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """The three arrays, as the native kernels read them."""
+        return self.pose_t0, self.linear, self.angular
+
     def at(self, t: ArrayLike) -> NDArray[np.float64]:
         """Poses at time ``t`` (a number, or one a row). Shape (N, 4, 4)."""
         from scipy.spatial.transform import Rotation
@@ -90,3 +95,16 @@ class Motion(Rebuilt):
         out[:, :3, :3] = turn @ self.pose_t0[:, :3, :3]
         out[:, :3, 3] += time * self.linear
         return out
+
+
+def common_length(lengths: dict[str, int]) -> int:
+    """The common length of several batches by name, each being that or 1.
+
+    Raises:
+        ValueError: lengths that do not match.
+    """
+    count = 0 if 0 in lengths.values() else max(lengths.values())
+    for name, length in lengths.items():
+        if length not in (1, count):
+            raise ValueError(f"{name}: {length} rows, expected {count} or 1")
+    return count

@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import Rebuilt, frozen_finite, sealed
-from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Tetrahedra
+from tauguard.rigid.shapes import (
+    Bodies,
+    Boxes,
+    Hulls,
+    Parallelepipeds,
+    Polygons,
+    Tetrahedra,
+)
 
 #: Coordinates and radii beyond this are refused: their products would overflow.
 MOST_COORDINATE = 1e100
@@ -122,3 +129,25 @@ def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
     if isinstance(solid, Rounded | Spheres | Capsules):
         return solid.core, solid.radius
     return solid, _SHARP
+
+
+def solid_parts(
+    name: str, solid: Solid, most: float = MOST_COORDINATE
+) -> tuple[Bodies, NDArray[np.float64]]:
+    """Core and radii of bodies in space.
+
+    Raises:
+        ValueError: no batch of bodies, polygons, or a number beyond ``most``.
+    """
+    core, radius = parts(solid)
+    if isinstance(core, Polygons):
+        raise ValueError(
+            f"{name}: Polygons, expected bodies in space; give them thickness as Hulls"
+        )
+    if not isinstance(core, Tetrahedra | Boxes | Parallelepipeds | Hulls):
+        kinds = "Tetrahedra, Boxes, Parallelepipeds, Hulls, Rounded, Spheres, Capsules, MeshTree"
+        raise ValueError(f"{name}: {type(core).__name__}, expected one of {kinds}")
+    largest = max(np.abs(core.packed).max(initial=0.0), radius.max(initial=0.0))
+    if largest > most:
+        raise ValueError(f"{name}: a number beyond {most:g}; scale the scene down".replace("+", ""))
+    return core, radius

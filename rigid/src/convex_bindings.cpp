@@ -1,8 +1,7 @@
 // The convex half of tauguard.rigid._rigid.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 
+#include "bodies_binding.hpp"
 #include "convex_lanes.hpp"
 #include "convex_overlap.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"
@@ -13,16 +12,9 @@ using tauguard::geometry::LongCall;
 
 namespace {
 
-using Data = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Offsets = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Data = Packed;
 using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-
-Bodies view(int kind, const Data& data, const Offsets& offsets) {
-  const bool hulls = is_cloud(static_cast<Kind>(kind));
-  return {static_cast<Kind>(kind), data.data(), offsets.data(),
-          hulls ? offsets.shape(0) - 1 : data.shape(0)};
-}
 
 }  // namespace
 

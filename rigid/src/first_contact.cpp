@@ -9,6 +9,10 @@
 // separating axis of time t and r its own rate of turning: then all vertices of the touching
 // features keep one tangent, and the steps converge quadratically, as Newton's do, but from below.
 // (With r = 0 a turning face tilts away from n and convergence is linear.)
+//
+// Bodies grown by balls of radii R in all are apart while s(h) > R |n(h)|, and |n(h)| is at most
+// 1 + (h |r|)^2 / 2 for r across n: R and R |r|^2 join the constant and K. Their direction is that
+// of the nearest points of the hulls, and r the rate at which the features turn that these lie on.
 #include "tauguard/rigid/first_contact.hpp"
 
 #include <algorithm>
@@ -43,6 +47,13 @@ double most(const std::vector<Vec>& points, const Vec& n) {
   return m;
 }
 
+double rounding(const MovingBody& a, const MovingBody& b) { return a.rounding + b.rounding; }
+
+// Of the surfaces along n, from a to b.
+double separation_along(const MovingBody& a, const MovingBody& b, const Vec& n) {
+  return least(b.now, n) - most(a.now, n) - rounding(a, b);
+}
+
 // Tries n and -n, n of length 1; true where one of them is the best so far.
 bool consider(const MovingBody& a, const MovingBody& b, const Vec& n, Axis* best) {
   double a_lo = INFINITY, a_hi = -INFINITY, b_lo = INFINITY, b_hi = -INFINITY;
@@ -54,14 +65,50 @@ bool consider(const MovingBody& a, const MovingBody& b, const Vec& n, Axis* best
     const double x = dot(n, p);
     b_lo = std::min(b_lo, x), b_hi = std::max(b_hi, x);
   }
-  const double forward = b_lo - a_hi, backward = a_lo - b_hi;
+  const double forward = b_lo - a_hi - rounding(a, b), backward = a_lo - b_hi - rounding(a, b);
   if (!(std::max(forward, backward) > best->separation)) return false;
   *best = forward >= backward ? Axis{n, {}, forward} : Axis{-1.0 * n, {}, backward};
   return true;
 }
 
+// The rate at which the way v between the nearest points of both hulls turns with what they lie on.
+Vec feature_rate(const MovingBody& a, const MovingBody& b, const Nearest& near, const Vec& v) {
+  Vec w[3], u[3];
+  for (int i = 0; i < near.size; ++i) {
+    const auto [p, q] = near.corner[i];
+    w[i] = b.now[q] - a.now[p], u[i] = b.velocity[q] - a.velocity[p];
+  }
+  const double square = dot(v, v);
+  const auto across = [&](const Vec& x) { return x - (dot(x, v) / square) * v; };
+  const double length = std::sqrt(square);
+  if (near.size == 1) return (1 / length) * across(u[0]);
+  const Vec e = w[1] - w[0], f = u[1] - u[0];
+  if (near.size == 2) {  // v stays across the edge e
+    const double ee = dot(e, e), share = -dot(w[0], e) / ee;
+    const Vec moved = u[0] + share * f;
+    return (1 / length) * across(moved - ((dot(moved, e) + dot(v, f)) / ee) * e);
+  }
+  const Vec g = w[2] - w[0], h = u[2] - u[0], c = cross(e, g);
+  const Vec turned = across(cross(f, g) + cross(e, h));
+  return (dot(c, v) < 0 ? -1 : 1) / norm(c) * turned;
+}
+
+Axis nearest_axis(const MovingBody& a, const MovingBody& b) {
+  const Nearest near = nearest(a.now, b.now);
+  const Vec v = near.b - near.a;
+  const double length = norm(v);
+  if (near.size == 4 || !(length > 0)) return {};
+  const Vec n = (1 / length) * v;
+  const Vec rate = feature_rate(a, b, near, v);
+  return {n, norm(rate) < HUGE_VAL ? rate : Vec{}, separation_along(a, b, n)};
+}
+
 Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
   Axis best;
+  if (rounding(a, b) > 0) {
+    best = nearest_axis(a, b);
+    if (best.separation > enough) return best;
+  }
   int chosen = -1;  // 0: turns with a, 1: with b, 2: crossed edges x, y
   Vec x{}, y{};
   for (const Vec& n : a.normal)
@@ -78,6 +125,7 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
   if (best.separation <= enough && !(a.complete && b.complete)) {
     Axis other;
     separating_direction(a.now, b.now, &other.n, &other.separation);
+    other.separation -= rounding(a, b);
     if (other.separation > best.separation) {
       other.rate = cross(a.angular(), other.n);
       return other;
@@ -97,11 +145,12 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
 class Lower {
  public:
   Lower(const MovingBody& a, const MovingBody& b, const Axis& axis, double horizon, double margin)
-      : margin_(margin) {
+      : margin_(margin + rounding(a, b)) {
     const double turn = norm(axis.rate) * (1 + 0x1p-40), drift = turn * horizon;
     const double speed_b = norm(b.linear() - a.linear()) * (1 + 0x1p-40) + b.turning_speed();
     half_k_ = turn * (a.turning_speed() + speed_b) +
-              0.5 * (a.acceleration(axis.n, drift) + b.acceleration(axis.n, drift));
+              0.5 * (a.acceleration(axis.n, drift) + b.acceleration(axis.n, drift)) +
+              0.5 * rounding(a, b) * turn * turn;
     project(a, axis, a.centre, a.linear(), &a_);
     project(b, axis, a.centre, a.linear(), &b_);
   }
@@ -147,6 +196,13 @@ double safe_step(const Lower& g, double at_zero, double limit) {
   return value >= 0 ? h : h * (at_zero / (at_zero - value)) * (1 - 4 * unit_roundoff);
 }
 
+double certified_step(const MovingBody& a, const MovingBody& b, const Axis& axis, double margin,
+                      double left) {
+  // Beyond the time that the direction takes to turn by a radian its tangent says nothing.
+  const double turn = norm(axis.rate), horizon = turn * left > 1 ? 1 / turn : left;
+  return safe_step(Lower(a, b, axis, horizon, margin), axis.separation - margin, horizon);
+}
+
 // How far the step goes for which the bodies stay apart along one fixed direction whatever their
 // angles are; `axis` becomes that direction. Bodies that turn fast and pass by each other are kept
 // apart by it in a few steps, where their true surfaces would take one for each radian.
@@ -167,7 +223,8 @@ double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* 
     if (!(length > 0)) continue;
     for (const double sign : {1.0, -1.0}) {
       const Vec n = (sign / length) * v;
-      const double gap = dot(n, between) + b.spun(n)[0] - a.spun(n)[1] - 2 * margin;
+      const double gap =
+          dot(n, between) + b.spun(n)[0] - a.spun(n)[1] - rounding(a, b) - 2 * margin;
       if (!(gap > 0)) continue;
       const double closing = -dot(n, drift) + 4 * unit_roundoff * norm(drift);
       const double h = closing > 0 ? gap / closing * (1 - 4 * unit_roundoff) : INFINITY;
@@ -184,7 +241,7 @@ Vec contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, d
                    const Axis& now) {
   if (last.separation > -INFINITY) {
     const Vec turned = last.n + h * last.rate, n = (1 / norm(turned)) * turned;
-    const double slack = contact_tolerance(a, b), separation = least(b.now, n) - most(a.now, n);
+    const double slack = contact_tolerance(a, b), separation = separation_along(a, b, n);
     if (separation >= -slack && separation >= now.separation - slack) return n;
   }
   return now.separation > -INFINITY ? now.n : Vec{};
@@ -209,11 +266,14 @@ Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
       return Impact{t, true, contact_normal(a, b, last, t - before, axis)};
     };
     if (axis.separation <= 2 * margin) return touch();
-    // Beyond the time that the direction takes to turn by a radian its tangent says nothing.
-    const double turn = norm(axis.rate), left = end - t,
-                 horizon = turn * left > 1 ? 1 / turn : left;
-    const Lower lower(a, b, axis, horizon, margin);
-    double h = safe_step(lower, axis.separation - margin, horizon);
+    const double left = end - t;
+    double h = certified_step(a, b, axis, margin, left);
+    if (h < left && rounding(a, b) > 0) {  // the nearest features may be about to change
+      Axis still = axis;
+      still.rate = {};
+      const double longer = certified_step(a, b, still, margin, left);
+      if (longer > h) h = longer, axis = still;
+    }
     if (h < left && turning > little_turn) {
       Axis fixed = axis;
       const double longer = spun_step(a, b, margin, &fixed);

@@ -67,8 +67,8 @@ Gap together(const Points<double>& a, const Points<double>& b, const Vec& n, dou
 }
 
 bool certified_apart(const Points<double>& a, const Points<double>& b, double size, Gap* out) {
-  const auto [point_a, point_b] = nearest_points(a, b);
-  *out = apart(point_a, point_b);
+  const Nearest ends = nearest(a, b);
+  *out = apart(ends.a, ends.b);
   if (!(out->distance > near * size)) return false;
   return out->distance - (bottom(b, out->normal) - top(a, out->normal)) <= certain * size;
 }
@@ -183,6 +183,30 @@ Gap gap_of(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, doub
   g = grown(g, radius_a, radius_b, sign, known);
   g.point_a = g.point_a + origin, g.point_b = g.point_b + origin;
   return g;
+}
+
+bool meet(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, double radius_a,
+          double radius_b) {
+  const double* p = bodies_a.row(row);
+  const Vec origin = {p[0], p[1], p[2]};
+  const auto a = local_points(bodies_a, row, origin), b = local_points(bodies_b, row, origin);
+  const double size = size_of(a, b), radii = radius_a + radius_b;
+  if (size > least_size && size < most_size) {
+    const Nearest ends = nearest(a, b);
+    const Vec way = ends.b - ends.a;
+    const double slack = near * (size + radii), length = norm(way);
+    if (length < radii - slack) return true;
+    if (length > radii + slack) {
+      const Vec n = (1 / length) * way;
+      if (bottom(b, n) - top(a, n) > radii + slack) return false;
+    }
+    Gap g;
+    if (!(length > slack) && certified_together(a, b, size, &g)) return true;
+  }
+  const auto x = vertices_of<Dyadic>(bodies_a, row), y = vertices_of<Dyadic>(bodies_b, row);
+  const ExactNearest<Dyadic> nearest(x, y);
+  const Dyadic reach = (Dyadic(radius_a) + Dyadic(radius_b)) * nearest.denominator;
+  return (inner(nearest.numerator, nearest.numerator) - reach * reach).sign() <= 0;
 }
 
 }  // namespace tauguard::rigid

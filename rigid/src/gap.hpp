@@ -16,4 +16,7 @@ struct Gap {
 // numbers say; the length is off by 2^-45 of the bodies' extent and distance at most.
 Gap gap_of(const Bodies& a, const Bodies& b, std::size_t row, double radius_a, double radius_b);
 
+// Do the bodies of row `row`, grown so, share a point? Exact, touching counts.
+bool meet(const Bodies& a, const Bodies& b, std::size_t row, double radius_a, double radius_b);
+
 }  // namespace tauguard::rigid

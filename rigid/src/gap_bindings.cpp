@@ -1,44 +1,112 @@
-// Distances in tauguard.rigid._rigid_mesh. Arguments are checked in Python.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
-#include "gap.hpp"
+// Distances, overlap and first contact of convex bodies, grown by balls or not, with each other and
+// with meshes, in tauguard.rigid._rigid_mesh. Arguments are checked in Python.
+#include "bodies_binding.hpp"
+#include "mesh_body.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"
 
 namespace nb = nanobind;
 using namespace tauguard::rigid;
+using tauguard::geometry::interruptible_for;
+using tauguard::geometry::LongCall;
 
 namespace {
 
-using Packed = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Offsets = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Radii = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Gaps = nb::ndarray<double, nb::shape<-1, 10>, nb::c_contig, nb::device::cpu>;
+using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Touches = nb::ndarray<double, nb::shape<-1, 7>, nb::c_contig, nb::device::cpu>;
+using FaceRows = nb::ndarray<std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-Bodies view(int kind, const Packed& data, const Offsets& offsets) {
-  const bool cloud = is_cloud(static_cast<Kind>(kind));
-  return {static_cast<Kind>(kind), data.data(), offsets.data(),
-          cloud ? offsets.shape(0) - 1 : data.shape(0)};
+// A row of distance, point of a, point of b, normal.
+void store(const Gap& g, double* row) {
+  row[0] = g.distance;
+  for (int k = 0; k < 3; ++k)
+    row[1 + k] = g.point_a[k], row[4 + k] = g.point_b[k], row[7 + k] = g.normal[k];
 }
 
-double at(const Radii& radii, std::size_t i) { return radii.data()[radii.shape(0) == 1 ? 0 : i]; }
+void store(const FirstTouch& t, double* row) {
+  row[0] = t.toi;
+  for (int k = 0; k < 3; ++k) row[1 + k] = t.point[k], row[4 + k] = t.normal[k];
+}
 
-// Rows of distance, point of a, point of b, normal.
 void gaps(int kind_a, Packed a, Offsets offsets_a, Radii radius_a, int kind_b, Packed b,
           Offsets offsets_b, Radii radius_b, Gaps out, int threads) {
-  const tauguard::geometry::LongCall call;
+  const LongCall call;
   const Bodies x = view(kind_a, a, offsets_a), y = view(kind_b, b, offsets_b);
-  tauguard::geometry::interruptible_for(out.shape(0), threads, 64, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i) {
-      const Gap g = gap_of(x, y, i, at(radius_a, i), at(radius_b, i));
-      double* row = out.data() + 10 * i;
-      row[0] = g.distance;
-      for (int k = 0; k < 3; ++k)
-        row[1 + k] = g.point_a[k], row[4 + k] = g.point_b[k], row[7 + k] = g.normal[k];
-    }
+  interruptible_for(out.shape(0), threads, 64, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i)
+      store(gap_of(x, y, i, at(radius_a, i), at(radius_b, i)), out.data() + 10 * i);
   });
+}
+
+void meets(int kind_a, Packed a, Offsets offsets_a, Radii radius_a, int kind_b, Packed b,
+           Offsets offsets_b, Radii radius_b, Hits hit, int threads) {
+  const LongCall call;
+  const Bodies x = view(kind_a, a, offsets_a), y = view(kind_b, b, offsets_b);
+  interruptible_for(hit.shape(0), threads, 64, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i)
+      hit.data()[i] = meet(x, y, i, at(radius_a, i), at(radius_b, i));
+  });
+}
+
+void impacts(int kind_a, Packed a, Offsets offsets_a, Radii radius_a, int kind_b, Packed b,
+             Offsets offsets_b, Radii radius_b, Poses pose_a, Vectors linear_a, Vectors angular_a,
+             Poses pose_b, Vectors linear_b, Vectors angular_b, Touches out, int threads) {
+  const LongCall call;
+  const Bodies x = view(kind_a, a, offsets_a), y = view(kind_b, b, offsets_b);
+  const Motions mx{pose_a, linear_a, angular_a}, my{pose_b, linear_b, angular_b};
+  interruptible_for(out.shape(0), threads, 16, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i)
+      store(bodies_impact(x, y, i, at(radius_a, i), at(radius_b, i), mx[i], my[i]),
+            out.data() + 7 * i);
+  });
+}
+
+// body(row) for every row of the batch.
+template <class Body>
+void each_body(const Bodies& bodies, const Radii& radius, std::size_t rows, int threads,
+               Body body) {
+  const LongCall call;
+  interruptible_for(rows, threads, 1, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i) body(i, RoundedBody(bodies, i, at(radius, i)));
+  });
+}
+
+void mesh_meets(const Mesh& mesh, int kind, Packed data, Offsets offsets, Radii radius,
+                FaceRows faces, int threads) {
+  each_body(view(kind, data, offsets), radius, faces.shape(0), threads,
+            [&](auto i, const RoundedBody& body) { faces.data()[i] = first_overlap(mesh, body); });
+}
+
+void mesh_gaps(const Mesh& mesh, int kind, Packed data, Offsets offsets, Radii radius, Gaps out,
+               FaceRows faces, int threads) {
+  each_body(view(kind, data, offsets), radius, faces.shape(0), threads,
+            [&](auto i, const RoundedBody& body) {
+              const FaceGap nearest = nearest_face(mesh, body);
+              store(nearest.gap, out.data() + 10 * i), faces.data()[i] = nearest.face;
+            });
+}
+
+void mesh_impacts(const Mesh& mesh, int kind, Packed data, Offsets offsets, Radii radius,
+                  Poses pose_a, Vectors linear_a, Vectors angular_a, Poses pose_b, Vectors linear_b,
+                  Vectors angular_b, Touches out, FaceRows faces, int threads) {
+  const Motions of_mesh{pose_a, linear_a, angular_a}, of_body{pose_b, linear_b, angular_b};
+  each_body(view(kind, data, offsets), radius, faces.shape(0), threads,
+            [&](auto i, const RoundedBody& body) {
+              store(mesh_body_impact(mesh, body, of_mesh[i], of_body[i], faces.data() + i),
+                    out.data() + 7 * i);
+            });
 }
 
 }  // namespace
 
-void bind_gaps(nb::module_& m) { m.def("gaps", &gaps); }
+void bind_gaps(nb::module_& m) {
+  m.def("gaps", &gaps);
+  m.def("meets", &meets);
+  m.def("time_of_impact", &impacts);
+}
+
+void bind_bodies(nb::class_<Mesh>& mesh) {
+  mesh.def("meets", &mesh_meets);
+  mesh.def("gaps", &mesh_gaps);
+  mesh.def("time_of_impact_of_bodies", &mesh_impacts);
+}

@@ -1,9 +1,8 @@
 // tauguard.rigid._rigid_mesh: meshes and their queries over batches of poses. Arguments are checked
 // in Python.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 
+#include "bodies_binding.hpp"
 #include "mesh_impact.hpp"
 #include "mesh_query.hpp"
 #include "tauguard/geometry/interrupt_binding.hpp"
@@ -15,10 +14,6 @@ using tauguard::geometry::LongCall;
 
 using Vertices = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Faces = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Poses = nb::ndarray<const double, nb::shape<-1, 4, 4>, nb::c_contig, nb::device::cpu>;
-using Vectors = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Packed = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Offsets = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Touches =
     nb::ndarray<double, nb::shape<-1, 7>, nb::c_contig, nb::device::cpu>;  // toi, point, normal
 using Pairs = nb::ndarray<std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
@@ -65,37 +60,9 @@ nb::tuple contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit,
                         owned(std::move(values), std::array<std::size_t, 2>{count, 7}));
 }
 
-// A batch of motions, one row or as many as the query has.
-struct Motions {
-  Poses pose;
-  Vectors linear, angular;
-  RigidMotion operator[](std::size_t i) const {
-    const std::size_t r = pose.shape(0) == 1 ? 0 : i;
-    return RigidMotion(pose.data() + 16 * r, linear.data() + 3 * r, angular.data() + 3 * r);
-  }
-};
-
-Bodies view(int kind, const Packed& data, const Offsets& offsets) {
-  const bool hulls = kind == static_cast<int>(Kind::hulls);
-  return {static_cast<Kind>(kind), data.data(), offsets.data(),
-          hulls ? offsets.shape(0) - 1 : data.shape(0)};
-}
-
 void store(const FirstTouch& t, double* out) {
   out[0] = t.toi;
   for (int k = 0; k < 3; ++k) out[1 + k] = t.point[k], out[4 + k] = t.normal[k];
-}
-
-void impact_of_bodies(int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b,
-                      Offsets offsets_b, Poses pose_a, Vectors linear_a, Vectors angular_a,
-                      Poses pose_b, Vectors linear_b, Vectors angular_b, Touches out, int threads) {
-  const LongCall call;
-  const Bodies x = view(kind_a, a, offsets_a), y = view(kind_b, b, offsets_b);
-  const Motions mx{pose_a, linear_a, angular_a}, my{pose_b, linear_b, angular_b};
-  interruptible_for(out.shape(0), threads, 16, [&](auto begin, auto end, auto) {
-    for (auto i = begin; i < end; ++i)
-      store(bodies_impact(x, y, i, mx[i], my[i]), out.data() + 7 * i);
-  });
 }
 
 void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear_a,
@@ -115,14 +82,16 @@ void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear
 }  // namespace
 
 void bind_gaps(nb::module_& m);
+void bind_bodies(nb::class_<Mesh>& mesh);
 void bind_volumes(nb::module_& m);
 
 NB_MODULE(_rigid_mesh, m) {
   tauguard::geometry::bind_interrupts();
   bind_gaps(m);
   bind_volumes(m);
-  nb::class_<Mesh>(m, "Mesh")
-      .def("__init__",
+  nb::class_<Mesh> mesh(m, "Mesh");
+  bind_bodies(mesh);
+  mesh.def("__init__",
            [](Mesh* self, Vertices vertices, Faces faces, const std::string& volume) {
              const LongCall call;
              new (self) Mesh(vertices.data(), faces.data(), faces.shape(0), kind_of(volume));
@@ -141,7 +110,6 @@ NB_MODULE(_rigid_mesh, m) {
            })
       .def("contacts", &contacts)
       .def("time_of_impact", &impact_of_meshes);
-  m.def("time_of_impact", &impact_of_bodies);
   // Row by row, for tests of the exact answer.
   m.def("triangles_overlap",
         [](nb::ndarray<const double, nb::shape<-1, 2, 3, 3>, nb::c_contig, nb::device::cpu> pairs,

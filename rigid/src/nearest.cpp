@@ -6,10 +6,11 @@
 namespace tauguard::rigid {
 namespace {
 
-// A corner of the simplex: the difference and the points it comes from; its weight in the nearest
+// A corner of the simplex: the difference and the rows it comes from; its weight in the nearest
 // point.
 struct Corner {
-  Vec w, a, b;
+  Vec w;
+  std::array<std::size_t, 2> pair;
   double weight;
 };
 
@@ -43,7 +44,7 @@ bool weigh(const Corner* c, int m, double* l) {
 
 class Simplex {
  public:
-  Simplex(const Vec& a, const Vec& b) : c_{{b - a, a, b, 1.0}}, m_(1), nearest_(b - a) {}
+  explicit Simplex(const Vec& w) : c_{{w, {0, 0}, 1.0}}, m_(1), nearest_(w) {}
 
   int size() const { return m_; }
   const Vec& w(int i) const { return c_[i].w; }
@@ -51,16 +52,19 @@ class Simplex {
   bool holds(const Vec& w) const {
     return std::any_of(c_, c_ + m_, [&](const Corner& c) { return c.w == w; });
   }
-  // The nearest points of both sets.
-  std::array<Vec, 2> points() const {
-    Vec a{}, b{};
-    for (int i = 0; i < m_; ++i) a = a + c_[i].weight * c_[i].a, b = b + c_[i].weight * c_[i].b;
-    return {a, b};
+  Nearest of(const std::vector<Vec>& a, const std::vector<Vec>& b) const {
+    Nearest out{{}, {}, m_, {}};
+    for (int i = 0; i < m_; ++i) {
+      out.a = out.a + c_[i].weight * a[c_[i].pair[0]];
+      out.b = out.b + c_[i].weight * b[c_[i].pair[1]];
+      out.corner[i] = c_[i].pair;
+    }
+    return out;
   }
-  // Takes b - a in and keeps the face nearest to the origin among those that hold it; false, and no
+  // Takes w in and keeps the face nearest to the origin among those that hold it; false, and no
   // change to what was kept, where that is no nearer.
-  bool add(const Vec& a, const Vec& b) {
-    c_[m_] = {b - a, a, b, 0};
+  bool add(const Vec& w, std::size_t i, std::size_t j) {
+    c_[m_] = {w, {i, j}, 0};
     double best = dot(nearest_, nearest_), weight[4] = {};
     int kept = 0;
     for (int mask = 1 << m_; mask < 2 << m_; ++mask) {
@@ -89,27 +93,33 @@ class Simplex {
   Vec nearest_;
 };
 
-const Vec& extreme(const std::vector<Vec>& points, const Vec& n) {
-  return *std::max_element(points.begin(), points.end(),
-                           [&](auto& x, auto& y) { return dot(n, x) < dot(n, y); });
+// The first row that is furthest along n.
+std::size_t extreme(const std::vector<Vec>& points, const Vec& n) {
+  std::size_t best = 0;
+  double most = dot(n, points[0]);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const double x = dot(n, points[i]);
+    if (most < x) most = x, best = i;
+  }
+  return best;
 }
 
 // Runs until the nearest point is found or rounding stops the descent. `attempt` sees the
 // directions on the way.
 template <class Attempt>
 Simplex descend(const std::vector<Vec>& a, const std::vector<Vec>& b, Attempt attempt) {
-  Simplex s(a[0], b[0]);
+  Simplex s(b[0] - a[0]);
   for (int iteration = 0; iteration < 100; ++iteration) {
     const Vec v = s.nearest();
     attempt(v);
     if (s.size() == 3) attempt(cross(s.w(1) - s.w(0), s.w(2) - s.w(0)));
     if (s.size() == 4 || !(dot(v, v) > 0)) break;
-    const Vec &far_a = extreme(a, v), &far_b = extreme(b, -1.0 * v);
-    const Vec next = far_b - far_a;
+    const std::size_t far_a = extreme(a, v), far_b = extreme(b, -1.0 * v);
+    const Vec next = b[far_b] - a[far_a];
     if (dot(v, v) - dot(v, next) <= 1e-14 * dot(v, v) || s.holds(next)) break;
     const int size = s.size() + 1;
     const Vec all[4] = {s.w(0), size > 2 ? s.w(1) : next, size > 3 ? s.w(2) : next, next};
-    if (s.add(far_a, far_b)) continue;
+    if (s.add(next, far_a, far_b)) continue;
     for (int skip = 0; size == 4 && skip < 4; ++skip)
       attempt(cross(all[(skip + 1) % 4] - all[skip], all[(skip + 2) % 4] - all[skip]));
     if (size == 3) attempt(cross(all[1] - all[0], all[2] - all[0]));
@@ -130,7 +140,7 @@ bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, 
     if (!(length > 0)) return;
     for (const double sign : {1.0, -1.0}) {
       const Vec u = (sign / length) * d;
-      const double s = dot(u, extreme(b, -1.0 * u)) - dot(u, extreme(a, u));
+      const double s = dot(u, b[extreme(b, -1.0 * u)]) - dot(u, a[extreme(a, u)]);
       if (s > *separation) *separation = s, *n = u;
     }
   });
@@ -138,12 +148,12 @@ bool separating_direction(const std::vector<Vec>& a, const std::vector<Vec>& b, 
 }
 
 Vec middle_point(const std::vector<Vec>& a, const std::vector<Vec>& b) {
-  const auto [x, y] = nearest_points(a, b);
-  return 0.5 * (x + y);
+  const Nearest near = nearest(a, b);
+  return 0.5 * (near.a + near.b);
 }
 
-std::array<Vec, 2> nearest_points(const std::vector<Vec>& a, const std::vector<Vec>& b) {
-  return descend(a, b, [](const Vec&) {}).points();
+Nearest nearest(const std::vector<Vec>& a, const std::vector<Vec>& b) {
+  return descend(a, b, [](const Vec&) {}).of(a, b);
 }
 
 }  // namespace tauguard::rigid

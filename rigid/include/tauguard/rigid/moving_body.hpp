@@ -105,13 +105,14 @@ class MovingBody {
   double angular_speed() const { return motion_.speed; }
   // Largest magnitude that enters a position; the angle counts because its rounding turns the body.
   double magnitude() const {
-    return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_;
+    return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_ + rounding;
   }
   double radius() const { return radius_; }
   const Vec& linear() const { return motion_.linear; }
 
   std::vector<Vec> now, velocity, normal, edge;
   Vec centre{};          // of the rotation
+  double rounding = 0;   // the body is the hull of its vertices grown by a ball of this radius
   bool complete = true;  // normals and crossed edges hold a separating axis of any disjoint pair
 
  private:

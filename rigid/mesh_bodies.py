@@ -1,0 +1,97 @@
+"""A mesh against convex bodies: what `overlap`, `distance` and `time_of_impact` do with one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.geometry import thread_count
+from tauguard.rigid.gap import Gaps
+from tauguard.rigid.mesh import MeshOverlap, MeshTree
+from tauguard.rigid.motion import Motion, common_length
+from tauguard.rigid.queries import native
+from tauguard.rigid.rounded import Solid, solid_parts
+
+#: Coordinates and radii beyond this are refused beside a mesh, whose own bound it is.
+MOST_COORDINATE = 1e30
+
+
+@dataclass(frozen=True, eq=False)
+class MeshGaps(Gaps):
+    """Signed distance of a mesh and convex bodies, row by row.
+
+    Below zero it is that of the triangle that is deepest in the body: how far the body is to move
+    to leave that triangle, not the whole mesh.
+
+    Attributes:
+        face: The triangle nearest to the body, or deepest in it. Shape (N,).
+    """
+
+    face: NDArray[np.int32]
+
+
+Native = tuple[int, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
+
+
+def bodies_of(name: str, solid: Solid) -> Native:
+    """A batch as the native module takes it: kind, packed rows, offsets, radii."""
+    core, radius = solid_parts(name, solid, MOST_COORDINATE)
+    return *native(core), radius
+
+
+def overlap(mesh: MeshTree, solid: Solid, threads: int = 1, swapped: bool = False) -> MeshOverlap:
+    """Which bodies the surface meets, and a triangle of each."""
+    face = np.empty(len(solid), dtype=np.int32)
+    mesh._mesh.meets(*bodies_of(_other(swapped), solid), face, thread_count(threads))
+    return MeshOverlap(face >= 0, faces_of(face, swapped))
+
+
+def distance(mesh: MeshTree, solid: Solid, threads: int = 1, swapped: bool = False) -> MeshGaps:
+    """How far the surface is from each body."""
+    out, face = np.empty((len(solid), 10)), np.empty(len(solid), dtype=np.int32)
+    mesh._mesh.gaps(*bodies_of(_other(swapped), solid), out, face, thread_count(threads))
+    first, second, normal = out[:, 1:4], out[:, 4:7], out[:, 7:10]
+    if swapped:
+        first, second, normal = second, first, -normal
+    return MeshGaps(out[:, 0], first, second, normal, face)
+
+
+def first_contact(
+    mesh: MeshTree,
+    solid: Solid,
+    motion_mesh: Motion,
+    motion_solid: Motion,
+    threads: int = 1,
+    swapped: bool = False,
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Rows of toi, point and normal (N, 7), and the faces (N, 2)."""
+    lengths = {
+        f"motion_{'b' if swapped else 'a'}": len(motion_mesh),
+        "bodies": len(solid),
+        f"motion_{'a' if swapped else 'b'}": len(motion_solid),
+    }
+    count = common_length(lengths)
+    out, face = np.empty((count, 7)), np.empty(count, dtype=np.int32)
+    mesh._mesh.time_of_impact_of_bodies(
+        *bodies_of(_other(swapped), solid),
+        *motion_mesh.packed,
+        *motion_solid.packed,
+        out,
+        face,
+        thread_count(threads),
+    )
+    if swapped:
+        out[:, 4:7] *= -1
+    return out, faces_of(face, swapped)
+
+
+def faces_of(face: NDArray[np.int32], swapped: bool) -> NDArray[np.int32]:
+    """Faces of a and of b, -1 for the side that is no mesh. Shape (N, 2)."""
+    none = np.full_like(face, -1)
+    return np.stack([none, face] if swapped else [face, none], axis=1)
+
+
+def _other(swapped: bool) -> str:
+    return "a" if swapped else "b"

@@ -1,0 +1,43 @@
+// Batches of bodies and of motions as Python hands them over.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include "tauguard/rigid/moving_body.hpp"
+
+namespace tauguard::rigid {
+
+using Packed =
+    nanobind::ndarray<const double, nanobind::ndim<2>, nanobind::c_contig, nanobind::device::cpu>;
+using Offsets = nanobind::ndarray<const std::int64_t, nanobind::ndim<1>, nanobind::c_contig,
+                                  nanobind::device::cpu>;
+using Radii =
+    nanobind::ndarray<const double, nanobind::ndim<1>, nanobind::c_contig, nanobind::device::cpu>;
+using Poses = nanobind::ndarray<const double, nanobind::shape<-1, 4, 4>, nanobind::c_contig,
+                                nanobind::device::cpu>;
+using Vectors = nanobind::ndarray<const double, nanobind::shape<-1, 3>, nanobind::c_contig,
+                                  nanobind::device::cpu>;
+
+inline Bodies view(int kind, const Packed& data, const Offsets& offsets) {
+  const bool cloud = is_cloud(static_cast<Kind>(kind));
+  return {static_cast<Kind>(kind), data.data(), offsets.data(),
+          cloud ? offsets.shape(0) - 1 : data.shape(0)};
+}
+
+// One radius a row, or one for all.
+inline double at(const Radii& radii, std::size_t i) {
+  return radii.data()[radii.shape(0) == 1 ? 0 : i];
+}
+
+// A batch of motions, one row or as many as the query has.
+struct Motions {
+  Poses pose;
+  Vectors linear, angular;
+  RigidMotion operator[](std::size_t i) const {
+    const std::size_t r = pose.shape(0) == 1 ? 0 : i;
+    return RigidMotion(pose.data() + 16 * r, linear.data() + 3 * r, angular.data() + 3 * r);
+  }
+};
+
+}  // namespace tauguard::rigid

@@ -1,0 +1,23 @@
+// The first contact of two moving convex bodies, with its point and normal.
+#pragma once
+
+#include "tauguard/rigid/first_contact.hpp"
+
+namespace tauguard::rigid {
+
+// toi (inf: none), a common point and the normal from a to b at that time (NaN where undefined).
+struct FirstTouch {
+  double toi, point[3], normal[3];
+};
+inline constexpr FirstTouch no_touch = {INFINITY, {NAN, NAN, NAN}, {NAN, NAN, NAN}};
+
+// Point and normal of an impact. The normal is undefined where the bodies were in each other from
+// the start; the point comes from the features that touch along it, or from the nearest points.
+FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& origin);
+
+// Of row `row`, each body grown by a ball of the given radius.
+FirstTouch bodies_impact(const Bodies& a, const Bodies& b, std::size_t row, double rounding_a,
+                         double rounding_b, const RigidMotion& motion_a,
+                         const RigidMotion& motion_b);
+
+}  // namespace tauguard::rigid
