@@ -52,6 +52,10 @@ STUDIES: dict[str, Study] = {
         "datasets.study",
         "generation: rate beside mujoco.rollout, bytes, reading, memory, kills",
     ),
+    "entries": Study(
+        "datasets.entries",
+        "every detector on tauguard-collisions-v1, and trained by path beside from traces",
+    ),
     "rigid": Study(
         "rigid.study",
         "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",

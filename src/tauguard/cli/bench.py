@@ -31,7 +31,8 @@ def command(
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
         robot: arms of the study `arms`, by name or file, parted by commas.
-        keep: folder of the scenes of the study `guard`; those it holds are not played again.
+        keep: folder of the scenes of the study `guard`, or of the dataset of `entries`; what it
+            holds is not made again.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
@@ -48,8 +49,8 @@ def command(
         raise ValueError(f"--detector goes with the study detection, not with {name}")
     if robot is not None and name != "arms":
         raise ValueError(f"--robot goes with the study arms, not with {name}")
-    if keep is not None and name != "guard":
-        raise ValueError(f"--keep goes with the study guard, not with {name}")
+    if keep is not None and name not in ("guard", "entries"):
+        raise ValueError(f"--keep goes with the studies guard and entries, not with {name}")
     given = {"detector": detector, "robot": robot, "keep": None if keep is None else str(keep)}
     more = {key: value for key, value in given.items() if value is not None}
     if name == "all":
