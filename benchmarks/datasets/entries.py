@@ -20,15 +20,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tauguard.benchmarks.workers import Workers
-from tauguard.cli.dataset import judged
-from tauguard.cli.fitting import trained
-from tauguard.cli.folder import labelled
+from tauguard.datasets.arm_splits import judged
 from tauguard.datasets.configuration import Configuration, load
 from tauguard.datasets.generation import generate_dataset
+from tauguard.datasets.labelled import labelled
 from tauguard.datasets.reader import arms_of
 from tauguard.datasets.schedule import all_planned
 from tauguard.datasets.shard import simulated
-from tauguard.detectors import DETECTORS, CollisionAlarm, Matching, figures, match_detection
+from tauguard.detectors import (
+    DETECTORS,
+    CollisionAlarm,
+    Matching,
+    figures,
+    make_detector,
+    match_detection,
+    train,
+)
+from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.report import Row
 from tauguard.traces import Trace
 
@@ -108,13 +116,18 @@ def _entry(job: tuple[Path, str, str]) -> Entry:
     folder, arm, name = job
     recordings = labelled(folder, arm)
     begin = time.process_time()
-    alarm = trained(recordings, PER_HOUR, name)
+    alarm = trained(recordings, name)
     seconds = time.process_time() - begin
     splits = tuple(
         (split, tuple(matched(alarm, traces)))
         for split, traces in judged(folder, alarm.detector.arm.robot, ())
     )
     return Entry(name, arm, seconds, splits)
+
+
+def trained(recordings: Sequence[Trace], name: str) -> CollisionAlarm:
+    """A method of the registry, fitted as ``tauguard train --traces`` does."""
+    return train(make_detector(name), recordings, nominal_arm(recordings), PER_HOUR)
 
 
 def matched(alarm: CollisionAlarm, traces: Iterator[Trace] | Sequence[Trace]) -> list[Matching]:
@@ -162,9 +175,8 @@ def by_path(wanted: Configuration, folder: Path, arm: str, name: str) -> list[Ro
     }
     rows = []
     for source in ("path", "traces"):
-        alarm = trained(
-            labelled(folder, arm) if source == "path" else traces["train"], PER_HOUR, name
-        )
+        recordings = labelled(folder, arm) if source == "path" else traces["train"]
+        alarm = trained(recordings, name)
         judge: Iterator[Trace] | Sequence[Trace] = traces["test"]
         if source == "path":
             judge = dict(judged(folder, alarm.detector.arm.robot, ("test",)))["test"]

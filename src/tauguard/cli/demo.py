@@ -38,10 +38,10 @@ def command(
     started = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
 
-    from tauguard.cli.fitting import trained
     from tauguard.cli.summary import draw, text
     from tauguard.datasets import demo_plan, simulate_all
-    from tauguard.detectors import figures, match_detection
+    from tauguard.detectors import SrqSvr, figures, match_detection, train
+    from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.envs import simulate
     from tauguard.models import load_arm
     from tauguard.report import write_json
@@ -51,7 +51,7 @@ def command(
     training = list(simulate_all(plan.train, workers, "simulate training"))
     judged = list(simulate_all([*plan.judge_struck, *plan.judge_free], workers, "simulate test"))
     simulated = time.perf_counter()
-    detector = trained(training, FALSE_ALARMS_PER_HOUR)
+    detector = train(SrqSvr(), training, nominal_arm(training), FALSE_ALARMS_PER_HOUR)
     fitted = time.perf_counter()
     detections = [detector.detect(trace) for trace in judged]
     detected = time.perf_counter()

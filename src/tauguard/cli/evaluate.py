@@ -40,10 +40,10 @@ def command(
             alarm, with a page that `tauguard replay --web` opens.
         late: with --events, a collision found later than this is an event [s].
     """
-    from tauguard.cli.dataset import judged
     from tauguard.cli.events import EventFolder
-    from tauguard.cli.folder import labelled
     from tauguard.cli.summary import diagnosis_text, draw, text
+    from tauguard.datasets.arm_splits import judged
+    from tauguard.datasets.labelled import labelled
     from tauguard.detectors import figures, load_model
     from tauguard.detectors.registry import make_detector
     from tauguard.report import machine, versions, write_json

@@ -106,20 +106,20 @@ def labelled_motion(
     arm: str | None = None,
 ) -> None:
     """Train on labelled recordings."""
-    from tauguard.cli.fitting import trained
-    from tauguard.cli.folder import labelled
-    from tauguard.detectors import make_detector, save_model, with_guarantee
+    from tauguard.datasets.labelled import labelled
+    from tauguard.detectors import make_detector, save_model, train, with_guarantee
+    from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.detectors.thresholds.guarantee import check_guarantee
 
     # First: what cannot be used, or cannot be guaranteed, is better named before training.
-    make_detector(name)
+    method = make_detector(name)
     if calibration is not None and calibration.resolve() == traces.resolve():
         raise ValueError(f"--calibration {calibration}: is --traces; give recordings not in it")
     free = labelled(calibration) if calibration is not None else []
     if free:
         check_guarantee([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
     recordings = labelled(traces, arm)
-    alarm, guarantee = trained(recordings, rate, name), None
+    alarm, guarantee = train(method, recordings, nominal_arm(recordings), rate), None
     if free:
         alarm, guarantee = with_guarantee(alarm, free, rate, confidence)
     save_model(alarm, model)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from tauguard.traces import Trace
+from tqdm import tqdm
+
+from tauguard.datasets.arm_splits import training
+from tauguard.datasets.reader import is_dataset
+from tauguard.traces import Trace, read_mcap
 
 
 def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
@@ -20,12 +22,6 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
         ValueError: no recordings there, or one without truth (named).
         FileNotFoundError: no such folder.
     """
-    from tqdm import tqdm
-
-    from tauguard.cli.dataset import training
-    from tauguard.datasets.reader import is_dataset
-    from tauguard.traces import read_mcap
-
     if not folder.is_dir():
         raise FileNotFoundError(f"{folder}: no such folder; `tauguard simulate --out` makes one")
     if is_dataset(folder):

@@ -1,14 +1,17 @@
-"""What a command takes from a generated dataset: one arm's episodes, split by split."""
+"""One arm's episodes of a generated dataset, split by split: to train on and to judge on."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from tauguard.detectors import RobotNumbers
-    from tauguard.traces import Trace
+import numpy as np
+
+from tauguard.datasets.dataset_folder import arm_xml, configuration_in
+from tauguard.datasets.reader import arms_of, read, splits_of
+from tauguard.detectors import RobotNumbers
+from tauguard.models import pin_model
+from tauguard.traces import Trace
 
 
 def training(folder: Path, arm: str | None) -> list[Trace]:
@@ -17,9 +20,6 @@ def training(folder: Path, arm: str | None) -> list[Trace]:
     Raises:
         ValueError: the split has several arms and ``arm`` does not choose, or it has no such arm.
     """
-    from tauguard.datasets.dataset_folder import configuration_in
-    from tauguard.datasets.reader import arms_of, read
-
     first = (configuration_in(folder).splits[0].name,)
     arms = arms_of(folder, first)
     if arm is None and len(arms) > 1:
@@ -43,9 +43,6 @@ def judged(
     Raises:
         ValueError: no split has that arm.
     """
-    from tauguard.datasets.dataset_folder import configuration_in
-    from tauguard.datasets.reader import arms_of, read, splits_of
-
     every = [split.name for split in configuration_in(folder).splits]
     chosen = splits_of(folder, splits or [s for s in every if s.startswith("test")])
     arm = same_arm(folder, robot)
@@ -61,13 +58,6 @@ def judged(
 
 def same_arm(folder: Path, robot: RobotNumbers) -> str | None:
     """Which arm of the dataset has the geometry that a detector believes in."""
-    import numpy as np
-
-    from tauguard.datasets.dataset_folder import arm_xml
-    from tauguard.datasets.reader import arms_of
-    from tauguard.detectors import RobotNumbers
-    from tauguard.models import pin_model
-
     for arm in arms_of(folder):
         own = RobotNumbers.from_pin(pin_model(arm_xml(folder, arm)))
         parts = ("translation", "axis", "armature")  # masses are identified in training
