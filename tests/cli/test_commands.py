@@ -150,7 +150,8 @@ def test_detect_with_a_trained_model(tmp_path, capsys):
     assert set(kinds) <= {"impact", "clamp", "push"}
     out = capsys.readouterr().out
     assert f"{kinds[0]}, " in out
-    assert " N on link " in out
+    assert "peak force " in out
+    assert all(0 <= e["peak_force_n"]["low"] <= e["peak_force_n"]["high"] for e in result["events"])
     rows = ["time,q1,q2,q3,q4,q5,q6"] + [f"{k / 100},0,0,0,0,0,0" for k in range(500)]
     log, columns = tmp_path / "slow.csv", tmp_path / "columns.json"
     log.write_text("\n".join(rows))
