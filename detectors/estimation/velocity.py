@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,18 +73,24 @@ class SensorNoise:
             dt: sample interval [s].
             agility: see :data:`AGILITY`.
         """
-        move = np.array([[1, dt, dt * dt / 2], [0, 1, dt], [0, 0, 1]])
-        see = np.array([[1.0, 0, 0], [0, 1.0, 0]])
-        push = agility * np.sqrt(dt) * np.array([dt * dt / 6, dt / 2, 1.0])
-        wander = np.outer(push, push)
-        gains: list[float] = []
-        for position, velocity in zip(self.position, self.velocity, strict=True):
-            # In units of the noise, so that the equation is well scaled.
-            scale = np.diag([1 / position, 1 / velocity, dt / velocity])
-            back = np.linalg.inv(scale)
-            a, c = scale @ move @ back, see @ back
-            noise = np.diag([position**2, velocity**2])
-            p = solve_discrete_are(a.T, c.T, scale @ wander @ scale, noise)
-            gain = back @ (p @ c.T @ np.linalg.inv(c @ p @ c.T + noise))
-            gains += [float(g) for g in gain.ravel()]
-        return gains
+        return [
+            gain
+            for position, velocity in zip(self.position, self.velocity, strict=True)
+            for gain in _joint_gains(float(position), float(velocity), dt, agility)
+        ]
+
+
+@lru_cache(maxsize=1024)  # a Riccati equation, asked again at every reset of a detector
+def _joint_gains(position: float, velocity: float, dt: float, agility: float) -> tuple[float, ...]:
+    """The six gains of a joint whose encoder and tachometer have this noise [rad], [rad/s]."""
+    move = np.array([[1, dt, dt * dt / 2], [0, 1, dt], [0, 0, 1]])
+    see = np.array([[1.0, 0, 0], [0, 1.0, 0]])
+    push = agility * np.sqrt(dt) * np.array([dt * dt / 6, dt / 2, 1.0])
+    # In units of the noise, so that the equation is well scaled.
+    scale = np.diag([1 / position, 1 / velocity, dt / velocity])
+    back = np.linalg.inv(scale)
+    a, c = scale @ move @ back, see @ back
+    noise = np.diag([position**2, velocity**2])
+    p = solve_discrete_are(a.T, c.T, scale @ np.outer(push, push) @ scale, noise)
+    gain = back @ (p @ c.T @ np.linalg.inv(c @ p @ c.T + noise))
+    return tuple(float(g) for g in gain.ravel())
