@@ -31,13 +31,19 @@ REST = Motion(np.eye(4), np.zeros(3), np.zeros(3))
 
 def batches():
     rng = np.random.default_rng(0)
-    yield Tetrahedra(rng.normal(size=(3, 4, 3)))
-    yield Boxes(rng.normal(size=(3, 3)), np.ones((3, 3)), np.tile(np.eye(3), (3, 1, 1)))
-    yield Parallelepipeds(rng.normal(size=(3, 3)), rng.normal(size=(3, 3, 3)))
-    yield Hulls(rng.normal(size=(9, 3)), [0, 3, 5, 9])
-    yield Polygons(rng.normal(size=(9, 2)), [0, 3, 5, 9])
-    yield Motion(np.tile(np.eye(4), (3, 1, 1)), np.ones((3, 3)), np.ones((3, 3)))
-    yield MeshTree(rng.normal(size=(5, 3)), [[0, 1, 2], [2, 3, 4]])
+    made = (
+        Tetrahedra(rng.normal(size=(3, 4, 3))),
+        Boxes(rng.normal(size=(3, 3)), np.ones((3, 3)), np.tile(np.eye(3), (3, 1, 1))),
+        Parallelepipeds(rng.normal(size=(3, 3)), rng.normal(size=(3, 3, 3))),
+        Hulls(rng.normal(size=(9, 3)), [0, 3, 5, 9]),
+        Polygons(rng.normal(size=(9, 2)), [0, 3, 5, 9]),
+        Motion(np.tile(np.eye(4), (3, 1, 1)), np.ones((3, 3)), np.ones((3, 3))),
+        MeshTree(rng.normal(size=(5, 3)), [[0, 1, 2], [2, 3, 4]]),
+    )
+    return {type(batch): batch for batch in made}
+
+
+BATCHES = (Tetrahedra, Boxes, Parallelepipeds, Hulls, Polygons, Motion, MeshTree)
 
 
 def arrays(batch):
@@ -46,8 +52,10 @@ def arrays(batch):
     return {name: x for name, x in found.items() if isinstance(x, np.ndarray)}
 
 
-@pytest.mark.parametrize("batch", list(batches()), ids=lambda b: type(b).__name__)
-def test_no_array_of_a_batch_can_be_changed(batch):
+# Made in the test: an object among the parameters is never let go, and nanobind calls it leaked.
+@pytest.mark.parametrize("kind", BATCHES)
+def test_no_array_of_a_batch_can_be_changed(kind):
+    batch = batches()[kind]
     for copied in (
         batch,
         copy.copy(batch),
