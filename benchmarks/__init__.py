@@ -84,6 +84,10 @@ STUDIES: dict[str, Study] = {
         "faults.study",
         "faults of samples: which are seen, how soon, false alarms, and what goes untold",
     ),
+    "listen": Study(
+        "faults.live",
+        "a log played by RTDE in real time and heard: losses, alarms, latency",
+    ),
     "mutants": Study(
         "trust.mutants",
         "damaged files of every format: an answer or one line, and no wrong answer",

@@ -1,0 +1,225 @@
+"""A log played by RTDE in real time and heard by a detector: losses, alarms, latency.
+
+The server and the listener of each rate are processes of their own, as ``tauguard play-ur`` and
+``tauguard listen`` are; all rates run at once. The alarms are held against those of the file.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.report import Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tauguard.detectors import CollisionAlarm
+    from tauguard.traces import Trace
+
+Array = NDArray[np.float64]
+
+#: Samples a second: of UR's CB and e-Series; blows in the log of a full and of a quick run.
+RATES, BLOWS = (125.0, 500.0), (195, 6)
+#: Training: collision-free seconds, speeds [%], and false alarms an hour that it aims at.
+SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
+#: Samples of which each stage is timed.
+TIMED = 4000
+#: Percentiles of the latency.
+LEVELS = ("median", "p99", "p99_9", "p99_99", "max")
+
+NOTES = {
+    "listen": "a simulated arm with blows, played in real time, all rates at once. alike: alarms "
+    "of the listener that are those of `detect` on the file, of how many. false faults: named "
+    "although the log has none. Times in us from the packet's arrival to the answer.",
+    "stages": "one sample, us of this thread at the median and at p99.9, and what a call allocates "
+    "at most at a time and keeps, bytes. native: the work is C++; the rest is Python around it. "
+    "monitor holds the other three; packet: RTDE bytes to arrays.",
+}
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """A row a rate, and one for each stage of a sample."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_inputs(folder, quick, seed)
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(len(RATES), context) as workers:
+            rows = list(workers.map(heard, [folder] * len(RATES), RATES))
+        return rows + stages(folder, RATES[-1])
+
+
+def write_inputs(folder: Path, quick: bool, seed: int) -> None:
+    """A log and a detector for each rate; the arm and its motions follow from the seed."""
+    from tauguard.datasets.plans import free_episodes, struck_episodes
+    from tauguard.detectors import ArmModel, RobotNumbers, make_detector, save_model, train
+    from tauguard.envs import simulate
+    from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
+    from tauguard.traces import Trace, write_mcap
+
+    def thinned(trace: Trace, rate: float) -> Trace:
+        rows = slice(None, None, round(1 / (trace.dt * rate)))
+        signals = (trace.t[rows], trace.q[rows], trace.qd[rows], trace.current[rows])
+        return Trace(trace.joint_names, *signals)
+
+    drawn = Mismatch(seed=2000 + seed)
+    arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
+    free = free_episodes(seed, EPISODES, SECONDS, SPEEDS, (0.0,), drawn)
+    training = [simulate(episode) for episode in free]
+    (struck,) = struck_episodes(700 + seed, 1, BLOWS[quick], (40.0,), (0.0,), drawn)
+    log = simulate(struck)
+    for rate in RATES:
+        write_mcap(folder / f"{rate:g}.mcap", thinned(log, rate))
+        own = [thinned(trace, rate) for trace in training]
+        alarm = train(make_detector("moving-thresholds"), own, arm, PER_HOUR)
+        save_model(alarm, folder / f"{rate:g}.skops")
+
+
+def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
+    """The detector and the log of a rate."""
+    from tauguard.datasets import read_log
+    from tauguard.detectors import load_model
+
+    return load_model(folder / f"{rate:g}.skops"), read_log(folder / f"{rate:g}.mcap").trace
+
+
+def serve(folder: Path, rate: float, pipe: Any) -> None:
+    """Play the log: tell the port, and at the end how many packets were sent."""
+    from tauguard.datasets import read_log
+    from tauguard.datasets.live import UrServer
+    from tauguard.datasets.live.packets import Packets
+
+    with UrServer(Packets.of(read_log(folder / f"{rate:g}.mcap").trace), 0) as server:
+        pipe.send(server.port)
+        server.wait()
+        pipe.send(server.sent)
+
+
+def heard(folder: Path, rate: float) -> Row:
+    """Listen to the played log."""
+    from tauguard.datasets.live import UrSource
+    from tauguard.datasets.live.listening import listen
+    from tauguard.detectors.faults.detection import detect_with_faults
+    from tauguard.detectors.faults.monitor import Monitor
+
+    alarm, trace = read_inputs(folder, rate)
+    assert alarm.inputs is not None
+    truth = detect_with_faults(alarm, trace).detection.alarm
+    context = multiprocessing.get_context("spawn")
+    mine, theirs = context.Pipe()
+    server = context.Process(target=serve, args=(folder, rate, theirs))
+    server.start()
+    with UrSource("127.0.0.1", mine.recv(), rate, reconnect=0) as source:
+        busy = time.process_time()
+        found = listen(source, Monitor(alarm, alarm.inputs), keep=True)
+        busy = time.process_time() - busy
+        lost = len(source.events)
+    sent = mine.recv()
+    server.join()
+    kept = found.trace()
+    rows = np.searchsorted(kept.t, trace.t - 0.5 / rate)
+    up = np.append(found.alarms, False)[rows]
+    begins = np.flatnonzero(np.diff(truth.astype(int), prepend=0) > 0)
+    same = [up[k] and not (k and up[k - 1]) for k in begins]
+    return {
+        "study": "listen",
+        "rate [Hz]": rate,
+        "seconds": float(trace.t[-1] - trace.t[0]),
+        "sent": sent,
+        "heard": found.samples,
+        "lost": sent - found.samples + lost,
+        "alarms": int(np.sum(np.diff(up.astype(int), prepend=0) > 0)),
+        "alike": f"{sum(same)} of {len(begins)}",
+        "false faults": len(found.spans.of("fault")),
+        **{f"{name} [us]": value for name, value in found.quantiles().items()},
+        "cpu [us]": 1e6 * busy / max(1, found.samples),
+    }
+
+
+def stages(folder: Path, rate: float) -> list[Row]:
+    """What a sample costs, stage by stage, on the log's beginning."""
+    from tauguard.datasets.live import rtde
+    from tauguard.detectors.faults import FaultCheck
+    from tauguard.detectors.faults.monitor import Monitor
+    from tauguard.detectors.faults.torques import TorqueCheck
+
+    alarm, trace = read_inputs(folder, rate)
+    assert alarm.inputs is not None
+    usual, stream = alarm.inputs, alarm.stream()
+    check, monitor = FaultCheck(usual), Monitor(alarm, usual)
+    torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
+    recipe = rtde.Recipe(1, ("DOUBLE", "VECTOR6D", "VECTOR6D", "VECTOR6D"))
+    reader, layout = rtde.PacketReader(), recipe.layout
+    count = min(TIMED, len(trace.t))
+    t, rows = trace.t.tolist(), list(zip(trace.q, trace.qd, trace.current, strict=True))[:count]
+    sent = [recipe.pack([t[k], *np.concatenate(row)]) for k, row in enumerate(rows)]
+
+    def packet(k: int) -> None:
+        reader.feed(sent[k])
+        found = reader.next()
+        assert found is not None
+        np.array(layout.unpack(found.payload)[1:])
+
+    calls: dict[str, tuple[str, Callable[[int], object]]] = {
+        "packet": ("struct, NumPy", packet),
+        "fault check": ("yes", lambda k: check.step(t[k], *rows[k])),
+        "torque check": ("yes", lambda k: torques.step(*rows[k])),
+        "detector": ("observer and features", lambda k: stream.step(*rows[k])),
+        "monitor": ("these three", lambda k: monitor.step(t[k], *rows[k])),
+    }
+    return [
+        {"study": "stages", "stage": name, "native": native, "samples": count}
+        | timed(call, count // 2)
+        | allocated(lambda k, call=call, n=count // 2: call(n + k), count // 2)
+        for name, (native, call) in calls.items()
+    ]
+
+
+def timed(call: Callable[[int], object], count: int) -> Row:
+    """Processor time of a call [us]."""
+    spent = np.empty(count, np.int64)
+    for k in range(count):
+        begin = time.thread_time_ns()
+        call(k)
+        spent[k] = time.thread_time_ns() - begin
+    median, tail = np.percentile(spent / 1e3, (50, 99.9))
+    return {"p50 [us]": float(median), "p99.9 [us]": float(tail)}
+
+
+def allocated(call: Callable[[int], object], count: int) -> Row:
+    """Bytes that Python and NumPy take during a call at the median, and keep of it."""
+    peaks = np.empty(count)
+    tracemalloc.start()
+    try:
+        begin, _ = tracemalloc.get_traced_memory()
+        for k in range(count):
+            before, _ = tracemalloc.get_traced_memory()
+            tracemalloc.reset_peak()
+            call(k)
+            peaks[k] = tracemalloc.get_traced_memory()[1] - before
+        end, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    return {"taken [bytes]": float(np.median(peaks)), "kept [bytes]": (end - begin) / count}
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Latency of each rate beside its period."""
+    axes = figure.subplots()
+    for k, row in enumerate(row for row in rows if row["study"] == "listen"):
+        values = [float(row[f"{name} [us]"]) / 1e3 for name in LEVELS]
+        label = f"{row['rate [Hz]']:g} Hz, {row['heard']:,} samples"
+        axes.semilogy(LEVELS, values, "o-", color=f"C{k}", label=label)
+        period = 1e3 / float(row["rate [Hz]"])
+        axes.axhline(period, color=f"C{k}", linestyle=":", label=f"its period, {period:g} ms")
+    axes.set_ylabel("from packet to answer [ms]")
+    axes.legend(frameon=False)
