@@ -22,6 +22,8 @@ VARIABLES = {
 HANDSHAKE = 3.0  # [s] for each answer of the handshake
 #: Controllers that send 500 samples a second (e-Series, major version 5 and up); older: 125.
 E_SERIES = 5
+#: Events of a connection that are kept; a robot that is lost every second has more in an hour.
+MOST_EVENTS = 1000
 
 
 class UrSource(Closing):
@@ -75,15 +77,15 @@ class UrSource(Closing):
         while True:
             try:
                 found = self._packet(deadline)
+                if found is None:
+                    return None
+                if found.kind == rtde.DATA_PACKAGE:
+                    return self._sample(found.payload)
             except (OSError, ValueError) as error:
                 self._again(error)
                 return None
-            if found is None:
-                return None
-            if found.kind == rtde.DATA_PACKAGE:
-                return self._sample(found.payload)
             if found.kind == rtde.TEXT_MESSAGE:
-                self.events.append(f"the controller says: {rtde.read_text(found.payload)}")
+                self._note(f"the controller says: {rtde.read_text(found.payload)!r}")
 
     def close(self) -> None:
         """Let go of the connection."""
@@ -135,6 +137,7 @@ class UrSource(Closing):
                 f"{self.host}:{self.port} does not give {', '.join(wrong)}: expected a UR "
                 "controller with software 3.4 or later"
             )
+        self._recipe = answer[0]
         self._layout = rtde.Recipe(answer[0], types).layout
         if self._ask(rtde.START)[:1] != b"\x01":
             raise ConnectionError(f"{self.host}:{self.port} does not start its data")
@@ -181,17 +184,27 @@ class UrSource(Closing):
             except ConnectionError:
                 time.sleep(0.2)
                 continue
-            self.events.append(
-                f"connection lost ({error}), back after {time.monotonic() - began:.1f} s"
-            )
+            self._note(f"connection lost ({error}), back after {time.monotonic() - began:.1f} s")
             return
         raise SourceClosed(f"{self.host}:{self.port}: connection lost ({error})")
 
     def _sample(self, payload: bytes) -> Sample:
         arrived = time.monotonic_ns()
+        if len(payload) != self._layout.size or payload[0] != self._recipe:
+            raise ValueError(
+                f"a data packet of {len(payload)} bytes, expected {self._layout.size} of recipe "
+                f"{self._recipe}"
+            )
         values = np.array(self._layout.unpack(payload)[1:])
         t = float(values[0])
         passed, self._last = t - self._last, t
-        if np.isfinite(passed) and (missed := round(passed * self._rate) - 1) > 0:
-            self.events.append(f"{missed} samples lost before {t:.3f} s")
+        if np.isfinite(passed) and passed * self._rate > 1.5:
+            self._note(f"{passed * self._rate - 1:.0f} samples lost before {t:.3f} s")
         return Sample(t, values[1:7], values[7:13], values[13:19], arrived)
+
+    def _note(self, event: str) -> None:
+        """Keep an event, a bounded number of them."""
+        if len(self.events) < MOST_EVENTS:
+            self.events.append(event[:200])
+        elif len(self.events) == MOST_EVENTS:
+            self.events.append("more events are not listed")
