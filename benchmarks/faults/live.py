@@ -39,8 +39,9 @@ LEVELS = ("median", "p99", "p99_9", "p99_99", "max")
 
 NOTES = {
     "listen": "a simulated arm with blows, played in real time, all rates at once. alike: alarms "
-    "of the listener that are those of `detect` on the file, of how many. false faults: named "
-    "although the log has none. Times in us from the packet's arrival to the answer.",
+    "of the listener that are those of `detect` on the file, of how many. silent or late: times "
+    "that samples came too late, as other programs of the machine ran. Times in us from the "
+    "packet's arrival to the answer.",
     "stages": "one sample, us of this thread at the median and at p99.9, and what a call allocates "
     "at most at a time and keeps, bytes. native: the work is C++; the rest is Python around it. "
     "monitor holds the other three; packet: RTDE bytes to arrays.",
@@ -139,7 +140,7 @@ def heard(folder: Path, rate: float) -> Row:
         "lost": sent - found.samples + lost,
         "alarms": int(np.sum(np.diff(up.astype(int), prepend=0) > 0)),
         "alike": f"{sum(same)} of {len(begins)}",
-        "false faults": len(found.spans.of("fault")),
+        "silent or late": len(found.spans.of("fault")),
         **{f"{name} [us]": value for name, value in found.quantiles().items()},
         "cpu [us]": 1e6 * busy / max(1, found.samples),
     }
@@ -179,7 +180,7 @@ def stages(folder: Path, rate: float) -> list[Row]:
     return [
         {"study": "stages", "stage": name, "native": native, "samples": count}
         | timed(call, count // 2)
-        | allocated(lambda k, call=call, n=count // 2: call(n + k), count // 2)
+        | allocated(call, range(count // 2, count))
         for name, (native, call) in calls.items()
     ]
 
@@ -195,21 +196,21 @@ def timed(call: Callable[[int], object], count: int) -> Row:
     return {"p50 [us]": float(median), "p99.9 [us]": float(tail)}
 
 
-def allocated(call: Callable[[int], object], count: int) -> Row:
+def allocated(call: Callable[[int], object], numbers: range) -> Row:
     """Bytes that Python and NumPy take during a call at the median, and keep of it."""
-    peaks = np.empty(count)
+    peaks = []
     tracemalloc.start()
     try:
         begin, _ = tracemalloc.get_traced_memory()
-        for k in range(count):
+        for k in numbers:
             before, _ = tracemalloc.get_traced_memory()
             tracemalloc.reset_peak()
             call(k)
-            peaks[k] = tracemalloc.get_traced_memory()[1] - before
+            peaks.append(tracemalloc.get_traced_memory()[1] - before)
         end, _ = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    return {"taken [bytes]": float(np.median(peaks)), "kept [bytes]": (end - begin) / count}
+    return {"taken [bytes]": float(np.median(peaks)), "kept [bytes]": (end - begin) / len(numbers)}
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

@@ -4,7 +4,8 @@ A fault of a second is put into logs that training has not seen; the same stretc
 the answers are held against. ``seen``: a reason is given while the fault lasts, or within 0.15 s
 after it. ``false alarms``: collisions said in or after the fault that the intact stretch does not
 have. ``found after``: alarms of the intact stretch, from the recovery on, that are there as well.
-``untold``: seconds of fault, from 20 ms on, in which the answer is "free".
+``untold``: seconds of fault, from 20 ms on, in which the answer is "free". ``missed``: collisions
+within faults at which the answer stays "free", of those that the intact stretch finds.
 
 What is optimistic: the allowances of the position check (a velocity or time stamp one sample late)
 and the bounds on torque ratios were chosen on these logs of the real arms; the simulated arms are
@@ -24,7 +25,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from tauguard.benchmarks.faults.arms import Watched, arms
-from tauguard.datasets.live.listening import SILENT
+from tauguard.datasets.live.lateness import Lateness, most_behind
+from tauguard.datasets.live.listening import told_late
 from tauguard.datasets.live.packets import FAULTS, Fault, Packets
 from tauguard.detectors.faults.monitor import COLLISION, FREE, Monitor
 from tauguard.detectors.faults.spans import Spans
@@ -36,16 +38,19 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Moments of each fault, an arm: in a full run, in a quick one.
-MOMENTS = (12, 3)
+#: Moments of each fault, an arm, drawn at random and again at collisions: full run, quick one.
+MOMENTS = (8, 3)
+#: A collision within a fault is missed if the answer is "free" for so long after its alarm [s].
+MISSED = 0.15
 #: A fault lasts so long [s]; it is looked at for as long after the detector has settled again.
 LASTS, AFTER = 1.0, 2.5
 #: Faults that a single sample, or its neighbours, can show; the others need the arm's model.
 PLAIN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan", "late")
 NOTES = {
     "clean": "logs as they are: seconds at fault, each of them false, and alarms beside `detect`.",
-    "faults": "a fault of 1 s at random moments; delays in ms from its first sample. What is not "
-    "seen looks like a contact, or like nothing.",
+    "faults": "a fault of 1 s at random moments and at collisions; delays in ms from its first "
+    "sample. untold_s: the answer is free. missed: collisions within faults with no answer but "
+    "free, of those that the same stretch without the fault finds.",
     "loop": "microseconds from sample to answer, calls taken in turn on the longest log; Python "
     "around native parts. Other programs of the machine are in the tail.",
     "another arm": "one arm's samples given to another's model.",
@@ -59,6 +64,7 @@ class Heard:
     spans: Spans = field(default_factory=Spans)
     reasons: list[float] = field(default_factory=list)  #: when a reason was given [s of due]
     free: list[float] = field(default_factory=list)  #: when the answer was "free"
+    other: list[float] = field(default_factory=list)  #: when it was another
     starts: list[float] = field(default_factory=list)  #: of alarms
 
 
@@ -66,18 +72,21 @@ def heard(watched: Watched, packets: Packets) -> Heard:
     """What the monitor says of packets, as ``listen`` counts it."""
     assert watched.alarm.inputs is not None
     monitor, out = Monitor(watched.alarm, watched.alarm.inputs), Heard()
+    lateness, most = Lateness(), most_behind(watched.alarm.inputs.dt)
     up, last = False, float(packets.due[0])
     rows = zip(packets.due, packets.t, packets.q, packets.qd, packets.current, strict=True)
     for due, t, q, qd, current in rows:
-        if due - last > SILENT:
-            out.reasons.append(last + SILENT)
+        if due - last > most:
+            out.reasons.append(last + most)
+            out.other += np.arange(last + most, due, most).tolist()
         last = float(due)
         answer = monitor.step(float(t), q, qd, current)
+        late = lateness.step(float(t), last)
+        answer = told_late(answer, late) if late > most else answer
         out.spans.add(float(due), answer)
         if answer.reason:
             out.reasons.append(last)
-        if answer.state == FREE:
-            out.free.append(last)
+        (out.free if answer.state == FREE else out.other).append(last)
         if answer.alarm and not up:
             out.starts.append(last)
         up = answer.alarm
@@ -94,7 +103,8 @@ class Tally:
     found: int = 0
     after: int = 0
     untold: float = 0.0
-    early: int = 0  #: moments with a reason before the fault
+    struck: int = 0  #: collisions within faults
+    missed: int = 0  #: of them, with no answer but "free"
 
     def add(self, watched: Watched, log: str, name: str, start: float) -> None:
         """The fault at one moment, beside the same stretch without it."""
@@ -108,7 +118,6 @@ class Tally:
         keep = (broken.due >= begin) & (broken.due <= intact.due[-1])
         a, b = heard(watched, intact), heard(watched, broken.rows(np.flatnonzero(keep)))
         self.moments += 1
-        self.early += any(t < start for t in b.reasons) and not a.reasons
         times = [t for t in b.reasons if start - 1e-9 <= t <= start + LASTS + 0.15]
         self.delays += [1e3 * (times[0] - start)] if times else []
         said = [s.start for s in b.spans.of(COLLISION)]
@@ -120,8 +129,11 @@ class Tally:
         late = [t for t in true if t > start + LASTS + settle + 0.2]
         self.after += len(late)
         self.found += sum(any(abs(t - u) < 0.1 for u in said) for t in late)
-        gaps = [t for t in b.free if start + 0.02 < t < start + LASTS]
+        gaps = {t for t in b.free if start + 0.02 < t < start + LASTS}  # a burst has one time
         self.untold += len(gaps) * trace.dt
+        within = [t for t in true if start + 0.02 < t < start + LASTS]
+        self.struck += len(within)
+        self.missed += sum(not any(t <= u <= t + MISSED for u in b.other) for t in within)
 
     def row(self, arm: str, name: str) -> Row:
         """For the table."""
@@ -138,6 +150,7 @@ class Tally:
             "found_after": f"{self.found} of {self.after}",
             "untold_s": self.untold,
             "of_s": self.moments * (LASTS - 0.02),
+            "missed": f"{self.missed} of {self.struck}",
         }
 
 
@@ -160,18 +173,23 @@ def run(quick: bool, seed: int) -> list[Row]:
 
 
 def moments(watched: Watched, rng: np.random.Generator, count: int) -> list[tuple[str, float]]:
-    """Logs that are long enough, and random starts in them, in motion."""
+    """Logs and starts in them: so many at random, in motion, and as many just before alarms."""
     margin = watched.alarm.settle
-    starts = {}
+    starts, struck = {}, []
     for name, trace in watched.logs.items():
         since, whole = trace.t - trace.t[0], trace.t[-1] - trace.t[0]
-        fits = moving(trace) & (since > margin + 1.5) & (since < whole - margin - LASTS - AFTER)
-        if fits.any():
-            starts[name] = since[fits]
+        fits = (since > margin + 1.5) & (since < whole - margin - LASTS - AFTER)
+        if (fits & moving(trace)).any():
+            starts[name] = since[fits & moving(trace)]
+        for alarm in watched.alarm.detect(trace).alarms:
+            begin = alarm.start - trace.t[0] - 0.5 * LASTS
+            struck += [(name, float(begin))] if fits[np.searchsorted(since, begin)] else []
     if not starts:
         return []
     names = [str(name) for name in rng.choice(list(starts), count)]
-    return [(name, float(rng.choice(starts[name]))) for name in names]
+    drawn = [(name, float(rng.choice(starts[name]))) for name in names]
+    chosen = rng.permutation(len(struck))[:count]
+    return drawn + [struck[k] for k in chosen]
 
 
 def moving(trace: Trace) -> np.ndarray:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from tqdm import tqdm
 
 from tauguard.benchmarks.trust.tasks import FILES, command
 from tauguard.report import Row
@@ -270,11 +271,11 @@ def run(quick: bool, seed: int) -> list[Row]:
             raise OSError(f"{base}: the recordings cannot be written there")
         for number, ((kind, workers), counts) in enumerate(TRIALS.items()):
             count, rng = Count(), np.random.default_rng((seed, number))
-            if kind != "full disk" or disks:
-                for _ in range(counts[quick]):
+            name = f"{kind}, {workers} workers"
+            for _ in tqdm(range(counts[quick]), desc=name, disable=None, leave=False):
+                if kind != "full disk" or disks:
                     trial(kind, workers, base, rng, count)
             rows.append(row(kind, workers, count))
-            print(rows[-1], flush=True)
     return rows
 
 

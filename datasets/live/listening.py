@@ -5,13 +5,14 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.datasets.live.lateness import Lateness, most_behind
 from tauguard.datasets.live.sample import LiveSource, Sample, SourceClosed
-from tauguard.detectors.faults.monitor import FAULT, Answer, Monitor
+from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer, Monitor
 from tauguard.detectors.faults.spans import Spans
 from tauguard.traces.trace import Trace
 
@@ -19,8 +20,6 @@ Array = NDArray[np.float64]
 
 #: Latencies are counted in bins of a microsecond, up to so many; longer ones are in the last.
 BINS = 100_000
-#: A source that gives nothing for so long is said to be silent [s]: a fault without a sample.
-SILENT = 0.1
 
 
 @dataclass
@@ -41,8 +40,8 @@ class Heard:
     alarms: list[bool] = field(default_factory=list)
     ended: str = ""  #: why it ended
 
-    def add(self, sample: Sample, answer: Answer, latency: int) -> None:
-        """One sample with its answer."""
+    def add(self, sample: Sample, answer: Answer, latency: int, late: float = 0.0) -> None:
+        """One sample with its answer; ``late`` [s] is above 0 where it came too late."""
         self.samples += 1
         self.counts[min(latency // 1000, BINS - 1)] += 1
         self.slowest = max(self.slowest, latency)
@@ -54,13 +53,13 @@ class Heard:
                 self.rows.append(sample)
                 self.scores.append(answer.score)
                 self.alarms.append(answer.alarm)
-        self.spans.add(t, answer)
+        self.spans.add(t, told_late(answer, late) if late else answer)
 
     def silent(self, seconds: float) -> None:
         """Nothing came for ``seconds``; before the first sample that is no fault."""
         if np.isnan(self.last):
             return
-        self.spans.mark(FAULT, True, self.last, f"silent: no sample for {seconds:.1f} s")
+        self.spans.mark(FAULT, True, self.last, f"silent: no sample for {1e3 * seconds:.0f} ms")
 
     def trace(self) -> Trace:
         """The believed samples as a trace."""
@@ -83,6 +82,14 @@ class Heard:
         return found | {"max": self.slowest * 1e-3}
 
 
+def told_late(answer: Answer, late: float) -> Answer:
+    """An answer that comes too late: no collision is not "free", as the robot is further on."""
+    if answer.reason:
+        return answer
+    reason = f"late: the samples are {1e3 * late:.0f} ms behind the robot"
+    return replace(answer, state=COLLISION if answer.alarm else FAULT, reason=reason)
+
+
 def listen(
     source: LiveSource,
     monitor: Monitor,
@@ -99,23 +106,26 @@ def listen(
         report: called after every answer; it must return at once (the latency does not count it).
         keep: keep the samples, for :meth:`Heard.trace`.
     """
-    heard = Heard(source.joint_names, keep)
+    heard, lateness = Heard(source.joint_names, keep), Lateness()
     end = time.monotonic() + seconds
-    last = time.monotonic()
+    last, most = time.monotonic(), most_behind(1 / source.rate)
     collecting = gc.isenabled()
     gc.disable()  # a collection would come between a packet and its answer
     try:
         while (now := time.monotonic()) < end:
-            sample = source.read(min(SILENT, end - now))
+            sample = source.read(min(most, end - now))
             if sample is None:
-                if time.monotonic() - last > SILENT:
+                if time.monotonic() - last > most:
                     heard.silent(time.monotonic() - last)
                 continue
             answer = monitor.step(sample.t, sample.q, sample.qd, sample.current)
-            heard.add(sample, answer, time.monotonic_ns() - sample.arrived)
+            latency = time.monotonic_ns() - sample.arrived
+            late = lateness.step(sample.t, 1e-9 * sample.arrived)
+            late = late if late > most else 0.0
+            heard.add(sample, answer, latency, late)
             last = time.monotonic()
             if report is not None:
-                report(sample, answer)
+                report(sample, told_late(answer, late) if late else answer)
         heard.ended = f"{seconds:g} s are over"
     except SourceClosed as closed:
         heard.ended = str(closed)

@@ -110,6 +110,17 @@ def test_a_dead_worker_is_noticed():
         list(in_processes(os._exit, [3, 3], 2))
 
 
+def test_no_worker_hears_ctrl_c_not_even_the_first():
+    # In a new process: its first worker begins multiprocessing's resource tracker.
+    code = (
+        "import functools, signal; from tauguard.datasets.workers import in_processes\n"
+        "mask = functools.partial(signal.pthread_sigmask, signal.SIG_BLOCK)\n"
+        "print([signal.SIGINT in blocked for blocked in in_processes(mask, [[], []], 2)])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout == "[True, True]\n", done.stderr
+
+
 def test_results_of_workers_are_complete_and_errors_come_through():
     squares = [float(n * n) for n in range(9)]
     assert sorted(in_processes(math.sqrt, squares, 2)) == list(range(9))

@@ -26,18 +26,20 @@ def test_a_log_without_a_fault_has_none_and_the_alarms_of_detect(watched):
     assert row["alarms"] == row["alarms_of_detect"] > 0
 
 
-@pytest.mark.parametrize("name", ["nan", "frozen", "missing"])
+@pytest.mark.parametrize("name", ["nan", "frozen", "missing", "late"])
 def test_a_fault_is_seen_and_leaves_nothing_untold(watched, name):
     tally = Tally()
     chosen = moments(watched, np.random.default_rng(1), 2)
-    assert len(chosen) == 2
+    assert 2 <= len(chosen) <= 4  # two at random, and what collisions there are
     for log, start in chosen:
         tally.add(watched, log, name, start)
     row = tally.row("small", name)
     assert row["seen"]["value"] == 1
-    assert row["untold_s"] == 0
+    # The last samples of a burst are no more than 20 ms old, and all come at one moment.
+    assert row["untold_s"] <= (0.002 * len(chosen) + 1e-9 if name == "late" else 0)
     assert row["false_alarms"] == 0
-    assert row["longest_ms"] <= 100.001
+    assert row["longest_ms"] <= 20.001
+    assert row["missed"].startswith("0 of ")
 
 
 def test_the_moments_follow_from_the_seed(watched):
