@@ -50,7 +50,7 @@ STUDIES: dict[str, Study] = {
     ),
     "datasets": Study(
         "datasets.study",
-        "generation: rate beside mujoco.rollout, bytes, reading, memory, kills",
+        "generation: rate beside mujoco.rollout, bytes, reading, memory",
     ),
     "entries": Study(
         "datasets.entries",

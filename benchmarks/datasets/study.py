@@ -1,11 +1,10 @@
-"""Generation of datasets: rate and where it goes, bytes, reading, memory, and kills."""
+"""Generation of datasets: rate and where it goes, bytes, reading and memory."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from tauguard.benchmarks.datasets.files import memory_rows, size_rows
-from tauguard.benchmarks.datasets.kills import kill_rows
 from tauguard.benchmarks.datasets.rates import PARTS, rate_rows
 from tauguard.report import Row
 
@@ -23,18 +22,15 @@ NOTES = {
     "read": "MB of float32 a second, one column of one shard, median of 7.",
     "memory": "Peak resident memory [MiB] of the command and of the largest of two workers; "
     "episodes of 1 s, 20 a shard.",
-    "kills": "Commands killed (SIGKILL, the whole process group) at moments drawn at random, then "
-    "gone on with by one process; bytes compared with those of a run that nobody killed.",
 }
 
 
 def run(quick: bool, seed: int) -> list[Row]:
-    """All rows; the quick run has few episodes and kills."""
+    """All rows; the quick run has few episodes."""
     return [
         *rate_rows(quick, seed),
         *size_rows(quick, seed),
         *memory_rows(quick, seed),
-        *kill_rows(quick, seed),
     ]
 
 

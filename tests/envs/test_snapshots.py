@@ -42,6 +42,23 @@ def test_a_snapshot_goes_on_with_the_same_bits(name):
         np.testing.assert_array_equal(played(other, actions[12:]), expected)
 
 
+def test_a_person_goes_on_in_another_environment_from_any_moment():
+    # A reach may begin where the body was a step before: a snapshot holds that, too.
+    one, other = (gym.make("tauguard/React-v0", obstacles=("person",)).unwrapped for _ in "ab")
+    one.reset(seed=3)
+    other.reset(seed=4)
+    action = np.zeros(one.action_space.shape)
+    for _ in range(15):
+        other.step(action)
+    for _ in range(250):
+        other.set_state(one.get_state())
+        expected, *_, info = one.step(action)
+        seen, *_, own = other.step(action)
+        np.testing.assert_array_equal(seen, expected)
+        assert own["distance"] == info["distance"]
+        np.testing.assert_array_equal(other.get_state()["plant"], one.get_state()["plant"])
+
+
 def test_a_state_of_another_scene_is_refused():
     one, other = (gym.make(f"tauguard/{n}").unwrapped for n in ("Reach-v0", "React-v0"))
     one.reset(seed=0)

@@ -1,14 +1,8 @@
-"""Generation killed (SIGKILL) at random moments: the same bytes when it goes on.
-
-``python -m tauguard.benchmarks.datasets.kills --count 20 --workers 1 2 --ray local`` prints a line
-a kind; the exit code is 1 where bytes differ.
-"""
+"""``tauguard generate`` killed (SIGKILL) at random moments: the same bytes when it goes on."""
 
 from __future__ import annotations
 
-import argparse
 import hashlib
-import json
 import os
 import signal
 import subprocess
@@ -44,9 +38,13 @@ SMALL = """
 """
 
 
+#: Kills with each number of workers, in a full and in a quick run.
+KILLS = (20, 1)
+
+
 def kill_rows(quick: bool, seed: int) -> list[Row]:
     """A row a number of workers."""
-    return [killed(["--workers", str(n)], 2 if quick else 20, seed) for n in (1, 2)]
+    return [killed(["--workers", str(n)], KILLS[quick], seed) for n in (1, 2)]
 
 
 def killed(how: list[str], count: int, seed: int) -> Row:
@@ -76,7 +74,7 @@ def killed(how: list[str], count: int, seed: int) -> Row:
             generate_dataset(load(config), folder, workers=1)
             same += contents(folder) == contents(wanted)
     return {
-        "study": "kills",
+        "study": "generate",
         "who": " ".join(how).removeprefix("--"),
         "kills": count,
         "before it ended": midway,
@@ -117,25 +115,3 @@ def _timed(config: Path, folder: Path, how: list[str]) -> tuple[float, float]:
     if command.wait() != 0:
         raise RuntimeError(f"tauguard generate {' '.join(how)} failed")
     return begun, time.monotonic()
-
-
-def main() -> None:
-    """The command."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--count", type=int, default=20)
-    options.add_argument("--workers", type=int, nargs="*", default=[1, 2])
-    options.add_argument("--ray", help="address of a cluster, or local")
-    options.add_argument("--seed", type=int, default=0)
-    given = options.parse_args()
-    kinds = [["--workers", str(n)] for n in given.workers]
-    kinds += [["--ray", given.ray]] if given.ray else []
-    rows = []
-    for how in kinds:
-        rows.append(killed(how, given.count, given.seed))
-        print(json.dumps(rows[-1]), flush=True)
-    if any(row["same bytes"] != row["kills"] for row in rows):
-        raise SystemExit(1)
-
-
-if __name__ == "__main__":
-    main()
