@@ -10,21 +10,19 @@ its motion.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tauguard.benchmarks.detection.fleet import CALIBRATE, TEST, Training, stream, train
-from tauguard.benchmarks.detection.pool import SPEEDS, Conditions, free_pool
-from tauguard.benchmarks.detection.thresholds import free_scores, joined
+from tauguard.benchmarks.detection.arm_scores import Arm, Extent, arm_scores
+from tauguard.benchmarks.detection.fleet import Training
+from tauguard.benchmarks.kept import Kept
 from tauguard.benchmarks.workers import Workers
-from tauguard.datasets.plans import TRAINING_PAYLOADS
-from tauguard.detectors import FittedDetector, FreeScores, poisson_rate
+from tauguard.detectors import poisson_rate
 from tauguard.detectors.thresholds.free_scores import speed_levels
 from tauguard.detectors.thresholds.law import rate_interval, threshold_for_rate
-from tauguard.envs import Episode, simulate
 from tauguard.report import Row
 
 if TYPE_CHECKING:
@@ -46,69 +44,39 @@ NOTES = {
     "Missed collisions are not in it.",
 }
 
-Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
-Free = dict[str, list[FreeScores]]
-
-
 @dataclass(frozen=True)
 class Size:
     """How much is simulated."""
 
     arms: int
     asked: tuple[float, ...]  #: false alarms per hour
-    training: Training
-    calibration_hours: float  #: of each arm
-    hours: float  #: fresh ones, of each arm
+    extent: Extent  #: of each arm
 
 
-FULL = Size(10, (0.25, 1.0, 5.0), Training(), 0.75, 0.6)
-QUICK = Size(2, (5.0, 30.0), Training(slices=5, free=6, free_seconds=20.0), 0.1, 0.05)
+FULL = Size(10, (0.25, 1.0, 5.0), Extent(NAMES, Training(), 0.75, 1.4, 1))
+QUICK = Size(
+    2, (5.0, 30.0), Extent(NAMES, Training(slices=5, free=6, free_seconds=20.0), 0.1, 0.05, 0)
+)
 
 
-@dataclass(frozen=True)
-class Arm:
-    """One arm's scores without a collision, by detector."""
+def arms_of(
+    size: Size, seed: int, workers: int | None = None, keep: str | None = None
+) -> list[Arm]:
+    """Train, simulate and score; the same for any number of workers.
 
-    seed: int
-    calibration: Mapping[str, Sequence[FreeScores]]
-    fresh: Mapping[str, Sequence[FreeScores]]
-
-
-def arms_of(size: Size, seed: int, workers: int | None = None) -> list[Arm]:
-    """Train, simulate and score; the same for any number of workers."""
+    Arms that the folder ``keep`` holds are read.
+    """
     seeds = [51_000 + 100 * seed + k for k in range(size.arms)]
+    kept = Kept.of(keep, "false_alarms", seed, size.extent)
     with Workers(workers) as each:
-        fitted = dict(zip(seeds, each(_train, [(size, seed, arm) for arm in seeds]), strict=True))
-        known = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
-        jobs: list[tuple[int, bool, dict[str, FittedDetector], list[Episode]]] = []
-        for arm in seeds:
-            for speed in SPEEDS:
-                for fresh in (False, True):
-                    hours = (size.hours if fresh else size.calibration_hours) / len(SPEEDS)
-                    own = stream(seed, TEST if fresh else CALIBRATE, 9)
-                    pool = free_pool(own, speed, (arm,), hours, None if fresh else known)
-                    jobs.append((arm, fresh, fitted[arm], [episode for _, episode in pool]))
-        parts = list(zip(jobs, each(_score, jobs), strict=True))
-    found: dict[tuple[int, bool], list[Free]] = {}
-    for (arm, fresh, *_), part in parts:
-        found.setdefault((arm, fresh), []).append(part)
-    return [Arm(arm, joined(found[arm, False]), joined(found[arm, True])) for arm in seeds]
+        jobs = [(size.extent, seed, arm) for arm in seeds]
+        return list(kept.over(each, "arm")(arm_scores, jobs))
 
 
-def _train(job: tuple[Size, int, int]) -> dict[str, FittedDetector]:
-    size, seed, arm = job
-    return train(seed, arm, NAMES, size.training)
-
-
-def _score(job: tuple[int, bool, dict[str, FittedDetector], list[Episode]]) -> Free:
-    _, _, detectors, episodes = job
-    return joined([free_scores(detectors, simulate(episode)) for episode in episodes])
-
-
-def run(quick: bool, seed: int) -> list[Row]:
+def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     """Rows ``arms``: a row per detector, way to choose the threshold, and rate asked for."""
     size = QUICK if quick else FULL
-    arms = arms_of(size, seed)
+    arms = arms_of(size, seed, keep=keep)
     cases = itertools.product(NAMES, LAWS, size.asked)
     return [row_of(arms, name, law, asked) for name, law, asked in cases]
 

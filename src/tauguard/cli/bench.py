@@ -7,6 +7,9 @@ from typing import Annotated
 
 import tyro
 
+#: Studies that keep what they have done in a folder.
+KEEPING = ("guard", "entries", "detection", "false_alarms")
+
 
 def command(
     name: Annotated[str, tyro.conf.Positional] = "all",
@@ -31,8 +34,8 @@ def command(
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
         robot: arms of the study `arms`, by name or file, parted by commas.
-        keep: folder of the scenes of the study `guard`, or of the dataset of `entries`; what it
-            holds is not made again.
+        keep: folder for what `guard`, `entries`, `detection` and `false_alarms` have done; what it
+            holds is not done again. Of one build: empty it after a change.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
@@ -49,8 +52,8 @@ def command(
         raise ValueError(f"--detector goes with the study detection, not with {name}")
     if robot is not None and name != "arms":
         raise ValueError(f"--robot goes with the study arms, not with {name}")
-    if keep is not None and name not in ("guard", "entries"):
-        raise ValueError(f"--keep goes with the studies guard and entries, not with {name}")
+    if keep is not None and name not in KEEPING:
+        raise ValueError(f"--keep goes with the studies {', '.join(KEEPING)}, not with {name}")
     given = {"detector": detector, "robot": robot, "keep": None if keep is None else str(keep)}
     more = {key: value for key, value in given.items() if value is not None}
     if name == "all":
