@@ -17,10 +17,9 @@ from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
-#: Motion is kept as the peaks of pieces this long [s]: ten hours are two million numbers.
+#: Motion is kept as the peaks of pieces this long [s], or of single samples that are longer: ten
+#: hours are two million numbers.
 PIECE = 0.02
-#: Pieces of a merge gap and of a non-collision case.
-GAP, CASE = round(MERGE_GAP / PIECE), round(CASE_SECONDS / PIECE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +49,15 @@ class FreeScores:
                 f"an episode of {trace.t[-1] - trace.t[0]:g} s: no collision-free motion after the "
                 f"{alarm.settle:g} s that {alarm.detector.name} needs to settle"
             )
-        peaks, where = block_maxima(level[rows], max(1, round(PIECE / trace.dt)))
+        samples = max(1, round(PIECE / trace.dt))
+        peaks, where = block_maxima(level[rows], samples)
         speeds = recent_speed(trace.qd, trace.dt)[rows][where]
         return cls(peaks, speeds, len(rows) * trace.dt)
+
+    @property
+    def piece(self) -> float:
+        """Length of a piece [s]."""
+        return self.seconds / len(self.peaks)
 
     @property
     def peak(self) -> float:
@@ -61,13 +66,14 @@ class FreeScores:
 
     def blocks(self) -> tuple[Array, Array]:
         """Peak of every merge gap and the speed where it stands."""
-        high, where = block_maxima(self.peaks, GAP)
+        high, where = block_maxima(self.peaks, self._pieces(MERGE_GAP))
         return high, self.speeds[where]
 
     def cases(self) -> Array:
         """Peak of every whole non-collision case."""
-        whole = len(self.peaks) // CASE * CASE
-        found: Array = self.peaks[:whole].reshape(-1, CASE).max(axis=1)
+        case = self._pieces(CASE_SECONDS)
+        whole = len(self.peaks) // case * case
+        found: Array = self.peaks[:whole].reshape(-1, case).max(axis=1)
         return found
 
     def over(self, levels: SpeedLevels) -> FreeScores:
@@ -76,8 +82,12 @@ class FreeScores:
 
     def alarms(self, threshold: float) -> int:
         """How many alarms a threshold gives, those less than the merge gap apart as one."""
-        times = np.arange(len(self.peaks)) * (self.seconds / len(self.peaks))
+        times = np.arange(len(self.peaks)) * self.piece
         return len(find_alarms(times, self.peaks > threshold, MERGE_GAP))
+
+    def _pieces(self, seconds: float) -> int:
+        """How many pieces come nearest to ``seconds``."""
+        return max(1, round(seconds / self.piece))
 
 
 def speed_levels(episodes: Sequence[FreeScores]) -> SpeedLevels:

@@ -49,7 +49,7 @@ from tauguard.benchmarks.detection.variations import every
 from tauguard.benchmarks.harness import Incomplete
 from tauguard.detectors import CollisionAlarm, FreeScores
 from tauguard.detectors.evaluation.events import find_alarms
-from tauguard.detectors.thresholds.free_scores import CASE, PIECE
+from tauguard.detectors.thresholds.free_scores import PIECE
 from tauguard.envs import simulate
 from tauguard.traces import STRATA, Collision, Trace, Truth
 
@@ -136,7 +136,7 @@ def test_conditions_scale_the_mismatch_and_set_the_temperature():
 
 def scores(peaks, seconds=None, speed=0.0):
     """Free scores whose blocks and cases are ``peaks``, one after the other."""
-    pieces = np.repeat(peaks, CASE)
+    pieces = np.repeat(peaks, round(2.0 / PIECE))
     return FreeScores(pieces, np.full(len(pieces), speed), seconds or len(pieces) * PIECE)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import CollisionAlarm, FreeScores
-from tauguard.detectors.thresholds.free_scores import GAP, PIECE
+from tauguard.detectors.thresholds.free_scores import PIECE
 from tauguard.detectors.thresholds.law import threshold_for_rate
 from tauguard.traces import Trace
 
@@ -36,6 +36,25 @@ def test_pieces_agree_with_scores_looked_at_one_by_one():
     assert short.peak == lowest.max()
 
 
+@pytest.mark.parametrize("hz", [1000.0, 500.0, 125.0, 23.8, 10.0])
+def test_blocks_and_cases_last_as_long_at_every_sample_rate(hz):
+    rng = np.random.default_rng(2)
+    t = np.arange(round(120 * hz)) / hz
+    score = rng.normal(size=len(t))
+    trace = Trace(("j",), t, *(x[:, None] for x in (t, t, score)))
+    found = FreeScores.of(CollisionAlarm(Given(), np.inf, confirmation=0.0), trace)
+    assert found.seconds == pytest.approx(120)
+    assert len(found.peaks) * found.piece == pytest.approx(120, rel=0.01)
+    assert found.seconds / len(found.blocks()[0]) == pytest.approx(0.5, rel=0.05)
+    assert found.seconds / len(found.cases()) == pytest.approx(2.0, rel=0.05)
+    # Alarms 0.4 s apart are one, those 0.9 s apart are two.
+    for apart, alarms in ((0.4, 1), (0.9, 2)):
+        score[:] = 0
+        score[np.searchsorted(t, (5.0, 5.0 + apart))] = 1
+        found = FreeScores.of(CollisionAlarm(Given(), np.inf, confirmation=0.0), trace)
+        assert found.alarms(0.5) == alarms
+
+
 @pytest.mark.parametrize(
     ("draw", "level"),
     [
@@ -46,7 +65,7 @@ def test_pieces_agree_with_scores_looked_at_one_by_one():
 )
 def test_the_threshold_for_a_rate_lies_on_the_tail(draw, level):
     blocks = draw(np.random.default_rng(0), 7200)
-    pieces = np.repeat(blocks, GAP)
+    pieces = np.repeat(blocks, round(0.5 / PIECE))
     free = [FreeScores(pieces, np.zeros_like(pieces), len(pieces) * PIECE)]
     for per_hour in (5.0, 0.5, 0.1):
         assert threshold_for_rate(free, per_hour) == pytest.approx(level(per_hour / 7200), rel=0.25)
