@@ -59,13 +59,27 @@ class Kept:
             return each(call, jobs)
         paths = [self.folder / f"{name}-{k:03d}.npz" for k in range(len(jobs))]
         known = [path.exists() for path in paths]
-        open_jobs = [
+        missing = [
             (call, job, path)
             for job, path, done in zip(jobs, paths, known, strict=True)
             if not done
         ]
-        fresh = each(_done, open_jobs)
-        return (read(p) if done else next(fresh) for p, done in zip(paths, known, strict=True))
+        return _InOrder(iter(zip(paths, known, strict=True)), each(_done, missing))
+
+
+@dataclass(frozen=True)
+class _InOrder:
+    """Results in the order of the jobs; after one that raises the others still come."""
+
+    jobs: Iterator[tuple[Path, bool]]  #: and whether they are kept
+    fresh: Iterator[Any]
+
+    def __iter__(self) -> _InOrder:
+        return self
+
+    def __next__(self) -> Any:
+        path, known = next(self.jobs)
+        return read(path) if known else next(self.fresh)
 
 
 def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:

@@ -34,7 +34,7 @@ class Blow:
     """One detector around one collision."""
 
     peak_tau: float  #: [N m]
-    t: Array  #: since the touch [s], from a merge gap before it to the end of its window, shape (T,)
+    t: Array  #: since the touch [s], from a merge gap before it on, shape (T,)
     level: Array  #: sustained score, shape (T,)
     speed: Array  #: recent speed [rad/s], shape (T,)
 

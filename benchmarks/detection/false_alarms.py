@@ -44,6 +44,7 @@ NOTES = {
     "Missed collisions are not in it.",
 }
 
+
 @dataclass(frozen=True)
 class Size:
     """How much is simulated."""

@@ -7,9 +7,9 @@ arm, and are judged on motions with payloads that no slice had and nobody tells.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tauguard.benchmarks.detection import chart as detection_chart
 from tauguard.benchmarks.detection import rows as report
@@ -36,6 +36,7 @@ from tauguard.benchmarks.detection.pool import (
 )
 from tauguard.benchmarks.detection.thresholds import Fleet, Free, operated
 from tauguard.benchmarks.harness import Incomplete
+from tauguard.benchmarks.kept import Each, Kept
 from tauguard.benchmarks.workers import Workers
 from tauguard.detectors import FittedDetector, make_detector
 from tauguard.envs import simulate
@@ -73,7 +74,6 @@ NOTES = {
     "met: both rates of the best reach 0.98, and both of SVR-SRQ's the dissertation's.",
 }
 
-Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 Trained = Mapping[int, dict[str, FittedDetector]]
 
 
@@ -123,28 +123,34 @@ QUICK = Size(
 )
 
 
-def run(quick: bool, seed: int, detector: str | None = None) -> list[Row]:
+def run(quick: bool, seed: int, detector: str | None = None, keep: str | None = None) -> list[Row]:
     """Rows of all studies; see :mod:`tauguard.benchmarks.detection.rows` for their fields.
 
-    ``detector`` is one more method, as module:Class.
+    Args:
+        quick: a small run.
+        seed: of all arms and motions.
+        detector: one more method, as module:Class.
+        keep: folder of what is done already, and goes on being done.
     """
     size = QUICK if quick else FULL
     if detector is not None and detector not in size.detectors:
         make_detector(detector)  # names what is wrong before anything is simulated
         size = replace(size, detectors=(*size.detectors, detector))
-    return study(size, seed)
+    return study(size, seed, kept=Kept.of(keep, "detection", seed, size))
 
 
-def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
+def study(size: Size, seed: int, workers: int | None = None, kept: Kept | None = None) -> list[Row]:
     """Train, judge, report; the result does not depend on the number of ``workers``."""
+    kept = kept or Kept(None)
     arms = [1000 * (seed + 1) + k for k in range(size.arms)]
     with Workers(workers) as each:
-        trained = _trained(size, seed, arms, each)
-        fleets = _calibrated(size, seed, trained, each)
+        trained = _trained(size, seed, arms, kept.over(each, "train"))
+        fleets = _calibrated(size, seed, trained, kept.over(each, "free"))
         parts = [(part, arms[0], fleets[arms[0]], seed) for part in PARTS]
         jobs = [(size, seed, speed, arm) for speed in SPEEDS for arm in (0, *arms)]
-        judged = each(_judge, [(job, fleets) for job in jobs])
-        more = each(_vary, parts if size.variations else [])  # whoever is done goes on with it
+        judged = kept.over(each, "judged")(_judge, [(job, fleets) for job in jobs])
+        vary = kept.over(each, "variation")
+        more = vary(_vary, parts if size.variations else [])  # whoever is done goes on with it
         tallies = list(judged)
         by_speed = {
             speed: merged(t for (*_, own, _), t in zip(jobs, tallies, strict=True) if own == speed)
@@ -152,10 +158,10 @@ def study(size: Size, seed: int, workers: int | None = None) -> list[Row]:
         }
         rows = report.rows(by_speed, report.spread(list(fleets.values())))
         rows += detection_table.headline(rows)
-        return rows + _kept(rows, (part for part, *_ in parts), more)
+        return rows + _with_variations(rows, (part for part, *_ in parts), more)
 
 
-def _kept(rows: list[Row], parts: Iterable[str], more: Iterator[list[Row]]) -> list[Row]:
+def _with_variations(rows: list[Row], parts: Iterable[str], more: Iterator[list[Row]]) -> list[Row]:
     """The rows of the variations; one that fails does not take the others along."""
     found: list[Row] = []
     failed: dict[str, BaseException] = {}

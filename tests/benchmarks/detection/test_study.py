@@ -338,7 +338,7 @@ def test_one_failed_variation_keeps_the_rows_of_the_others():
             return one
 
     with pytest.raises(Incomplete, match="size: ZeroDivisionError: in a worker") as stop:
-        detection_study._kept([{"study": "speed"}], ("sigma", "size", "rate"), Each())
+        detection_study._with_variations([{"study": "speed"}], ("sigma", "size", "rate"), Each())
     assert [row["study"] for row in stop.value.rows] == ["speed", "sigma", "rate"]
 
 
@@ -346,7 +346,7 @@ def test_a_detector_of_ones_own_is_judged_beside_ours(tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(MINE)
     monkeypatch.syspath_prepend(tmp_path)
     asked = []
-    monkeypatch.setattr(detection_study, "study", lambda size, seed: asked.append(size) or [])
+    monkeypatch.setattr(detection_study, "study", lambda size, *_, **__: asked.append(size) or [])
     detection_study.run(True, 0, "mine:Size")
     assert asked[0].detectors == (*detection_study.QUICK.detectors, "mine:Size")
     with pytest.raises(ValueError, match="no_such_module"):
