@@ -1,37 +1,30 @@
 """From collision-free motion to a threshold: the one way, for the command line and all studies.
 
 Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
-(:mod:`.speed_levels`), and the threshold is where the tail of the peaks meets the rate of false
-alarms that is accepted (:mod:`.rates`), or the one that a calibration set guarantees
+(:mod:`.speed_levels`), and the threshold is where the expected rate of false alarms is the one that
+is accepted (:mod:`.expected_rate`), or the one that a calibration set guarantees
 (:mod:`.guarantee`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.detectors.detector import Detector, FittedDetector
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
+from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
-from tauguard.detectors.thresholds.rates import peaks_above, tail_level
 from tauguard.traces.trace import Trace
 
-Array = NDArray[np.float64]
-
-#: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
-TAIL = 0.02
 #: Share of the collision-free training traces that the threshold comes from.
 HELD_OUT = 0.34
-#: How often episodes are drawn again to see how far a rate can be trusted.
-BOOTSTRAP = 200
 
 
 def held_out(traces: Sequence[Trace], share: float = HELD_OUT) -> tuple[list[Trace], list[Trace]]:
@@ -123,28 +116,18 @@ def threshold_for_rate(
 ) -> float:
     """The threshold that collision-free motion exceeds ``per_hour`` times an hour.
 
-    Alarms are counted as blocks of the merge gap that exceed the threshold; rarer alarms than the
-    motion shows are extrapolated along a generalised Pareto tail of the blocks' peaks.
+    See :mod:`.expected_rate`.
 
     Args:
         scores: an episode each.
         per_hour: false alarms to accept.
-        confidence: take the threshold that would have been enough in this share of all sets of as
-            many episodes (bootstrap); ``None``: the one expected.
+        confidence: take the threshold that is enough in this share of all sets of as many episodes;
+            ``None``: the one expected.
 
     Raises:
         ValueError: no scores, or a rate that is not above 0.
     """
-    if not per_hour > 0:
-        raise ValueError(f"per_hour: {per_hour}, expected above 0")
-
-    def level(peaks: Array, hours: float) -> float:
-        return tail_level(peaks, per_hour * hours, _tail_of(peaks))
-
-    if confidence is None:
-        return level(*_peaks(scores))
-    levels = [level(*_peaks(again)) for again in _drawn_again(scores)]
-    return float(np.quantile(levels, confidence))
+    return ExpectedRate.of(scores).threshold(per_hour, confidence)
 
 
 def rate_interval(
@@ -152,7 +135,7 @@ def rate_interval(
 ) -> tuple[float, float]:
     """How many false alarms an hour a threshold may give, as far as these episodes can tell.
 
-    Episodes are drawn again with replacement, since the moments of one are alike.
+    See :mod:`.expected_rate`.
 
     Args:
         scores: collision-free motion, an episode each.
@@ -163,28 +146,27 @@ def rate_interval(
         The lowest and the highest rate [1/h].
     """
 
-    def rate(peaks: Array, hours: float) -> float:
-        return peaks_above(peaks, threshold, _tail_of(peaks)) / hours
-
-    rates = [rate(*_peaks(again)) for again in _drawn_again(scores)]
-    low, high = np.quantile(rates, ((1 - confidence) / 2, (1 + confidence) / 2))
-    return float(low), float(high)
+    return ExpectedRate.of(scores).interval(threshold, confidence)
 
 
-def _drawn_again(scores: Sequence[FreeScores]) -> Iterator[list[FreeScores]]:
-    rng = np.random.default_rng(0)
-    for _ in range(BOOTSTRAP):
-        yield [scores[k] for k in rng.integers(len(scores), size=len(scores))]
+def stated_rate(
+    alarm: CollisionAlarm, traces: Sequence[Trace], confidence: float = 0.95
+) -> tuple[float, float]:
+    """How many false alarms an hour an alarm may give, as far as collision-free motion can tell.
 
+    Args:
+        alarm: with its threshold.
+        traces: that the threshold came from, or others that the detector was not trained on.
+        confidence: of the interval.
 
-def _peaks(scores: Sequence[FreeScores]) -> tuple[Array, float]:
-    """Peaks of all blocks in descending order, and the hours."""
-    peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
-    return peaks, sum(one.seconds for one in scores) / 3600
+    Returns:
+        The lowest and the highest rate [1/h].
 
-
-def _tail_of(peaks: Array) -> int:
-    return max(2, round(TAIL * len(peaks)))
+    Raises:
+        ValueError: no collision-free motion.
+    """
+    scores = [FreeScores.of(alarm, trace) for trace in long_enough(alarm, traces)]
+    return rate_interval(scores, alarm.threshold, confidence)
 
 
 def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:

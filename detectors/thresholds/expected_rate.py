@@ -1,0 +1,125 @@
+"""How many false alarms an hour a threshold gives, as far as recorded motion can tell.
+
+Alarms are blocks of the merge gap whose peak exceeds the threshold. Rates that are rarer than the
+motion shows follow a generalised Pareto tail of the blocks' peaks. Episodes are drawn again with
+replacement, since the moments of one are alike, and every draw has a tail of its own. Tails that
+the same motion allows differ most in rare alarms, and a few of them give many: the expected rate is
+the mean over the draws, not the rate of the likeliest tail.
+
+No tail knows of moments that no episode shows. The upper end of an interval is therefore at least
+the exact Poisson bound of the episodes that exceed the threshold: 45 minutes without an alarm do
+not exclude two an hour with 80 % confidence, whatever the threshold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+from tauguard.detectors.thresholds.free_scores import FreeScores
+from tauguard.detectors.thresholds.rates import Tail
+
+Array = NDArray[np.float64]
+
+#: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
+TAIL = 0.02
+#: How often episodes are drawn again to see how far a rate can be trusted.
+DRAWS = 200
+
+
+@dataclass(frozen=True)
+class _Draw:
+    """One draw of the episodes."""
+
+    peaks: Array  #: of all blocks, rising
+    tail: Tail
+    hours: float
+
+    def rate(self, threshold: float) -> float:
+        """Alarms per hour: counted, or along the tail."""
+        if threshold > self.tail.base:
+            return self.tail.above(threshold) / self.hours
+        above = len(self.peaks) - np.searchsorted(self.peaks, threshold, side="right")
+        return float(above / self.hours)
+
+
+@dataclass(frozen=True)
+class ExpectedRate:
+    """Rates of false alarms of one detector, by threshold."""
+
+    draws: tuple[_Draw, ...]
+    highest: Array  #: peak of every episode
+    hours: float  #: of all episodes
+
+    @classmethod
+    def of(cls, scores: Sequence[FreeScores]) -> ExpectedRate:
+        """From collision-free motion, an episode each.
+
+        Raises:
+            ValueError: no episodes.
+        """
+        if not scores:
+            raise ValueError("no collision-free motion to tell a rate of false alarms from")
+        highest = np.array([one.peak for one in scores])
+        return cls(tuple(_draws(scores)), highest, sum(one.seconds for one in scores) / 3600)
+
+    def mean(self, threshold: float) -> float:
+        """The expected rate [1/h]."""
+        return float(np.mean([draw.rate(threshold) for draw in self.draws]))
+
+    def quantile(self, threshold: float, share: float) -> float:
+        """The rate that this share of the draws does not exceed [1/h]."""
+        return float(np.quantile([draw.rate(threshold) for draw in self.draws], share))
+
+    def interval(self, threshold: float, confidence: float = 0.95) -> tuple[float, float]:
+        """The lowest and the highest rate that the motion allows [1/h]."""
+        side = (1 - confidence) / 2
+        low, high = self.quantile(threshold, side), self.quantile(threshold, 1 - side)
+        return low, max(high, self.unseen(threshold, 1 - side))
+
+    def unseen(self, threshold: float, confidence: float) -> float:
+        """The Poisson bound of the rate of episodes with an alarm [1/h], whatever the tail."""
+        count = int(np.sum(self.highest > threshold))
+        return float(stats.chi2.ppf(confidence, 2 * count + 2) / 2 / self.hours)
+
+    def threshold(self, per_hour: float, confidence: float | None = None) -> float:
+        """The threshold whose rate is expected to be ``per_hour``.
+
+        Args:
+            per_hour: false alarms to accept, above 0.
+            confidence: take the threshold that is enough for this share of the draws; ``None``:
+                the one expected.
+
+        Raises:
+            ValueError: a rate that is not above 0.
+        """
+        if not per_hour > 0:
+            raise ValueError(f"per_hour: {per_hour}, expected above 0")
+
+        def above(threshold: float) -> float:
+            if confidence is None:
+                return self.mean(threshold) - per_hour
+            return self.quantile(threshold, confidence) - per_hour
+
+        low = min(float(draw.peaks[0]) for draw in self.draws) - 1e-9
+        if above(low) <= 0:
+            return low
+        step = max(float(np.max(self.highest)) - low, 1e-9)
+        while above(low + step) > 0:
+            step *= 2
+        close = 1e-9 * step
+        return float(optimize.bisect(above, low, low + step, xtol=close)) + close
+
+
+def _draws(scores: Sequence[FreeScores]) -> Iterator[_Draw]:
+    rng = np.random.default_rng(0)
+    blocks, seconds = [one.blocks()[0] for one in scores], [one.seconds for one in scores]
+    for _ in range(DRAWS):
+        again = rng.integers(len(scores), size=len(scores))
+        peaks = np.sort(np.concatenate([blocks[k] for k in again]))
+        tail = Tail.of(peaks[::-1], max(2, round(TAIL * len(peaks))))
+        yield _Draw(peaks, tail, sum(seconds[k] for k in again) / 3600)
