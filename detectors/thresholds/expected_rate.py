@@ -4,7 +4,8 @@ Alarms are blocks of the merge gap whose peak exceeds the threshold. Rates that 
 motion shows follow a generalised Pareto tail of the blocks' peaks. Episodes are drawn again with
 replacement, since the moments of one are alike, and every draw has a tail of its own. Tails that
 the same motion allows differ most in rare alarms, and a few of them give many: the expected rate is
-the mean over the draws, not the rate of the likeliest tail.
+the mean over the draws, not the rate of the likeliest tail. That a tail ends is believed only as
+far as the peaks show it beyond chance.
 
 No tail knows of moments that no episode shows. The upper end of an interval is therefore at least
 the exact Poisson bound of the episodes that exceed the threshold: 45 minutes without an alarm do
@@ -26,7 +27,12 @@ from tauguard.detectors.thresholds.rates import Tail
 Array = NDArray[np.float64]
 
 #: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
-TAIL = 0.02
+TAIL = 0.05
+#: Bounds of the tail's shape where the peaks do not show that it ends, and the lowest if they do.
+SHAPES, LOWEST = (0.0, 0.5), -0.5
+#: Standard errors of the shape that a tail must be below 0 to end. One of n peaks is about
+#: sqrt(4 / 3n) near the shape 0 (Hosking & Wallis 1987).
+BEYOND_CHANCE = 3.0
 #: How often episodes are drawn again to see how far a rate can be trusted.
 DRAWS = 200
 
@@ -105,7 +111,7 @@ class ExpectedRate:
                 return self.mean(threshold) - per_hour
             return self.quantile(threshold, confidence) - per_hour
 
-        low = min(float(draw.peaks[0]) for draw in self.draws) - 1e-9
+        low = min(float(draw.peaks[0]) for draw in self.draws)
         if above(low) <= 0:
             return low
         step = max(float(np.max(self.highest)) - low, 1e-9)
@@ -118,8 +124,16 @@ class ExpectedRate:
 def _draws(scores: Sequence[FreeScores]) -> Iterator[_Draw]:
     rng = np.random.default_rng(0)
     blocks, seconds = [one.blocks()[0] for one in scores], [one.seconds for one in scores]
+    shapes = _shapes(np.sort(np.concatenate(blocks))[::-1])
     for _ in range(DRAWS):
         again = rng.integers(len(scores), size=len(scores))
         peaks = np.sort(np.concatenate([blocks[k] for k in again]))
-        tail = Tail.of(peaks[::-1], max(2, round(TAIL * len(peaks))))
+        tail = Tail.of(peaks[::-1], max(2, round(TAIL * len(peaks))), shapes)
         yield _Draw(peaks, tail, sum(seconds[k] for k in again) / 3600)
+
+
+def _shapes(peaks: Array) -> tuple[float, float]:
+    """Bounds of the shape of every draw's tail, from the peaks of all, in descending order."""
+    whole = Tail.of(peaks, max(2, round(TAIL * len(peaks))), (LOWEST, SHAPES[1]))
+    error = float(np.sqrt(4 / 3 / max(whole.count, 1)))
+    return max(LOWEST, min(SHAPES[0], whole.shape + BEYOND_CHANCE * error)), SHAPES[1]

@@ -149,24 +149,17 @@ def rate_interval(
     return ExpectedRate.of(scores).interval(threshold, confidence)
 
 
-def stated_rate(
-    alarm: CollisionAlarm, traces: Sequence[Trace], confidence: float = 0.95
-) -> tuple[float, float]:
-    """How many false alarms an hour an alarm may give, as far as collision-free motion can tell.
+def expected_rate(alarm: CollisionAlarm, traces: Sequence[Trace]) -> ExpectedRate:
+    """How many false alarms an hour an alarm may give, by threshold.
 
     Args:
-        alarm: with its threshold.
+        alarm: detector and speed levels.
         traces: that the threshold came from, or others that the detector was not trained on.
-        confidence: of the interval.
-
-    Returns:
-        The lowest and the highest rate [1/h].
 
     Raises:
         ValueError: no collision-free motion.
     """
-    scores = [FreeScores.of(alarm, trace) for trace in long_enough(alarm, traces)]
-    return rate_interval(scores, alarm.threshold, confidence)
+    return ExpectedRate.of([FreeScores.of(alarm, t) for t in long_enough(alarm, traces)])
 
 
 def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:

@@ -46,7 +46,7 @@ class Tail:
     count: int  #: peaks above the base
 
     @classmethod
-    def of(cls, peaks: Array, count: int) -> Tail:
+    def of(cls, peaks: Array, count: int, shapes: tuple[float, float] = SHAPES) -> Tail:
         """From the ``count`` largest peaks and the next one.
 
         Their excesses tell scale and shape by probability-weighted moments (Hosking & Wallis 1987).
@@ -54,6 +54,7 @@ class Tail:
         Args:
             peaks: in descending order, shape (N,), N >= 1.
             count: at most N - 1 are used.
+            shapes: lowest and highest shape.
         """
         count = min(count, len(peaks) - 1)
         if count < 2:
@@ -65,7 +66,7 @@ class Tail:
         weighted = float(np.mean(excess * exceeded))
         if not mean - 2 * weighted > 1e-12 * max(mean, 1e-300):
             return cls(float(peaks[0]), 0.0, 0.0, 0)
-        shape = float(np.clip(2 - mean / (mean - 2 * weighted), *SHAPES))
+        shape = float(np.clip(2 - mean / (mean - 2 * weighted), *shapes))
         return cls(float(peaks[count]), mean * (1 - shape), shape, count)
 
     def level(self, allowed: float) -> float:
@@ -102,9 +103,3 @@ def tail_level(peaks: Array, allowed: float, count: int) -> float:
     if allowed >= max(min(count, len(peaks) - 1), 1):
         return float(peaks[min(int(allowed), len(peaks) - 1)])
     return Tail.of(peaks, count).level(allowed)
-
-
-def peaks_above(peaks: Array, level: float, count: int) -> float:
-    """How many peaks are expected above ``level``: counted, or along their :class:`Tail`."""
-    tail = Tail.of(peaks, count)
-    return tail.above(level) if level > tail.base else float(np.sum(peaks > level))

@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tauguard.detectors import CollisionAlarm
     from tauguard.detectors.methods.free_motion import FittedFreeMotion
     from tauguard.traces import Trace
 
@@ -128,12 +131,26 @@ def labelled_motion(
         f"{model}: {name} trained on {len(recordings)} recordings with {collisions} collisions, "
         f"threshold {alarm.threshold:.3g}"
     )
-    if guarantee:
+    if guarantee is None:
+        print(_aimed_at(alarm, recordings, rate))
+    else:
         print(
             f"guaranteed: at most {rate:g} false alarms per hour on motion like that of "
             f"{calibration} ({guarantee.episodes} episodes, {guarantee.hours:.2g} h), with a "
             f"confidence of {guarantee.confidence:.0%}"
         )
+
+
+def _aimed_at(alarm: CollisionAlarm, recordings: Sequence[Trace], rate: float) -> str:
+    """What the threshold aims at, and what its motion can tell of it."""
+    from tauguard.detectors.thresholds.law import expected_rate, held_out
+
+    expected = expected_rate(alarm, held_out(recordings)[1])
+    low, high = expected.interval(alarm.threshold)
+    return (
+        f"aimed at {rate:g} false alarms per hour; the {60 * expected.hours:.2g} min of motion "
+        f"that the threshold comes from allow {low:.2g} to {high:.2g} (95 %)"
+    )
 
 
 def free_motion(

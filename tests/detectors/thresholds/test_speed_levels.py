@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.law import rate_interval, threshold_for_rate, with_rate
-from tauguard.detectors.thresholds.rates import Tail, block_maxima, peaks_above, tail_level
+from tauguard.detectors.thresholds.rates import Tail, block_maxima, tail_level
 from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels, recent_speed
 from tauguard.traces import Trace
 
@@ -123,7 +123,6 @@ def test_a_tail_says_how_many_peaks_to_expect_above_the_level_that_it_gives():
         assert tail.above(tail.level(allowed)) == pytest.approx(allowed)
     # An exponential's level that 0.1 of 5,000 exceed is log(50,000).
     assert tail.level(0.1) == pytest.approx(np.log(50_000), rel=0.25)
-    assert peaks_above(peaks, 1.0, 100) == np.sum(peaks > 1.0)
 
 
 def test_the_rate_of_a_threshold_lies_in_the_interval_that_its_calibration_states():
