@@ -149,6 +149,11 @@ def presets_of(header: Collection[str]) -> list[str]:
     return found
 
 
+def presets_of_width(width: int) -> list[str]:
+    """Names of the presets of files without a header line whose rows have so many columns."""
+    return [name for name, one in PRESETS.items() if one.headerless and one.width == width]
+
+
 def column_map(columns: str | None) -> ColumnMap | str | None:
     """A preset's name as it is; a map from a JSON file.
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.datasets.columns import PRESETS, Column, ColumnMap, presets_of
+from tauguard.datasets.columns import PRESETS, Column, ColumnMap, presets_of, presets_of_width
 from tauguard.datasets.log_checks import checked
 from tauguard.strangers import reading
 from tauguard.traces.trace import Array, Trace
@@ -98,10 +98,15 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
             + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
         )
     rows = rows[1:] if header else rows
-    where = {
-        name: [position(column, header, columns) for column in group]
-        for name, group in {"t": (columns.t,), **columns.groups()}.items()
-    }
+    try:
+        where = {
+            name: [position(column, header, columns) for column in group]
+            for name, group in {"t": (columns.t,), **columns.groups()}.items()
+        }
+    except ValueError as error:
+        better = presets_of(header) if header else presets_of_width(len(rows[0][1]))
+        hint = f"; these are the columns of the preset {' or '.join(better)}" if better else ""
+        raise ValueError(f"{error}{hint}") from None
     if not rows:
         raise ValueError("a header line without rows of numbers")
     width = columns.width or len(header) or len(rows[0][1])
@@ -118,6 +123,8 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
         name: np.ascontiguousarray(value[keep]) for name, value in parts.items()
     }
     meta = {"log": path.name}
+    if preset := [name for name, known in PRESETS.items() if known == columns]:
+        meta["columns"] = preset[0]
     if columns.torque:
         meta["effort"] = "torque"
     else:

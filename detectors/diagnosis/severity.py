@@ -153,8 +153,8 @@ def severity(
     noise = trust.noise(felt.mean, after.envelope[felt.row])
     place = belief.probability ** (1 / moments)
     force = force_draws(robot, surface, after.q[felt.row], felt.mean, noise, place)
-    rng = np.random.default_rng(SEED)
-    size = np.linalg.norm(force, axis=1) * np.exp(SPREAD * rng.standard_normal(len(force)))
+    rng, spread = np.random.default_rng(SEED), SPREAD * (1 + felt.hidden)
+    size = np.linalg.norm(force, axis=1) * np.exp(spread * rng.standard_normal(len(force)))
     sharper = 1 / (1 - felt.hidden * rng.random(len(force)))
     peak = size * felt.shape * sharper
     return Severity(Between.of(size * felt.seconds), Between.of(peak), felt)

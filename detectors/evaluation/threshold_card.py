@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 SEEN = 3.0
 #: An upper threshold, from which on a robot is to stop, over the lower one of contact.
 UPPER = 1.5
+#: Joints of the arms that libfranka speaks to.
+FRANKA_JOINTS = 7
 #: Poses and directions of the force at the tool.
 POSES, DIRECTIONS = 24, 100
 
@@ -35,6 +37,7 @@ class ThresholdCard:
     tool: dict[str, tuple[float, float]]
     """Force at the last link's origin [N], standing and moving: found in half of all poses and
     directions, and in 95 % of those in which any force reaches a joint."""
+    moment: float  #: at the last link that is found moving, in half of them [N m]
     seconds: float  #: of collision-free motion
     alarms: int  #: in left-out logs, under bounds from the others
     false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %)
@@ -42,16 +45,20 @@ class ThresholdCard:
 
     @property
     def franka(self) -> dict[str, list[float]]:
-        """In the form of ``setCollisionBehavior``: torques of the joints [N m], forces [N]."""
-        force = self.tool["moving"][0]
+        """What ``setCollisionBehavior`` takes: torques of 7 joints [N m], forces and moments
+        along and about three axes [N, N m]; empty for an arm with other joints."""
+        if len(self.joints) != FRANKA_JOINTS:
+            return {}
+        tool = np.repeat([self.tool["moving"][0], self.moment], 3)
         lower = {
-            "torque_thresholds_acceleration": self.starting.tolist(),
-            "torque_thresholds_nominal": self.moving.tolist(),
-            "force_thresholds_acceleration": [1.5 * force] * 3,
-            "force_thresholds_nominal": [force] * 3,
+            "torque_thresholds_acceleration": self.starting,
+            "torque_thresholds_nominal": self.moving,
+            "force_thresholds_acceleration": 1.5 * tool,
+            "force_thresholds_nominal": tool,
         }
-        upper = {f"upper_{k}": [UPPER * x for x in v] for k, v in lower.items()}
-        return {f"lower_{k}": v for k, v in lower.items()} | upper
+        both = {f"lower_{k}": v for k, v in lower.items()}
+        both |= {f"upper_{k}": UPPER * v for k, v in lower.items()}
+        return {name: values.tolist() for name, values in both.items()}
 
     @property
     def ur(self) -> dict[str, float]:
@@ -90,6 +97,7 @@ def threshold_card(detector: FittedFreeMotion, traces: Sequence[Trace]) -> Thres
             "standing": _tool(detector, poses, standing),
             "moving": _tool(detector, poses, usual),
         },
+        _tool(detector, poses, usual, moment=True)[0],
         detector.seconds,
         detector.alarms,
         poisson_rate(detector.alarms, detector.seconds / 3600),
@@ -97,8 +105,13 @@ def threshold_card(detector: FittedFreeMotion, traces: Sequence[Trace]) -> Thres
     )
 
 
-def _tool(detector: FittedFreeMotion, poses: Array, level: Array) -> tuple[float, float]:
-    """Forces at the tool that reach some joint's level, in half and in 95 % of directions [N]."""
+def _tool(
+    detector: FittedFreeMotion, poses: Array, level: Array, moment: bool = False
+) -> tuple[float, float]:
+    """Forces [N] or moments [N m] on the last link that reach some joint's level.
+
+    In half and in 95 % of the directions in which any force reaches a joint.
+    """
     robot = detector.arm.robot
     directions = np.random.default_rng(0).standard_normal((DIRECTIONS, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -106,9 +119,11 @@ def _tool(detector: FittedFreeMotion, poses: Array, level: Array) -> tuple[float
     last = np.array([robot.joints - 1])
     for q in poses:
         placed = link_poses(robot, q)
-        jacobian = point_jacobians(robot, placed, last, placed.origin[-1:])[0]
-        torque = np.abs(directions @ jacobian)
-        least.append(1 / (torque / level).max(axis=1))
+        turns = placed.axis * (placed.moved_by[-1] & ~robot.prismatic)[:, None]
+        slides = point_jacobians(robot, placed, last, placed.origin[-1:])[0]
+        torque = np.abs(directions @ (turns.T if moment else slides))
+        with np.errstate(divide="ignore"):
+            least.append(1 / (torque / level).max(axis=1))
     forces = np.concatenate(least)
     return float(np.quantile(forces, 0.5)), float(np.quantile(forces, 0.95))
 

@@ -145,13 +145,18 @@ class FreeMotion:
             arm: nominal numbers and drive gains, whose scale holds.
 
         Raises:
-            ValueError: too little motion, or other joints.
+            ValueError: no or too little motion, or other joints.
         """
         recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
         check_joints([r.trace for r in recordings], arm)
         parts = pieces(recordings, FOLDS)
         moving = [r for r in parts if moves(r.trace)]
         standing = [r for r in parts if not moves(r.trace)]
+        if not moving:
+            raise ValueError(
+                "no joint moves in any of these logs: friction and the arm's bounds in motion "
+                "cannot be learned from standing alone; add 20 s of motion"
+            )
         models, whole = _calibrations(arm, moving)
         bound = Bound.prior(friction_level(whole, moving))
         dt = max(r.trace.dt for r in recordings)

@@ -4,8 +4,8 @@
 // At rest static friction may hold any torque, so only a change counts: the residual less a
 // baseline that follows it. Motion of any joint stirs the torques of all that stand: integral
 // action of the controllers, changing loads. That adds to the bound, fully from `full_speed` on,
-// and is forgotten within about a second. For a second after an excess only change away from what
-// was before counts, so that letting go is no new push.
+// and is forgotten within about a second. For a second after a joint's excess only its change away
+// from what was before counts, so that letting go is no new push; other joints go on as before.
 //
 // In motion the residual without slow errors counts. The bound is linear in speed and
 // accelerations; while a joint starts, its friction is between static and sliding, and more is
@@ -44,8 +44,8 @@ class Regimes {
     base_.assign(n_, 0.0);
     before_.assign(n_, 0.0);
     rest_.assign(n_, 0);
+    since_.assign(n_, after);
     stirred_ = 1.0;
-    since_ = after;
   }
 
   const double* moved() const { return moved_.data(); }  // how long in motion [s]
@@ -68,11 +68,11 @@ class Regimes {
   // it less slow errors, `spread` the deviation that they leave, all [N m], n.
   void judge(const double* residual, const double* left, const double* spread, const double* qd,
              const double* qdd, double dt, double* ratio, double* bound) {
-    double hardest = 0.0, largest = 0.0;
+    double hardest = 0.0;
     for (std::size_t j = 0; j < n_; ++j) hardest = std::max(hardest, std::fabs(qdd[j]));
-    since_ += dt;
     for (std::size_t j = 0; j < n_; ++j) {
       const bool was = rest_[j];
+      since_[j] += dt;
       rest_[j] = slow_for_[j] >= wait;
       double signal = left[j];
       if (rest_[j]) {
@@ -86,26 +86,25 @@ class Regimes {
                    of_.start[j] * std::exp(-moved_[j] / starts);
       }
       ratio[j] = std::fabs(signal) / bound[j];
-      largest = std::max(largest, ratio[j]);
+      if (ratio[j] > 1.0) since_[j] = 0.0;
     }
-    if (largest > 1.0) since_ = 0.0;
   }
 
  private:
   double changed(std::size_t j, double residual, bool begins, double dt) {
     if (begins) base_[j] = before_[j] = residual;
-    if (since_ >= after) before_[j] = base_[j];
+    if (since_[j] >= after) before_[j] = base_[j];
     const double change = residual - base_[j];
     const bool back = change * (base_[j] - before_[j]) < 0.0;
     base_[j] = residual - change * std::exp(-dt / follow);
-    return since_ < after && back ? 0.0 : change;
+    return since_[j] < after && back ? 0.0 : change;
   }
 
   RegimeBounds of_;
   std::size_t n_;
-  std::vector<double> slow_for_, moved_, base_, before_;
+  std::vector<double> slow_for_, moved_, base_, before_, since_;
   std::vector<char> rest_;
-  double stirred_ = 1.0, since_ = 0.0, fastest_ = 0.0;
+  double stirred_ = 1.0, fastest_ = 0.0;
 };
 
 }  // namespace tauguard::detectors

@@ -115,7 +115,7 @@ def test_joints_that_do_not_match(log, capsys):
 
 def test_a_short_log_is_said_to_be_short(log, capsys):
     run(log, "--gains", "8", "5")
-    assert "per hour (95 %), a longer log would say more" in capsys.readouterr().out
+    assert "0.2 min are too short to say how many an hour" in capsys.readouterr().out
 
 
 @pytest.mark.data

@@ -189,7 +189,7 @@ def test_an_untold_load_names_its_log(folder, capsys):
         main(arguments)
     except SystemExit:
         line = capsys.readouterr().err
-    assert "did laden.csv carry something? tell it with --payload laden.csv=KG" in (
+    assert "did laden.csv carry something (tell it with --payload laden.csv=KG or =unknown)" in (
         line or capsys.readouterr().out
     )
     main([*arguments, "--payload", "laden=unknown"])
@@ -287,3 +287,18 @@ def test_joints_that_the_log_lacks_are_held(tmp_path, capsys):
     main(["train", "--free", *files, *common, str(out), "--model", model])
     main(["detect", files[0], *common, str(out), "--model", model])
     assert "0 alarms" in capsys.readouterr().out
+
+
+def test_a_load_that_the_torques_do_not_show_is_refused(folder, tmp_path, capsys):
+    logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
+    given = [*flags(folder), "--gains", *GAINS, "--out", str(tmp_path / "false.xml")]
+    error = fails(capsys, "calibrate", *logs, *given, "--payload", "log1=3")
+    assert "log1.csv: 3 kg were told, its torques show" in error
+    assert not (tmp_path / "false.xml").exists()
+
+
+def test_a_standing_arm_alone_teaches_no_motion(folder, tmp_path, capsys):
+    trace = record(5, dwell=(-1.0, 99.0))
+    log = written(tmp_path, "still.csv", trace)
+    given = [*flags(folder), "--gains", *GAINS, "--model", str(tmp_path / "m.skops")]
+    assert "no joint moves in any of these logs" in fails(capsys, "train", "--free", log, *given)

@@ -205,3 +205,16 @@ def test_a_recording_of_our_own(tmp_path):
     again = read_log(tmp_path / "a.mcap").trace
     np.testing.assert_array_equal(again.current, trace.current)
     assert again.joint_names == ("a",)
+
+
+def test_a_wrong_preset_names_the_one_that_fits(tmp_path):
+    names = ["t", *(f"{x}{k}" for x in ("q", "qd", "i") for k in range(1, 7))]
+    rows = np.column_stack([np.arange(9) * 0.01, np.zeros((9, 18))])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=",".join(names), comments="")
+    for wrong in ("ur3", "ur_rtde"):
+        with pytest.raises(ValueError, match="the columns of the preset ur5"):
+            read_log(tmp_path / "a.csv", wrong)
+    assert read_log(tmp_path / "a.csv").trace.meta["columns"] == "ur5"
+    np.savetxt(tmp_path / "b.csv", np.zeros((9, 31)), delimiter=",")
+    with pytest.raises(ValueError, match="the columns of the preset ur10e"):
+        read_log(tmp_path / "b.csv", "ur5")

@@ -57,7 +57,7 @@ def command(
     """
     from tauguard.cli.real_logs import doubts, loaded, moving, read_logs, start
     from tauguard.detectors.calibration.arm_file import save_arm
-    from tauguard.detectors.calibration.assessment import left_out
+    from tauguard.detectors.calibration.assessment import check_loads, left_out
     from tauguard.detectors.calibration.belongs import check_signs, check_weight
     from tauguard.detectors.calibration.identification import identify
     from tauguard.report import write_json
@@ -75,6 +75,7 @@ def command(
     found = identify(arm, recordings, scale=chosen)
     if chosen == "gains":
         check_weight(numbers, found.arm.robot, list(traces.values()))
+        check_loads(arm, list(traces), recordings)
     elif (abs(found.arm.drive_gain) < SMALL_GAIN).all():
         print(
             f"note: all gains are below {SMALL_GAIN:g} N m/A, as those of joint torques told as "

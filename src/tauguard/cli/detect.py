@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
-#: A log shorter than this hardly says how often false alarms come [s].
-SHORT = 1800.0
-
-
 @dataclasses.dataclass(frozen=True)
 class Plain:
     """Without --model: the momentum observer, and thresholds from the log's own beginning.
@@ -258,6 +254,8 @@ def summary(
 
 def report(result: dict[str, Any]) -> None:
     """The figures for a reader."""
+    from tauguard.cli.threshold_card import rate_text
+
     pairs = zip(result["joints"], result["thresholds_nm"], strict=True)
     used = [f"{name} {value:.1f} N m" for name, value in pairs if value is not None]
     if result["detector"] == "threshold":
@@ -274,9 +272,8 @@ def report(result: dict[str, Any]) -> None:
     count, seconds = result["alarms"], result["watched_seconds"]
     print(
         f"{count} alarm{'' if count == 1 else 's'} in {seconds:.1f} s watched; in a log without "
-        f"collisions each is a false one: in {seconds:.0f} s, at most "
-        f"{result['alarms_per_hour_high']:.0f} per hour (95 %)"
-        + (", a longer log would say more" if seconds < SHORT else "")
+        "collisions each is a false one"
+        + rate_text(result["alarms_per_hour_high"], seconds, ": at most {} per hour (95 %)")
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tauguard.datasets import ColumnMap
+    from tauguard.datasets.drives import DriveNumbers
     from tauguard.detectors import ArmModel, RobotNumbers
     from tauguard.detectors.calibration.recording import Load, Recording
     from tauguard.traces import Trace
@@ -296,7 +297,8 @@ def doubts(
         log = names[bare[found[0]]]
         asked.append(
             f"{log} is {found[1]:.1f} times as far from what the other logs predict as they are: "
-            f"did {log} carry something? tell it with --payload {log}=KG (or =unknown)"
+            f"did {log} carry something (tell it with --payload {log}=KG or =unknown), or did "
+            "something touch the arm (leave the log out)?"
         )
     told = [
         f"{r.load.mass:g} kg in {n}"
@@ -308,6 +310,13 @@ def doubts(
     if refused:
         raise ValueError("; ".join([refused, *asked]))
     return [*notes, *asked]
+
+
+def drive_of(columns: str | None, trace: Trace) -> DriveNumbers | None:
+    """The drive of the preset that was named, or that a log's header line is that of."""
+    from tauguard.datasets.drives import DRIVES
+
+    return DRIVES.get(columns or trace.meta.get("columns", ""))
 
 
 def start(
@@ -324,7 +333,6 @@ def start(
     """
     import numpy as np
 
-    from tauguard.datasets.drives import DRIVES
     from tauguard.detectors import ArmModel
     from tauguard.detectors.calibration.assessment import start_gains
 
@@ -332,7 +340,7 @@ def start(
         if gains:
             raise ValueError("--gains: the logs hold joint torques, which need none")
         return ArmModel(numbers, np.ones(numbers.joints)), "torques"
-    preset = DRIVES.get(columns or "")
+    preset = drive_of(columns, recordings[0].trace)
     known = any(r.load is not None and r.load.mass > 0 for r in recordings)
     if scale == "auto":
         otherwise = "payload" if known else "masses"
@@ -364,7 +372,7 @@ def watched_arm(
     """
     import numpy as np
 
-    from tauguard.datasets.drives import DRIVES, REVERSAL, DriveNumbers
+    from tauguard.datasets.drives import REVERSAL, DriveNumbers
     from tauguard.detectors import ArmModel, FrictionModel
     from tauguard.detectors.calibration.arm_file import load_arm
 
@@ -376,13 +384,13 @@ def watched_arm(
                 "--gains, --viscous and --coulomb, or give the robot's own file"
             )
         return calibrated, f"the calibration in {robot.name}"
-    preset, source = DRIVES.get(columns or ""), "the flags"
+    preset, source = drive_of(columns, trace), "the flags"
     if is_torque(trace) and not gains:
         gains, source = (1.0,) * numbers.joints, "the log's torques"
     if not gains and preset is None:
         raise ValueError(f"--gains: give {numbers.joints} numbers, N m of joint torque per ampere")
     if not gains and preset is not None:
-        gains, source = preset.gain, f"the preset {columns}"
+        gains, source = preset.gain, f"the preset {trace.meta.get('columns', columns)}"
         viscous, coulomb = viscous or preset.viscous, coulomb or preset.coulomb
     if len(gains) != numbers.joints:
         raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")

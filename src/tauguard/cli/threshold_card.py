@@ -11,6 +11,9 @@ from tauguard.whole_file import whole_file
 if TYPE_CHECKING:
     from tauguard.detectors.evaluation.threshold_card import ThresholdCard
 
+#: Logs shorter than this say nothing of alarms per hour, logs shorter than that hardly [s].
+SHORTEST, SHORT = 300.0, 1800.0
+
 
 def text(card: ThresholdCard) -> str:
     """One page."""
@@ -30,6 +33,20 @@ def text(card: ThresholdCard) -> str:
     return "\n".join([table(rows), *(line for part in _lines(card) for line in _wrapped(part))])
 
 
+def rate_text(high: float, seconds: float, said: str) -> str:
+    """An upper bound of alarms per hour in the words ``said``, where a log is long enough for one.
+
+    Args:
+        high: the bound.
+        seconds: that were watched.
+        said: with {} for the number.
+    """
+    if seconds < SHORTEST:
+        return f"; {seconds / 60:.1f} min are too short to say how many an hour"
+    more = "; longer logs would say more" if seconds < SHORT else ""
+    return said.format(f"{high:.0f}") + more
+
+
 def _wrapped(line: str) -> list[str]:
     return textwrap.wrap(line, 96, subsequent_indent="  ")
 
@@ -41,8 +58,10 @@ def _lines(card: ThresholdCard) -> list[str]:
         f"at the tool: {half[0]:.0f} N standing and {half[1]:.0f} N moving, in half of all poses "
         f"and directions; {most[0]:.0f} N and {most[1]:.0f} N in 95 % of them",
         f"false alarms: {card.alarms} in {card.seconds / 60:.1f} min, each part under "
-        f"calibration and bounds from the others, so at most {rate['high']:.0f} per hour (95 %) "
-        "on motion like this" + ("; longer logs would say more" if card.seconds < 1800 else ""),
+        "calibration and bounds from the others"
+        + rate_text(
+            rate["high"], card.seconds, ", so at most {} per hour (95 %) on motion like this"
+        ),
     ]
     if card.unseen:
         parts = "; ".join(
@@ -54,16 +73,20 @@ def _lines(card: ThresholdCard) -> list[str]:
     def numbers(values: list[float]) -> str:
         return "{" + ", ".join(f"{value:.1f}" for value in values) + "}"
 
-    franka = card.franka
     order = [
         f"{level}_{what}_thresholds_{phase}"
         for what in ("torque", "force")
         for phase in ("acceleration", "nominal")
         for level in ("lower", "upper")
     ]
-    lines.append("as Franka's setCollisionBehavior takes them:")
-    lines += [f"  {name} {numbers(franka[name])}" for name in order]
-    lines.append(f"as UR's safety settings: tool force limit {card.ur['tool_force_limit_n']:.0f} N")
+    if franka := card.franka:
+        lines.append("as Franka's setCollisionBehavior takes them (7 joints; x, y, z, R, P, Y):")
+        lines += [f"  {name} {numbers(franka[name])}" for name in order]
+    else:
+        lines.append(
+            f"as UR's safety settings: tool force limit {card.ur['tool_force_limit_n']:.0f} N "
+            f"(Franka's setCollisionBehavior is for 7 joints, this arm has {len(card.joints)})"
+        )
     lines.append("These are estimates from logs; they replace no safety function.")
     return lines
 

@@ -7,9 +7,12 @@ import pytest
 
 from tauguard.detectors import ArmModel, CollisionAlarm, load_model, save_model
 from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tauguard.detectors.evaluation.threshold_card import threshold_card
+from tauguard.detectors.features.free_bound import friction_level
 from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion, carrying
+from tauguard.detectors.thresholds.quiet_start import SERIES
 from tests.detectors.synthetic_arm import GAIN, nominal, record
 
 
@@ -77,6 +80,22 @@ def test_bounds_follow_motion_and_what_the_logs_taught(alarm):
     above = (seen.bound - least)[went]
     assert above.min() > -1e-9
     assert (np.median(above, axis=0) < 0.3 * bound.least).all()  # what slow errors leave
+
+
+def test_one_joint_s_alarm_hides_no_push_on_another(alarm):
+    """Joint 1 is pushed, which loads joint 2 a little; then joint 2 is pushed the other way."""
+    trace = record(7, dwell=(6.0, 24.0))
+    first = add_contact(trace, GAIN, Added(12.0, 2.0, (10.0, 0.8, 0.0), "push"))
+    both = add_contact(first, GAIN, Added(13.1, 0.5, (0.0, -8.0, 0.0), "push"))
+    starts = [one.start for one in find_alarms(trace.t, alarm.detect(both).alarm, SERIES)]
+    assert any(13.1 < start < 13.4 for start in starts)
+
+
+def test_few_seconds_leave_the_friction_level_unsure(fitted):
+    logs = [Recording(record(seed)) for seed in range(3)]
+    short = [Recording(record(0, seconds=12.0))]
+    level = friction_level(fitted.arm, logs), friction_level(fitted.arm, short)
+    assert (level[1] > 1.5 * level[0]).all()
 
 
 def test_letting_go_is_no_new_push(alarm):
@@ -149,7 +168,10 @@ def test_the_card_counts_what_the_bounds_are(fitted):
     assert card.tool["standing"][0] < card.tool["moving"][0]
     assert "standing for 2 s" in card.unseen
     assert set(card.unseen["moving alone"]) == {"a", "b", "c"}
-    assert len(card.franka["lower_torque_thresholds_nominal"]) == 3
+    assert card.franka == {}  # libfranka speaks to arms of seven joints
+    seven = replace(card, joints=tuple("abcdefg"), starting=np.ones(7), moving=np.ones(7)).franka
+    assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
+    assert {len(v) for k, v in seven.items() if "force" in k} == {6}
     assert card.false_alarms_per_hour["high"] > 0
 
 
