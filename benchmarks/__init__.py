@@ -25,6 +25,10 @@ STUDIES: dict[str, Study] = {
         "simulation.study",
         "what each part of a scene costs, and what the time step costs in accuracy",
     ),
+    "needs": Study(
+        "simulation.needs",
+        "model only what a scene needs: parts left out, and what the detector then does",
+    ),
     "impact": Study(
         "simulation.impact",
         "blows against body regions beside the two-mass model: error against cost",

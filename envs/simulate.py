@@ -120,6 +120,7 @@ class Simulation:
         episode: Episode,
         nominal: Drive | None = None,
         checkers: Sequence[str | Checker] = (),
+        without: Sequence[str] = (),
     ) -> None:
         """Compose the scene, plan the motion and the feed-forward torques.
 
@@ -127,11 +128,13 @@ class Simulation:
             episode: what to simulate.
             nominal: what the controller believes about the drive (default: the arm's nominal one).
             checkers: contact checkers whose answers go into the trace.
+            without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.
         """
         self._checkers = [_known(c) for c in checkers]
         self.episode = episode
         self.scene = scene_for(episode, visuals=bool(checkers))
-        self.nominal = nominal or self.scene.facts.nominal
+        self.scene = replace(self.scene, drive=self.scene.drive.without(*without))
+        self.nominal = (nominal or self.scene.facts.nominal).without(*without)
         streams = np.random.SeedSequence(episode.seed).spawn(3)
         motion_rng, aim_rng, self._sensor_rng = map(np.random.default_rng, streams)
         self.motion = random_motion(
@@ -318,7 +321,10 @@ def _matrices(poses: Array) -> Array:
 
 
 def simulate(
-    episode: Episode, nominal: Drive | None = None, checkers: Sequence[str | Checker] = ()
+    episode: Episode,
+    nominal: Drive | None = None,
+    checkers: Sequence[str | Checker] = (),
+    without: Sequence[str] = (),
 ) -> Trace:
     """Simulate ``episode``: the same episode gives the same bytes.
 
@@ -327,12 +333,13 @@ def simulate(
         nominal: what the controller believes about the drive (default: the arm's nominal one).
         checkers: contact checkers, by name or made, whose answers go into ``Trace.contacts``; they
             change nothing else.
+        without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.
 
     Raises:
         SimulationDiverged: the simulation left every sensible range.
-        ValueError: an unknown checker.
+        ValueError: an unknown checker or part.
     """
-    return Simulation(episode, nominal, checkers).run()
+    return Simulation(episode, nominal, checkers, without).run()
 
 
 def _known(name: str | Checker) -> str | Checker:

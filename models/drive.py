@@ -5,7 +5,7 @@ Units are those of the joint side: ``tau = gain * current`` with the gain in N m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,6 +126,12 @@ def _rounded(signal: Array, quantum: Array | float) -> Array:
     return np.where(given, np.rint(signal / step) * step, signal)
 
 
+#: Parts that :meth:`Drive.without` leaves out: all friction; its higher level near standstill, its
+#: growth with the torque, its change with temperature; torque ripple; the current loop's lag; noise
+#: and quantisation of the sensors.
+PARTS = ("friction", "stribeck", "load", "warmth", "ripple", "lag", "sensors")
+
+
 @dataclass(frozen=True)
 class Drive:
     """The drives of an arm. A part that is ``None`` is left out and costs nothing."""
@@ -184,6 +190,34 @@ class Drive:
         limit = np.asarray(torque_limit, dtype=float)
         same = np.full(limit.shape, gain)
         return cls(same, np.full(limit.shape, 101.0), limit / gain, None)
+
+    def without(self, *parts: str) -> Drive:
+        """The same drives with some parts left out.
+
+        Args:
+            parts: of :data:`PARTS`.
+
+        Raises:
+            ValueError: another name.
+        """
+        for name in parts:
+            if name not in PARTS:
+                raise ValueError(f"part {name!r}: there are {', '.join(PARTS)}")
+        friction = None if "friction" in parts else self.friction
+        if friction is not None:
+            if "stribeck" in parts:
+                friction = replace(friction, static=friction.coulomb)
+            if "load" in parts:
+                friction = replace(friction, load=np.zeros_like(friction.load))
+            if "warmth" in parts:
+                friction = replace(friction, temperature=friction.reference_temperature)
+        return replace(
+            self,
+            friction=friction,
+            ripple=None if "ripple" in parts else self.ripple,
+            sensors=None if "sensors" in parts else self.sensors,
+            electrical_time_constant=None if "lag" in parts else self.electrical_time_constant,
+        )
 
     @property
     def torque_limit(self) -> Array:

@@ -195,3 +195,13 @@ def test_mujoco_keeps_its_clock_after_a_run_without_it():
         assert data.timer[0].duration == 0
     mujoco.mj_step(model, data)
     assert data.timer[0].duration > 0
+
+
+def test_drives_without_losses_part_by_part_are_ideal_drives():
+    episode = Episode(seed=4, seconds=0.3, speed=40.0)
+    parts = ("friction", "ripple", "lag", "sensors")
+    one, other = simulate(episode, without=parts), simulate(replace(episode, ideal_drive=True))
+    for name in ("q", "qd", "current"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    quiet = simulate(episode, without=("sensors",))
+    assert 0 < np.abs(quiet.q - simulate(episode).q).max() <= 1e-6  # half a quantum

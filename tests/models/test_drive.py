@@ -85,3 +85,17 @@ def test_an_ideal_drive_has_the_limits_it_is_given():
     drive = Drive.ideal(np.array([5.0, np.inf]))
     np.testing.assert_allclose(drive.torque_limit, [5, np.inf])
     assert (drive.friction, drive.ripple, drive.sensors) == (None, None, None)
+
+
+def test_parts_are_left_out_by_name():
+    drive = cura6_drive()
+    poorer = drive.without("stribeck", "load", "ripple", "sensors", "lag")
+    assert (poorer.friction.static == drive.friction.coulomb).all()
+    assert not poorer.friction.load.any()
+    assert (poorer.friction.viscous == drive.friction.viscous).all()
+    assert poorer.ripple is poorer.sensors is poorer.electrical_time_constant is None
+    assert drive.without("friction").friction is None
+    warm = replace(drive, friction=replace(drive.friction, temperature=60.0))
+    assert warm.without("warmth").friction.temperature == warm.friction.reference_temperature
+    with pytest.raises(ValueError, match="'gears': there are friction"):
+        drive.without("gears")
