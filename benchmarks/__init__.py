@@ -41,6 +41,10 @@ STUDIES: dict[str, Study] = {
         "detection.false_alarms",
         "thresholds for a rate of false alarms, on ten arms of fresh seeds",
     ),
+    "detection_parts": Study(
+        "detection.parts",
+        "what each part of the detector brings: left out, everything else stays",
+    ),
     "detection_online": Study(
         "detection.online", "observer and SVR a sample: microseconds, and fewer support vectors"
     ),

@@ -59,7 +59,11 @@ class Arm:
 def arm_scores(job: tuple[Extent, int, int]) -> Arm:
     """Train, simulate and score the arm ``job[2]`` of the study's seed ``job[1]``."""
     extent, seed, arm = job
-    detectors = train(seed, arm, extent.names, extent.training)
+    return scored(extent, seed, arm, train(seed, arm, extent.names, extent.training))
+
+
+def scored(extent: Extent, seed: int, arm: int, detectors: dict[str, FittedDetector]) -> Arm:
+    """Simulate and score detectors that are trained already."""
     known = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
     return Arm(
         arm,

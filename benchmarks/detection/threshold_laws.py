@@ -13,9 +13,12 @@ from tauguard.detectors.evaluation.metrics import HEADLINE
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
 from tauguard.detectors.thresholds.rates import tail_level
+from tauguard.detectors.thresholds.speed_levels import SpeedLevels
 from tauguard.report import Row
 from tauguard.report import rate as wilson
 
+#: The score at every speed.
+AS_IT_IS = SpeedLevels(np.zeros(1), np.zeros(1), np.ones(1))
 #: Share of the blocks that the likeliest tail is fitted to.
 LIKELIEST = 0.02
 
@@ -61,13 +64,16 @@ class Judged:
     arms: tuple[OfArm, ...]
 
 
-def judged(arms: Sequence[Arm], name: str, law: str, asked: float) -> Judged:
-    """Thresholds of one law at one rate, on all arms."""
-    return Judged(name, law, asked, tuple(_of_arm(arm, name, law, asked) for arm in arms))
+def judged(
+    arms: Sequence[Arm], name: str, law: str, asked: float, normalised: bool = True
+) -> Judged:
+    """Thresholds of one law at one rate, on all arms; of scores over the speed, or as they are."""
+    of_arms = (_of_arm(arm, name, law, asked, normalised) for arm in arms)
+    return Judged(name, law, asked, tuple(of_arms))
 
 
-def _of_arm(arm: Arm, name: str, law: str, asked: float) -> OfArm:
-    levels = speed_levels(arm.calibration[name])
+def _of_arm(arm: Arm, name: str, law: str, asked: float, normalised: bool) -> OfArm:
+    levels = speed_levels(arm.calibration[name]) if normalised else AS_IT_IS
     known = [one.over(levels) for one in arm.calibration[name]]
     fresh = [one.over(levels) for one in arm.fresh[name]]
     expected = ExpectedRate.of(known)

@@ -66,7 +66,7 @@ class FrontEndSettings:
             )
         if self.calibrate:
             arm = calibrate(arm, traces, friction=arm.friction).arm
-        bare = FrontEnd(self.gain, self.adapt, self.settle, joints, arm, dt)
+        bare = self.bare(joints, arm, dt)
         estimates = [bare.estimator().run(t.t, t.q, t.qd, t.current) for t in traces]
         tables = (
             [e.unexplained for e in estimates],
@@ -83,6 +83,10 @@ class FrontEndSettings:
         for trace, estimate in zip(traces, estimates, strict=True):
             _remember(trace, found, estimate)
         return found
+
+    def bare(self, joints: tuple[int, ...], arm: ArmModel, dt: float) -> FrontEnd:
+        """The front end of a calibrated arm before its envelope is known."""
+        return FrontEnd(self.gain, self.adapt, self.settle, joints, arm, dt)
 
 
 @dataclass(frozen=True, eq=False)

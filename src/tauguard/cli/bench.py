@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 #: Studies that keep what they have done in a folder.
-KEEPING = ("guard", "entries", "detection", "false_alarms")
+KEEPING = ("guard", "entries", "detection", "detection_parts", "false_alarms")
 
 
 def command(
@@ -34,8 +34,8 @@ def command(
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
         robot: arms of the study `arms`, by name or file, parted by commas.
-        keep: folder for what `guard`, `entries`, `detection` and `false_alarms` have done; what it
-            holds is not done again. Of one build: empty it after a change.
+        keep: folder for what `guard`, `entries`, `detection`, `detection_parts` and `false_alarms`
+            have done; what it holds is not done again. Of one build: empty it after a change.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
