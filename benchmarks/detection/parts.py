@@ -58,7 +58,7 @@ class PartialFrontEnd(FrontEnd):
 
     def estimator(self) -> Estimator:
         """Without a part of its state."""
-        known = replace(Unknowns.for_detection(), **UNKNOWNS[self.without])  # type: ignore[arg-type]
+        known = replace(Unknowns.for_detection(), **UNKNOWNS[self.without])
         return Estimator(self.arm, self.gain, self.dt, known)
 
 
