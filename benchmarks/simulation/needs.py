@@ -175,4 +175,4 @@ def draw(rows: list[Row], figure: Figure) -> None:
     left.set_yticks(range(len(rows)), [row["left out"] for row in rows])
     left.invert_yaxis()
     left.set_ylabel("left out of the simulation that it was trained in")
-    left.legend(loc="lower right")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=2)
