@@ -4,6 +4,7 @@
 
 #include "convex_contact.hpp"
 #include "exact_gap.hpp"
+#include "facet_depth.hpp"
 #include "nearest.hpp"
 
 namespace tauguard::rigid {
@@ -70,19 +71,35 @@ bool certified_apart(const Points<double>& a, const Points<double>& b, double si
   const Nearest ends = nearest(a, b);
   *out = apart(ends.a, ends.b);
   if (!(out->distance > near * size)) return false;
-  return out->distance - (bottom(b, out->normal) - top(a, out->normal)) <= certain * size;
+  double sure = bottom(b, out->normal) - top(a, out->normal);
+  if (out->distance - sure > certain * size && ends.size == 3) {
+    // The way between close faces is short: their normal is the better direction.
+    Vec w[3];
+    for (int i = 0; i < 3; ++i) w[i] = b[ends.corner[i][1]] - a[ends.corner[i][0]];
+    const Vec c = cross(w[1] - w[0], w[2] - w[0]);
+    out->normal = ((dot(c, w[0]) < 0 ? -1 : 1) / norm(c)) * c;
+    sure = bottom(b, out->normal) - top(a, out->normal);
+  }
+  return out->distance - sure <= certain * size;
 }
 
-bool certified_together(const Points<double>& a, const Points<double>& b, double size, Gap* out) {
+bool certified_depth(const Points<double>& a, const Points<double>& b, const Bodies& bodies_a,
+                     const Bodies& bodies_b, std::size_t row, double size, double* way, Vec* n) {
+  BodyEdges ea, eb;
+  if (edges_of(bodies_a, row, &ea) && edges_of(bodies_b, row, &eb)) {
+    FacetDepth facets(a, b, size);
+    if (facets.solve(ea, eb, certain * size)) {
+      *way = facets.way, *n = facets.normal;
+      return *way > near * size;
+    }
+  }
   NearestFacet<double> search(a, b);
   if (search.solve(2000) != NearestFacet<double>::Answer::facet) return false;
   const double length = norm(search.normal), depth = search.offset / length;
   if (!(depth > near * size)) return false;
-  const Vec n = (-1 / length) * search.normal;
-  const double way = top(a, n) - bottom(b, n);  // certainly enough to come free
-  if (!(way - depth <= certain * size)) return false;
-  *out = together(a, b, n, way, size);
-  return true;
+  *n = (-1 / length) * search.normal;
+  *way = top(a, *n) - bottom(b, *n);  // certainly enough to come free
+  return *way - depth <= certain * size;
 }
 
 // The largest binary exponent among the components; 0 for a zero vector.
@@ -171,9 +188,14 @@ Gap gap_of(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, doub
   Gap g;
   bool known = false;
   int sign = 0;
-  const bool ranged = size > least_size && size < most_size;
-  const bool quick =
-      ranged && (certified_apart(a, b, size, &g) || certified_together(a, b, size, &g));
+  bool quick = false;
+  if (size > least_size && size < most_size) {
+    quick = certified_apart(a, b, size, &g);
+    double way;
+    Vec n;
+    if (!quick && certified_depth(a, b, bodies_a, bodies_b, row, size, &way, &n))
+      quick = true, g = together(a, b, n, way, size);
+  }
   if (!quick || (radii > 0 && std::fabs(g.distance - radii) <= near * (size + radii))) {
     const auto exact =
         exact_gap(bodies_a, bodies_b, row, a, b, Dyadic(radius_a) + Dyadic(radius_b), size);
@@ -200,8 +222,10 @@ bool meet(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, doubl
       const Vec n = (1 / length) * way;
       if (bottom(b, n) - top(a, n) > radii + slack) return false;
     }
-    Gap g;
-    if (!(length > slack) && certified_together(a, b, size, &g)) return true;
+    double depth;
+    Vec n;
+    if (!(length > slack) && certified_depth(a, b, bodies_a, bodies_b, row, size, &depth, &n))
+      return true;
   }
   const auto x = vertices_of<Dyadic>(bodies_a, row), y = vertices_of<Dyadic>(bodies_b, row);
   const ExactNearest<Dyadic> nearest(x, y);
