@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.rigid.rounded import Capsules, Rounded, Solid, Spheres
 from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Tetrahedra
 
 _TETRAHEDRON_FACES = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
@@ -55,9 +56,20 @@ def collide_all(
     return hit, time.process_time() - start
 
 
-def geometries(bodies: Bodies) -> list[tuple[Any, Any]]:
+def geometries(bodies: Solid) -> list[tuple[Any, Any]]:
     """coal's shape and pose of each body."""
     coal = coal_module()
+    if isinstance(bodies, Spheres):
+        pairs = zip(bodies.center, bodies.radius, strict=True)
+        return [(coal.Sphere(r), coal.Transform3s(np.eye(3), c)) for c, r in pairs]
+    if isinstance(bodies, Capsules):
+        rows = zip(bodies.start, bodies.end, bodies.radius, strict=True)
+        return [_capsule(coal, start, end, radius) for start, end, radius in rows]
+    if isinstance(bodies, Rounded):
+        found = geometries(bodies.core)
+        for (shape, _), radius in zip(found, bodies.radius, strict=True):
+            shape.setSweptSphereRadius(radius)
+        return found
     if isinstance(bodies, Boxes):
         return [
             (coal.Box(2 * half), coal.Transform3s(rotation, center))
@@ -69,6 +81,20 @@ def geometries(bodies: Bodies) -> list[tuple[Any, Any]]:
         (_convex(coal, points, faces), coal.Transform3s.Identity())
         for points, faces in _hulls(bodies)
     ]
+
+
+def _capsule(
+    coal: Any, start: NDArray[np.float64], end: NDArray[np.float64], radius: float
+) -> tuple[Any, Any]:
+    """coal's capsules lie along z."""
+    way = end - start
+    length = float(np.linalg.norm(way))
+    z = way / length if length > 0 else np.array([0.0, 0.0, 1.0])
+    x = np.eye(3)[np.abs(z).argmin()]
+    x = x - z * (z @ x)
+    x /= np.linalg.norm(x)
+    turn = np.stack([x, np.cross(z, x), z], axis=1)
+    return coal.Capsule(radius, length), coal.Transform3s(turn, 0.5 * (start + end))
 
 
 def _hulls(bodies: Bodies) -> list[tuple[NDArray[np.float64], Any]]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tauguard.benchmarks.cloth.peer import load_ipctk
 from tauguard.benchmarks.cloth.scaling import Step, bound, scaled, scenes, step_at
 from tauguard.benchmarks.harness import measure
+from tauguard.cloth import Frame as FrameAnswer
 from tauguard.cloth import Groups, MeshCCD
 from tauguard.cloth.scenes import load_recording
 from tauguard.report import Row
@@ -87,6 +88,7 @@ def methods(frame: Frame, repeats: int) -> list[Row]:
                 "ab2pf_hits": len(truth.vf) + len(truth.ee),
                 "missed": vf[0] + ee[0],
                 "added": vf[1] + ee[1],
+                **lateness(truth, answer),
             }
         )
     return rows
@@ -184,6 +186,34 @@ def _clear(ipctk: Any, found: Any, answer: Any, most: int) -> dict[str, list[Any
         if (min(c.edge0_id, c.edge1_id), max(c.edge0_id, c.edge1_id)) not in hits
     ]
     return {"fv": clear_fv, "ee": clear_ee}
+
+
+def lateness(truth: FrameAnswer, found: FrameAnswer) -> Row:
+    """How many of the common hits' times are late, and the latest by how much of the step.
+
+    The truth's times are at most 1e-9 of the step early, so less than that is no lateness.
+    """
+    after = np.concatenate(
+        [
+            _after(truth.vf, truth.vf_impacts.toi, found.vf, found.vf_impacts.toi),
+            _after(truth.ee, truth.ee_impacts.toi, found.ee, found.ee_impacts.toi),
+        ]
+    )
+    late = after[after > 1e-9]
+    return {"late": len(late), "late_most": float(late.max(initial=0.0))}
+
+
+def _after(
+    pairs: NDArray[np.int32],
+    toi: NDArray[np.float64],
+    other: NDArray[np.int32],
+    other_toi: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The other's times less the first's, of the pairs that both have."""
+    weights = np.array([1 << 32, 1])
+    a, b = (x.astype(np.int64) @ weights for x in (pairs, other))
+    _, i, j = np.intersect1d(a, b, assume_unique=True, return_indices=True)
+    return other_toi[j] - toi[i]
 
 
 def compare(truth: NDArray[np.int32], found: NDArray[np.int32]) -> tuple[int, int]:

@@ -206,6 +206,7 @@ def _methods(name: str, total: int, queries: Queries, truth: Answer, repeats: in
                 "misses": rate(int((hit & ~answer.hit).sum()), int(hit.sum())),
                 "false_hits": rate(int((answer.hit & ~hit).sum()), int((~hit).sum())),
                 "late": int((toi > first).sum()),
+                "late_most": float((toi - first).max(initial=0)),
                 "toi_error_most": float(np.abs(first - toi).max(initial=0)),
                 "decided_exactly": answer.counts["exact"],
             }
@@ -277,6 +278,7 @@ def _peers(
                 "misses": rate(int((real & ~hit).sum()), int(real.sum())),
                 "false_hits": rate(int((hit & ~real).sum()), int((~real).sum())),
                 "toi_error_median": float(np.median(np.abs(early))) if both.any() else None,
+                "late_most": float((-early).max(initial=0)),
                 "us_a_hit": float(np.median(hit_us[both])) if both.any() else None,
             }
         )

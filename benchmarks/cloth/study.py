@@ -11,6 +11,7 @@ import numpy as np
 from tauguard.benchmarks.cloth import adversarial as cloth_adversarial
 from tauguard.benchmarks.cloth import check as cloth_check
 from tauguard.benchmarks.cloth import frames as cloth_frames
+from tauguard.benchmarks.cloth import loose as cloth_loose
 from tauguard.benchmarks.cloth import queries as cloth_queries
 from tauguard.benchmarks.cloth import scaling as cloth_scaling
 from tauguard.benchmarks.cloth import truth as cloth_truth
@@ -33,20 +34,31 @@ NOTES = {
     "frame": "all collisions of one step. volume: the broad phase's, (moving_)k_dopK has K/2 axes "
     "and sweeps the step (moves with it); first what each method was published with, then iccd "
     "and vcd on ab2pf's. frame_ms: broad and narrow phase; times_ab2pf: over ab2pf's; missed and "
-    "added: hits that ab2pf has and the method has not, and the reverse.",
+    "added: hits that ab2pf has and the method has not, and the reverse; late: common hits whose "
+    "time is more than 1e-9 after ab2pf's, late_most by how much of the step.",
     "frame mean": "times_ab2pf of the table above over its scenes.",
     "frame peer": "the same step by ipctk: broad phase, then its candidates (vf_ns and ee_ns "
     "each); peer_ms is both, speedup is that over ab2pf's whole frame.",
     "query": "n candidates of ipctk's broad phase (of so many). ns: a query, gather included; "
-    "misses of so many hits, false_hits of so many others; late: times after the exact one.",
+    "misses of so many hits, false_hits of so many others; late: times after the exact one, "
+    "late_most by how much of the step.",
     "query clear": "ab2pf on the candidates without contact (ab2pf_ns), and on all of them.",
     "query peer": "ns: one of n queries without contact, inside ipctk's own loop (3 repeats); "
     "all_ns: with the hits' share; misses and false_hits of so many among the queries that it was "
-    "asked from Python; us_a_hit: microseconds of a hit, asked so.",
+    "asked from Python; late_most: the latest time, in steps; us_a_hit: microseconds of a hit, "
+    "asked so.",
     "truth": "whole frames beside the collisions that are listed with the data: misses and "
-    "false_hits are counts.",
+    "false_hits are counts; late and late_most as in the table of frames.",
     "hard query": "n public queries with exact labels. us: microseconds a query; misses and "
     "false_hits are counts; decided_exactly: left to exact arithmetic.",
+    "point query": "a point and an edge, or two points: drawn from a lattice, and made to meet "
+    "exactly. ns: a query, a batch a call; peer_ns: ipctk, a call each, "
+    "call_ns of which is Python's; misses, false_hits, late: counts, ours by rational arithmetic "
+    "(of `known` queries), the peer's by ours.",
+    "safe step": "safe_step beside ipctk's compute_collision_free_stepsize on rods, particles and "
+    "triangles of one step. step, peer_step: the answers; earliest: the first contact by all pairs "
+    "in exact arithmetic; meets_after: contacts that the exact method finds up to ours, and up to "
+    "the peer's.",
     "adversarial": "ab2pf beside method exact. early_most: largest error of a time that is not "
     "late; scaled, turned, backwards, modes: answers that change by 2^+-300, another order of "
     "vertices, time reversed, other rounding modes.",
@@ -99,6 +111,8 @@ def run(quick: bool, seed: int) -> list[Row]:
     if data:
         rows += cloth_truth.on_listed_frames(data / "ccd")
         rows += cloth_queries.on_hard_sets(data / "ccd", 20 if quick else 60)
+    rows += cloth_loose.point_queries(2_000 if quick else 20_000, seed, repeats)
+    rows += cloth_loose.safe_steps(triangles // 10, seed, repeats)
     rows += cloth_adversarial.adversarial(12_000 if quick else 1_000_000, seed)
     if data:
         rows += cloth_check.on_labels(data / "ccd", map)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.benchmarks.cloth.frames import compare
+from tauguard.benchmarks.cloth.frames import compare, lateness
 from tauguard.cloth import MeshCCD
 from tauguard.cloth.impacts import METHODS
 from tauguard.cloth.scenes import load_recording
@@ -26,6 +26,7 @@ def on_listed_frames(folder: Path) -> list[Row]:
         step = next(recording.steps())
         edges = MeshCCD(recording.faces).edges
         vf, ee = listed(folder / name, number, edges, len(step[0]))
+        ours = MeshCCD(recording.faces).find(*step)
         for method in METHODS:
             ccd = MeshCCD(recording.faces, method)
             if method == "exact" and len(ccd.faces) > 50_000:
@@ -42,6 +43,7 @@ def on_listed_frames(folder: Path) -> list[Row]:
                     "listed_ee": len(ee),
                     "misses": by_kind[0][0] + by_kind[1][0],
                     "false_hits": by_kind[0][1] + by_kind[1][1],
+                    **lateness(ours, frame),
                 }
             )
     return rows

@@ -18,6 +18,7 @@ def claims(rows: list[Row], quick: bool, volume: str = "obb") -> list[Row]:
         *mesh_ratios(rows, volume),
         *impacts(rows),
         *distances(rows),
+        *rounded(rows),
     ]
     for row in found:
         if row["met"] is False and row["of"] == "time":
@@ -168,4 +169,34 @@ def distances(rows: list[Row]) -> list[Row]:
     return [
         claim("distance: wrong signs", "error", 0, wrong),
         claim("distance: error as a share of the extent", "error", 3e-14, errors),
+        at_least("distance over coal, random pairs", 1, _over_coal(found)),
+    ]
+
+
+def _over_coal(found: list[Row]) -> list[float | None]:
+    return [
+        row["coal_ns"] / row["distance_ns"]["median"] if isinstance(row["coal_ns"], float) else None
+        for row in found
+        if row["outcome"] != "hard case"
+    ]
+
+
+def rounded(rows: list[Row]) -> list[Row]:
+    """Bodies with radii and meshes against convex bodies."""
+    static, moving = of(rows, "rounded"), of(rows, "rounded in motion")
+    mesh = of(rows, "mesh and convex")
+    wrong = [row["wrong"] for row in static if row["wrong"] is not None]
+    differ = [row["signs_differ"] for row in static + mesh]
+    early = [row.get("passed_before") for row in moving]
+    early += [row.get("moving_passed_before") for row in mesh]
+    gaps = [row.get("gap_at_toi") for row in moving]
+    gaps += [row.get("moving_gap_at_toi") for row in mesh]
+    return [
+        error_at_most("rounded bodies: wrong overlaps", 0, wrong),
+        error_at_most("rounded and mesh: overlaps that distances contradict", 0, differ),
+        error_at_most(
+            "rounded: error as a share of the extent", 3e-14, [r["error"] for r in static]
+        ),
+        error_at_most("rounded and mesh in motion: coal says they met before", 0, early),
+        error_at_most("rounded and mesh in motion: coal's distance at the time", 1e-6, gaps),
     ]

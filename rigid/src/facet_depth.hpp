@@ -2,13 +2,15 @@
 // the normals of either body's faces and of every pair of edges.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::rigid {
 
-// Edge directions, each off by at most 4 roundings of itself, and which pairs of them span faces.
+// Edge directions, each off by at most 4 roundings of itself, and which pairs of them span faces,
+// of parallelepipeds and of hulls of at most four points.
 struct BodyEdges {
   Vec edge[6];
   int edges = 0, faces = 0;
@@ -27,15 +29,15 @@ inline bool edges_of(const Bodies& bodies, std::size_t row, BodyEdges* out) {
     out->edges = out->faces = 3, out->parallel = true;
     return true;
   }
-  if (bodies.kind != Kind::tetrahedra) return false;
-  for (int i = 0; i < 4; ++i)
-    for (int j = i + 1; j < 4; ++j)
-      for (int k = 0; k < 3; ++k)
-        out->edge[i == 0 ? j - 1 : i + j][k] = p[3 * j + k] - p[3 * i + k];
-  constexpr int pairs[4][2] = {
-      {0, 1}, {0, 2}, {1, 2}, {3, 4}};  // 01 x 02, 01 x 03, 02 x 03, 12 x 13
-  for (int f = 0; f < 4; ++f) out->face[f][0] = pairs[f][0], out->face[f][1] = pairs[f][1];
-  out->edges = 6, out->faces = 4;
+  const int n = static_cast<int>(bodies.vertex_count(row));
+  if (bodies.kind == Kind::polygons || n > 4) return false;
+  // Of 01, 02, 12, 03, 13, 23 those that there are; faces 012, 013, 023, 123.
+  for (int j = 1; j < n; ++j)
+    for (int i = 0; i < j; ++i, ++out->edges)
+      for (int k = 0; k < 3; ++k) out->edge[out->edges][k] = p[3 * j + k] - p[3 * i + k];
+  constexpr int pairs[4][2] = {{0, 1}, {0, 3}, {1, 3}, {2, 4}};
+  out->faces = n == 4 ? 4 : n == 3 ? 1 : 0;
+  for (int f = 0; f < out->faces; ++f) std::copy_n(pairs[f], 2, out->face[f]);
   return true;
 }
 
@@ -58,7 +60,7 @@ class FacetDepth {
     for (int i = 0; i < ea.edges; ++i)
       for (int j = 0; j < eb.edges; ++j)
         if (!consider(ea.edge[i], eb.edge[j], ea.parallel && eb.parallel)) return false;
-    return way > 0 && low_ >= way - slack;
+    return way > 0 && way < INFINITY && low_ >= way - slack;
   }
 
   double way = INFINITY;

@@ -67,20 +67,33 @@ Gap together(const Points<double>& a, const Points<double>& b, const Vec& n, dou
   return {-depth, point, point - depth * n, n};
 }
 
+// The way between close faces is short, and rounding turns it: their normal is the better
+// direction, and the nearest points are the feet of the origin on the triangle of differences.
+bool between_faces(const Points<double>& a, const Points<double>& b, const Nearest& ends,
+                   double size, Gap* out) {
+  Vec w[3], at_a{}, at_b{};
+  for (int i = 0; i < 3; ++i) w[i] = b[ends.corner[i][1]] - a[ends.corner[i][0]];
+  const Vec c = cross(w[1] - w[0], w[2] - w[0]);
+  const double length = norm(c);
+  const Vec n = ((dot(c, w[0]) < 0 ? -1 : 1) / length) * c, foot = dot(n, w[0]) * n;
+  for (int i = 0; i < 3; ++i) {
+    const Vec part = cross(w[(i + 1) % 3] - foot, w[(i + 2) % 3] - foot);
+    const double weight = dot(part, c) / (length * length);
+    if (!(weight >= 0)) return false;
+    at_a = at_a + weight * a[ends.corner[i][0]], at_b = at_b + weight * b[ends.corner[i][1]];
+  }
+  *out = {norm(at_b - at_a), at_a, at_b, n};
+  return norm((at_b - at_a) - out->distance * n) <= 0x1p-44 * size;
+}
+
 bool certified_apart(const Points<double>& a, const Points<double>& b, double size, Gap* out) {
   const Nearest ends = nearest(a, b);
   *out = apart(ends.a, ends.b);
   if (!(out->distance > near * size)) return false;
-  double sure = bottom(b, out->normal) - top(a, out->normal);
-  if (out->distance - sure > certain * size && ends.size == 3) {
-    // The way between close faces is short: their normal is the better direction.
-    Vec w[3];
-    for (int i = 0; i < 3; ++i) w[i] = b[ends.corner[i][1]] - a[ends.corner[i][0]];
-    const Vec c = cross(w[1] - w[0], w[2] - w[0]);
-    out->normal = ((dot(c, w[0]) < 0 ? -1 : 1) / norm(c)) * c;
-    sure = bottom(b, out->normal) - top(a, out->normal);
-  }
-  return out->distance - sure <= certain * size;
+  const auto certified = [&] {
+    return out->distance - (bottom(b, out->normal) - top(a, out->normal)) <= certain * size;
+  };
+  return certified() || (ends.size == 3 && between_faces(a, b, ends, size, out) && certified());
 }
 
 bool certified_depth(const Points<double>& a, const Points<double>& b, const Bodies& bodies_a,

@@ -7,9 +7,10 @@ from tauguard.benchmarks.rigid import claims as rigid_claims
 from tauguard.benchmarks.rigid import convex as rigid_convex
 from tauguard.benchmarks.rigid import impact as rigid_impact
 from tauguard.benchmarks.rigid import mesh as rigid_mesh
+from tauguard.benchmarks.rigid import rounded as rigid_rounded
 from tauguard.benchmarks.rigid import volumes as rigid_volumes
 from tauguard.report import rate
-from tauguard.rigid import Boxes, Motion, overlap
+from tauguard.rigid import Boxes, MeshTree, Motion, overlap
 
 
 def test_a_static_cell_counts_wrong_answers():
@@ -177,7 +178,27 @@ def test_a_quick_run_says_no_to_errors_only(monkeypatch):
         monkeypatch.setattr(rigid_claims, "mesh_ratios", lambda rows, volume: [])
         monkeypatch.setattr(rigid_claims, "impacts", lambda rows: [])
         monkeypatch.setattr(rigid_claims, "distances", lambda rows: [])
+        monkeypatch.setattr(rigid_claims, "rounded", lambda rows: [])
         return [row["met"] for row in rigid_claims.claims([], quick)]
 
     assert judged(quick=True) == [False, False, False, "full run", "full run"]
     assert judged(quick=False) == [False] * 5
+
+
+def test_rows_of_rounded_bodies_and_a_mesh_stand_beside_coal():
+    pytest.importorskip("coal")
+    rng = np.random.default_rng(5)
+    static = rigid_rounded.static_row(rng, ("capsules", "spheres"), 60, 20)
+    assert (static["wrong"], static["signs_differ"]) == (0, 0)
+    assert static["error"] < 3e-14
+    assert static["coal_differs_most"] < 1e-6
+    moving = rigid_rounded.moving_row(rng, ("capsules", "rounded boxes"), 20)
+    assert (moving["passed_before"], moving["coal_disagrees"]) == (0, 0)
+    assert moving["hits"] > 0
+    assert moving["gap_at_toi"] < 1e-6
+    mesh = rigid_mesh.generated(12)
+    tree = MeshTree(mesh.vertices, mesh.faces)
+    row = rigid_rounded.mesh_row(rng, mesh, tree, "boxes", 20)
+    assert (row["signs_differ"], row["coal_disagrees"]["value"]) == (0, 0)
+    assert row["coal_differs_most"] < 1e-6
+    assert row["moving_passed_before"] == 0

@@ -1,26 +1,38 @@
 """Point-edge and point-point contact of doubles in rational arithmetic, from the definition."""
 
+from __future__ import annotations
+
 from fractions import Fraction
 from math import inf, isqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Positions = NDArray[np.float64]
+Line = tuple[Fraction, Fraction]
+Quadratic = tuple[Any, ...]
 
 BITS = 400  # roots are bracketed to 2^-400, far closer than those of small integers can lie
 
 
-def moving(x0, x1, i, j):
+def moving(x0: Positions, x1: Positions, i: int, j: int) -> list[Line]:
     """Vertex i as seen from vertex j: coefficients (start, rate) of each coordinate."""
     at = [[Fraction(float(x[i][k])) - Fraction(float(x[j][k])) for k in range(3)] for x in (x0, x1)]
     return [(a, b - a) for a, b in zip(*at, strict=True)]
 
 
-def product(a, b):
+def product(a: Line, b: Line) -> Quadratic:
+    """Of two linear functions."""
     return (a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[1] * b[1])
 
 
-def value(p, t):
-    return sum(c * t**k for k, c in enumerate(p))
+def value(p: Quadratic, t: Fraction) -> Fraction:
+    """The polynomial p at t."""
+    return sum((c * t**k for k, c in enumerate(p)), Fraction(0))
 
 
-def roots(p):
+def roots(p: Quadratic) -> list[Fraction]:
     """Of a quadratic that is not zero, in [0, 1], ascending, to BITS bits."""
     c, b, a = p
     if a == 0:
@@ -34,12 +46,14 @@ def roots(p):
     return sorted(t for t in found if 0 <= t <= 1)
 
 
-def zero(p, t):
+def zero(p: Quadratic, t: Fraction) -> bool:
+    """Is p(t) zero, t being a root to BITS bits?"""
     size = max(abs(c) for c in p) or 1
-    return abs(value(p, t)) < size * Fraction(1, 1 << BITS // 4)
+    return bool(abs(value(p, t)) < size * Fraction(1, 1 << BITS // 4))
 
 
-def point_point_time(x0, x1):
+def point_point_time(x0: Positions, x1: Positions) -> float:
+    """When two points first meet, positions of shape (2, 3); inf where they do not."""
     seen = moving(x0, x1, 0, 1)
     rates = [(a, r) for a, r in seen if a != 0 or r != 0]
     if not rates:
@@ -50,14 +64,17 @@ def point_point_time(x0, x1):
     return float(-a / r) if all(p + q * (-a / r) == 0 for p, q in seen) else inf
 
 
-def point_edge_time(x0, x1):
+def point_edge_time(x0: Positions, x1: Positions) -> float:
+    """When a point first meets an edge, positions of shape (3, 3); inf where it does not."""
     a, b = moving(x0, x1, 1, 0), moving(x0, x1, 2, 0)
     sides = []
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         left, right = product(a[i], b[j]), product(a[j], b[i])
         sides.append(tuple(p - q for p, q in zip(left, right, strict=True)))
-    dot = tuple(sum(c) for c in zip(*(product(a[k], b[k]) for k in range(3)), strict=True))
+    dot: Quadratic = tuple(
+        sum(c) for c in zip(*(product(a[k], b[k]) for k in range(3)), strict=True)
+    )
     turning = [s for s in sides if any(s)]
     if not turning:  # on one line throughout
         if dot[0] <= 0:
