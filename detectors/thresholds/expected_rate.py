@@ -7,15 +7,16 @@ the same motion allows differ most in rare alarms, and a few of them give many: 
 the mean over the draws, not the rate of the likeliest tail. That a tail ends is believed only as
 far as the peaks show it beyond chance.
 
-No tail knows of moments that no episode shows. The upper end of an interval is therefore at least
-the exact Poisson bound of the episodes that exceed the threshold: 45 minutes without an alarm do
-not exclude two an hour with 80 % confidence, whatever the threshold.
+No tail knows of moments that no episode shows, nor where it ends. An interval therefore holds the
+exact Poisson interval of the episodes that exceed the threshold: 45 minutes without an alarm do not
+exclude two an hour with 80 % confidence, whatever the threshold, nor none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,10 +46,8 @@ class _Draw:
     tail: Tail
     hours: float
 
-    def rate(self, threshold: float) -> float:
-        """Alarms per hour: counted, or along the tail."""
-        if threshold > self.tail.base:
-            return self.tail.above(threshold) / self.hours
+    def counted(self, threshold: float) -> float:
+        """Alarms per hour of these episodes."""
         above = len(self.peaks) - np.searchsorted(self.peaks, threshold, side="right")
         return float(above / self.hours)
 
@@ -73,24 +72,39 @@ class ExpectedRate:
         highest = np.array([one.peak for one in scores])
         return cls(tuple(_draws(scores)), highest, sum(one.seconds for one in scores) / 3600)
 
+    def rates(self, threshold: float) -> Array:
+        """The rate of every draw, counted or along its tail [1/h], shape (D,)."""
+        found = self._tails.above(threshold)
+        for k in np.flatnonzero(threshold <= self._tails.base):
+            found[k] = self.draws[k].counted(threshold)
+        return found
+
+    @cached_property
+    def _tails(self) -> _Tails:
+        return _Tails.of(self.draws)
+
     def mean(self, threshold: float) -> float:
         """The expected rate [1/h]."""
-        return float(np.mean([draw.rate(threshold) for draw in self.draws]))
+        return float(np.mean(self.rates(threshold)))
 
     def quantile(self, threshold: float, share: float) -> float:
         """The rate that this share of the draws does not exceed [1/h]."""
-        return float(np.quantile([draw.rate(threshold) for draw in self.draws], share))
+        return float(np.quantile(self.rates(threshold), share))
 
     def interval(self, threshold: float, confidence: float = 0.95) -> tuple[float, float]:
         """The lowest and the highest rate that the motion allows [1/h]."""
         side = (1 - confidence) / 2
+        least, most = self.counted(threshold, side), self.counted(threshold, 1 - side)
         low, high = self.quantile(threshold, side), self.quantile(threshold, 1 - side)
-        return low, max(high, self.unseen(threshold, 1 - side))
+        return min(low, least), max(high, most)
 
-    def unseen(self, threshold: float, confidence: float) -> float:
-        """The Poisson bound of the rate of episodes with an alarm [1/h], whatever the tail."""
-        count = int(np.sum(self.highest > threshold))
-        return float(stats.chi2.ppf(confidence, 2 * count + 2) / 2 / self.hours)
+    def counted(self, threshold: float, confidence: float) -> float:
+        """The exact Poisson bound of the rate of episodes with an alarm [1/h], whatever the tail.
+
+        An upper one where ``confidence`` is above one half, else a lower one.
+        """
+        count = int(np.sum(self.highest > threshold)) + int(confidence > 0.5)
+        return float(stats.chi2.ppf(confidence, 2 * count) / 2 / self.hours) if count else 0.0
 
     def threshold(self, per_hour: float, confidence: float | None = None) -> float:
         """The threshold whose rate is expected to be ``per_hour``.
@@ -119,6 +133,30 @@ class ExpectedRate:
             step *= 2
         close = 1e-9 * step
         return float(optimize.bisect(above, low, low + step, xtol=close)) + close
+
+
+@dataclass(frozen=True)
+class _Tails:
+    """The tails of all draws, shape (D,) each."""
+
+    base: Array
+    scale: Array
+    shape: Array
+    per_hour: Array  #: peaks above the base
+
+    @classmethod
+    def of(cls, draws: Sequence[_Draw]) -> _Tails:
+        rows = [(d.tail.base, d.tail.scale, d.tail.shape, d.tail.count / d.hours) for d in draws]
+        return cls(*np.array(rows).T)
+
+    def above(self, threshold: float) -> Array:
+        """Rates above a threshold that is not below the bases [1/h], shape (D,)."""
+        far = np.maximum(threshold - self.base, 0.0) / np.where(self.scale > 0, self.scale, np.inf)
+        steep = np.where(np.abs(self.shape) < 1e-9, 1e-9, self.shape)
+        inside = steep * far > -1  # a negative shape ends at 1 + shape far = 0
+        grown = np.log1p(np.where(inside, steep * far, 0.0)) / steep
+        found: Array = np.where(inside, self.per_hour * np.exp(-grown), 0.0)
+        return found
 
 
 def _draws(scores: Sequence[FreeScores]) -> Iterator[_Draw]:

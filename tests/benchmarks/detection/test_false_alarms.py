@@ -8,6 +8,7 @@ import pytest
 from tauguard.benchmarks.detection import false_alarms
 from tauguard.benchmarks.detection.arm_scores import Arm, Blow, Extent
 from tauguard.benchmarks.detection.fleet import Training
+from tauguard.benchmarks.detection.known_tails import TAILS
 from tauguard.benchmarks.detection.threshold_laws import LAWS, judged, price_row, rate_row
 from tauguard.benchmarks.kept import read
 from tauguard.detectors import FreeScores
@@ -66,11 +67,21 @@ def test_a_law_is_judged_by_what_fresh_motion_gives_and_by_what_it_finds():
     assert rows["80 % bound"]["found_per_hour"]["value"] <= row["found_per_hour"]["value"]
 
 
+@pytest.mark.parametrize("name", TAILS)
+def test_known_rates_are_those_of_what_is_drawn(name):
+    tail, rng = TAILS[name], np.random.default_rng(0)
+    drawn = np.concatenate([tail.draw(rng) for _ in range(40)])
+    hours = drawn.size / 7200
+    for threshold in (1.0, 2.0, 4.0):
+        counted = np.sum(drawn > threshold) / hours
+        assert counted == pytest.approx(tail.rate(threshold), rel=0.25, abs=2.0)
+
+
 def test_arms_are_kept_and_not_made_again(tmp_path, monkeypatch):
     little = Training(slices=1, collisions=1, free=1, free_seconds=8.0)
     extent = Extent(("moving-thresholds",), little, 0.001, 0.001, 0)
     monkeypatch.setattr(false_alarms, "NAMES", extent.names)
-    size = replace(false_alarms.QUICK, arms=1, extent=extent)
+    size = replace(false_alarms.QUICK, arms=1, extent=extent, calibrations=2)
     monkeypatch.setattr(false_alarms, "QUICK", size)
     monkeypatch.setattr(false_alarms, "KNOWN", 1)
     (one,) = false_alarms.arms_of(size, 3, 1, str(tmp_path))
@@ -78,7 +89,7 @@ def test_arms_are_kept_and_not_made_again(tmp_path, monkeypatch):
     assert read(path).seed == one.seed
     monkeypatch.setattr(false_alarms, "arm_scores", None)
     rows = false_alarms.run(True, 3, str(tmp_path))
-    assert {row["study"] for row in rows} == {"arms"}
+    assert {row["study"] for row in rows} == {"arms", "known"}
     assert "likeliest tail" in table(rows, notes=false_alarms.NOTES)
     figure = pytest.importorskip("matplotlib.figure").Figure()
     false_alarms.draw(rows, figure)

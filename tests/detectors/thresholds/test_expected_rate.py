@@ -58,8 +58,8 @@ def test_no_threshold_promises_less_than_motion_without_an_alarm_can_show():
     assert rate.threshold(0.25) < 1.05  # the peaks show that the tail ends at 1
     # Nothing lies beyond, but the motion lasts 45 minutes only: exp(-0.75 r) is 0.025.
     assert rate.mean(2.0) == 0
-    assert rate.interval(2.0)[1] == pytest.approx(-np.log(0.025) / 0.75)
-    assert rate.unseen(2.0, 0.8) == pytest.approx(-np.log(0.2) / 0.75)
+    assert rate.interval(2.0) == (0.0, pytest.approx(-np.log(0.025) / 0.75))
+    assert rate.counted(2.0, 0.8) == pytest.approx(-np.log(0.2) / 0.75)
 
 
 def test_one_noisy_episode_widens_the_interval():
