@@ -99,8 +99,10 @@ def draw(target: Path, card: ThresholdCard) -> None:
     import matplotlib.pyplot as plt
     import numpy as np
 
+    lines = [line for part in _lines(card) for line in _wrapped(part)]
+    sizes = (4.6, 0.3 + 0.17 * len(lines))
     figure, (bars, words) = plt.subplots(
-        2, 1, figsize=(9, 8), height_ratios=(1, 0.9), layout="constrained"
+        2, 1, figsize=(9, sum(sizes)), height_ratios=sizes, layout="constrained"
     )
     levels = {
         "standing": card.standing,
@@ -118,7 +120,6 @@ def draw(target: Path, card: ThresholdCard) -> None:
     bars.legend(frameon=False)
     bars.set_title("Threshold card: what the free-motion detector finds", loc="left")
     words.axis("off")
-    lines = [line for part in _lines(card) for line in _wrapped(part)]
     words.text(0, 1, "\n".join(lines), va="top", fontsize=8.5, family="monospace")
     with whole_file(target) as stream:
         figure.savefig(stream, dpi=130, format=target.suffix[1:] or "png")
