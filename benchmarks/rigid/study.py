@@ -37,8 +37,9 @@ NOTES = {
     "the `known` overlaps by rational arithmetic; signs_differ: distances that say otherwise; "
     "error: of the known distances, as a share of the extent; coal_disagrees: its overlaps.",
     "rounded in motion": "both turn; us a pair. coal_us: advancement over coal's distance, its "
-    "calls alone. passed_before: pairs that coal says meet before the time given; gap_at_toi: "
-    "coal's distance at that time, most; coal_disagrees: hits that differ (it stops at 1e-6).",
+    "calls with the binding. passed_before: pairs that coal says meet before the time given; "
+    "gap_at_toi: coal's distance at that time, most; coal_disagrees: hits that differ (it stops "
+    "at 1e-6).",
     "mesh and convex": "one mesh (OBBRSS of coal) and convex bodies, us a body, coal's with the "
     "call; coal_differs_most: of distances of pairs apart; moving_: as in the table before.",
     "claims": "the worst figure of each kind beside what was asked of it; a quick run denies no "
