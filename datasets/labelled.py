@@ -7,7 +7,9 @@ from pathlib import Path
 from tqdm import tqdm
 
 from tauguard.datasets.arm_splits import training
+from tauguard.datasets.log_checks import checked
 from tauguard.datasets.reader import is_dataset
+from tauguard.strangers import reading
 from tauguard.traces import Trace, read_mcap
 
 
@@ -36,5 +38,7 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
         trace, _ = read_mcap(path)
         if trace.truth is None:
             raise ValueError(f"{path}: no truth in it; simulated recordings have one")
+        with reading(path):  # a gap is no watched time, here as in logs
+            checked(trace, lambda row: f"sample {row}")
         traces.append(trace)
     return traces

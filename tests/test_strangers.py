@@ -87,6 +87,23 @@ def test_csv_with_an_open_quote_or_a_huge_field(text, tmp_path):
         read_log(path)
 
 
+def test_bombs_of_nesting_in_robot_and_model_files(tmp_path):
+    import zipfile
+
+    from tauguard.detectors import load_model
+
+    robot, model = tmp_path / "arm.urdf", tmp_path / "model.skops"
+    for text in ("<link>" * 60_000, "<link>" * 20_000 + "</link>" * 20_000 + "</robot>"):
+        robot.write_text('<robot name="a">' + text)
+        with pytest.raises(ValueError, match=r"^[^\n]*(not well-formed|nested more than)[^\n]*$"):
+            compiled(str(robot))
+    for text in ("[" * 100_000, '{"a":' * 50_000 + "1" + "}" * 50_000):
+        with zipfile.ZipFile(model, "w") as archive:
+            archive.writestr("schema.json", text)
+        with pytest.raises(ValueError, match=r"^[^\n]*not a model file, or a damaged one[^\n]*$"):
+            load_model(model)
+
+
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 def test_mcap_bomb_is_refused_before_it_unpacks(compression, tmp_path):
     from mcap.writer import CompressionType, Writer

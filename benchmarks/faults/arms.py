@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -31,6 +32,14 @@ class Watched:
     logs: dict[str, Trace]
     contacts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     """Onset and end [s] of each contact of a log, where the truth is known."""
+
+    @cached_property
+    def alarms(self) -> dict[str, list[float]]:
+        """When alarms begin in each log, by its own clock [s]."""
+        return {
+            name: [float(alarm.start) for alarm in self.alarm.detect(trace).alarms]
+            for name, trace in self.logs.items()
+        }
 
     @classmethod
     def struck(cls, name: str, alarm: CollisionAlarm, episodes: Sequence[Episode]) -> Watched:

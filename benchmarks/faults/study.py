@@ -137,15 +137,14 @@ class Tally:
 
     def row(self, arm: str, name: str) -> Row:
         """For the table."""
-        delays = self.delays or [np.nan]
         return {
             "study": "faults",
             "arm": arm,
             "fault": name,
             "shows in": "samples" if name in PLAIN else "torques",
             "seen": rate(len(self.delays), self.moments),
-            "median_ms": float(np.median(delays)),
-            "longest_ms": float(np.max(delays)),
+            "median_ms": float(np.median(self.delays)) if self.delays else None,
+            "longest_ms": max(self.delays, default=None),
             "false_alarms": self.false,
             "found_after": f"{self.found} of {self.after}",
             "untold_s": self.untold,
@@ -181,9 +180,9 @@ def moments(watched: Watched, rng: np.random.Generator, count: int) -> list[tupl
         fits = (since > margin + 1.5) & (since < whole - margin - LASTS - AFTER)
         if (fits & moving(trace)).any():
             starts[name] = since[fits & moving(trace)]
-        for alarm in watched.alarm.detect(trace).alarms:
-            begin = alarm.start - trace.t[0] - 0.5 * LASTS
-            struck += [(name, float(begin))] if fits[np.searchsorted(since, begin)] else []
+        for alarm in watched.alarms[name]:
+            begin = alarm - float(trace.t[0]) - 0.5 * LASTS
+            struck += [(name, begin)] if fits[np.searchsorted(since, begin)] else []
     if not starts:
         return []
     names = [str(name) for name in rng.choice(list(starts), count)]
@@ -262,7 +261,7 @@ def others(known: Sequence[Watched]) -> list[Row]:
                     "model": model.name,
                     "samples": source.name,
                     "seen": rate(len(seen), len(first)),
-                    "median_s": float(np.median(seen)) if seen else np.nan,
+                    "median_s": float(np.median(seen)) if seen else None,
                 }
             )
     return rows
@@ -273,7 +272,7 @@ def draw(rows: list[Row], figure: Figure) -> None:
     own = [row for row in rows if row["study"] == "faults"]
     names, axes = list(FAULTS), figure.add_subplot()
     for k, arm in enumerate(dict.fromkeys(row["arm"] for row in own)):
-        part = [row for row in own if row["arm"] == arm]
+        part = [row for row in own if row["arm"] == arm and row["median_ms"] is not None]
         y = [names.index(row["fault"]) + 0.2 * k for row in part]
         axes.plot([max(row["median_ms"], 1) for row in part], y, "o", label=arm)
     axes.axvline(20, color="grey", linestyle=":", label="20 ms")

@@ -122,7 +122,8 @@ def as_obj(path: Path, found: Any, intact: Any) -> str:
     """The vertices and faces of the text."""
     rows = [line.split() for line in path.read_bytes().splitlines()]
     points = [[float(x) for x in row[1:4]] for row in rows if row[:1] == [b"v"]]
-    faces = [[int(x.split(b"/")[0]) - 1 for x in row[1:]] for row in rows if row[:1] == [b"f"]]
+    corners = [[int(x.split(b"/")[0]) - 1 for x in row[1:]] for row in rows if row[:1] == [b"f"]]
+    faces = [[f[0], f[k], f[k + 1]] for f in corners for k in range(1, len(f) - 1)]
     same = np.array_equal(found[0], np.array(points)) and np.array_equal(found[1], np.array(faces))
     return "" if same else "another mesh than the text's"
 
@@ -133,7 +134,8 @@ def as_ply(path: Path, found: Any, intact: Any) -> str:
     counts = [int(line.split()[2]) for line in head.splitlines() if line[:8] == b"element "]
     rows = [line.split() for line in io.BytesIO(body)]
     points = np.array([[float(x) for x in row] for row in rows[: counts[0]]])
-    faces = np.array([[int(x) for x in row[1:]] for row in rows[counts[0] : sum(counts)]])
+    corners = [[int(x) for x in row[1:]] for row in rows[counts[0] : sum(counts)]]
+    faces = np.array([[f[0], f[k], f[k + 1]] for f in corners for k in range(1, len(f) - 1)])
     same = np.array_equal(found[0], points) and np.array_equal(found[1], faces)
     return "" if same else "another mesh than the text's"
 

@@ -122,6 +122,14 @@ def test_a_file_is_answered_as_the_stream_is(alarm, struck):
     assert 0.5 <= found.fault_seconds <= 0.5 + alarm.settle + 0.1
 
 
+def test_a_long_file_takes_no_longer_a_sample(alarm, struck, monkeypatch):
+    # The interval is a median over the whole trace: asked at every sample it takes an hour a file.
+    asked, interval = [], Trace.dt.fget
+    monkeypatch.setattr(Trace, "dt", property(lambda trace: asked.append(0) or interval(trace)))
+    detect_with_faults(alarm, struck)
+    assert len(asked) < 20
+
+
 def test_its_size_does_not_grow_with_time(alarm, struck):
     heard = listen(Handed(struck), Monitor(alarm, alarm.inputs))
     assert heard.rows == []

@@ -105,5 +105,24 @@ def test_recordings_of_our_own_pass_the_same_checks(tmp_path):
     write_mcap(path, changed(q=57.3, qd=57.3))
     with pytest.raises(ValueError, match=r"gap\.mcap: sample \d+: the velocity of . is"):
         read_log(path)
+    absurd = trace.qd.copy()
+    absurd[300, 1] = 1e160
+    write_mcap(path, dataclasses.replace(trace, qd=absurd))
+    with pytest.raises(ValueError, match=r"sample 300: the velocity of b is 1e\+160"):
+        read_log(path)
     write_mcap(path, trace)
     assert read_log(path).notes == ()
+
+
+def test_a_gap_in_a_labelled_recording_is_no_watched_time(tmp_path):
+    from tauguard.datasets.labelled import labelled
+    from tauguard.datasets.plans import free_episodes
+    from tauguard.envs import simulate
+
+    trace = simulate(free_episodes(0, 1, 2.0, (30.0,), (0.0,), None)[0])
+    write_mcap(tmp_path / "whole.mcap", trace)
+    assert len(labelled(tmp_path)) == 1
+    late = trace.t + np.where(np.arange(len(trace.t)) >= 700, 3600.0, 0.0)
+    write_mcap(tmp_path / "gap.mcap", dataclasses.replace(trace, t=late))
+    with pytest.raises(ValueError, match=r"gap\.mcap: sample 700: nothing for 3\.6e\+03 s"):
+        labelled(tmp_path)

@@ -45,3 +45,15 @@ def test_a_fault_is_seen_and_leaves_nothing_untold(watched, name):
 def test_the_moments_follow_from_the_seed(watched):
     one, two = (moments(watched, np.random.default_rng(3), 3) for _ in range(2))
     assert [start for _, start in one] == [start for _, start in two]
+
+
+def test_a_fault_that_is_never_seen_can_be_written_and_drawn():
+    import json
+
+    from matplotlib.figure import Figure
+
+    from tauguard.benchmarks.faults.study import draw
+
+    row = Tally(moments=3).row("small", "bias")
+    assert "NaN" not in json.dumps(row, allow_nan=False)
+    draw([row], Figure())

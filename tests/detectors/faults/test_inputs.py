@@ -123,6 +123,17 @@ def test_a_bus_that_stands_still_with_the_arm_is_frozen(usual):
     assert found[1000 + usual.repeats + 1].startswith("frozen: no signal has changed")
 
 
+def test_an_encoder_that_freezes_at_rest_is_not_seen_until_its_joint_moves(usual):
+    trace = motion(42)
+    still = np.arange(len(trace.t)) < 1500
+    trace.q[still, 1], trace.qd[still, 1] = trace.q[1500, 1], 0.0
+    found = said(usual, trace, encoder)
+    assert set(found[:1500]) == {None}
+    first = next(k for k, fault in enumerate(found) if fault)
+    assert 1500 <= first < 1520
+    assert found[first].startswith("position: the position of elbow")
+
+
 def test_another_rate_is_named_within_20_samples(usual):
     found = said(usual, motion(42, rate=250.0))
     first = next(k for k, fault in enumerate(found) if fault)

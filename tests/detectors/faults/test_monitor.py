@@ -1,5 +1,7 @@
 """Free, collision or fault: what a trained detector says of streams with faults in them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -105,3 +107,36 @@ def test_a_clock_that_begins_anew_does_not_blind_it(alarm, struck, quiet):
     said = answers(alarm, Packets(packets.due, t, packets.q, packets.qd, packets.current))
     assert said[begin].state == FAULT
     assert said[-1].state != FAULT
+
+
+def test_up_to_20_ms_of_missing_packets_are_interpolated(alarm, struck, quiet):
+    start = quiet - struck.t[0]
+    for count in (1, 2):
+        packets = Fault("missing", start, (count - 0.5) * struck.dt).apply(Packets.of(struck))
+        said = answers(alarm, part(packets, start - 3.5, start + 0.5))
+        assert len(packets.t) == len(struck.t) - count
+        assert not any(a.reason for a in said)
+
+
+#: Not told from a contact: what it is answered with instead, at least once while it lasts.
+LIKE_A_CONTACT = ("bias", "swapped")
+
+
+@pytest.mark.parametrize("name", LIKE_A_CONTACT)
+def test_a_large_error_of_the_currents_is_not_silent(alarm, struck, quiet, name):
+    start = quiet - struck.t[0]
+    packets = Fault(name, start, 1.0).apply(Packets.of(struck))
+    said = answers(alarm, part(packets, start - 3.5, start + 1.0))
+    assert any(a.state == COLLISION or a.reason for a in said[-1000:])
+
+
+def test_a_bias_below_the_noise_of_the_residual_is_not_seen(alarm, struck, quiet):
+    # Nothing differs but by less than what collision-free motion shows.
+    start = quiet - struck.t[0]
+    packets = Packets.of(struck)
+    current = packets.current.copy()
+    smallest = 0.2 * np.asarray(alarm.detector.arm.noise) / np.abs(alarm.detector.arm.drive_gain)
+    current[packets.due >= start] += smallest
+    shifted = replace(packets, current=current)
+    said = answers(alarm, part(shifted, start - 3.5, start + 1.0))
+    assert not any(a.alarm or a.reason for a in said)
