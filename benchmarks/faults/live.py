@@ -23,7 +23,9 @@ from tauguard.report import Row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from tauguard.datasets.live import Sample
     from tauguard.detectors import CollisionAlarm
+    from tauguard.detectors.faults.monitor import Answer
     from tauguard.traces import Trace
 
 Array = NDArray[np.float64]
@@ -121,14 +123,19 @@ def heard(folder: Path, rate: float) -> Row:
     server.start()
     with UrSource("127.0.0.1", mine.recv(), rate, reconnect=0) as source:
         busy = time.process_time()
-        found = listen(source, Monitor(alarm, alarm.inputs), keep=True)
+        answers: list[tuple[float, bool]] = []
+
+        def report(sample: Sample, answer: Answer) -> None:
+            answers.append((sample.t, answer.alarm))
+
+        found = listen(source, Monitor(alarm, alarm.inputs), report=report)
         busy = time.process_time() - busy
         lost = len(source.events)
     sent = mine.recv()
     server.join()
-    kept = found.trace()
-    rows = np.searchsorted(kept.t, trace.t - 0.5 / rate)
-    up = np.append(found.alarms, False)[rows]
+    times, flags = np.array(answers).T
+    rows = np.searchsorted(times, trace.t - 0.5 / rate)
+    up = np.append(flags > 0, False)[rows]
     begins = np.flatnonzero(np.diff(truth.astype(int), prepend=0) > 0)
     same = [up[k] and not (k and up[k - 1]) for k in begins]
     return {
