@@ -205,15 +205,15 @@ def timed(call: Callable[[int], object], count: int) -> Row:
 
 def allocated(call: Callable[[int], object], numbers: range) -> Row:
     """Bytes that Python and NumPy take during a call at the median, and keep of it."""
-    peaks = []
+    peaks = np.empty(len(numbers))
     tracemalloc.start()
     try:
         begin, _ = tracemalloc.get_traced_memory()
-        for k in numbers:
+        for row, k in enumerate(numbers):
             before, _ = tracemalloc.get_traced_memory()
             tracemalloc.reset_peak()
             call(k)
-            peaks.append(tracemalloc.get_traced_memory()[1] - before)
+            peaks[row] = tracemalloc.get_traced_memory()[1] - before
         end, _ = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

@@ -109,7 +109,7 @@ class Monitor:
         if self._last is None:
             self._ready, self._bad = t + self._settle, 0
             return 0
-        missing = max(self._bad, round((t - self._time) / self._dt) - 1)
+        missing = max(0, round((t - self._time) / self._dt) - 1)  # a packet sent twice misses none
         if t < self._time or missing > max(BRIDGED, SPAN / self._dt):
             self._stream = self._alarm.stream()
             self._torques = TorqueCheck(self._alarm.detector.arm, self._dt, self._usual.ratios)
