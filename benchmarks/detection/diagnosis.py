@@ -23,11 +23,12 @@ from tauguard.benchmarks.detection.diagnosis_pool import (
     push_events,
     struck_events,
 )
-from tauguard.benchmarks.detection.fleet import CALIBRATE, TEST, Training, nominal, stream
+from tauguard.benchmarks.detection.fleet import CALIBRATE, TEST, Training, stream
 from tauguard.benchmarks.detection.pool import SPEEDS, free_pool
 from tauguard.benchmarks.detection.severity_rows import NOTE, severity_rows
 from tauguard.benchmarks.harness import measure
 from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
+from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.diagnosis.aftermath import Aftermath, AftermathOf
 from tauguard.detectors.diagnosis.classification import KINDS
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
@@ -144,7 +145,7 @@ def run(quick: bool, seed: int) -> list[Row]:
 
 def watcher(seed: int, arm: int, size: Size) -> CollisionAlarm:
     """The detector of one arm, trained and thresholded on motion of its own."""
-    detector = make_detector(DETECTOR).fit(size.training.traces(seed, arm), nominal())
+    detector = make_detector(DETECTOR).fit(size.training.traces(seed, arm), nominal_design())
     hours = size.calibration_hours / len(size.speeds)
     pools = (free_pool(stream(seed, CALIBRATE, 5), s, (arm,), hours) for s in size.speeds)
     return with_rate(detector, [simulate(e) for pool in pools for _, e in pool], PER_HOUR)

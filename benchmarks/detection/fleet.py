@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from tauguard.benchmarks.detection.pool import Conditions, free_pool
 from tauguard.benchmarks.detection.thresholds import free_scores, joined
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
-from tauguard.detectors import ArmModel, FittedDetector, FreeScores, FrictionModel, RobotNumbers
+from tauguard.detectors import FittedDetector, FreeScores
+from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.registry import make_detector
 from tauguard.envs import simulate
-from tauguard.models import SceneSpec, compose, cura6_drive, pin_model
 from tauguard.traces import Trace
 
 #: Percent of the maximum speed in the training slices.
@@ -52,19 +52,6 @@ class Training:
         return [simulate(under.applied(episode)) for episode in [*struck, *free]]
 
 
-def nominal() -> ArmModel:
-    """What is believed of every arm before training: nominal numbers, friction of weight 0.
-
-    The gear's ripple frequencies are known from its data sheet, their heights and phases are not.
-    """
-    scene, drive = compose(SceneSpec()), cura6_drive()
-    cycles = drive.ripple.cycles if drive.ripple is not None else np.empty(0)
-    columns = FrictionModel(cycles=np.outer(drive.gear, cycles))
-    robot = RobotNumbers.from_pin(pin_model(scene.arm_xml))
-    friction = replace(columns, weights=np.zeros((robot.joints, columns.columns)))
-    return ArmModel(robot, drive.gain, friction)
-
-
 def training_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
     """Detectors that are trained together; neighbours of the registry share their front end."""
     half = -(-len(names) // 2)
@@ -75,7 +62,7 @@ def train(
     seed: int, arm: int, names: Sequence[str], training: Training
 ) -> dict[str, FittedDetector]:
     """The detectors of one arm, trained on its slices."""
-    traces, robot = training.traces(seed, arm), nominal()
+    traces, robot = training.traces(seed, arm), nominal_design()
     return {name: make_detector(name).fit(traces, robot) for name in names}
 
 

@@ -249,13 +249,13 @@ def _one_window(model: KernelMachine, slices: list[Array]) -> Callable[[int], ob
 
 def run(quick: bool, seed: int) -> list[Row]:
     """Rows ``real time`` (scene to alarm), ``step`` (every method), ``kernel`` (fewer vectors)."""
-    from tauguard.benchmarks.detection.fleet import nominal
     from tauguard.detectors import DETECTORS, SrqSvr, held_out, make_detector, train
+    from tauguard.detectors.calibration.nominal import nominal_design
     from tauguard.detectors.methods.svr_regressor import SrqSVR
 
     extent = Extent(5, 5, 15_000, 1000, 20.0, 3) if quick else Extent(15, 20, 27_000, 5000, 60.0, 9)
     traces, trace = motions(extent, seed)
-    arm = nominal()
+    arm = nominal_design()
     rows: list[Row] = []
     for name in DETECTORS:
         alarm = train(make_detector(name), traces, arm, PER_HOUR)

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tauguard.benchmarks.detection.arm_scores import Arm, Extent, scored
-from tauguard.benchmarks.detection.fleet import TEST, Training, nominal, stream
+from tauguard.benchmarks.detection.fleet import TEST, Training, stream
 from tauguard.benchmarks.detection.pool import free_pool
 from tauguard.benchmarks.detection.threshold_laws import judged, price_row, rate_row
 from tauguard.benchmarks.kept import Kept
 from tauguard.benchmarks.workers import Workers
 from tauguard.detectors import ArmModel, FittedDetector, SrqSvr
+from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
@@ -134,7 +135,7 @@ def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
 def of_arm(job: tuple[Extent, int, int]) -> tuple[Arm, dict[str, float]]:
     """Scores of every form on one arm, and microseconds of a sample."""
     extent, seed, arm = job
-    traces, robot = extent.training.traces(seed, arm), nominal()
+    traces, robot = extent.training.traces(seed, arm), nominal_design()
     fitted: dict[str, FittedDetector] = {n: d.fit(traces, robot) for n, d in forms().items()}
     (_, episode), *_ = free_pool(stream(seed, TEST, 11), 30.0, (arm,), 1e-4, seconds=5.0)
     times = microseconds(fitted, simulate(episode))

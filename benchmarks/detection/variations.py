@@ -15,7 +15,6 @@ from tauguard.benchmarks.detection.fleet import (
     TEST,
     TRAINING_SPEEDS,
     Training,
-    nominal,
     stream,
 )
 from tauguard.benchmarks.detection.judge import Tally, judge_free, judge_struck, merged
@@ -30,6 +29,7 @@ from tauguard.benchmarks.detection.thresholds import (
     operated,
 )
 from tauguard.detectors import FittedDetector, PlainSrqSvr, SrqSvr
+from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.registry import make_detector
 from tauguard.envs import PayloadPick, simulate
 from tauguard.report import Row
@@ -148,7 +148,8 @@ def training_size(bench: Bench, names: Sequence[str]) -> list[Row]:
     for count in TRAINING_COLLISIONS:
         traces = bench.training(Training(collisions=count))
         for name in names:
-            own: dict[str, FittedDetector] = {name: make_detector(name).fit(traces, nominal())}
+            fitted = make_detector(name).fit(traces, nominal_design())
+            own: dict[str, FittedDetector] = {name: fitted}
             fleet = own_thresholds(own, calibration, bench.extent.target)
             tally = judged(fleet, both)[name]
             rows.append(_row("training_size", {"collisions": 15 * count}, name, tally))
@@ -166,7 +167,7 @@ def sigmas(bench: Bench) -> list[Row]:
         ("srq-svr-plain, residuals in N m", PlainSrqSvr(distance=0.0)),
     ]
     for name, settings in cases:
-        own: dict[str, FittedDetector] = {name: settings.fit(traces, nominal())}
+        own: dict[str, FittedDetector] = {name: settings.fit(traces, nominal_design())}
         fleet = own_thresholds(own, calibration, bench.extent.target)
         tally = judged(fleet, both)[name]
         rows.append(_row("sigma", {"sigma": settings.sigma}, name, tally))
@@ -179,7 +180,7 @@ def sample_rate(bench: Bench) -> list[Row]:
     traces = bench.training(Training())
     rows = []
     for stride in (1, CURA6_STRIDE):
-        detector = SrqSvr().fit([every(t, stride) for t in traces], nominal())
+        detector = SrqSvr().fit([every(t, stride) for t in traces], nominal_design())
         own: dict[str, FittedDetector] = {"srq-svr": detector}
         fleet = own_thresholds(own, [every(t, stride) for t in calibration], bench.extent.target)
         struck = [replace(s, trace=every(s.trace, stride)) for s in both[0]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -13,37 +13,24 @@ from gymnasium.vector import SyncVectorEnv
 from mujoco import rollout
 from mujoco.batch import Batch
 
-from tauguard.benchmarks.detection.fleet import nominal
 from tauguard.benchmarks.harness import measure
+from tauguard.benchmarks.simulation.reactions import reactions, trained_detector
 from tauguard.contacts import registered
-from tauguard.datasets import demo_plan, simulate_all
-from tauguard.detectors import CollisionAlarm, make_detector, train
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.cell import DIVERGED
-from tauguard.envs.react import ReactEnv
-from tauguard.envs.reactions import REACTIONS, Reaction
+from tauguard.envs.reactions import REACTIONS
 from tauguard.models import body_region
-from tauguard.report import Row, rate
+from tauguard.report import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: False alarms accepted per hour of the trained detector, as in the demo.
-PER_HOUR = 10.0
-
-REACH, REACT = "tauguard:tauguard/Reach-v0", "tauguard:tauguard/React-v0"
-#: Copies in the vector study, and speeds of the reactions' swings [m/s].
-COPIES, SPEEDS = 16, (0.25, 0.5, 1.0)
+REACH = "tauguard:tauguard/Reach-v0"
+#: Copies in the vector study.
+COPIES = 16
 #: The peers of one environment: MuJoCo's own loop with the forces given, and with the drives.
 ROLLOUT, PHYSICS = "mujoco.rollout, forces given", "physics and drives, no environment"
 WHOLE, THREADED = "the environment", "make_vec, 2 threads"
-#: What a swing comes to.
-OUTCOMES = (
-    "peak_force_N", "energy_J", "delay_s", "stopping_time_s", "stopping_distance_m", "end_m",
-    "force_over_limit",
-)  # fmt: skip
-#: The tool counts as stopped this near to the farthest place that it comes to [m].
-NEAR = 5e-4
 
 #: What the columns of each table mean.
 NOTES = {
@@ -74,12 +61,6 @@ def run(quick: bool, seed: int) -> list[Row]:
         known["trained detector"] = trained_detector(seed)
     rows += reactions(2 if quick else 10, seed, known)
     return rows + answers(rows)
-
-
-def trained_detector(seed: int) -> CollisionAlarm:
-    """The demo's: trained on its arm and motions, none of which is a swing of this study."""
-    episodes = list(simulate_all(demo_plan(seed).train, None, "simulate training"))
-    return train(make_detector("srq-svr"), episodes, nominal(), PER_HOUR)
 
 
 def answers(rows: list[Row]) -> list[Row]:
@@ -281,100 +262,6 @@ def batched(seed: int, count: int, threads: int) -> Callable[[], object]:
             batch.step(nstep=substeps)
 
     return call
-
-
-# -- reactions -------------------------------------------------------------------------------------
-
-
-def reactions(count: int, seed: int, known: Mapping[str, Any]) -> list[Row]:
-    """Each reaction at three speeds, the collision known from the contact itself or a detector.
-
-    ``known`` names the detectors; ``None`` stands for the contact. A swing with an alarm before the
-    touch counts as a false alarm and nowhere else.
-    """
-    rows: list[Row] = []
-    for speed in SPEEDS:
-        for source, detector in known.items():
-            for reaction in REACTIONS:
-                runs = [swing(speed, detector, reaction, seed, seed + k) for k in range(count)]
-                heard = [run for run in runs if not run["delay_s"] < 0]
-                rows.append(
-                    {
-                        "study": "reaction",
-                        "speed_m_s": speed,
-                        "known_from": source,
-                        "reaction": reaction,
-                        "false_alarms": rate(count - len(heard), count),
-                        **{key: spread([run[key] for run in heard]) for key in runs[0]},
-                    }
-                )
-    return rows
-
-
-def spread(values: list[float]) -> dict[str, float | None]:
-    """Median, smallest and largest of those that are finite."""
-    known = [v for v in values if np.isfinite(v)]
-    if not known:
-        return {"median": None, "low": None, "high": None}
-    return {"median": float(np.median(known)), "low": min(known), "high": max(known)}
-
-
-def swing(speed: float, detector: Any, reaction: str, arm: int, seed: int) -> dict[str, float]:
-    """One swing into the chest: peak force, energy, and how long and far the tool went on.
-
-    ``arm`` is the seed of how the arm differs from its nominal model, the same as in the training
-    of a detector; ``seed`` that of the swing.
-    """
-    made = gymnasium.make(
-        REACT,
-        speed=speed,
-        detector=detector,
-        mismatch=arm,
-        approach=False,
-        max_episode_steps=10**6,
-    )
-    env = Reaction(made, reaction, "contact" if detector is None else "alarm")
-    env.reset(seed=seed)
-    inner = env.unwrapped
-    assert isinstance(inner, ReactEnv)
-    way = np.diff(inner.task.swing[0], axis=0) * 100 / inner.world.max_speed  # type: ignore[attr-defined]
-    n = len(inner.world.scene.joint_names)
-    tools, times, force, onset, begun = [], [], 0.0, -1.0, -1.0
-    for step in range(len(way) + 150):
-        action = way[step] if step < len(way) else np.zeros(n)
-        observation, _, _, _, info = env.step(action)
-        tools.append(observation[3 * n : 3 * n + 3].copy())
-        times.append(info["time"])
-        force, onset = max(force, info["force"]), info["onset_time"] if onset < 0 else onset
-        if begun < 0 and info["reacting"]:
-            begun = info["time"]
-    return judged(np.array(tools), np.array(times), force, onset, begun)
-
-
-def judged(
-    tools: np.ndarray, times: np.ndarray, force: float, onset: float, begun: float
-) -> dict[str, float]:
-    """The figures of one swing, which goes along y.
-
-    The tool has stopped where it is farthest forward from where it was at the touch, to within
-    :data:`NEAR`; ``end_m`` is where it is in the end.
-    """
-    if 0 <= begun < (onset if onset >= 0 else np.inf):
-        return dict.fromkeys(OUTCOMES, np.nan) | {"delay_s": -np.inf}
-    touch = int(np.searchsorted(times, onset))
-    gone = tools[touch:, 1] - tools[touch, 1]
-    stop = touch + int(np.flatnonzero(gone >= gone.max() - NEAR)[0])
-    region = body_region("chest")
-    found = (
-        force,
-        force**2 / (2 * region.stiffness),
-        begun - onset if begun >= 0 else np.nan,
-        float(times[stop] - onset),
-        float(gone.max()),
-        float(gone[-1]),
-        force / region.transient_force,
-    )
-    return dict(zip(OUTCOMES, found, strict=True))
 
 
 # -- the figure ------------------------------------------------------------------------------------

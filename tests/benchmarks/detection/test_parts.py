@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tauguard.benchmarks.detection import parts
-from tauguard.benchmarks.detection.fleet import Training, nominal
+from tauguard.benchmarks.detection.fleet import Training
 from tauguard.detectors import SrqSvr
+from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.report import table
 
 
@@ -17,7 +18,7 @@ def slices():
 
 
 def test_estimators_lack_what_is_left_out(slices):
-    found = {n: f.front.fit(slices, nominal()) for n, f in parts.forms().items()}
+    found = {n: f.front.fit(slices, nominal_design()) for n, f in parts.forms().items()}
     plain = found[parts.WHOLE]
     trace = slices[-1]
     whole = plain.estimate(trace).unexplained

@@ -6,6 +6,7 @@ import pytest
 
 from tauguard.benchmarks import STUDIES
 from tauguard.benchmarks.simulation import environments
+from tauguard.benchmarks.simulation.reactions import SPEEDS, reactions
 from tauguard.report import table
 
 KNOWN = {"contact": None, "observer": "observer"}
@@ -26,7 +27,7 @@ def test_the_bare_loop_makes_the_same_motion():
 @pytest.fixture(scope="module")
 def rows():
     found = environments.steps(5, 1, 0) + environments.vectors(3, 1, 0)
-    return found + environments.reactions(1, 0, KNOWN)
+    return found + reactions(1, 0, KNOWN)
 
 
 def test_a_row_a_checker_and_a_reaction(rows):
@@ -35,13 +36,13 @@ def test_a_row_a_checker_and_a_reaction(rows):
 
     whats = [row["what"] for row in rows if row["study"] == "step"]
     assert all(f"checker {name}" in whats for name in registered())
-    reactions = [row for row in rows if row["study"] == "reaction"]
-    assert len(reactions) == len(REACTIONS) * len(environments.SPEEDS) * 2
+    swings = [row for row in rows if row["study"] == "reaction"]
+    assert len(swings) == len(REACTIONS) * len(SPEEDS) * 2
     assert all(row["same_bits_as_sync"] in (True, None) for row in rows if row["study"] == "vector")
 
 
 def test_stopping_beats_going_on(rows):
-    for speed in environments.SPEEDS:
+    for speed in SPEEDS:
         for known in KNOWN:
             peak = {
                 row["reaction"]: row["peak_force_N"]["median"]
