@@ -131,7 +131,7 @@ class Simulation:
             without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.
         """
         self._checkers = [_known(c) for c in checkers]
-        self.episode = episode
+        self.episode, self._without = episode, tuple(without)
         self.scene = scene_for(episode, visuals=bool(checkers))
         self.scene = replace(self.scene, drive=self.scene.drive.without(*without))
         self.nominal = (nominal or self.scene.facts.nominal).without(*without)
@@ -254,6 +254,7 @@ class Simulation:
                 "tauguard": importlib.metadata.version("tauguard"),
                 "mujoco": mujoco.__version__,
                 **({} if episode.arm == "cura6" else {"arm": episode.arm}),
+                **({"without": ",".join(self._without)} if self._without else {}),
             },
             attachments={
                 "scene.xml": scene.xml,
@@ -326,7 +327,7 @@ def simulate(
     checkers: Sequence[str | Checker] = (),
     without: Sequence[str] = (),
 ) -> Trace:
-    """Simulate ``episode``: the same episode gives the same bytes.
+    """Simulate ``episode``: the same arguments give the same bytes.
 
     Args:
         episode: what to simulate.

@@ -203,5 +203,7 @@ def test_drives_without_losses_part_by_part_are_ideal_drives():
     one, other = simulate(episode, without=parts), simulate(replace(episode, ideal_drive=True))
     for name in ("q", "qd", "current"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    assert one.meta["without"] == "friction,ripple,lag,sensors"
+    assert "without" not in other.meta
     quiet = simulate(episode, without=("sensors",))
     assert 0 < np.abs(quiet.q - simulate(episode).q).max() <= 1e-6  # half a quantum
