@@ -18,7 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from tauguard.datasets.code_identity import sources, tree_digest
 from tauguard.detectors.registry import file_type
+from tauguard.report import versions
 from tauguard.whole_file import whole_file
 
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
@@ -32,15 +34,18 @@ class Kept:
 
     @classmethod
     def of(cls, keep: str | None, study: str, seed: int, size: object) -> Kept:
-        """Results of other seeds and sizes lie in folders of their own; of other builds they do
-        not.
+        """Results of other seeds, sizes and builds lie in folders of their own.
+
+        A build is the versions of the libraries and the sources of simulation and detectors. A
+        change of native code or of the study itself is not seen: take another folder then.
 
         Raises:
             ValueError: the folder cannot be made.
         """
         if keep is None:
             return cls(None)
-        digest = hashlib.sha256(repr(size).encode()).hexdigest()[:8]
+        build = (versions(), sources(), tree_digest("detectors"))
+        digest = hashlib.sha256(repr((size, build)).encode()).hexdigest()[:8]
         folder = Path(keep) / f"{study}-seed{seed}-{digest}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -126,7 +131,7 @@ def _apart(value: Any, arrays: list[np.ndarray]) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
         arrays.append(value)
         return {"array": len(arrays) - 1}
-    if isinstance(value, list | tuple):
+    if type(value) in (list, tuple):
         return {type(value).__name__: [_apart(item, arrays) for item in value]}
     if isinstance(value, dict):
         return {"dict": [[_apart(k, arrays), _apart(v, arrays)] for k, v in value.items()]}

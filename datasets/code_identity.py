@@ -45,6 +45,14 @@ def sources() -> str:
 
 
 @functools.cache
+def tree_digest(room: str) -> str:
+    """SHA-256 over the Python and XML sources of one folder of the package."""
+    digest = hashlib.sha256()
+    _add_tree(digest, files(f"tauguard.{room}"), room)
+    return digest.hexdigest()
+
+
+@functools.cache
 def computed_bits() -> str:
     """SHA-256 of a short episode as this machine computes it: other processors may round apart."""
     from tauguard.detectors import RobotNumbers, observe

@@ -69,7 +69,7 @@ def scored(extent: Extent, seed: int, arm: int, detectors: dict[str, FittedDetec
         arm,
         _free(detectors, stream(seed, CALIBRATE, 9), arm, extent.calibration_hours, known),
         _free(detectors, stream(seed, TEST, 9), arm, extent.hours, None),
-        _struck(detectors, stream(seed, TEST, 10), arm, extent.per_stratum),
+        _struck(detectors, stream(seed, TEST, 10, arm), arm, extent.per_stratum),
     )
 
 
@@ -91,8 +91,8 @@ def _struck(
     detectors: dict[str, FittedDetector], seed: int, arm: int, per_stratum: int
 ) -> dict[str, list[Blow]]:
     found: dict[str, list[Blow]] = {name: [] for name in detectors}
-    for speed in SPEEDS if per_stratum else ():
-        for struck in struck_pool(seed, speed, (arm,), per_stratum):
+    for k, speed in enumerate(SPEEDS if per_stratum else ()):
+        for struck in struck_pool(seed, speed, (arm,), per_stratum, first=k):
             for name, detector in detectors.items():
                 found[name] += _blows(detector, struck)
     return found

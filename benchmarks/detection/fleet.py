@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from tauguard.benchmarks.detection.pool import Conditions, free_pool
 from tauguard.benchmarks.detection.thresholds import free_scores, joined
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
-from tauguard.detectors import FittedDetector, FreeScores
+from tauguard.detectors import Detector, FittedDetector, FreeScores
 from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.registry import make_detector
 from tauguard.envs import simulate
@@ -62,8 +62,15 @@ def train(
     seed: int, arm: int, names: Sequence[str], training: Training
 ) -> dict[str, FittedDetector]:
     """The detectors of one arm, trained on its slices."""
+    return fitted(seed, arm, {name: make_detector(name) for name in names}, training)
+
+
+def fitted(
+    seed: int, arm: int, detectors: Mapping[str, Detector], training: Training
+) -> dict[str, FittedDetector]:
+    """The same for detectors that need not be in the registry."""
     traces, robot = training.traces(seed, arm), nominal_design()
-    return {name: make_detector(name).fit(traces, robot) for name in names}
+    return {name: detector.fit(traces, robot) for name, detector in detectors.items()}
 
 
 def calibration_scores(

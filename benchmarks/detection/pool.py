@@ -86,6 +86,7 @@ def struck_pool(
     strata: Sequence[Stratum] = STRATA,
     forces: tuple[float, float] = FORCES,
     conditions: Conditions | None = None,
+    first: int = 0,
 ) -> Iterator[Struck]:
     """Episodes until every stratum holds ``per_stratum`` collisions, or the rounds are used up.
 
@@ -97,16 +98,17 @@ def struck_pool(
         strata: [low, high) of the achieved peak |tau_ext| over joints 1-4 [N m].
         forces: lowest and highest peak contact force [N].
         conditions: payloads, temperature, mismatch.
+        first: number of the first episode, which arms and payloads are gone through by.
     """
     under = conditions or Conditions()
     missing = Counter(wishes(per_stratum, strata))
-    number = 0
+    number = first
     for round_ in range(ROUNDS):
         rng = np.random.default_rng([seed, round(100 * speed), 3, round_])
         wanted = [wish for wish in sorted(missing.elements())]
         wanted = [wanted[i] for i in rng.permutation(len(wanted))]
-        for first in range(0, len(wanted), GROUP):
-            group = wanted[first : first + GROUP]
+        for begin in range(0, len(wanted), GROUP):
+            group = wanted[begin : begin + GROUP]
             arm = arms[number % len(arms)]
             payload = under.payloads[(number // len(arms)) % len(under.payloads)]
             number += 1

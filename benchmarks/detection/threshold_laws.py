@@ -14,7 +14,7 @@ from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
 from tauguard.detectors.thresholds.rates import tail_level
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels
-from tauguard.report import Row
+from tauguard.report import Row, two_digits
 from tauguard.report import rate as wilson
 
 #: The score at every speed.
@@ -96,7 +96,7 @@ def rate_row(case: Judged, group: str, arms: Sequence[OfArm]) -> Row:
         "asked": case.asked,
         "arms": group,
         "found_per_hour": poisson_rate(sum(a.alarms for a in arms), sum(a.hours for a in arms)),
-        "stated": f"{low:.2g} to {high:.2g}",
+        "stated": f"{two_digits(low)} to {two_digits(high)}",
         "kept": f"{sum(a.found[0] <= case.asked for a in arms)} of {len(arms)}",
         "inside": f"{sum(_meet(a.found, a.stated) for a in arms)} of {len(arms)}",
         "by_arm": " ".join(str(a.alarms) for a in arms),

@@ -22,6 +22,7 @@ from tauguard.detectors.diagnosis.force_draws import SEED, force_draws
 from tauguard.detectors.diagnosis.isolation import Trust
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
+from tauguard.report import two_digits
 
 Array = NDArray[np.float64]
 
@@ -61,13 +62,8 @@ class Between:
 
     def text(self, unit: str) -> str:
         """``120 N [90, 180]``; without the median where that says nothing."""
-        ends = f"[{_digits(self.low)}, {_digits(self.high)}]"
-        return f"{_digits(self.value)} {unit} {ends}" if self.identifiable else f"{ends} {unit}"
-
-
-def _digits(value: float) -> str:
-    """Two significant digits, without an exponent."""
-    return f"{float(f'{value:.2g}'):g}"
+        ends = f"[{two_digits(self.low)}, {two_digits(self.high)}]"
+        return f"{two_digits(self.value)} {unit} {ends}" if self.identifiable else f"{ends} {unit}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +86,7 @@ class ContactTorque:
     def text(self, names: Sequence[str]) -> str:
         """The joint that felt it most, in a few words."""
         joint = int(np.abs(self.peak).argmax())
-        return f"{_digits(abs(float(self.peak[joint])))} N m at {names[joint]}"
+        return f"{two_digits(abs(float(self.peak[joint])))} N m at {names[joint]}"
 
     @classmethod
     def of(cls, after: Aftermath) -> ContactTorque:
@@ -153,7 +149,7 @@ def severity(
     noise = trust.noise(felt.mean, after.envelope[felt.row])
     place = belief.probability ** (1 / moments)
     force = force_draws(robot, surface, after.q[felt.row], felt.mean, noise, place)
-    rng, spread = np.random.default_rng(SEED), SPREAD * (1 + felt.hidden)
+    rng, spread = np.random.default_rng((SEED, 1)), SPREAD * (1 + felt.hidden)
     size = np.linalg.norm(force, axis=1) * np.exp(spread * rng.standard_normal(len(force)))
     sharper = 1 / (1 - felt.hidden * rng.random(len(force)))
     peak = size * felt.shape * sharper

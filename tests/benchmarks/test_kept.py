@@ -1,8 +1,11 @@
 """Results of jobs that are kept: the same values come back, and nothing is done twice."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
+from tauguard.benchmarks import kept
 from tauguard.benchmarks.detection.judge import Outcome, Tally
 from tauguard.benchmarks.kept import Kept, read, write
 from tauguard.benchmarks.workers import Workers
@@ -13,6 +16,11 @@ from tauguard.traces import Collision
 def in_place(call, jobs):
     """A map that goes on after a job that raised, as that of a pool does."""
     return Each(call, iter(jobs))
+
+
+class Pair(NamedTuple):
+    low: int
+    high: int
 
 
 class Each:
@@ -42,6 +50,8 @@ def test_what_is_written_is_read(tmp_path):
     with pytest.raises(ValueError, match="a set cannot be kept"):
         write(tmp_path / "b.npz", {1, 2})
     assert not (tmp_path / "b.npz").exists()
+    with pytest.raises(ValueError, match="a Pair cannot be kept"):  # it would come back as a tuple
+        write(tmp_path / "b.npz", Pair(1, 2))
 
 
 def test_no_job_is_done_twice_and_one_that_fails_leaves_the_others(tmp_path):
@@ -53,13 +63,13 @@ def test_no_job_is_done_twice_and_one_that_fails_leaves_the_others(tmp_path):
             raise ZeroDivisionError("two")
         return 10 * job
 
-    kept = Kept.of(str(tmp_path), "study", 0, "size")
-    results = kept.over(in_place, "part")(call, [1, 2, 3])
+    first = Kept.of(str(tmp_path), "study", 0, "size")
+    results = first.over(in_place, "part")(call, [1, 2, 3])
     assert next(results) == 10
     with pytest.raises(ZeroDivisionError):
         next(results)
     assert next(results) == 30
-    assert list(kept.over(in_place, "part")(call, [1, 2, 3])) == [10, 20, 30]
+    assert list(first.over(in_place, "part")(call, [1, 2, 3])) == [10, 20, 30]
     assert done == [1, 2, 3, 2]
     other = Kept.of(str(tmp_path), "study", 0, "another size")
     assert list(other.over(in_place, "part")(call, [3])) == [30]
@@ -67,17 +77,26 @@ def test_no_job_is_done_twice_and_one_that_fails_leaves_the_others(tmp_path):
 
 
 def test_workers_write_and_a_damaged_file_is_named(tmp_path):
-    kept = Kept.of(str(tmp_path), "study", 7, "size")
+    own = Kept.of(str(tmp_path), "study", 7, "size")
     with Workers(2) as each:
-        assert list(kept.over(each, "part")(abs, [-1, -2])) == [1, 2]
-    files = sorted(kept.folder.glob("*.npz"))
+        assert list(own.over(each, "part")(abs, [-1, -2])) == [1, 2]
+    files = sorted(own.folder.glob("*.npz"))
     assert [read(path) for path in files] == [1, 2]
     files[0].write_bytes(files[0].read_bytes()[:-40])
     with pytest.raises(ValueError, match=r"part-000\.npz: damaged, or of another build: delete"):
-        list(kept.over(map, "part")(abs, [-1, -2]))
+        list(own.over(map, "part")(abs, [-1, -2]))
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ValueError, match="cannot be written"):
         Kept.of(str(tmp_path / "file"), "study", 0, "size")
+
+
+def test_results_of_other_builds_and_versions_are_not_used(tmp_path, monkeypatch):
+    folders = [Kept.of(str(tmp_path), "study", 0, "size").folder]
+    monkeypatch.setattr(kept, "versions", lambda: {"tauguard": "0.0"})
+    folders.append(Kept.of(str(tmp_path), "study", 0, "size").folder)
+    monkeypatch.setattr(kept, "tree_digest", lambda room: f"other {room}")
+    folders.append(Kept.of(str(tmp_path), "study", 0, "size").folder)
+    assert len(set(folders)) == 3

@@ -35,7 +35,8 @@ def command(
         detector: a method of your own as module:Class, beside those of the study `detection`.
         robot: arms of the study `arms`, by name or file, parted by commas.
         keep: folder for what `guard`, `entries`, `detection`, `detection_parts` and `false_alarms`
-            have done; what it holds is not done again. Of one build: empty it after a change.
+            have done; what it holds is not done again. The last three leave results of other
+            versions, or of other sources of simulation and detectors, alone and do not use them.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.

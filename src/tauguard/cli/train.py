@@ -113,6 +113,7 @@ def labelled_motion(
     from tauguard.detectors import make_detector, save_model, train, with_guarantee
     from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.detectors.thresholds.guarantee import check_guarantee
+    from tauguard.report import two_digits
 
     # First: what cannot be used, or cannot be guaranteed, is better named before training.
     method = make_detector(name)
@@ -134,9 +135,10 @@ def labelled_motion(
     if guarantee is None:
         print(_aimed_at(alarm, recordings, rate))
     else:
+        hours = two_digits(guarantee.hours)
         print(
             f"guaranteed: at most {rate:g} false alarms per hour on motion like that of "
-            f"{calibration} ({guarantee.episodes} episodes, {guarantee.hours:.2g} h), with a "
+            f"{calibration} ({guarantee.episodes} episodes, {hours} h), with a "
             f"confidence of {guarantee.confidence:.0%}"
         )
 
@@ -144,12 +146,14 @@ def labelled_motion(
 def _aimed_at(alarm: CollisionAlarm, recordings: Sequence[Trace], rate: float) -> str:
     """What the threshold aims at, and what its motion can tell of it."""
     from tauguard.detectors.thresholds.law import expected_rate, held_out
+    from tauguard.report import two_digits
 
     expected = expected_rate(alarm, held_out(recordings)[1])
-    low, high = expected.interval(alarm.threshold)
+    low, high = map(two_digits, expected.interval(alarm.threshold))
+    minutes = max(1, round(60 * expected.hours))
     return (
-        f"aimed at {rate:g} false alarms per hour; the {60 * expected.hours:.2g} min of motion "
-        f"that the threshold comes from allow {low:.2g} to {high:.2g} (95 %)"
+        f"aimed at {rate:g} false alarms per hour; the {minutes} min of motion "
+        f"that the threshold comes from allow {low} to {high} (95 %)"
     )
 
 

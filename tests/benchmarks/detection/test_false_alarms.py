@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.detection import false_alarms
+from tauguard.benchmarks.detection import arm_scores, false_alarms, pool
 from tauguard.benchmarks.detection.arm_scores import Arm, Blow, Extent
 from tauguard.benchmarks.detection.fleet import Training
 from tauguard.benchmarks.detection.known_tails import TAILS
@@ -13,6 +13,7 @@ from tauguard.benchmarks.detection.threshold_laws import LAWS, judged, price_row
 from tauguard.benchmarks.kept import read
 from tauguard.detectors import FreeScores
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels
+from tauguard.envs import Episode, simulate
 from tauguard.report import table
 
 LEVELS = SpeedLevels(np.array([0.0]), np.array([0.0]), np.array([1.0]))
@@ -75,6 +76,25 @@ def test_known_rates_are_those_of_what_is_drawn(name):
     for threshold in (1.0, 2.0, 4.0):
         counted = np.sum(drawn > threshold) / hours
         assert counted == pytest.approx(tail.rate(threshold), rel=0.25, abs=2.0)
+
+
+def test_every_arm_is_struck_in_its_own_episodes_and_with_several_payloads(monkeypatch):
+    made = {5: [], 6: []}
+    nothing = simulate(Episode(seed=1, seconds=0.1))
+
+    def struck(episode):
+        made[episode.mismatch.seed].append(episode)
+        return nothing
+
+    monkeypatch.setattr(pool, "simulate", struck)
+    monkeypatch.setattr(arm_scores, "_free", lambda *_: {})
+    extent = Extent((), Training(), 0.0, 0.0, 1)
+    for seed in made:
+        arm_scores.scored(extent, 0, seed, {})
+    assert not {e.seed for e in made[5]} & {e.seed for e in made[6]}
+    first = made[5][:: pool.ROUNDS]  # of each speed: nothing was struck, so all rounds are drawn
+    assert [e.speed for e in first] == list(pool.SPEEDS)
+    assert {e.payload_g for e in first} == set(pool.PAYLOADS)
 
 
 def test_arms_are_kept_and_not_made_again(tmp_path, monkeypatch):

@@ -45,7 +45,10 @@ def test_a_small_run_prints_a_row_for_every_part(monkeypatch, tmp_path):
     monkeypatch.setattr(parts, "QUICK", size)
     rows = parts.run(True, 0, str(tmp_path))
     assert [row["without"] for row in rows] == [*names, parts.LEVELS]
-    assert all(row["us"] > 0 for row in rows)
+    times = [row["time"] for row in rows]
+    assert times[0]["median"] == 1.0
+    assert all(0 < one["low"] <= one["median"] <= one["high"] for one in times[:-1])
+    assert times[-1] is None
     assert "torque offsets" in table(rows, notes=parts.NOTES)
     figure = pytest.importorskip("matplotlib.figure").Figure()
     parts.draw(rows, figure)
