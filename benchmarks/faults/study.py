@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from tauguard.benchmarks.faults.arms import Watched, arms
-from tauguard.datasets.live.lateness import Lateness, most_behind
-from tauguard.datasets.live.listening import told_late
+from tauguard.datasets.live.lateness import Lateness
 from tauguard.datasets.live.packets import FAULTS, Fault, Packets
 from tauguard.detectors.faults.monitor import COLLISION, FREE, Monitor
 from tauguard.detectors.faults.spans import Spans
@@ -50,7 +49,8 @@ NOTES = {
     "clean": "logs as they are: seconds at fault, each of them false, and alarms beside `detect`.",
     "faults": "a fault of 1 s at random moments and at collisions; delays in ms from its first "
     "sample. untold_s: the answer is free. missed: collisions within faults with no answer but "
-    "free, of those that the same stretch without the fault finds.",
+    "free; of_struck: collisions that the same stretch without the fault finds there. found_after: "
+    "share of its later collisions that are found after the recovery.",
     "loop": "microseconds from sample to answer, calls taken in turn on the longest log; Python "
     "around native parts. Other programs of the machine are in the tail.",
     "another arm": "one arm's samples given to another's model.",
@@ -72,17 +72,15 @@ def heard(watched: Watched, packets: Packets) -> Heard:
     """What the monitor says of packets, as ``listen`` counts it."""
     assert watched.alarm.inputs is not None
     monitor, out = Monitor(watched.alarm, watched.alarm.inputs), Heard()
-    lateness, most = Lateness(), most_behind(watched.alarm.inputs.dt)
+    lateness = Lateness(watched.alarm.inputs.dt)
     up, last = False, float(packets.due[0])
     rows = zip(packets.due, packets.t, packets.q, packets.qd, packets.current, strict=True)
     for due, t, q, qd, current in rows:
-        if due - last > most:
-            out.reasons.append(last + most)
-            out.other += np.arange(last + most, due, most).tolist()
+        if due - last > lateness.most:
+            out.reasons.append(last + lateness.most)
+            out.other += np.arange(last + lateness.most, due, lateness.most).tolist()
         last = float(due)
-        answer = monitor.step(float(t), q, qd, current)
-        late = lateness.step(float(t), last)
-        answer = told_late(answer, late) if late > most else answer
+        answer = lateness.judge(monitor.step(float(t), q, qd, current), float(t), last)
         out.spans.add(float(due), answer)
         if answer.reason:
             out.reasons.append(last)
@@ -146,10 +144,11 @@ class Tally:
             "median_ms": float(np.median(self.delays)) if self.delays else None,
             "longest_ms": max(self.delays, default=None),
             "false_alarms": self.false,
-            "found_after": f"{self.found} of {self.after}",
+            "found_after": rate(self.found, self.after),
             "untold_s": self.untold,
             "of_s": self.moments * (LASTS - 0.02),
-            "missed": f"{self.missed} of {self.struck}",
+            "missed": self.missed,
+            "of_struck": self.struck,
         }
 
 

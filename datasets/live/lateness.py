@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer
+
 #: No sample for so long, or samples this much behind the least late of them, are a fault [s].
 BEHIND = 20e-3
 #: Or so many sample intervals, where that is longer.
 INTERVALS = 2.5
-#: Two clocks may run apart by this share.
-DRIFT = 5e-4
+#: Two clocks may run apart by this share: each crystal is off by at most 5e-5 by its data sheet
+#: (20 to 50 ppm with temperature and age). A delay that grows more slowly is not seen.
+DRIFT = 1e-4
 
 
 def most_behind(dt: float) -> float:
@@ -22,22 +27,42 @@ class Lateness:
     once. It may grow by ``DRIFT``, so clocks that run apart are not taken for lateness.
     """
 
-    def __init__(self) -> None:
-        """Begin before the first sample."""
+    def __init__(self, dt: float) -> None:
+        """Begin before the first sample; ``dt``: the sample interval [s]."""
+        self.most = most_behind(dt)  #: later than this is a fault [s]
         self._least, self._arrived, self._time = float("inf"), 0.0, float("-inf")
 
-    def step(self, t: float, arrived: float) -> float:
-        """Seconds that this sample is late; 0 where its time stamp says nothing.
+    def judge(self, answer: Answer, t: float, arrived: float) -> Answer:
+        """The monitor's answer, or a fault where its sample came too late.
+
+        The time stamp of a sample that the monitor does not believe says nothing: one stale packet
+        leaves the others as late as they were. A robot whose clock began anew is measured anew once
+        the monitor has settled on it.
 
         Args:
+            answer: the monitor's.
             t: the robot's time stamp [s].
             arrived: this machine's clock at the arrival [s].
         """
-        if not abs(t) < float("inf"):
-            return 0.0
-        if t < self._time:  # a clock that begins anew
+        if answer.reason:
+            return answer
+        late = self.step(t, arrived)
+        return late_answer(answer, late) if late > self.most else answer
+
+    def step(self, t: float, arrived: float) -> float:
+        """Seconds that a sample with a believed time stamp is late; see :meth:`judge`.
+
+        A time stamp that goes back is a clock that begins anew.
+        """
+        if t < self._time:
             self._least = float("inf")
         offset = arrived - t
         least = self._least + DRIFT * max(0.0, arrived - self._arrived)
         self._least, self._arrived, self._time = min(offset, least), arrived, t
         return offset - self._least
+
+
+def late_answer(answer: Answer, late: float) -> Answer:
+    """An answer that comes too late: no collision is not "free", as the robot is further on."""
+    reason = f"late: the samples are {1e3 * late:.0f} ms behind the robot"
+    return replace(answer, state=COLLISION if answer.alarm else FAULT, reason=reason)

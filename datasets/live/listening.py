@@ -5,20 +5,20 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.datasets.live.lateness import Lateness, most_behind
+from tauguard.datasets.live.lateness import Lateness
 from tauguard.datasets.live.sample import LiveSource, Sample, SourceClosed
-from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer, Monitor
+from tauguard.detectors.faults.monitor import FAULT, Answer, Monitor
 from tauguard.detectors.faults.spans import Spans
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
-#: Latencies are counted in bins of a microsecond, up to so many; longer ones are in the last.
+#: Latencies are counted in bins of a microsecond, so many; what takes longer is in one more.
 BINS = 100_000
 
 
@@ -32,7 +32,7 @@ class Heard:
     first: float = np.nan  #: robot's time of the first sample [s]
     last: float = np.nan  #: and of the last one
     spans: Spans = field(default_factory=Spans)
-    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(BINS, np.int64))
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(BINS + 1, np.int64))
     """Samples by their latency from packet to answer, in microseconds."""
     slowest: int = 0  #: [ns]
     rows: list[Sample] = field(default_factory=list)
@@ -40,10 +40,17 @@ class Heard:
     alarms: list[bool] = field(default_factory=list)
     ended: str = ""  #: why it ended
 
-    def add(self, sample: Sample, answer: Answer, latency: int, late: float = 0.0) -> None:
-        """One sample with its answer; ``late`` [s] is above 0 where it came too late."""
+    def add(self, sample: Sample, answer: Answer, latency: int, said: Answer) -> None:
+        """One sample.
+
+        Args:
+            sample: as it came.
+            answer: the monitor's; a sample with a reason is not believed, and not kept.
+            latency: [ns].
+            said: the answer with the sample's lateness in it.
+        """
         self.samples += 1
-        self.counts[min(latency // 1000, BINS - 1)] += 1
+        self.counts[min(latency // 1000, BINS)] += 1
         self.slowest = max(self.slowest, latency)
         t = sample.t
         if not answer.reason:
@@ -53,7 +60,7 @@ class Heard:
                 self.rows.append(sample)
                 self.scores.append(answer.score)
                 self.alarms.append(answer.alarm)
-        self.spans.add(t, told_late(answer, late) if late else answer)
+        self.spans.add(t, said)
 
     def silent(self, seconds: float) -> None:
         """Nothing came for ``seconds``; before the first sample that is no fault."""
@@ -72,22 +79,18 @@ class Heard:
             np.array([r.current for r in rows]),
         )
 
-    def quantiles(self) -> dict[str, float]:
-        """Latency from packet to answer [us]: median, p99, p99.9, p99.99 and the largest."""
+    def quantiles(self) -> dict[str, float | None]:
+        """Latency from packet to answer [us]: median, p99, p99.9, p99.99 and the largest.
+
+        None: ``BINS`` microseconds or more, which are not told apart.
+        """
         if not self.samples:
             return {}
         levels = {"median": 0.5, "p99": 0.99, "p99_9": 0.999, "p99_99": 0.9999}
         below = np.cumsum(self.counts) / self.samples
-        found = {name: float(np.searchsorted(below, q) + 1) for name, q in levels.items()}
+        bins = {name: int(np.searchsorted(below, q)) for name, q in levels.items()}
+        found = {name: float(k + 1) if k < BINS else None for name, k in bins.items()}
         return found | {"max": self.slowest * 1e-3}
-
-
-def told_late(answer: Answer, late: float) -> Answer:
-    """An answer that comes too late: no collision is not "free", as the robot is further on."""
-    if answer.reason:
-        return answer
-    reason = f"late: the samples are {1e3 * late:.0f} ms behind the robot"
-    return replace(answer, state=COLLISION if answer.alarm else FAULT, reason=reason)
 
 
 def listen(
@@ -106,9 +109,9 @@ def listen(
         report: called after every answer; it must return at once (the latency does not count it).
         keep: keep the samples, for :meth:`Heard.trace`.
     """
-    heard, lateness = Heard(source.joint_names, keep), Lateness()
+    heard, lateness = Heard(source.joint_names, keep), Lateness(1 / source.rate)
     end = time.monotonic() + seconds
-    last, most = time.monotonic(), most_behind(1 / source.rate)
+    last, most = time.monotonic(), lateness.most
     collecting = gc.isenabled()
     gc.disable()  # a collection would come between a packet and its answer
     try:
@@ -120,12 +123,11 @@ def listen(
                 continue
             answer = monitor.step(sample.t, sample.q, sample.qd, sample.current)
             latency = time.monotonic_ns() - sample.arrived
-            late = lateness.step(sample.t, 1e-9 * sample.arrived)
-            late = late if late > most else 0.0
-            heard.add(sample, answer, latency, late)
+            said = lateness.judge(answer, sample.t, 1e-9 * sample.arrived)
+            heard.add(sample, answer, latency, said)
             last = time.monotonic()
             if report is not None:
-                report(sample, told_late(answer, late) if late else answer)
+                report(sample, said)
         heard.ended = f"{seconds:g} s are over"
     except SourceClosed as closed:
         heard.ended = str(closed)

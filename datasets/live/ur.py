@@ -175,7 +175,12 @@ class UrSource(Closing):
         return found
 
     def _again(self, error: Exception) -> None:
-        """Open the connection again, or give up."""
+        """Open the connection again, or give up.
+
+        An ``OSError`` broke it; any other error is of a packet that cannot be read, and the
+        connection was dropped here.
+        """
+        lost = isinstance(error, OSError)
         began = time.monotonic()
         self.close()
         while time.monotonic() - began < self.reconnect:
@@ -184,9 +189,11 @@ class UrSource(Closing):
             except ConnectionError:
                 time.sleep(0.2)
                 continue
-            self._note(f"connection lost ({error}), back after {time.monotonic() - began:.1f} s")
+            what = "connection lost" if lost else "connection begun anew"
+            self._note(f"{what} ({error}), back after {time.monotonic() - began:.1f} s")
             return
-        raise SourceClosed(f"{self.host}:{self.port}: connection lost ({error})")
+        what = "connection lost" if lost else "connection given up"
+        raise SourceClosed(f"{self.host}:{self.port}: {what} ({error})")
 
     def _sample(self, payload: bytes) -> Sample:
         arrived = time.monotonic_ns()

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tauguard.cli.listen import check_source
+from tauguard.cli.listen import check_source, report
 from tauguard.datasets.live import PlayedSource, SourceClosed, UrServer, UrSource
-from tauguard.datasets.live.listening import listen
+from tauguard.datasets.live.listening import BINS, Heard, listen
 from tauguard.datasets.live.packets import Fault, Packets
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, RobotNumbers, make_detector, train
@@ -78,7 +78,18 @@ def test_over_rtde_nothing_is_lost(alarm, struck):
     assert heard.samples == len(struck.t)
     assert np.array(heard.scores).tobytes() == alarm.detect(struck).score.tobytes()
     quantiles = heard.quantiles()
-    assert 0 < quantiles["median"] <= quantiles["p99"] <= quantiles["p99_99"]
+    assert 0 < quantiles["median"] <= quantiles["p99"]
+
+
+def test_latencies_beyond_the_last_bin_are_not_given_a_number(capsys):
+    heard = Heard(("a",))
+    heard.samples, heard.slowest = 1000, 250_000_000
+    heard.counts[[40, BINS]] = 995, 5
+    found = heard.quantiles()
+    assert (found["median"], found["p99"], found["p99_9"], found["max"]) == (41, 41, None, 250_000)
+    none = {"events": [], "faults": [], "connection": [], "ended": "by hand"}
+    report({**none, "samples": 1000, "seconds": 2.0, "latency_us": found})
+    assert "p99 41, p99.9 100,000 or more, " in capsys.readouterr().out
 
 
 def test_a_silent_robot_is_a_fault(alarm, struck):
@@ -95,6 +106,40 @@ def test_a_silent_robot_is_a_fault(alarm, struck):
     heard = listen(Silent(struck), Monitor(alarm, alarm.inputs))
     assert [span.state for span in heard.spans.found if span.reason][-1] == "fault"
     assert heard.spans.found[-1].reason.startswith("silent: no sample for")
+
+
+def states(alarm, trace, late, stamps):
+    """What is said at every sample that comes ``late`` [s] with the time ``stamps`` [s]."""
+
+    class Behind(Handed):
+        def read(self, timeout):
+            k = self._next
+            sample = super().read(timeout)
+            arrived = round(1e9 * (trace.t[k] + late[k]))
+            return replace(sample, t=float(stamps[k]), arrived=arrived)
+
+    said = []
+    listen(Behind(trace), Monitor(alarm, alarm.inputs), report=lambda _, a: said.append(a.state))
+    return said
+
+
+def test_one_stale_packet_erases_no_backlog(alarm, struck):
+    late = np.where(np.arange(len(struck.t)) < 1000, 0.0, 0.3)
+    stamps = struck.t.copy()
+    stamps[1200] = struck.t[1198]
+    said = states(alarm, struck, late, stamps)
+    assert "free" in said[:1000]
+    assert "free" not in said[1000:]
+
+
+def test_a_robot_whose_clock_begins_anew_is_not_late_for_ever(alarm, struck):
+    def back(trace, seconds):
+        return trace.t - np.where(np.arange(len(trace.t)) < 1000, 0.0, seconds)
+
+    said = states(alarm, struck, np.zeros(len(struck.t)), back(struck, struck.t[1000]))
+    assert said[1000] == "fault"
+    assert "free" in said[-100:]
+    assert "free" not in states(alarm, struck, np.zeros(len(struck.t)), back(struck, 0.1))[1000:]
 
 
 def test_a_frozen_robot_is_a_fault_and_no_collision(alarm, struck):

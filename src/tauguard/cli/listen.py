@@ -246,12 +246,17 @@ def report(result: dict[str, Any]) -> None:
     if latency:
         print(
             f"{result['samples']} samples in {result['seconds']:.1f} s, {result['ended']}; packet "
-            f"to answer: median {latency['median']:.0f} us, p99 {latency['p99']:.0f}, "
-            f"p99.9 {latency['p99_9']:.0f}, p99.99 {latency['p99_99']:.0f}, "
-            f"longest {latency['max']:.0f}"
+            f"to answer: median {_us(latency['median'])} us, p99 {_us(latency['p99'])}, "
+            f"p99.9 {_us(latency['p99_9'])}, p99.99 {_us(latency['p99_99'])}, "
+            f"longest {_us(latency['max'])}"
         )
     else:
         print(f"no sample came: {result['ended']}")
+
+
+def _us(value: float | None) -> str:
+    """Microseconds; None: more than are told apart."""
+    return "100,000 or more" if value is None else f"{value:,.0f}"
 
 
 def save(path: Path, heard: Heard, alarm: CollisionAlarm) -> None:

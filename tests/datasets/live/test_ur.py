@@ -1,5 +1,6 @@
 """The RTDE client and server: the protocol as published, a log played and read back."""
 
+import re
 import socket
 import struct
 import subprocess
@@ -35,6 +36,11 @@ def read_all(source):
     except SourceClosed:
         pass
     return samples
+
+
+def read_on(source):
+    while True:
+        source.read(0.5)
 
 
 def test_packets_are_those_of_the_published_guide():
@@ -108,6 +114,25 @@ def test_a_broken_connection_is_opened_again():
             samples += [sample] if sample else []
         assert any("connection lost" in event and "back after" in event for event in source.events)
     assert samples[-1].t > first.t
+
+
+@pytest.mark.parametrize("reconnect", [0, 5])
+def test_a_data_packet_of_another_size_is_no_lost_connection(reconnect):
+    with (
+        UrServer(Packets.of(moving(6.0)), 0) as server,
+        UrSource("127.0.0.1", server.port, reconnect=reconnect) as source,
+    ):
+        assert source.read(1.0) is not None
+        source._reader.feed(rtde.packet(rtde.DATA_PACKAGE, b"\x01short"))
+        said = "[(]a data packet of 6 bytes, expected 153 of recipe 1[)]"
+        if reconnect:
+            while not source.events:
+                source.read(0.5)
+            assert re.match(f"connection begun anew {said}, back after", source.events[0])
+            assert source.read(1.0) is not None
+        else:
+            with pytest.raises(SourceClosed, match=f"connection given up {said}"):
+                read_on(source)
 
 
 def test_another_version_is_refused_in_one_line():
