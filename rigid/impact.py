@@ -71,7 +71,7 @@ def time_of_impact(
 
     Raises:
         ValueError: lengths that do not match, polygons, or a coordinate beyond 1e100, whose
-            products would overflow.
+            products would overflow (for bodies beside a mesh beyond 1e30, as for the mesh).
     """
     for name, motion in (("motion_a", motion_a), ("motion_b", motion_b)):
         _bounded(name, motion.pose_t0[:, :3, 3], motion.linear)

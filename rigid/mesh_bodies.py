@@ -43,15 +43,17 @@ def bodies_of(name: str, solid: Solid) -> Native:
 
 def overlap(mesh: MeshTree, solid: Solid, threads: int = 1, swapped: bool = False) -> MeshOverlap:
     """Which bodies the surface meets, and a triangle of each."""
+    bodies = bodies_of(_other(swapped), solid)
     face = np.empty(len(solid), dtype=np.int32)
-    mesh._mesh.meets(*bodies_of(_other(swapped), solid), face, thread_count(threads))
+    mesh._mesh.meets(*bodies, face, thread_count(threads))
     return MeshOverlap(face >= 0, faces_of(face, swapped))
 
 
 def distance(mesh: MeshTree, solid: Solid, threads: int = 1, swapped: bool = False) -> MeshGaps:
     """How far the surface is from each body."""
+    bodies = bodies_of(_other(swapped), solid)
     out, face = np.empty((len(solid), 10)), np.empty(len(solid), dtype=np.int32)
-    mesh._mesh.gaps(*bodies_of(_other(swapped), solid), out, face, thread_count(threads))
+    mesh._mesh.gaps(*bodies, out, face, thread_count(threads))
     first, second, normal = out[:, 1:4], out[:, 4:7], out[:, 7:10]
     if swapped:
         first, second, normal = second, first, -normal
@@ -67,6 +69,7 @@ def first_contact(
     swapped: bool = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Rows of toi, point and normal (N, 7), and the faces (N, 2)."""
+    bodies = bodies_of(_other(swapped), solid)
     lengths = {
         f"motion_{'b' if swapped else 'a'}": len(motion_mesh),
         "bodies": len(solid),
@@ -75,7 +78,7 @@ def first_contact(
     count = common_length(lengths)
     out, face = np.empty((count, 7)), np.empty(count, dtype=np.int32)
     mesh._mesh.time_of_impact_of_bodies(
-        *bodies_of(_other(swapped), solid),
+        *bodies,
         *motion_mesh.packed,
         *motion_solid.packed,
         out,

@@ -64,7 +64,8 @@ def overlap(
 
     Raises:
         ValueError: lengths that do not match, an unknown method, ``sat`` of hulls, ``gjk``
-            without coal, another method than ``auto`` of rounded bodies or a mesh, two meshes.
+            without coal, another method than ``auto`` of rounded bodies or a mesh, two meshes,
+            a coordinate beyond 1e100 of rounded bodies (1e30 beside a mesh).
     """
     if method not in get_args(OverlapMethod):
         raise ValueError(

@@ -192,6 +192,13 @@ def lateness(truth: FrameAnswer, found: FrameAnswer) -> Row:
     """How many of the common hits' times are late, and the latest by how much of the step.
 
     The truth's times are at most 1e-9 of the step early, so less than that is no lateness.
+
+    Args:
+        truth: A frame with times that are never late.
+        found: Another method's frame of the same step; the pairs of both are compared.
+
+    Returns:
+        ``late``, a count, and ``late_most``, a share of the step (0 where none is late).
     """
     after = np.concatenate(
         [

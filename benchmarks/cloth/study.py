@@ -53,8 +53,8 @@ NOTES = {
     "false_hits are counts; decided_exactly: left to exact arithmetic.",
     "point query": "a point and an edge, or two points: drawn from a lattice, and made to meet "
     "exactly. ns: a query, a batch a call; peer_ns: ipctk, a call each, "
-    "call_ns of which is Python's; misses, false_hits, late: counts, ours by rational arithmetic "
-    "(of `known` queries), the peer's by ours.",
+    "call_ns of which is Python's; misses, false_hits, late: counts by rational arithmetic, of "
+    "`known` queries; early_most: in steps.",
     "safe step": "safe_step beside ipctk's compute_collision_free_stepsize on rods, particles and "
     "triangles of one step. step, peer_step: the answers; earliest: the first contact by all pairs "
     "in exact arithmetic; meets_after: contacts that the exact method finds up to ours, and up to "

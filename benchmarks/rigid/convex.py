@@ -17,7 +17,7 @@ import dataclasses
 from collections.abc import Callable
 from functools import partial
 from time import process_time
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,13 @@ from tauguard.benchmarks.harness import measure
 from tauguard.benchmarks.rigid.cases import HARD, KINDS
 from tauguard.benchmarks.rigid.truth import exact_toi, truth
 from tauguard.report import Row, rate
-from tauguard.rigid import PlaneCache, coal_peer
+from tauguard.rigid import Motion, PlaneCache, coal_peer
 from tauguard.rigid.queries import native_overlap, native_sweep, portable
 from tauguard.rigid.queries import overlap_boxes as overlap_boxes_native
-from tauguard.rigid.shapes import Bodies, Boxes, Tetrahedra
+from tauguard.rigid.rounded import Solid
+from tauguard.rigid.shapes import Bodies, Boxes
+
+Batch = TypeVar("Batch", bound=Solid | Motion)
 
 #: Published static ratios of separating axes to elimination (collision, non-collision).
 PUBLISHED = {
@@ -63,12 +66,12 @@ def run(quick: bool, seed: int) -> list[Row]:
     return rows
 
 
-def take(bodies: Bodies, index: NDArray[Any]) -> Bodies:
-    """The chosen rows of a batch."""
+def take(batch: Batch, index: NDArray[Any]) -> Batch:
+    """The chosen rows of a batch of bodies or of motions."""
     fields = [
-        getattr(bodies, field.name)[index] for field in dataclasses.fields(bodies) if field.init
+        getattr(batch, field.name)[index] for field in dataclasses.fields(batch) if field.init
     ]
-    return type(bodies)(*fields)
+    return type(batch)(*fields)
 
 
 def join(parts: list[Bodies]) -> Bodies:
@@ -305,12 +308,15 @@ def coherent_rows(rng: np.random.Generator, n: int, frames: int) -> list[Row]:
     return rows
 
 
-def shifted(bodies: Bodies, by: NDArray[np.float64]) -> Bodies:
-    """The same bodies moved by ``by``, shape (N, 3)."""
-    if isinstance(bodies, Tetrahedra):
-        return Tetrahedra(bodies.vertices + by[:, None])
-    assert isinstance(bodies, Boxes)
-    return Boxes(bodies.center + by, bodies.half_extents, bodies.rotation)
+def shifted(bodies: Batch, by: NDArray[np.float64]) -> Batch:
+    """The same bodies moved by ``by``, shape (N, 3) or (3,)."""
+    places = {"center": by, "start": by, "end": by, "vertices": by[..., None, :]}
+    moved = {
+        name: getattr(bodies, name) + way for name, way in places.items() if hasattr(bodies, name)
+    }
+    if not moved:
+        raise ValueError(f"bodies: {type(bodies).__name__}, which have no place of their own")
+    return dataclasses.replace(bodies, **moved)
 
 
 def hard_row(name: str, rng: np.random.Generator, n: int) -> Row:

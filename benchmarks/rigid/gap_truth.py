@@ -25,16 +25,32 @@ def root(x: Fraction) -> float:
 
 def exact_gap(a: Solid, b: Solid, i: int) -> float:
     """The signed distance of row i, rounded once (twice where there are radii)."""
-    (core_a, radius_a), (core_b, radius_b) = parts(a), parts(b)
-    radii = sum(Fraction(float(r[i if len(r) > 1 else 0])) for r in (radius_a, radius_b))
-    pa, ea = exact_vertices(core_a, i)
-    pb, eb = exact_vertices(core_b, i)
-    scale = lcm(*(x.denominator for v in [*pa, *pb, *ea, *eb] for x in v))
-    pa, ea, pb, eb = ([tuple(int(x * scale) for x in v) for v in w] for w in (pa, ea, pb, eb))
+    pa, ea, pb, eb, scale = _in_integers(a, b, i)
+    radii = _radii(a, b, i)
     square = squared_distance(pa, pb) / (scale * scale)
     if square > 0:
         return root(square) - float(radii) if radii else root(square)
     return -root(squared_depth(pa, ea, pb, eb) / (scale * scale)) - float(radii)
+
+
+def exactly_meet(a: Solid, b: Solid, i: int) -> bool:
+    """Is the squared distance of the cores of row i at most the squared sum of the radii?"""
+    pa, _, pb, _, scale = _in_integers(a, b, i)
+    return bool(squared_distance(pa, pb) <= (_radii(a, b, i) * scale) ** 2)
+
+
+def _in_integers(a: Solid, b: Solid, i: int) -> tuple[Vectors, Vectors, Vectors, Vectors, int]:
+    """Vertices and edges of the core of a, those of b, and by how much all are scaled."""
+    rows = [*exact_vertices(parts(a)[0], i), *exact_vertices(parts(b)[0], i)]
+    scale = lcm(*(x.denominator for row in rows for v in row for x in v))
+    pa, ea, pb, eb = ([tuple(int(x * scale) for x in v) for v in row] for row in rows)
+    return pa, ea, pb, eb, scale
+
+
+def _radii(a: Solid, b: Solid, i: int) -> Fraction:
+    """The sum of the radii of row i."""
+    both = (parts(a)[1], parts(b)[1])
+    return sum((Fraction(float(r[i if len(r) > 1 else 0])) for r in both), Fraction(0))
 
 
 def squared_distance(pa: Vectors, pb: Vectors) -> Fraction:
@@ -102,11 +118,9 @@ def squared_depth(pa: Vectors, ea: Vectors, pb: Vectors, eb: Vectors) -> Fractio
 
 def extent(a: Solid, b: Solid, i: int) -> float:
     """What an error is measured against: the pair's size and distance, radii included."""
-    (core_a, radius_a), (core_b, radius_b) = parts(a), parts(b)
-    points = [*exact_vertices(core_a, i)[0], *exact_vertices(core_b, i)[0]]
+    points = [*exact_vertices(parts(a)[0], i)[0], *exact_vertices(parts(b)[0], i)[0]]
     span = [float(max(p[k] for p in points) - min(p[k] for p in points)) for k in range(3)]
-    radii = sum(float(r[i if len(r) > 1 else 0]) for r in (radius_a, radius_b))
-    return float(np.linalg.norm(span)) + radii
+    return float(np.linalg.norm(span)) + float(_radii(a, b, i))
 
 
 def as_hulls(points: list[NDArray[np.float64]]) -> Hulls:

@@ -150,11 +150,6 @@ def groups(early: Array, touch: Array) -> dict[str, NDArray[np.intp]]:
     return {"hit": np.flatnonzero(later), "miss": np.flatnonzero(np.isinf(early))}
 
 
-def chosen(motion: Motion, index: NDArray[np.intp]) -> Motion:
-    """The chosen rows of a batch of motions."""
-    return Motion(motion.pose_t0[index], motion.linear[index], motion.angular[index])
-
-
 def our_row(
     kind: str, a: Bodies, b: Bodies, ma: Motion, mb: Motion, early: Array, touch: Array
 ) -> Row:
@@ -162,7 +157,7 @@ def our_row(
     toi = time_of_impact(a, b, ma, mb).toi
     calls, count = {}, {}
     for name, index in groups(early, touch).items():
-        part = take(a, index), take(b, index), chosen(ma, index), chosen(mb, index)
+        part = take(a, index), take(b, index), take(ma, index), take(mb, index)
         calls[name], count[name] = partial(time_of_impact, *part), len(index)
     us = {
         name: scaled(t, 1e6 / count[name])
@@ -222,7 +217,7 @@ def advanced(
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     alive = np.arange(n)
     for _ in range(MOST_STEPS):
-        places = [chosen(m, alive).at(t[alive]) for m in (ma, mb)]
+        places = [take(m, alive).at(t[alive]) for m in (ma, mb)]
         for k, i in enumerate(alive):
             left, right = (coal.Transform3s(p[k, :3, :3], p[k, :3, 3]) for p in places)
             result.clear()

@@ -9,6 +9,7 @@ from tauguard.benchmarks.rigid import convex as rigid_convex
 from tauguard.benchmarks.rigid import gap as rigid_gap
 from tauguard.benchmarks.rigid import impact as rigid_impact
 from tauguard.benchmarks.rigid import mesh as rigid_mesh
+from tauguard.benchmarks.rigid import mesh_bodies as rigid_mesh_bodies
 from tauguard.benchmarks.rigid import rounded as rigid_rounded
 from tauguard.benchmarks.rigid import volumes as rigid_volumes
 from tauguard.report import Row
@@ -49,7 +50,8 @@ NOTES = {
 
 def run(quick: bool, seed: int) -> list[Row]:
     """The rows of every part, and what was asked of them beside what they measured."""
-    rows = [row for part in (*PARTS, rigid_gap, rigid_rounded) for row in part.run(quick, seed)]
+    parts = (*PARTS, rigid_gap, rigid_rounded, rigid_mesh_bodies)
+    rows = [row for part in parts for row in part.run(quick, seed)]
     return rows + rigid_claims.claims(rows, quick)
 
 

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from tauguard.benchmarks.rigid import claims as rigid_claims
+from tauguard.benchmarks.rigid import coal_motion
 from tauguard.benchmarks.rigid import convex as rigid_convex
 from tauguard.benchmarks.rigid import impact as rigid_impact
 from tauguard.benchmarks.rigid import mesh as rigid_mesh
+from tauguard.benchmarks.rigid import mesh_bodies as rigid_mesh_bodies
 from tauguard.benchmarks.rigid import rounded as rigid_rounded
 from tauguard.benchmarks.rigid import volumes as rigid_volumes
 from tauguard.report import rate
@@ -198,7 +200,14 @@ def test_rows_of_rounded_bodies_and_a_mesh_stand_beside_coal():
     assert moving["gap_at_toi"] < 1e-6
     mesh = rigid_mesh.generated(12)
     tree = MeshTree(mesh.vertices, mesh.faces)
-    row = rigid_rounded.mesh_row(rng, mesh, tree, "boxes", 20)
+    row = rigid_mesh_bodies.mesh_row(rng, mesh, tree, "boxes", 20)
     assert (row["signs_differ"], row["coal_disagrees"]["value"]) == (0, 0)
     assert row["coal_differs_most"] < 1e-6
     assert row["moving_passed_before"] == 0
+
+
+def test_pairs_that_overlap_at_the_start_hide_no_pair_that_met_too_early():
+    toi = np.array([0.0, 0.0, 0.0, 0.5, np.inf])
+    least = np.array([-1.0, 0.0, 0.0, -1.0, -1.0])
+    assert coal_motion.passed_before(least, toi) == 2
+    assert coal_motion.passed_before(np.abs(least), toi) == 0
