@@ -6,19 +6,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-
 from tauguard.benchmarks.real_arm.arms import ARMS, available, nominal, recordings
+from tauguard.benchmarks.small_detector import thinned, trained
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers, make_detector, train
+from tauguard.detectors import CollisionAlarm
 from tauguard.detectors.faults import UsualInput
 from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
 from tauguard.envs import Episode, simulate
-from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
+from tauguard.models import Mismatch
 from tauguard.traces.trace import Trace
 
-#: Every so many samples of a simulation are kept: 500 Hz.
-THIN = 2
+#: Samples of a simulation that are kept [Hz].
+RATE = 500.0
 #: Of a real arm's collision-free logs every so many are left out of training.
 LEFT_OUT = 3
 
@@ -48,7 +47,7 @@ class Watched:
         for k, episode in enumerate(episodes):
             trace = simulate(episode)
             assert trace.truth is not None
-            logs[f"struck_{k}"] = thinned(trace)
+            logs[f"struck_{k}"] = thinned(trace, RATE)
             contacts[f"struck_{k}"] = [(c.onset, c.end) for c in trace.truth.collisions]
         return cls(name, alarm, logs, contacts)
 
@@ -70,18 +69,8 @@ def simulated(quick: bool, seed: int) -> Watched:
     speeds, loads = (20.0, 60.0), (0.0, 2000.0)
     free = free_episodes(seed, 3 if quick else 8, 20.0 if quick else 40.0, speeds, loads, drawn)
     struck = struck_episodes(500 + seed, 1 if quick else 4, 8, (40.0,), (0.0, 1000.0), drawn)
-    arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
-    training = [thinned(simulate(episode)) for episode in free]
-    alarm = train(make_detector("moving-thresholds"), training, arm, 5.0)
+    alarm = trained([simulate(episode) for episode in free], RATE, 5.0)
     return Watched.struck("simulated", alarm, struck)
-
-
-def thinned(trace: Trace) -> Trace:
-    """Every ``THIN``-th sample."""
-    rows = slice(None, None, THIN)
-    return Trace(
-        trace.joint_names, trace.t[rows], trace.q[rows], trace.qd[rows], trace.current[rows]
-    )
 
 
 def real(name: str) -> Watched:

@@ -6,19 +6,23 @@ The server and the listener of each rate are processes of their own, as ``taugua
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import tempfile
 import time
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.benchmarks.small_detector import thinned, trained
 from tauguard.report import Row
+from tauguard.report import rate as share
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,13 +40,16 @@ RATES, BLOWS = (125.0, 500.0), (195, 6)
 SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
 #: Samples of which each stage is timed.
 TIMED = 4000
+#: The serving process starts, and counts what it sent, within this time [s].
+ANSWERS = 120.0
 #: Percentiles of the latency.
 LEVELS = ("median", "p99", "p99_9", "p99_99", "max")
 
 NOTES = {
-    "listen": "a simulated arm with blows, played in real time, all rates at once. alike: alarms "
-    "of the listener that are those of `detect` on the file, of how many. silent or late: times "
-    "that samples came too late, as other programs of the machine ran. Times in us from the "
+    "listen": "a simulated arm with blows, played in real time, all rates at once. events: "
+    "lines about the connection. alike: share of the alarms of `detect` on the file that begin at "
+    "the same sample. silent or late: stretches of fault that begin so, as other programs of the "
+    "machine ran. Times in us from the "
     "packet's arrival to the answer.",
     "stages": "one sample, us of this thread at the median and at p99.9, and what a call allocates "
     "at most at a time and keeps, bytes. native: the work is C++; the rest is Python around it. "
@@ -64,27 +71,19 @@ def run(quick: bool, seed: int) -> list[Row]:
 def write_inputs(folder: Path, quick: bool, seed: int) -> None:
     """A log and a detector for each rate; the arm and its motions follow from the seed."""
     from tauguard.datasets.plans import free_episodes, struck_episodes
-    from tauguard.detectors import ArmModel, RobotNumbers, make_detector, save_model, train
+    from tauguard.detectors import save_model
     from tauguard.envs import simulate
-    from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
-    from tauguard.traces import Trace, write_mcap
-
-    def thinned(trace: Trace, rate: float) -> Trace:
-        rows = slice(None, None, round(1 / (trace.dt * rate)))
-        signals = (trace.t[rows], trace.q[rows], trace.qd[rows], trace.current[rows])
-        return Trace(trace.joint_names, *signals)
+    from tauguard.models import Mismatch
+    from tauguard.traces import write_mcap
 
     drawn = Mismatch(seed=2000 + seed)
-    arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
     free = free_episodes(seed, EPISODES, SECONDS, SPEEDS, (0.0,), drawn)
     training = [simulate(episode) for episode in free]
     (struck,) = struck_episodes(700 + seed, 1, BLOWS[quick], (40.0,), (0.0,), drawn)
     log = simulate(struck)
     for rate in RATES:
         write_mcap(folder / f"{rate:g}.mcap", thinned(log, rate))
-        own = [thinned(trace, rate) for trace in training]
-        alarm = train(make_detector("moving-thresholds"), own, arm, PER_HOUR)
-        save_model(alarm, folder / f"{rate:g}.skops")
+        save_model(trained(training, rate, PER_HOUR), folder / f"{rate:g}.skops")
 
 
 def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
@@ -95,7 +94,7 @@ def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
     return load_model(folder / f"{rate:g}.skops"), read_log(folder / f"{rate:g}.mcap").trace
 
 
-def serve(folder: Path, rate: float, pipe: Any) -> None:
+def serve(folder: Path, rate: float, pipe: Connection) -> None:
     """Play the log: tell the port, and at the end how many packets were sent."""
     from tauguard.datasets import read_log
     from tauguard.datasets.live import UrServer
@@ -105,6 +104,34 @@ def serve(folder: Path, rate: float, pipe: Any) -> None:
         pipe.send(server.port)
         server.wait()
         pipe.send(server.sent)
+
+
+@contextlib.contextmanager
+def served(folder: Path, rate: float) -> Iterator[Connection]:
+    """The pipe of a process that serves the log; it ends with the block, whatever happens there."""
+    context = multiprocessing.get_context("spawn")
+    mine, theirs = context.Pipe()
+    process = context.Process(target=serve, args=(folder, rate, theirs), daemon=True)
+    process.start()
+    theirs.close()  # so that its death ends the pipe
+    try:
+        yield mine
+    finally:
+        process.terminate()
+        process.join()
+        mine.close()
+
+
+def received(pipe: Connection) -> int:
+    """The next number from the serving process.
+
+    Raises:
+        RuntimeError: it ended, or sends nothing for ``ANSWERS`` seconds.
+    """
+    with contextlib.suppress(EOFError, OSError):
+        if pipe.poll(ANSWERS):
+            return int(pipe.recv())
+    raise RuntimeError("the process that plays the log says nothing")
 
 
 def heard(folder: Path, rate: float) -> Row:
@@ -117,40 +144,52 @@ def heard(folder: Path, rate: float) -> Row:
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None
     truth = detect_with_faults(alarm, trace).detection.alarm
-    context = multiprocessing.get_context("spawn")
-    mine, theirs = context.Pipe()
-    server = context.Process(target=serve, args=(folder, rate, theirs))
-    server.start()
-    with UrSource("127.0.0.1", mine.recv(), rate, reconnect=0) as source:
+    answers: list[tuple[float, bool]] = []
+
+    def report(sample: Sample, answer: Answer) -> None:
+        answers.append((sample.t, answer.alarm))
+
+    with (
+        served(folder, rate) as pipe,
+        UrSource("127.0.0.1", received(pipe), rate, reconnect=0) as source,
+    ):
         busy = time.process_time()
-        answers: list[tuple[float, bool]] = []
-
-        def report(sample: Sample, answer: Answer) -> None:
-            answers.append((sample.t, answer.alarm))
-
         found = listen(source, Monitor(alarm, alarm.inputs), report=report)
         busy = time.process_time() - busy
-        lost = len(source.events)
-    sent = mine.recv()
-    server.join()
-    times, flags = np.array(answers).T
-    rows = np.searchsorted(times, trace.t - 0.5 / rate)
-    up = np.append(flags > 0, False)[rows]
-    begins = np.flatnonzero(np.diff(truth.astype(int), prepend=0) > 0)
-    same = [up[k] and not (k and up[k - 1]) for k in begins]
+        sent, events = received(pipe), len(source.events)
+    late = [s for s in found.spans.of("fault") if s.reason.startswith(("late", "silent"))]
     return {
         "study": "listen",
         "rate [Hz]": rate,
         "seconds": float(trace.t[-1] - trace.t[0]),
         "sent": sent,
         "heard": found.samples,
-        "lost": sent - found.samples + lost,
-        "alarms": int(np.sum(np.diff(up.astype(int), prepend=0) > 0)),
-        "alike": f"{sum(same)} of {len(begins)}",
-        "silent or late": len(found.spans.of("fault")),
+        "lost": sent - found.samples,
+        "events": events,
+        "alarms": int(np.sum(np.diff([int(up) for _, up in answers], prepend=0) > 0)),
+        "alike": alike(trace.t.tolist(), truth, dict(answers)),
+        "silent or late": len(late),
         **{f"{name} [us]": value for name, value in found.quantiles().items()},
         "cpu [us]": 1e6 * busy / max(1, found.samples),
     }
+
+
+def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool]) -> dict[str, Any]:
+    """Alarms of the file that begin at the same sample for the listener.
+
+    Args:
+        times: of the file's samples [s].
+        truth: whether its alarm is up, shape (T,).
+        said: the same of the listener by the time; alarms that begin beside a sample that was not
+            heard are not judged.
+    """
+    begins = [
+        k
+        for k in np.flatnonzero(np.diff(truth.astype(int), prepend=0) > 0).tolist()
+        if times[k] in said and (k == 0 or times[k - 1] in said)
+    ]
+    same = [said[times[k]] and not (k and said[times[k - 1]]) for k in begins]
+    return share(sum(same), len(begins))
 
 
 def stages(folder: Path, rate: float) -> list[Row]:
@@ -224,7 +263,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
     """Latency of each rate beside its period."""
     axes = figure.subplots()
     for k, row in enumerate(row for row in rows if row["study"] == "listen"):
-        values = [float(row[f"{name} [us]"]) / 1e3 for name in LEVELS]
+        # None: more than are told apart.
+        values = [float(row[f"{name} [us]"] or np.nan) / 1e3 for name in LEVELS]
         label = f"{row['rate [Hz]']:g} Hz, {row['heard']:,} samples"
         axes.semilogy(LEVELS, values, "o-", color=f"C{k}", label=label)
         period = 1e3 / float(row["rate [Hz]"])

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from tauguard.benchmarks.small_detector import trained
 from tauguard.report import Row
 
 if TYPE_CHECKING:
@@ -59,20 +60,10 @@ def run(quick: bool, seed: int) -> list[Row]:
 def detector(seed: int) -> Any:
     """A detector trained on simulated collision-free motion of the same arm."""
     from tauguard.datasets.plans import free_episodes
-    from tauguard.detectors import ArmModel, RobotNumbers, make_detector, train
     from tauguard.envs import simulate
-    from tauguard.models import cura6, cura6_drive, pin_model
-    from tauguard.traces import Trace
-
-    def thinned(trace: Trace) -> Trace:
-        rows = slice(None, None, round(1 / (trace.dt * SAMPLES)))
-        signals = (trace.t[rows], trace.q[rows], trace.qd[rows], trace.current[rows])
-        return Trace(trace.joint_names, *signals)
 
     episodes = free_episodes(seed, EPISODES, SECONDS, SPEEDS, (0.0,), None)
-    arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
-    training = [thinned(simulate(episode)) for episode in episodes]
-    return train(make_detector("moving-thresholds"), training, arm, PER_HOUR)
+    return trained([simulate(episode) for episode in episodes], SAMPLES, PER_HOUR)
 
 
 def environment(alarm: Any) -> ArmEnv:

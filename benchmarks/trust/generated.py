@@ -44,14 +44,14 @@ KILLS = (20, 1)
 
 def kill_rows(quick: bool, seed: int) -> list[Row]:
     """A row a number of workers."""
-    return [killed(["--workers", str(n)], KILLS[quick], seed) for n in (1, 2)]
+    return [killed(workers, KILLS[quick], seed) for workers in (1, 2)]
 
 
-def killed(how: list[str], count: int, seed: int) -> Row:
+def killed(workers: int, count: int, seed: int) -> Row:
     """Kill a command ``count`` times, each in a folder of its own, and let it go on.
 
     Args:
-        how: options of ``tauguard generate`` that say who computes.
+        workers: processes that compute.
         count: kills.
         seed: of the dataset and of the moments.
     """
@@ -62,11 +62,11 @@ def killed(how: list[str], count: int, seed: int) -> Row:
         config.write_text(textwrap.dedent(SMALL.format(seed=seed)))
         wanted = Path(place) / "wanted"
         generate_dataset(load(config), wanted, workers=1)
-        begun, ended = _timed(config, Path(place) / "timed", how)
+        begun, ended = _timed(config, Path(place) / "timed", workers)
         assert contents(Path(place) / "timed") == contents(wanted), "differs without a kill"
         for number in range(count):
             folder = Path(place) / f"killed-{number}"
-            command = _start(config, folder, how)
+            command = _start(config, folder, workers)
             _wait(folder, command)
             time.sleep(rng.uniform(0, 1.1 * (ended - begun)))
             os.killpg(command.pid, signal.SIGKILL)
@@ -75,7 +75,7 @@ def killed(how: list[str], count: int, seed: int) -> Row:
             same += contents(folder) == contents(wanted)
     return {
         "study": "generate",
-        "who": " ".join(how).removeprefix("--"),
+        "workers": workers,
         "kills": count,
         "before it ended": midway,
         "same bytes": same,
@@ -91,10 +91,11 @@ def contents(folder: Path) -> dict[str, str]:
     }
 
 
-def _start(config: Path, folder: Path, how: list[str]) -> subprocess.Popen[bytes]:
+def _start(config: Path, folder: Path, workers: int) -> subprocess.Popen[bytes]:
     program = "from tauguard.cli import main; main()"
+    flags = ["--out", str(folder), "--workers", str(workers)]
     return subprocess.Popen(
-        [sys.executable, "-c", program, "generate", str(config), "--out", str(folder), *how],
+        [sys.executable, "-c", program, "generate", str(config), *flags],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
@@ -107,11 +108,11 @@ def _wait(folder: Path, command: subprocess.Popen[bytes]) -> None:
         time.sleep(0.002)
 
 
-def _timed(config: Path, folder: Path, how: list[str]) -> tuple[float, float]:
+def _timed(config: Path, folder: Path, workers: int) -> tuple[float, float]:
     """When the dataset is begun and when the command ends, of a run that is left alone."""
-    command = _start(config, folder, how)
+    command = _start(config, folder, workers)
     _wait(folder, command)
     begun = time.monotonic()
     if command.wait() != 0:
-        raise RuntimeError(f"tauguard generate {' '.join(how)} failed")
+        raise RuntimeError(f"tauguard generate --workers {workers} failed")
     return begun, time.monotonic()

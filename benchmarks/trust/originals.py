@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.benchmarks.small_detector import bare_arm
+
 Array = NDArray[np.float64]
 
 COLUMNS = {"t": 0, "q": [1, 2], "qd": [3, 4], "current": [5, 6], "repair": ["nan"]}
@@ -100,14 +102,12 @@ def _joint_state(time: float, q: Array, qd: Array) -> bytes:
 
 def _write_model(path: Path) -> None:
     from tauguard.datasets import free_episodes
-    from tauguard.detectors import ArmModel, CollisionAlarm, RobotNumbers, save_model
+    from tauguard.detectors import CollisionAlarm, save_model
     from tauguard.detectors.methods.current_threshold import CurrentThreshold
     from tauguard.envs import simulate
-    from tauguard.models import cura6, cura6_drive, pin_model
 
     trace = simulate(free_episodes(0, 1, 4.0, (30.0,), (0.0,), None)[0])
-    arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
-    save_model(CollisionAlarm(CurrentThreshold().fit([trace], arm), 3.0), path)
+    save_model(CollisionAlarm(CurrentThreshold().fit([trace], bare_arm()), 3.0), path)
 
 
 def _write_robot(path: Path) -> None:

@@ -3,20 +3,19 @@
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.faults.arms import Watched, thinned
+from tauguard.benchmarks.faults.arms import RATE, Watched
 from tauguard.benchmarks.faults.study import Tally, clean, moments
+from tauguard.benchmarks.small_detector import trained
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import ArmModel, RobotNumbers, make_detector, train
 from tauguard.envs import simulate
-from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
+from tauguard.models import Mismatch
 
 
 @pytest.fixture(scope="module")
 def watched():
     drawn = Mismatch(seed=4)
-    free = [thinned(simulate(e)) for e in free_episodes(9, 3, 8.0, (40.0,), (0.0,), drawn)]
-    arm = ArmModel(RobotNumbers.from_pin(pin_model(cura6.arm_xml())), np.array(cura6_drive().gain))
-    alarm = train(make_detector("residual-thresholds"), free, arm, 5.0)
+    free = [simulate(e) for e in free_episodes(9, 3, 8.0, (40.0,), (0.0,), drawn)]
+    alarm = trained(free, RATE, 5.0, "residual-thresholds")
     return Watched.struck("small", alarm, struck_episodes(2, 1, 3, (40.0,), (0.0,), drawn))
 
 
