@@ -34,7 +34,7 @@ class Kept:
 
     @classmethod
     def of(cls, keep: str | None, study: str, seed: int, size: object) -> Kept:
-        """Results of other seeds, sizes and builds lie in folders of their own.
+        """One folder a seed, size and build.
 
         A build is the versions of the libraries and the sources of simulation and detectors. A
         change of native code or of the study itself is not seen: take another folder then.

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tauguard.traces.trace import Array
+from tauguard.traces.trace import Array, Trace
 
 REVERSAL = 0.02  # [rad/s] over which Coulomb friction changes its sign
 
@@ -55,3 +56,15 @@ UR10E = DriveNumbers(
 # its logs. The last joint's is not identifiable; it has the drive of the one before.
 UR5 = DriveNumbers(gain=(12.0, 10.6, 11.1, 9.9, 10.3, 10.3))
 DRIVES = {"ur10e": UR10E, "ur5": UR5}
+
+
+def preset_drive(columns: str | None, logs: Sequence[Trace]) -> tuple[str, DriveNumbers] | None:
+    """Name and drive of the preset that the logs' columns are of, or else of the one named.
+
+    Raises:
+        ValueError: logs of different presets, one of whose drives is known.
+    """
+    names = sorted({str(log.meta.get("columns") or columns or "no preset") for log in logs})
+    if len(names) > 1 and not DRIVES.keys().isdisjoint(names):
+        raise ValueError(f"logs of {', '.join(names)}: give those of one preset, or --gains")
+    return (names[0], DRIVES[names[0]]) if names and names[0] in DRIVES else None

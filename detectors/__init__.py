@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     )
     from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
     from tauguard.detectors.estimation.observer import MomentumObserver, observe
-    from tauguard.detectors.evaluation.events import Matching, find_alarms, match, match_detection
+    from tauguard.detectors.evaluation.events import (
+        Matching,
+        find_alarms,
+        match,
+        match_detection,
+        matchings,
+    )
     from tauguard.detectors.evaluation.metrics import figures, poisson_rate
     from tauguard.detectors.methods.srq_svr import PlainSrqSvr, SrqSvr
     from tauguard.detectors.methods.svr_regressor import SrqSVR, srq_kernel
@@ -76,6 +82,7 @@ __all__ = [
     "match",
     "match_detection",
     "match_diagnoses",
+    "matchings",
     "momentum_regressor",
     "momentum_terms",
     "observe",

@@ -33,7 +33,7 @@ from tauguard.detectors import (
     Matching,
     figures,
     make_detector,
-    match_detection,
+    matchings,
     train,
 )
 from tauguard.detectors.calibration.nominal import nominal_arm
@@ -119,7 +119,7 @@ def _entry(job: tuple[Path, str, str]) -> Entry:
     alarm = trained(recordings, name)
     seconds = time.process_time() - begin
     splits = tuple(
-        (split, tuple(matched(alarm, traces)))
+        (split, tuple(matchings(alarm, traces)))
         for split, traces in judged(folder, alarm.detector.arm.robot, ())
     )
     return Entry(name, arm, seconds, splits)
@@ -130,27 +130,22 @@ def trained(recordings: Sequence[Trace], name: str) -> CollisionAlarm:
     return train(make_detector(name), recordings, nominal_arm(recordings), PER_HOUR)
 
 
-def matched(alarm: CollisionAlarm, traces: Iterator[Trace] | Sequence[Trace]) -> list[Matching]:
-    """A detector's alarms on recordings, matched with their truth; one recording in memory."""
-    return [match_detection(alarm.detect(trace), trace, alarm.settle) for trace in traces]
-
-
 def rows_of(name: str, entries: Sequence[Entry]) -> list[Row]:
     """A detector's rows, a split each."""
     own = [entry for entry in entries if entry.detector == name]
     found: dict[str, list[Matching]] = {}
     for entry in own:
-        for split, matchings in entry.splits:
-            found.setdefault(split, []).extend(matchings)
+        for split, own_split in entry.splits:
+            found.setdefault(split, []).extend(own_split)
     seconds = float(np.median([entry.seconds for entry in own]))
     return [
-        {"study": "entries", "detector": name, "split": split, **_told(m), "train_s": seconds}
+        {"study": "entries", "detector": name, "split": split, **_columns(m), "train_s": seconds}
         for split, m in found.items()
     ]
 
 
-def _told(matchings: Sequence[Matching]) -> dict[str, Any]:
-    one = figures(matchings)
+def _columns(found: Sequence[Matching]) -> dict[str, Any]:
+    one = figures(found)
     head = one["headline"]
     return {
         "from_16": head["sensitivity"],
@@ -180,8 +175,8 @@ def by_path(wanted: Configuration, folder: Path, arm: str, name: str) -> list[Ro
         judge: Iterator[Trace] | Sequence[Trace] = traces["test"]
         if source == "path":
             judge = dict(judged(folder, alarm.detector.arm.robot, ("test",)))["test"]
-        told = _told(matched(alarm, judge))
-        rows.append({"study": "by path", "from": source, "threshold": alarm.threshold, **told})
+        columns = _columns(matchings(alarm, judge))
+        rows.append({"study": "by path", "from": source, "threshold": alarm.threshold, **columns})
     return rows
 
 

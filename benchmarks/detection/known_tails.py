@@ -22,8 +22,10 @@ from tauguard.report import rate as wilson
 
 Array = NDArray[np.float64]
 
-#: Episodes of a calibration, and blocks of a minute.
+#: Episodes of a calibration, and blocks in a minute.
 EPISODES, BLOCKS = 45, 120
+#: Bootstrap samples of a mean rate, which is skewed.
+RESAMPLES = 4000
 #: Standard deviation of the logarithm of an episode's scale, where episodes differ.
 SPREAD = 0.4
 #: Rare moments: how many an hour, the least peak, and the mean excess of their peaks.
@@ -105,17 +107,17 @@ def rows(calibrations: int, asked: tuple[float, ...], seed: int) -> list[Row]:
 
 def _row(name: str, law: str, asked: float, pairs: list[tuple[float, bool]]) -> Row:
     rates = np.array([rate for rate, _ in pairs])
-    error = float(rates.std(ddof=1) / np.sqrt(len(rates)))
-    mean = float(rates.mean())
+    again = np.random.default_rng(0).integers(len(rates), size=(RESAMPLES, len(rates)))
+    low, high = np.quantile(rates[again].mean(axis=1), (0.025, 0.975))
     return {
         "study": "known",
         "tail": name,
         "law": law,
         "asked": asked,
         "mean_per_hour": {
-            "value": mean,
-            "low": max(0.0, mean - 1.96 * error),
-            "high": mean + 1.96 * error,
+            "value": float(rates.mean()),
+            "low": float(low),
+            "high": float(high),
             "n": len(rates),
         },
         "median_per_hour": float(np.median(rates)),

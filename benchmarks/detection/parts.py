@@ -37,10 +37,11 @@ if TYPE_CHECKING:
 #: What the columns of the table mean.
 NOTES = {
     "parts": "SVR-SRQ without one of its parts, thresholds for asked false alarms per hour. found: "
-    "in the fresh motion of all arms, with its exact 95 % interval; kept: arms whose interval "
-    "reaches down to asked. sensitivity from 16 N m up and of all from 4 N m up; the delay of the "
-    "former [ms]. time: of a sample in the stream, Python included, over the median of the whole "
-    "detector's (first row: its own spread), the forms taken in turn on the first arm.",
+    "in the fresh motion of all arms, with its exact 95 % interval; kept: share of the arms whose "
+    "interval reaches down to asked. sensitivity from 16 N m up and of all from 4 N m up; the "
+    "delay of the former [ms]. time: of a sample in the stream, Python included, over the "
+    "median of the whole detector's (first row: its own spread), the forms in turn on "
+    "the first arm.",
 }
 WHOLE, LEVELS = "nothing", "speed levels"
 #: Parts of the state that is estimated with the residual, by what is left out.

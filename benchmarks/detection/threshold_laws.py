@@ -39,7 +39,7 @@ LAWS: dict[str, Callable[[Sequence[FreeScores], ExpectedRate, float], float]] = 
 
 
 @dataclass(frozen=True)
-class OfArm:
+class ArmOutcome:
     """What a threshold gave on one arm."""
 
     alarms: int
@@ -61,7 +61,7 @@ class Judged:
     detector: str
     law: str
     asked: float  #: [1/h]
-    arms: tuple[OfArm, ...]
+    arms: tuple[ArmOutcome, ...]
 
 
 def judged(
@@ -72,13 +72,13 @@ def judged(
     return Judged(name, law, asked, tuple(of_arms))
 
 
-def _of_arm(arm: Arm, name: str, law: str, asked: float, normalised: bool) -> OfArm:
+def _of_arm(arm: Arm, name: str, law: str, asked: float, normalised: bool) -> ArmOutcome:
     levels = speed_levels(arm.calibration[name]) if normalised else AS_IT_IS
     known = [one.over(levels) for one in arm.calibration[name]]
     fresh = [one.over(levels) for one in arm.fresh[name]]
     expected = ExpectedRate.of(known)
     threshold = LAWS[law](known, expected, asked)
-    return OfArm(
+    return ArmOutcome(
         sum(one.alarms(threshold) for one in fresh),
         sum(one.seconds for one in fresh) / 3600,
         expected.interval(threshold),
@@ -86,7 +86,7 @@ def _of_arm(arm: Arm, name: str, law: str, asked: float, normalised: bool) -> Of
     )
 
 
-def rate_row(case: Judged, group: str, arms: Sequence[OfArm]) -> Row:
+def rate_row(case: Judged, group: str, arms: Sequence[ArmOutcome]) -> Row:
     """``arms``: the rate found on these arms."""
     low, high = np.median([arm.stated for arm in arms], axis=0)
     return {
@@ -97,8 +97,8 @@ def rate_row(case: Judged, group: str, arms: Sequence[OfArm]) -> Row:
         "arms": group,
         "found_per_hour": poisson_rate(sum(a.alarms for a in arms), sum(a.hours for a in arms)),
         "stated": f"{two_digits(low)} to {two_digits(high)}",
-        "kept": f"{sum(a.found[0] <= case.asked for a in arms)} of {len(arms)}",
-        "inside": f"{sum(_meet(a.found, a.stated) for a in arms)} of {len(arms)}",
+        "kept": wilson(sum(a.found[0] <= case.asked for a in arms), len(arms)),
+        "inside": wilson(sum(_meet(a.found, a.stated) for a in arms), len(arms)),
         "by_arm": " ".join(str(a.alarms) for a in arms),
     }
 
@@ -107,7 +107,7 @@ def _meet(one: tuple[float, float], other: tuple[float, float]) -> bool:
     return one[0] <= other[1] and other[0] <= one[1]
 
 
-def price_row(case: Judged, group: str, arms: Sequence[OfArm]) -> Row | None:
+def price_row(case: Judged, group: str, arms: Sequence[ArmOutcome]) -> Row | None:
     """``price``: what the thresholds find; nothing where nothing was struck."""
     all_of = [pair for arm in arms for pair in arm.collisions]
     if not all_of:

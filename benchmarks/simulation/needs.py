@@ -18,7 +18,7 @@ from tauguard.benchmarks.harness import measure
 from tauguard.benchmarks.workers import Workers
 from tauguard.datasets.demo import SPEEDS, TRAINING_SPEEDS
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
-from tauguard.detectors import CollisionAlarm, SrqSvr, figures, match_detection, train
+from tauguard.detectors import SrqSvr, figures, matchings, train
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch
@@ -107,19 +107,21 @@ def costs(episode: Episode, parts: Sequence[str], repeats: int) -> dict[str, dic
 
 
 @dataclass(frozen=True)
-class Without:
+class TrainedWithout:
     """A detector from simulations without a part, judged in them."""
 
     found: dict[str, Any]  #: judged in the whole simulation
     believed: dict[str, Any]  #: judged in the one without the part
 
 
-def _without(job: tuple[Plan, str]) -> Without:
+def _without(job: tuple[Plan, str]) -> TrainedWithout:
     episodes, part = job
     recordings = _simulated(episodes.train, part)
     alarm = train(SrqSvr(), recordings, nominal_arm(recordings), PER_HOUR)
-    found = _judged(alarm, _simulated(episodes.judge, ""))
-    return Without(found, _judged(alarm, _simulated(episodes.judge, part)) if part else found)
+    found = figures(matchings(alarm, _simulated(episodes.judge, "")))
+    if not part:
+        return TrainedWithout(found, found)
+    return TrainedWithout(found, figures(matchings(alarm, _simulated(episodes.judge, part))))
 
 
 def _simulated(episodes: Sequence[Episode], part: str) -> list[Trace]:
@@ -137,11 +139,7 @@ def poorer(episode: Episode, part: str) -> Episode:
     return episode
 
 
-def _judged(alarm: CollisionAlarm, traces: Sequence[Trace]) -> dict[str, Any]:
-    return figures(match_detection(alarm.detect(t), t, alarm.settle) for t in traces)
-
-
-def _row(part: str, one: Without, cost: dict[str, float]) -> Row:
+def _row(part: str, one: TrainedWithout, cost: dict[str, float]) -> Row:
     found, head = one.found, one.found["headline"]
     return {
         "study": "needs",

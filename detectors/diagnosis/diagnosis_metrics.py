@@ -78,7 +78,7 @@ class TrueSeverity:
         if trace.truth is None:
             raise ValueError("trace has no truth to match a diagnosis with")
         first, last = np.searchsorted(trace.t, (collision.onset, min(collision.end, until)))
-        force = trace.truth.contact_vector[first : last + 1]
+        force = trace.truth.contact_vector[first : max(last, first + 1)]
         size = np.linalg.norm(force, axis=1)
         return cls(float(np.linalg.norm(force.sum(axis=0)) * trace.dt), float(size.max()))
 

@@ -8,13 +8,17 @@ false and detects nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tauguard.traces.trace import Alarm, Collision, Detection, Trace
+
+if TYPE_CHECKING:
+    from tauguard.detectors.thresholds.alarm import CollisionAlarm
 
 #: Alarms closer than this are one [s]; the false-alarm rate changes up to fourfold with it.
 MERGE_GAP = 0.5
@@ -154,3 +158,12 @@ def match_detection(detection: Detection, trace: Trace, skip: float = 0.0) -> Ma
         raise ValueError(f"detection has {len(detection.t)} samples, the trace {len(trace.t)}")
     span = float(min(trace.t[0] + skip, trace.t[-1])), float(trace.t[-1])
     return match(detection.alarms, trace.truth.collisions, span)
+
+
+def matchings(alarm: CollisionAlarm, traces: Iterable[Trace]) -> list[Matching]:
+    """A detector's alarms on recordings, matched with their truth; one recording in memory.
+
+    Raises:
+        ValueError: a trace without truth, or one that the detector does not take.
+    """
+    return [match_detection(alarm.detect(trace), trace, alarm.settle) for trace in traces]

@@ -35,8 +35,8 @@ class ThresholdCard:
     moving: Array  #: on one in motion, median over the logs [N m], (n,)
     starting: Array  #: on one that starts [N m], (n,)
     tool: dict[str, tuple[float, float]]
-    """Force at the last link's origin [N], standing and moving: found in half of all poses and
-    directions, and in 95 % of those in which any force reaches a joint."""
+    """Force at the last link's origin [N], standing and moving: found in half and in 95 % of all
+    poses and directions; infinite where no force is found in so many."""
     moment: float  #: at the last link that is found moving, in half of them [N m]
     seconds: float  #: of collision-free motion
     alarms: int  #: in left-out logs, under bounds from the others
@@ -110,7 +110,7 @@ def _tool(
 ) -> tuple[float, float]:
     """Forces [N] or moments [N m] on the last link that reach some joint's level.
 
-    In half and in 95 % of the directions in which any force reaches a joint.
+    In half and in 95 % of all poses and directions; infinite where fewer reach any joint.
     """
     robot = detector.arm.robot
     directions = np.random.default_rng(0).standard_normal((DIRECTIONS, 3))
@@ -125,7 +125,8 @@ def _tool(
         with np.errstate(divide="ignore"):
             least.append(1 / (torque / level).max(axis=1))
     forces = np.concatenate(least)
-    return float(np.quantile(forces, 0.5)), float(np.quantile(forces, 0.95))
+    half, most = np.quantile(forces, (0.5, 0.95), method="higher")  # no means with infinity
+    return float(half), float(most)
 
 
 def _unseen(traces: Sequence[Trace], names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:

@@ -14,9 +14,8 @@ exclude two an hour with 80 % confidence, whatever the threshold, nor none.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,26 +37,15 @@ BEYOND_CHANCE = 3.0
 DRAWS = 200
 
 
-@dataclass(frozen=True)
-class _Draw:
-    """One draw of the episodes."""
-
-    peaks: Array  #: of all blocks, rising
-    tail: Tail
-    hours: float
-
-    def counted(self, threshold: float) -> float:
-        """Alarms per hour of these episodes."""
-        above = len(self.peaks) - np.searchsorted(self.peaks, threshold, side="right")
-        return float(above / self.hours)
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExpectedRate:
     """Rates of false alarms of one detector, by threshold."""
 
-    draws: tuple[_Draw, ...]
-    highest: Array  #: peak of every episode
+    blocks: tuple[Array, ...]  #: peaks of each episode's blocks, rising
+    draws: NDArray[np.int64]  #: how often each draw holds each episode, shape (D, E)
+    tails: Tails  #: of the draws
+    draw_hours: Array  #: of each draw, shape (D,)
+    highest: Array  #: peak of every episode, shape (E,)
     hours: float  #: of all episodes
 
     @classmethod
@@ -69,19 +57,21 @@ class ExpectedRate:
         """
         if not scores:
             raise ValueError("no collision-free motion to tell a rate of false alarms from")
+        blocks = tuple(np.sort(one.blocks()[0]) for one in scores)
         highest = np.array([one.peak for one in scores])
-        return cls(tuple(_draws(scores)), highest, sum(one.seconds for one in scores) / 3600)
+        hours = np.array([one.seconds for one in scores]) / 3600
+        draws = _draws(len(scores))
+        own = draws @ hours
+        return cls(blocks, draws, Tails.of(blocks, draws, own), own, highest, float(hours.sum()))
 
     def rates(self, threshold: float) -> Array:
         """The rate of every draw, counted or along its tail [1/h], shape (D,)."""
-        found = self._tails.above(threshold)
-        for k in np.flatnonzero(threshold <= self._tails.base):
-            found[k] = self.draws[k].counted(threshold)
+        found = self.tails.above(threshold)
+        counted = threshold <= self.tails.base
+        if counted.any():
+            above = [len(b) - np.searchsorted(b, threshold, side="right") for b in self.blocks]
+            found[counted] = (self.draws[counted] @ np.array(above)) / self.draw_hours[counted]
         return found
-
-    @cached_property
-    def _tails(self) -> _Tails:
-        return _Tails.of(self.draws)
 
     def mean(self, threshold: float) -> float:
         """The expected rate [1/h]."""
@@ -94,11 +84,12 @@ class ExpectedRate:
     def interval(self, threshold: float, confidence: float = 0.95) -> tuple[float, float]:
         """The lowest and the highest rate that the motion allows [1/h]."""
         side = (1 - confidence) / 2
-        least, most = self.counted(threshold, side), self.counted(threshold, 1 - side)
+        least = self.episode_bound(threshold, side)
+        most = self.episode_bound(threshold, 1 - side)
         low, high = self.quantile(threshold, side), self.quantile(threshold, 1 - side)
         return min(low, least), max(high, most)
 
-    def counted(self, threshold: float, confidence: float) -> float:
+    def episode_bound(self, threshold: float, confidence: float) -> float:
         """The exact Poisson bound of the rate of episodes with an alarm [1/h], whatever the tail.
 
         An upper one where ``confidence`` is above one half, else a lower one.
@@ -125,7 +116,7 @@ class ExpectedRate:
                 return self.mean(threshold) - per_hour
             return self.quantile(threshold, confidence) - per_hour
 
-        low = min(float(draw.peaks[0]) for draw in self.draws)
+        low = min(float(peaks[0]) for peaks in self.blocks)
         if above(low) <= 0:
             return low
         step = max(float(np.max(self.highest)) - low, 1e-9)
@@ -136,7 +127,7 @@ class ExpectedRate:
 
 
 @dataclass(frozen=True)
-class _Tails:
+class Tails:
     """The tails of all draws, shape (D,) each."""
 
     base: Array
@@ -145,8 +136,18 @@ class _Tails:
     per_hour: Array  #: peaks above the base
 
     @classmethod
-    def of(cls, draws: Sequence[_Draw]) -> _Tails:
-        rows = [(d.tail.base, d.tail.scale, d.tail.shape, d.tail.count / d.hours) for d in draws]
+    def of(cls, blocks: Sequence[Array], draws: NDArray[np.int64], hours: Array) -> Tails:
+        """Of each draw's blocks; ``hours`` of each draw."""
+        together = np.concatenate(blocks)
+        order = np.argsort(together)
+        together = together[order]
+        episode = np.repeat(np.arange(len(blocks)), [len(b) for b in blocks])[order]
+        shapes = _shapes(together[::-1])
+        rows = []
+        for counts, own in zip(draws, hours, strict=True):
+            peaks = np.repeat(together, counts[episode])
+            tail = Tail.of(peaks[::-1], max(2, round(TAIL * len(peaks))), shapes)
+            rows.append((tail.base, tail.scale, tail.shape, tail.count / own))
         return cls(*np.array(rows).T)
 
     def above(self, threshold: float) -> Array:
@@ -159,15 +160,11 @@ class _Tails:
         return found
 
 
-def _draws(scores: Sequence[FreeScores]) -> Iterator[_Draw]:
+def _draws(episodes: int) -> NDArray[np.int64]:
+    """How often each draw with replacement holds each episode, shape (DRAWS, episodes)."""
     rng = np.random.default_rng(0)
-    blocks, seconds = [one.blocks()[0] for one in scores], [one.seconds for one in scores]
-    shapes = _shapes(np.sort(np.concatenate(blocks))[::-1])
-    for _ in range(DRAWS):
-        again = rng.integers(len(scores), size=len(scores))
-        peaks = np.sort(np.concatenate([blocks[k] for k in again]))
-        tail = Tail.of(peaks[::-1], max(2, round(TAIL * len(peaks))), shapes)
-        yield _Draw(peaks, tail, sum(seconds[k] for k in again) / 3600)
+    again = (rng.integers(episodes, size=episodes) for _ in range(DRAWS))
+    return np.stack([np.bincount(one, minlength=episodes) for one in again])
 
 
 def _shapes(peaks: Array) -> tuple[float, float]:

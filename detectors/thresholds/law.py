@@ -130,25 +130,6 @@ def threshold_for_rate(
     return ExpectedRate.of(scores).threshold(per_hour, confidence)
 
 
-def rate_interval(
-    scores: Sequence[FreeScores], threshold: float, confidence: float = 0.95
-) -> tuple[float, float]:
-    """How many false alarms an hour a threshold may give, as far as these episodes can tell.
-
-    See :mod:`.expected_rate`.
-
-    Args:
-        scores: collision-free motion, an episode each.
-        threshold: of the same scores.
-        confidence: of the interval.
-
-    Returns:
-        The lowest and the highest rate [1/h].
-    """
-
-    return ExpectedRate.of(scores).interval(threshold, confidence)
-
-
 def expected_rate(alarm: CollisionAlarm, traces: Sequence[Trace]) -> ExpectedRate:
     """How many false alarms an hour an alarm may give, by threshold.
 

@@ -1,5 +1,6 @@
 """From logs of an arm to a calibrated file, and detection with it; what is refused and named."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from tauguard.cli import main, real_logs
 from tauguard.cli.train import never_moved
+from tauguard.datasets.drives import DRIVES, preset_drive
 from tauguard.detectors.calibration.arm_file import load_arm
 from tauguard.detectors.calibration.recording import Load
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
@@ -221,6 +223,18 @@ def test_maps_that_are_no_maps(tmp_path, fields, message):
         real_logs.column_map(str(path))
     with pytest.raises(ValueError, match="no such file; presets are ur10e"):
         real_logs.column_map(str(tmp_path / "nosuch.json"))
+
+
+def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
+    plain = record(0, 1.0)
+    own = [dataclasses.replace(plain, meta={"columns": name}) for name in ("ur5", "ur10e")]
+    assert preset_drive(None, own[:1]) == preset_drive("ur10e", own[:1]) == ("ur5", DRIVES["ur5"])
+    assert preset_drive("ur10e", [plain]) == ("ur10e", DRIVES["ur10e"])
+    assert preset_drive("mine.json", [plain]) is preset_drive(None, [plain, plain]) is None
+    with pytest.raises(ValueError, match="logs of ur10e, ur5: give those of one preset"):
+        preset_drive(None, own)
+    with pytest.raises(ValueError, match="logs of no preset, ur5: give those of one preset"):
+        preset_drive(None, [own[0], plain])
 
 
 def test_where_the_scale_comes_from_is_said(folder):

@@ -228,8 +228,9 @@ def summary(
         joint = loudest_joint(found, alarm.start, alarm.end)
         name = trace.joint_names[joint]
         events.append({"start": alarm.start, "end": alarm.end, "joint": name})
-    for event, one in zip(events, causes, strict=False):
-        event |= one
+    if causes:
+        for event, one in zip(events, causes, strict=True):
+            event |= one
     return {
         "name": "detect",
         "log": log.name,

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tauguard.datasets import ColumnMap
-    from tauguard.datasets.drives import DriveNumbers
     from tauguard.detectors import ArmModel, RobotNumbers
     from tauguard.detectors.calibration.recording import Load, Recording
     from tauguard.traces import Trace
@@ -312,13 +311,6 @@ def doubts(
     return [*notes, *asked]
 
 
-def drive_of(columns: str | None, trace: Trace) -> DriveNumbers | None:
-    """The drive of the preset that was named, or that a log's header line is that of."""
-    from tauguard.datasets.drives import DRIVES
-
-    return DRIVES.get(columns or trace.meta.get("columns", ""))
-
-
 def start(
     numbers: RobotNumbers,
     recordings: list[Recording],
@@ -329,10 +321,11 @@ def start(
     """The arm to begin with, and what fixes the scale: "gains", "preset", "payload" or "masses".
 
     Raises:
-        ValueError: not one gain a joint.
+        ValueError: not one gain a joint, or logs of different presets.
     """
     import numpy as np
 
+    from tauguard.datasets.drives import preset_drive
     from tauguard.detectors import ArmModel
     from tauguard.detectors.calibration.assessment import start_gains
 
@@ -340,13 +333,13 @@ def start(
         if gains:
             raise ValueError("--gains: the logs hold joint torques, which need none")
         return ArmModel(numbers, np.ones(numbers.joints)), "torques"
-    preset = drive_of(columns, recordings[0].trace)
+    preset = None if gains else preset_drive(columns, [r.trace for r in recordings])
     known = any(r.load is not None and r.load.mass > 0 for r in recordings)
     if scale == "auto":
         otherwise = "payload" if known else "masses"
         scale = "gains" if gains or (preset and not known) else otherwise
-    if not gains and preset is not None:
-        gains = preset.gain
+    if preset is not None:
+        gains = preset[1].gain
         scale = "preset" if scale == "gains" else scale
     if gains and len(gains) != numbers.joints:
         raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
@@ -372,7 +365,7 @@ def watched_arm(
     """
     import numpy as np
 
-    from tauguard.datasets.drives import REVERSAL, DriveNumbers
+    from tauguard.datasets.drives import REVERSAL, DriveNumbers, preset_drive
     from tauguard.detectors import ArmModel, FrictionModel
     from tauguard.detectors.calibration.arm_file import load_arm
 
@@ -384,14 +377,16 @@ def watched_arm(
                 "--gains, --viscous and --coulomb, or give the robot's own file"
             )
         return calibrated, f"the calibration in {robot.name}"
-    preset, source = drive_of(columns, trace), "the flags"
+    source = "the flags"
     if is_torque(trace) and not gains:
         gains, source = (1.0,) * numbers.joints, "the log's torques"
+    preset = None if gains else preset_drive(columns, [trace])
     if not gains and preset is None:
         raise ValueError(f"--gains: give {numbers.joints} numbers, N m of joint torque per ampere")
-    if not gains and preset is not None:
-        gains, source = preset.gain, f"the preset {trace.meta.get('columns', columns)}"
-        viscous, coulomb = viscous or preset.viscous, coulomb or preset.coulomb
+    if preset is not None:
+        name, known = preset
+        gains, source = known.gain, f"the preset {name}"
+        viscous, coulomb = viscous or known.viscous, coulomb or known.coulomb
     if len(gains) != numbers.joints:
         raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
     drive = DriveNumbers(gains, viscous, coulomb)

@@ -64,7 +64,7 @@ def test_a_law_is_judged_by_what_fresh_motion_gives_and_by_what_it_finds():
     assert row["found_per_hour"]["low"] < 30 < row["found_per_hour"]["high"]
     assert row["found_per_hour"]["hours"] == pytest.approx(1.0)
     assert sum(map(int, row["by_arm"].split())) == row["found_per_hour"]["n"]
-    assert (row["kept"], row["inside"]) == ("3 of 3", "3 of 3")
+    assert (row["kept"]["value"], row["inside"]["value"], row["kept"]["n"]) == (1.0, 1.0, 3)
     assert rows["80 % bound"]["found_per_hour"]["value"] <= row["found_per_hour"]["value"]
 
 

@@ -25,7 +25,7 @@ def test_the_cost_of_the_whole_is_one_and_every_row_is_drawn():
     cost = needs.costs(Episode(seed=1, seconds=0.5), ("friction",), 1)
     assert cost["nothing"]["median"] == 1
     assert cost["friction"]["median"] > 0
-    one = needs.Without(figures([NONE]), figures([NONE]))
+    one = needs.TrainedWithout(figures([NONE]), figures([NONE]))
     rows = [needs._row(part, one, cost[part]) for part in cost]
     figure = Figure()
     needs.draw(rows, figure)

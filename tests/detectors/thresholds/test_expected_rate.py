@@ -59,7 +59,7 @@ def test_no_threshold_promises_less_than_motion_without_an_alarm_can_show():
     # Nothing lies beyond, but the motion lasts 45 minutes only: exp(-0.75 r) is 0.025.
     assert rate.mean(2.0) == 0
     assert rate.interval(2.0) == (0.0, pytest.approx(-np.log(0.025) / 0.75))
-    assert rate.counted(2.0, 0.8) == pytest.approx(-np.log(0.2) / 0.75)
+    assert rate.episode_bound(2.0, 0.8) == pytest.approx(-np.log(0.2) / 0.75)
 
 
 def test_one_noisy_episode_widens_the_interval():

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores
-from tauguard.detectors.thresholds.law import rate_interval, threshold_for_rate, with_rate
+from tauguard.detectors.thresholds.law import threshold_for_rate, with_rate
 from tauguard.detectors.thresholds.rates import Tail, block_maxima, tail_level
 from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels, recent_speed
 from tauguard.traces import Trace
@@ -133,7 +134,7 @@ def test_the_rate_of_a_threshold_lies_in_the_interval_that_its_calibration_state
 
     known = episodes(45)
     threshold = threshold_for_rate(known, 1.0)
-    low, high = rate_interval(known, threshold)
+    low, high = ExpectedRate.of(known).interval(threshold)
     # Blocks of 25 pieces exceed u with probability 25 exp(-u): 7,200 blocks an hour.
     true = 7200 * 25 * np.exp(-threshold)
     assert low < true < high
