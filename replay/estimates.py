@@ -25,7 +25,7 @@ class Explained(Protocol):
         """A word; "payload" is no contact."""
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """All of it in a few words."""
 
     @property
@@ -68,6 +68,6 @@ def arrows(shown: Sequence[Explained | None], metres: float, longest: float) -> 
     return {
         "vectors": vectors,
         "origins": points - vectors,
-        "labels": [one.said for one in some],
+        "labels": [one.summary for one in some],
         "lengths": np.array([one is not None for one in shown], dtype=int),
     }

@@ -107,7 +107,7 @@ def collision_table(
     lines = [f"## {len(rows)} collisions" + (f", {seen} noticed" if detection else ""), ""]
     if not rows:
         return lines
-    said = {one.alarm.start: one.said for one in explained}
+    said = {one.alarm.start: one.summary for one in explained}
     extra = ("| said |", "-|") if said else ("|", "")
     lines += [
         "| onset [s] | kind | link | peak torque [N m] | noticed after " + extra[0],
@@ -131,7 +131,7 @@ def alarms(detection: Detection | None, explained: Sequence[Explained] = ()) -> 
     if detection is None:
         return []
     lines = [f"## {len(detection.alarms)} alarms", ""]
-    said = {one.alarm.start: f": {one.said}" for one in explained}
+    said = {one.alarm.start: f": {one.summary}" for one in explained}
     lines += [
         f"- {a.start:.3f} s to {a.end:.3f} s{said.get(a.start, '')}"
         for a in detection.alarms[:LISTED]

@@ -173,7 +173,7 @@ def judge(event: Event, watching: CollisionAlarm, surface: LinkSurface) -> Judge
     }
     truth = contact_at(event.trace, event.collision, found.time)
     errors = {n: ContactErrors.of(a.force, a.point, truth) for n, a in answers.items()}
-    true = TrueSeverity.of(event.trace, event.collision, found.looked)
+    true = TrueSeverity.of(event.trace, event.collision, found.until)
     return Judged(*known, found, {n: a.link for n, a in answers.items()}, errors, true)
 
 

@@ -42,7 +42,7 @@ class Diagnosis:
     kinds: dict[str, float]  #: probability of each kind
     signs: Signs  #: what the kind was decided by
     severity: Severity  #: impulse and peak force, each with an interval
-    looked: float  #: end of the look at it [s]
+    until: float  #: end of the look at it [s]
     joints: tuple[str, ...]  #: their names
 
     @property
@@ -56,7 +56,7 @@ class Diagnosis:
         return self.kind == "push"
 
     @property
-    def said(self) -> str:
+    def summary(self) -> str:
         """The diagnosis in a few words, with intervals that hold 90 %."""
         if not self.collision:
             return f"payload changed by {self.signs.mass:+.2f} kg, no collision"

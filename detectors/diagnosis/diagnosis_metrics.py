@@ -115,7 +115,7 @@ def match_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[Matche
             used.add(about[0].onset)
             truth = contact_at(trace, about[0], diagnosis.time)
             errors = ContactErrors.of(diagnosis.force, diagnosis.point, truth)
-            true = TrueSeverity.of(trace, about[0], diagnosis.looked)
+            true = TrueSeverity.of(trace, about[0], diagnosis.until)
             matched.append(MatchedDiagnosis(diagnosis, about[0], errors, true))
     return matched
 

@@ -27,11 +27,11 @@ from tauguard.report import two_digits
 Array = NDArray[np.float64]
 
 #: Share of the true values that the intervals are to hold.
-SURE = 0.9
+COVERAGE = 0.9
 #: The torque is averaged over so many lags to either side before its peak is taken.
 SMOOTHED = 0.3
 #: The contact lasts while the torque is above this share of its peak.
-TOUCHES = 0.15
+CONTACT_SHARE = 0.15
 #: Relative error besides noise and place (log): directions that turn, gains. Chosen on simulated
 #: arms and seeds that no study judges.
 SPREAD = 0.2
@@ -42,17 +42,17 @@ UNRESOLVED = 0.9
 
 
 @dataclass(frozen=True)
-class Between:
-    """An estimate and the interval that holds the true value with probability :data:`SURE`."""
+class Interval90:
+    """An estimate and the interval that holds the true value with probability :data:`COVERAGE`."""
 
     value: float  #: the median
     low: float
     high: float
 
     @classmethod
-    def of(cls, draws: Array) -> Between:
+    def of(cls, draws: Array) -> Interval90:
         """Of draws, shape (K,)."""
-        low, middle, high = np.quantile(draws, ((1 - SURE) / 2, 0.5, (1 + SURE) / 2))
+        low, middle, high = np.quantile(draws, ((1 - COVERAGE) / 2, 0.5, (1 + COVERAGE) / 2))
         return cls(float(middle), float(low), float(high))
 
     @property
@@ -108,8 +108,8 @@ class ContactTorque:
 class Severity:
     """Of one contact, from its beginning to the end of the look at it."""
 
-    impulse: Between  #: norm of the force's integral [N s]
-    peak: Between  #: largest force [N]
+    impulse: Interval90  #: norm of the force's integral [N s]
+    peak: Interval90  #: largest force [N]
     torque: ContactTorque  #: which needs no place
 
     def text(self, kind: str, names: Sequence[str]) -> str:
@@ -142,18 +142,23 @@ def severity(
         surface: its sampled surface.
         after: the residual around the alarm.
         belief: where it was touched.
-        moments: that the belief is the product of; as they share their errors, all count as one.
+        moments: number of moments multiplied in `belief`; its root of that order is used, because
+            their errors are not independent.
         trust: how far a residual is believed.
     """
-    felt = ContactTorque.of(after)
-    noise = trust.noise(felt.mean, after.envelope[felt.row])
+    contact_torque = ContactTorque.of(after)
+    noise = trust.noise(contact_torque.mean, after.envelope[contact_torque.row])
     place = belief.probability ** (1 / moments)
-    force = force_draws(robot, surface, after.q[felt.row], felt.mean, noise, place)
-    rng, spread = np.random.default_rng((SEED, 1)), SPREAD * (1 + felt.hidden)
+    force = force_draws(
+        robot, surface, after.q[contact_torque.row], contact_torque.mean, noise, place
+    )
+    rng, spread = np.random.default_rng((SEED, 1)), SPREAD * (1 + contact_torque.hidden)
     size = np.linalg.norm(force, axis=1) * np.exp(spread * rng.standard_normal(len(force)))
-    sharper = 1 / (1 - felt.hidden * rng.random(len(force)))
-    peak = size * felt.shape * sharper
-    return Severity(Between.of(size * felt.seconds), Between.of(peak), felt)
+    sharper = 1 / (1 - contact_torque.hidden * rng.random(len(force)))
+    peak = size * contact_torque.shape * sharper
+    return Severity(
+        Interval90.of(size * contact_torque.seconds), Interval90.of(peak), contact_torque
+    )
 
 
 def _without_lag(after: Aftermath) -> tuple[float, Array]:
@@ -169,7 +174,7 @@ def _without_lag(after: Aftermath) -> tuple[float, Array]:
 
 def _contact(along: Array, top: int) -> tuple[int, int]:
     """First and last row of the contact whose torque is highest at row ``top``."""
-    weak = along < TOUCHES * along[top]
+    weak = along < CONTACT_SHARE * along[top]
     before, later = np.flatnonzero(weak[:top]), np.flatnonzero(weak[top:])
     first = int(before[-1]) if len(before) else 0
     last = top + int(later[0]) if len(later) else len(along) - 1

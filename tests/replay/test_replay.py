@@ -134,7 +134,7 @@ def test_the_page_tells_what_was_noticed():
 class Said:
     alarm: Alarm
     kind: str = "clamp"
-    said: str = "clamp, link 3, 100 N"
+    summary: str = "clamp, link 3, 100 N"
     force: np.ndarray = dataclasses.field(default_factory=lambda: np.array([0.0, 60.0, 80.0]))
     point: np.ndarray = dataclasses.field(default_factory=lambda: np.array([0.5, 0.1, 0.4]))
 

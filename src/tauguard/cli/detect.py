@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tauguard.detectors import Diagnosis
-    from tauguard.detectors.diagnosis.severity import Between, ContactTorque
+    from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90
     from tauguard.detectors.thresholds.quiet_start import Watch
     from tauguard.traces import Trace
 
@@ -175,30 +175,30 @@ def explained(
         surface = link_surface(robot)
     except ValueError as error:
         looked = AftermathOf(detector.arm, detector.arm.envelope, trace)
-        felt = [ContactTorque.of(looked.at(alarm.start)) for alarm in alarms]
-        return [{"said": one.text(trace.joint_names), **torques(one)} for one in felt], (
-            f"{error}: links and forces are not looked for",
-        )
+        contact_torque = [ContactTorque.of(looked.at(alarm.start)) for alarm in alarms]
+        return [
+            {"summary": one.text(trace.joint_names), **torques(one)} for one in contact_torque
+        ], (f"{error}: links and forces are not looked for",)
     return [cause(one) for one in Diagnoser.of(detector.arm, surface).diagnose(trace, alarms)], ()
 
 
-def torques(felt: ContactTorque) -> dict[str, Any]:
+def torques(contact_torque: ContactTorque) -> dict[str, Any]:
     """What a contact did at the joints, ready for JSON."""
     return {
-        "contact_s": felt.seconds,
-        "peak_torque_nm": felt.peak.tolist(),
-        "joint_impulse_nms": felt.impulse.tolist(),
+        "contact_s": contact_torque.seconds,
+        "peak_torque_nm": contact_torque.peak.tolist(),
+        "joint_impulse_nms": contact_torque.impulse.tolist(),
     }
 
 
 def cause(one: Diagnosis) -> dict[str, Any]:
     """A diagnosis, ready for JSON."""
 
-    def interval(value: Between) -> dict[str, Any]:
+    def interval(value: Interval90) -> dict[str, Any]:
         return {**dataclasses.asdict(value), "identifiable": value.identifiable}
 
     return {
-        "said": one.said,
+        "summary": one.summary,
         "kind": one.kind,
         "kinds": one.kinds,
         "link": one.link,
@@ -265,7 +265,7 @@ def report(result: dict[str, Any]) -> None:
         print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")
     for event in result["events"]:
         line = f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}"
-        print(f"{line}: {event['said']}" if event.get("said") else line)
+        print(f"{line}: {event['summary']}" if event.get("summary") else line)
     for fault in result["faults"]:
         print(f"fault {fault['start']:.3f} s to {fault['end']:.3f} s: {fault['reason']}")
     if result["fault_seconds"]:

@@ -10,7 +10,7 @@ from tauguard.benchmarks.detection.fleet import Training
 from tauguard.detectors import Diagnosis
 from tauguard.detectors.diagnosis.classification import Signs
 from tauguard.detectors.diagnosis.diagnosis_metrics import ContactErrors
-from tauguard.detectors.diagnosis.severity import Between, Severity
+from tauguard.detectors.diagnosis.severity import Interval90, Severity
 from tauguard.traces import Alarm, Collision, Trace, Truth
 
 T = np.arange(0, 2, 1e-3)
@@ -32,7 +32,7 @@ def trace(pressed):
 def judged(link=3, said=3, kind="impact", called="impact", force=50.0, **event):
     alarm = Alarm(0.51, 0.6)
     signs = Signs(0.0, 0.0, 1.4, 0.1, 1e4, 1.0, 0.1)
-    size = Severity(Between(1.0, 0.9, 1.2), Between(70, 60, 400), None)
+    size = Severity(Interval90(1.0, 0.9, 1.2), Interval90(70, 60, 400), None)
     found = Diagnosis(
         *(alarm, said, np.ones(6) / 6, 1, 0.52, np.zeros(3), np.zeros(3), called, {}, signs),
         *(size, 0.8, ()),

@@ -8,13 +8,15 @@ from tauguard.detectors.diagnosis.diagnosis_metrics import (
     TrueSeverity,
     contact_at,
 )
-from tauguard.detectors.diagnosis.severity import Between, ContactTorque, Severity
+from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90, Severity
 from tauguard.traces import Alarm, Collision, Trace, Truth
 
 T = np.arange(0, 3, 1e-3)
 #: An impulse interval that holds 50 N for 21 ms, and a peak interval that does not hold 50 N.
 SIZE = Severity(
-    Between(1.0, 0.9, 1.2), Between(70, 60, 400), ContactTorque(0, 0.1, *np.ones((2, 1)), 1.0, 0.0)
+    Interval90(1.0, 0.9, 1.2),
+    Interval90(70, 60, 400),
+    ContactTorque(0, 0.1, *np.ones((2, 1)), 1.0, 0.0),
 )
 SIGNS = Signs(0.0, 0.0, 0.0, np.inf, 1e3, 0.0, 0.1)
 

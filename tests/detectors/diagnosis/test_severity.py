@@ -6,7 +6,7 @@ from tauguard.detectors.diagnosis.aftermath import Aftermath
 from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
 from tauguard.detectors.diagnosis.force_draws import force_draws
 from tauguard.detectors.diagnosis.isolation import Trust
-from tauguard.detectors.diagnosis.severity import SURE, Between, ContactTorque, severity
+from tauguard.detectors.diagnosis.severity import COVERAGE, ContactTorque, Interval90, severity
 from tauguard.models import cura6, link_surface, pin_model
 
 XML = cura6.arm_xml()
@@ -36,12 +36,12 @@ def seen(torque, seconds, lag, dt=1e-3, after=0.3):
 @pytest.mark.parametrize("lag", [0.002, 0.005, 0.02, 0.04])
 @pytest.mark.parametrize("seconds", [0.02, 0.1])
 def test_the_impulse_at_the_joints_does_not_depend_on_the_lag(lag, seconds):
-    felt = ContactTorque.of(seen(TORQUE, seconds, lag))
-    np.testing.assert_allclose(felt.impulse, TORQUE * seconds * 2 / np.pi, rtol=0.12)
+    contact_torque = ContactTorque.of(seen(TORQUE, seconds, lag))
+    np.testing.assert_allclose(contact_torque.impulse, TORQUE * seconds * 2 / np.pi, rtol=0.12)
     # The peak is blurred where the blow is as short as the lag, and never too high.
-    assert (felt.peak <= 1.01 * TORQUE).all()
+    assert (contact_torque.peak <= 1.01 * TORQUE).all()
     if seconds > 4 * lag:
-        np.testing.assert_allclose(felt.peak, TORQUE, rtol=0.05)
+        np.testing.assert_allclose(contact_torque.peak, TORQUE, rtol=0.05)
 
 
 def contact(link, row, force):
@@ -71,17 +71,17 @@ def test_draws_have_the_mean_of_the_closed_form(row):
 
 def said(link, row, force, seconds=0.05):
     after = seen(contact(link, row, force), seconds, 0.005)
-    felt = ContactTorque.of(after)
-    noise = Trust().noise(felt.mean, after.envelope[0])
-    return severity(ROBOT, SURFACE, after, believed(felt.mean, noise), 1, Trust())
+    contact_torque = ContactTorque.of(after)
+    noise = Trust().noise(contact_torque.mean, after.envelope[0])
+    return severity(ROBOT, SURFACE, after, believed(contact_torque.mean, noise), 1, Trust())
 
 
 def test_most_intervals_hold_what_happened():
     cases = [(link, row, 80.0) for link in (2, 3, 4, 5) for row in range(0, 150, 15)]
     found = [said(*case) for case in cases]
-    assert np.mean([f.peak.low <= 80 <= f.peak.high for f in found]) >= SURE - 0.1
+    assert np.mean([f.peak.low <= 80 <= f.peak.high for f in found]) >= COVERAGE - 0.1
     impulse = 80 * 0.05 * 2 / np.pi
-    assert np.mean([f.impulse.low <= impulse <= f.impulse.high for f in found]) >= SURE - 0.1
+    assert np.mean([f.impulse.low <= impulse <= f.impulse.high for f in found]) >= COVERAGE - 0.1
     for name in ("peak", "impulse"):  # from 0 to infinity would hold it, too
         assert np.median([getattr(f, name).high / getattr(f, name).low for f in found]) < 4.5
 
@@ -95,7 +95,7 @@ def test_a_force_that_no_joint_feels_is_not_identifiable():
 
 
 def test_the_interval_is_that_of_the_draws():
-    between = Between.of(np.linspace(0, 100, 1001))
+    between = Interval90.of(np.linspace(0, 100, 1001))
     assert (between.low, between.value, between.high) == pytest.approx((5, 50, 95))
-    assert Between(123.4, 98.7, 151.0).text("N") == "120 N [99, 150]"
-    assert Between(40.0, 2.0, 151.0).text("N") == "[2, 150] N"
+    assert Interval90(123.4, 98.7, 151.0).text("N") == "120 N [99, 150]"
+    assert Interval90(40.0, 2.0, 151.0).text("N") == "[2, 150] N"
