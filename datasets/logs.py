@@ -6,6 +6,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -93,8 +94,8 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
     if header and columns.headerless:
         fitting = presets_of(header)
         raise ValueError(
-            f"the first line names columns ({', '.join(header)[:60]}, ...), files of these "
-            "columns have no such line: "
+            f"the first line names columns ({listed(header, 60)}), files of these columns have no "
+            "such line: "
             + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
         )
     rows = rows[1:] if header else rows
@@ -111,7 +112,7 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
         raise ValueError("a header line without rows of numbers")
     width = columns.width or len(header) or len(rows[0][1])
     table, lines, notes = parse(
-        rows, [i for group in where.values() for i in group], width, columns
+        rows, [i for group in where.values() for i in group], width, columns, header
     )
     if len(table) < 2:
         raise ValueError(f"{len(table)} rows of numbers, expected at least 2")
@@ -194,13 +195,22 @@ def position(column: Column, header: Sequence[str], columns: ColumnMap) -> int:
             raise ValueError(f"column {column}: indices begin at 0")
         return column
     if column not in header:
-        have = ", ".join(header) if header else "no header line"
-        raise ValueError(f"no column {column!r}; the file has: {have[:200]}")
+        have = listed(header, 200) if header else "no header line"
+        raise ValueError(f"no column {column!r}; the file has: {have}")
     return header.index(column)
 
 
+def listed(names: Sequence[str], length: int) -> str:
+    """As many names as fit into ``length`` characters."""
+    return shorten(", ".join(names), length, placeholder=" ...")
+
+
 def parse(
-    rows: Sequence[tuple[int, list[str]]], wanted: Sequence[int], width: int, columns: ColumnMap
+    rows: Sequence[tuple[int, list[str]]],
+    wanted: Sequence[int],
+    width: int,
+    columns: ColumnMap,
+    header: Sequence[str] = (),
 ) -> tuple[Array, NDArray[np.int64], list[str]]:
     """The wanted columns of all good rows, shape (R, columns), their line numbers, and notes."""
     if max(wanted) >= width:
@@ -218,7 +228,8 @@ def parse(
         found = [number(row[i]) for i in wanted]
         bad = next((i for i, v in zip(wanted, found, strict=True) if v is None), None)
         if bad is not None and (row[bad].strip() or "nan" not in columns.repair):
-            raise ValueError(f"line {line}, column {bad}: {row[bad]!r} is not a number")
+            name = repr(header[bad]) if header else f"{bad} (counted from 0)"
+            raise ValueError(f"line {line}, column {name}: {row[bad]!r} is not a number")
         cells = [np.nan if v is None else v for v in found]
         if not np.isfinite(cells).all():
             if "nan" in columns.repair:

@@ -107,7 +107,9 @@ def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trac
                     file.read_row_group(line["row_group"]), line, {"arm.xml": arms[line["arm"]]}
                 )
     except FileNotFoundError:
-        raise
+        raise FileNotFoundError(
+            f"{path}: missing; the same `tauguard generate` that made the dataset makes it again"
+        ) from None
     except (OSError, ValueError, KeyError) as error:
         raise ValueError(
             f"{path}: damaged ({' '.join(str(error).split())[:120]}); the same `tauguard generate` "

@@ -105,6 +105,10 @@ def distributions(given: Mapping[str, Any]) -> dict[str, Distribution]:
     Raises:
         ValueError: an unknown name, or values that cannot be; the message says what would work.
     """
+    if not isinstance(given, Mapping):
+        raise ValueError(
+            f"randomize: a {type(given).__name__}; expected a dict such as {{'mass': (0.9, 1.1)}}"
+        )
     found: dict[str, Distribution] = {}
     for name, value in given.items():
         if name not in PARAMETERS:

@@ -91,7 +91,10 @@ def link_surface(
         normals.append(out @ frame)
         links.append(np.full(len(place), joint, dtype=np.int64))
     if not links:
-        raise ValueError("robot: no link has collision geometry; give a model with its shapes")
+        raise ValueError(
+            "robot: no link has collision geometry, or its meshes were not found; give a model "
+            "with its shapes"
+        )
     return LinkSurface(np.concatenate(links), np.concatenate(places), np.concatenate(normals))
 
 
