@@ -1,4 +1,4 @@
-"""Overlap and sweeps of convex bodies, row by row.
+"""Overlap and sweeps of sharp convex bodies, row by row.
 
 ``abfme`` eliminates the unknowns of a separating plane (Fourier-Motzkin elimination with facet
 functions scaled by determinants, redundant combinations left out); ``sat`` tests separating axes
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Literal, cast, get_args, overload
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,13 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.geometry import frozen_finite, thread_count
 from tauguard.rigid import _rigid
 from tauguard.rigid.results import Impacts, Overlap, Witness
-from tauguard.rigid.rounded import Capsules, Rounded, Solid, Spheres
+from tauguard.rigid.rounded import Capsules, Rounded, Spheres
 from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
 
-if TYPE_CHECKING:
-    from tauguard.rigid.mesh import MeshOverlap, MeshTree
-
-OverlapMethod = Literal["abfme", "sat", "gjk", "auto"]
 SweepMethod = Literal["abfme", "sat", "auto"]
 
 #: Number of a method in the native module; ``sat_textbook`` and ``exact`` serve studies and tests.
@@ -33,61 +29,8 @@ _KINDS: dict[type, int] = {Tetrahedra: 0, Boxes: 1, Parallelepipeds: 2, Hulls: 3
 _NO_OFFSETS = np.zeros(1, dtype=np.int64)
 
 
-@overload
-def overlap(a: Solid, b: Solid, method: OverlapMethod = "auto", threads: int = 1) -> Overlap: ...
-@overload
-def overlap(
-    a: MeshTree, b: Solid, method: OverlapMethod = "auto", threads: int = 1
-) -> MeshOverlap: ...
-@overload
-def overlap(
-    a: Solid, b: MeshTree, method: OverlapMethod = "auto", threads: int = 1
-) -> MeshOverlap: ...
-def overlap(
-    a: Solid | MeshTree, b: Solid | MeshTree, method: OverlapMethod = "auto", threads: int = 1
-) -> Overlap | MeshOverlap:
-    """Do the convex bodies ``a[i]`` and ``b[i]`` share a point? Touching counts as a hit.
-
-    Args:
-        a: N bodies of one kind, rounded or not, or one body that meets every ``b[i]``; or a mesh,
-            whose surface counts (not its inside) and whose frame the bodies' numbers are in.
-        b: likewise; kinds mix freely, and at most one side is a mesh.
-        method: ``abfme``, ``sat`` (not for hulls, which have no facets) or ``auto`` (what the
-            study ``rigid`` shows fastest for the two kinds): never wrong on any finite input.
-            ``gjk`` asks coal, pair by pair and without that guarantee, and serves as a peer.
-            Rounded bodies and meshes know ``auto``, which is as exact.
-        threads: 0 means all processors; the answer does not depend on it.
-
-    Returns:
-        ``hit`` of shape (N,); of bodies ``witness``, which is found at its first access, and of a
-        mesh the ``faces`` that are met.
-
-    Raises:
-        ValueError: lengths that do not match, an unknown method, ``sat`` of hulls, ``gjk``
-            without coal, another method than ``auto`` of rounded bodies or a mesh, two meshes,
-            a coordinate beyond 1e100 of rounded bodies (1e30 beside a mesh).
-    """
-    if method not in get_args(OverlapMethod):
-        raise ValueError(
-            f"method: {method!r}, expected one of {', '.join(get_args(OverlapMethod))}"
-        )
-    special = [name for name, solid in (("a", a), ("b", b)) if not isinstance(solid, Bodies)]
-    if special and method != "auto":
-        raise ValueError(f"method: {method!r} knows sharp bodies only, {special[0]} is none; auto")
-    if not special:
-        return _sharp_overlap(cast(Bodies, a), cast(Bodies, b), method, threads)
-    from tauguard.rigid import gap, mesh, mesh_bodies
-
-    if isinstance(a, mesh.MeshTree) and isinstance(b, mesh.MeshTree):
-        raise ValueError("b: a mesh, as a is; MeshTree.overlap is for two meshes and their poses")
-    if isinstance(a, mesh.MeshTree):
-        return mesh_bodies.overlap(a, cast(Solid, b), threads)
-    if isinstance(b, mesh.MeshTree):
-        return mesh_bodies.overlap(b, a, threads, swapped=True)
-    return gap.rounded_overlap(a, b, threads)
-
-
-def _sharp_overlap(a: Bodies, b: Bodies, method: str, threads: int) -> Overlap:
+def sharp_overlap(a: Bodies, b: Bodies, method: str, threads: int) -> Overlap:
+    """Whether bodies without radii share a point; the methods are those of the public query."""
     count = rows(a, b)
     if method == "gjk":
         from tauguard.rigid.coal_peer import collide

@@ -89,7 +89,7 @@ def static_row(rng: np.random.Generator, kinds: tuple[str, str], n: int, known: 
         "overlap_ns": nanoseconds(spent["overlap"], n),
         "distance_ns": nanoseconds(spent["distance"], n),
         "known": len(truth),
-        "wrong": sum(exactly_meet(a, b, i) != hit[i] for i in decided),
+        "wrong": sum(exactly_meet(a, b, i) != bool(hit[i]) for i in decided),
         "signs_differ": int(((gap <= 0) != hit).sum()),
         "error": worst(gap, truth, size),
         **_coal_static(a, b, hit, gap, truth, size),

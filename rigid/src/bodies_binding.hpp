@@ -4,6 +4,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include "first_touch.hpp"
 #include "tauguard/rigid/moving_body.hpp"
 
 namespace tauguard::rigid {
@@ -18,6 +19,15 @@ using Poses = nanobind::ndarray<const double, nanobind::shape<-1, 4, 4>, nanobin
                                 nanobind::device::cpu>;
 using Vectors = nanobind::ndarray<const double, nanobind::shape<-1, 3>, nanobind::c_contig,
                                   nanobind::device::cpu>;
+
+// Rows of toi, point, normal.
+using Touches =
+    nanobind::ndarray<double, nanobind::shape<-1, 7>, nanobind::c_contig, nanobind::device::cpu>;
+
+inline void store(const FirstTouch& t, double* row) {
+  row[0] = t.toi;
+  for (int k = 0; k < 3; ++k) row[1 + k] = t.point[k], row[4 + k] = t.normal[k];
+}
 
 inline Bodies view(int kind, const Packed& data, const Offsets& offsets) {
   const bool cloud = is_cloud(static_cast<Kind>(kind));

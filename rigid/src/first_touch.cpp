@@ -8,6 +8,10 @@
 namespace tauguard::rigid {
 namespace {
 
+// Radii below this share of the size: a contact is described to 1e-9 of the size, so that the
+// direction between cores no further apart than that is off by 1e-3 or more.
+constexpr double small_radii = 1e-6;
+
 // A point of both where grown bodies overlap: on the way between their cores' nearest points.
 Vec common_point(const MovingBody& a, const MovingBody& b) {
   const Nearest near = nearest(a.now, b.now);
@@ -31,8 +35,8 @@ FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const
   const double tolerance = contact_tolerance(a, b), rounding = a.rounding + b.rounding;
   const bool along = norm(impact.normal) > 0 && bottom - top - rounding >= -tolerance;
   Vec point;
-  if (!along || (rounding > 0 && rounding < 1e-6 * (a.radius() + b.radius()))) {
-    point = common_point(a, b);  // balls so small leave the features that touch to rounding
+  if (!along || (rounding > 0 && rounding < small_radii * (a.radius() + b.radius()))) {
+    point = common_point(a, b);  // the features that touch cannot be told
   } else {
     contact_point(a.now, b.now, impact.normal.data(), tolerance, point.data());
     if (rounding > 0) point = point + 0.5 * (a.rounding - b.rounding) * impact.normal;

@@ -241,9 +241,9 @@ bool meet(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, doubl
       return true;
   }
   const auto x = vertices_of<Dyadic>(bodies_a, row), y = vertices_of<Dyadic>(bodies_b, row);
-  const ExactNearest<Dyadic> nearest(x, y);
-  const Dyadic reach = (Dyadic(radius_a) + Dyadic(radius_b)) * nearest.denominator;
-  return (inner(nearest.numerator, nearest.numerator) - reach * reach).sign() <= 0;
+  const ExactNearest<Dyadic> exact(x, y);
+  const Dyadic reach = (Dyadic(radius_a) + Dyadic(radius_b)) * exact.denominator;
+  return (inner(exact.numerator, exact.numerator) - reach * reach).sign() <= 0;
 }
 
 }  // namespace tauguard::rigid

@@ -13,7 +13,6 @@ namespace {
 
 using Gaps = nb::ndarray<double, nb::shape<-1, 10>, nb::c_contig, nb::device::cpu>;
 using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Touches = nb::ndarray<double, nb::shape<-1, 7>, nb::c_contig, nb::device::cpu>;
 using FaceRows = nb::ndarray<std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // A row of distance, point of a, point of b, normal.
@@ -21,11 +20,6 @@ void store(const Gap& g, double* row) {
   row[0] = g.distance;
   for (int k = 0; k < 3; ++k)
     row[1 + k] = g.point_a[k], row[4 + k] = g.point_b[k], row[7 + k] = g.normal[k];
-}
-
-void store(const FirstTouch& t, double* row) {
-  row[0] = t.toi;
-  for (int k = 0; k < 3; ++k) row[1 + k] = t.point[k], row[4 + k] = t.normal[k];
 }
 
 void gaps(int kind_a, Packed a, Offsets offsets_a, Radii radius_a, int kind_b, Packed b,

@@ -14,8 +14,6 @@ using tauguard::geometry::LongCall;
 
 using Vertices = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Faces = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Touches =
-    nb::ndarray<double, nb::shape<-1, 7>, nb::c_contig, nb::device::cpu>;  // toi, point, normal
 using Pairs = nb::ndarray<std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 
 namespace {
@@ -58,11 +56,6 @@ nb::tuple contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit,
   const std::size_t count = rows.size() / 3;
   return nb::make_tuple(owned(std::move(rows), std::array<std::size_t, 2>{count, 3}),
                         owned(std::move(values), std::array<std::size_t, 2>{count, 7}));
-}
-
-void store(const FirstTouch& t, double* out) {
-  out[0] = t.toi;
-  for (int k = 0; k < 3; ++k) out[1 + k] = t.point[k], out[4 + k] = t.normal[k];
 }
 
 void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear_a,

@@ -1,5 +1,7 @@
 """The study rigid: what its rows hold and that a wrong answer would show."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -204,6 +206,7 @@ def test_rows_of_rounded_bodies_and_a_mesh_stand_beside_coal():
     assert (row["signs_differ"], row["coal_disagrees"]["value"]) == (0, 0)
     assert row["coal_differs_most"] < 1e-6
     assert row["moving_passed_before"] == 0
+    json.dumps([static, moving, row])
 
 
 def test_pairs_that_overlap_at_the_start_hide_no_pair_that_met_too_early():

@@ -1,0 +1,43 @@
+"""Overlap of bodies with radii and its witness."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.geometry import thread_count
+from tauguard.rigid import _rigid_mesh
+from tauguard.rigid.gap import solid_gaps
+from tauguard.rigid.queries import find_witness, native, rows
+from tauguard.rigid.results import Overlap, Witness
+from tauguard.rigid.rounded import Solid, solid_parts
+
+
+def rounded_overlap(a: Solid, b: Solid, threads: int = 1) -> Overlap:
+    """Whether bodies with radii share a point; exact as a distance is, without its depth."""
+    (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
+    hit = np.empty(rows(core_a, core_b), dtype=np.uint8)
+    _rigid_mesh.meets(
+        *native(core_a), radius_a, *native(core_b), radius_b, hit, thread_count(threads)
+    )
+    met = hit.view(np.bool_)
+    return Overlap(met, lambda: rounded_witness(a, b, met, threads))
+
+
+def rounded_witness(a: Solid, b: Solid, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
+    """A common point or a separating plane of each row, to rounding."""
+    (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
+    cores = solid_gaps(core_a, core_b, threads)
+    # Where the cores meet they have a common point; else it lies on the way between them.
+    point = find_witness(core_a, core_b, cores.distance <= 0, threads).point
+    way = np.maximum(cores.distance, 0.0)
+    share = 0.5 * (np.maximum(way - radius_b, 0.0) + np.minimum(way, radius_a))
+    between = cores.point_a + share[:, None] * cores.normal
+    point = np.where((cores.distance > 0)[:, None], between, point)
+    middle = cores.point_a + 0.5 * (way + radius_a - radius_b)[:, None] * cores.normal
+    offset = np.einsum("ij,ij->i", cores.normal, middle)
+    return Witness(
+        np.where(hit[:, None], point, np.nan),
+        np.where(hit[:, None], np.nan, cores.normal),
+        np.where(hit, np.nan, offset),
+    )
