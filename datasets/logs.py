@@ -200,6 +200,11 @@ def position(column: Column, header: Sequence[str], columns: ColumnMap) -> int:
     return header.index(column)
 
 
+def column_text(column: int, header: Sequence[str]) -> str:
+    """A column by its name, or by its number where there are no names."""
+    return f"column {header[column]!r}" if header else f"column {column} (counted from 0)"
+
+
 def listed(names: Sequence[str], length: int) -> str:
     """As many names as fit into ``length`` characters."""
     return shorten(", ".join(names), length, placeholder=" ...")
@@ -228,17 +233,17 @@ def parse(
         found = [number(row[i]) for i in wanted]
         bad = next((i for i, v in zip(wanted, found, strict=True) if v is None), None)
         if bad is not None and (row[bad].strip() or "nan" not in columns.repair):
-            name = repr(header[bad]) if header else f"{bad} (counted from 0)"
-            raise ValueError(f"line {line}, column {name}: {row[bad]!r} is not a number")
+            raise ValueError(
+                f"line {line}, {column_text(bad, header)}: {row[bad]!r} is not a number"
+            )
         cells = [np.nan if v is None else v for v in found]
         if not np.isfinite(cells).all():
             if "nan" in columns.repair:
                 dropped.append(line)
                 continue
             bad = wanted[int(np.flatnonzero(~np.isfinite(cells))[0])]
-            raise ValueError(
-                f"line {line}, column {bad}: {row[bad].strip() or 'empty'}, not finite"
-            )
+            cell = row[bad].strip() or "empty"
+            raise ValueError(f"line {line}, {column_text(bad, header)}: {cell}, not finite")
         values.append(cells)
         lines.append(line)
     if dropped:
