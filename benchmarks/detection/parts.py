@@ -126,7 +126,7 @@ def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     cases = [(name, name, True) for name in size.extent.names] + [(LEVELS, WHOLE, False)]
     rows = []
     for part, name, normalised in cases:
-        case = judged(arms, name, "expected", size.asked, normalised)
+        case = judged(arms, name, "likeliest tail", size.asked, normalised)
         price = price_row(case, "all", case.arms) or {}
         row = {**rate_row(case, "all", case.arms), **price, "study": "parts"}
         for column in ("detector", "law", "arms", "inside", "stated", "by_arm"):

@@ -12,29 +12,19 @@ from tauguard.detectors import poisson_rate
 from tauguard.detectors.evaluation.metrics import HEADLINE
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
-from tauguard.detectors.thresholds.rates import tail_level
+from tauguard.detectors.thresholds.law import threshold_for_rate
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels
 from tauguard.report import Row, two_digits
 from tauguard.report import rate as wilson
 
 #: The score at every speed.
 AS_IT_IS = SpeedLevels(np.zeros(1), np.zeros(1), np.ones(1))
-#: Share of the blocks that the likeliest tail is fitted to.
-LIKELIEST = 0.02
-
-
-def likeliest(known: Sequence[FreeScores], expected: ExpectedRate, asked: float) -> float:
-    """Where the one tail that fits best has the rate: the peer."""
-    peaks = np.sort(np.concatenate([one.blocks()[0] for one in known]))[::-1]
-    return tail_level(peaks, asked * expected.hours, max(2, round(LIKELIEST * len(peaks))))
-
-
-#: How a threshold is chosen: the product's way, a bound that is enough in 80 % of the draws, and
-#: the likeliest tail.
+#: How a threshold is chosen: the product's way, the rate expected over all draws of the episodes,
+#: and a bound that is enough in 80 % of the draws.
 LAWS: dict[str, Callable[[Sequence[FreeScores], ExpectedRate, float], float]] = {
-    "expected": lambda _, expected, asked: expected.threshold(asked),
+    "likeliest tail": lambda known, _, asked: threshold_for_rate(known, asked),
+    "mean over draws": lambda _, expected, asked: expected.threshold(asked),
     "80 % bound": lambda _, expected, asked: expected.threshold(asked, 0.8),
-    "likeliest tail": likeliest,
 }
 
 

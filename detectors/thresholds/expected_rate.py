@@ -4,7 +4,7 @@ Alarms are blocks of the merge gap whose peak exceeds the threshold. Rates that 
 motion shows follow a generalised Pareto tail of the blocks' peaks. Episodes are drawn again with
 replacement, since the moments of one are alike, and every draw has a tail of its own. Tails that
 the same motion allows differ most in rare alarms, and a few of them give many: the expected rate is
-the mean over the draws, not the rate of the likeliest tail. That a tail ends is believed only as
+the mean over the draws, above the rate of the likeliest tail. That a tail ends is believed only as
 far as the peaks show it beyond chance.
 
 No tail knows of moments that no episode shows, nor where it ends. An interval therefore holds the

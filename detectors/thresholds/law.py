@@ -1,9 +1,9 @@
 """From collision-free motion to a threshold: the one way, for the command line and all studies.
 
 Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
-(:mod:`.speed_levels`), and the threshold is where the expected rate of false alarms is the one that
-is accepted (:mod:`.expected_rate`), or the one that a calibration set guarantees
-(:mod:`.guarantee`).
+(:mod:`.speed_levels`), and the threshold is where the likeliest tail of their peaks has the rate of
+false alarms that is accepted (:mod:`.rates`), or the one that a calibration set guarantees
+(:mod:`.guarantee`). What the motion allows besides is told by :mod:`.expected_rate`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,11 @@ from tauguard.detectors.thresholds.confirmation import CONFIRMATION
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
+from tauguard.detectors.thresholds.rates import tail_level
 from tauguard.traces.trace import Trace
 
+#: Share of the blocks whose peaks the tail is fitted to.
+TAIL = 0.02
 #: Share of the collision-free training traces that the threshold comes from.
 HELD_OUT = 0.34
 
@@ -116,18 +119,25 @@ def threshold_for_rate(
 ) -> float:
     """The threshold that collision-free motion exceeds ``per_hour`` times an hour.
 
-    See :mod:`.expected_rate`.
+    Alarms are counted as blocks of the merge gap that exceed the threshold. Rarer alarms than the
+    motion shows are extrapolated along a generalised Pareto tail of the blocks' peaks.
 
     Args:
         scores: an episode each.
         per_hour: false alarms to accept.
-        confidence: take the threshold that is enough in this share of all sets of as many episodes;
-            ``None``: the one expected.
+        confidence: take the threshold that is enough in this share of all sets of as many episodes,
+            see :mod:`.expected_rate`; ``None``: that of the tail that fits best.
 
     Raises:
         ValueError: no scores, or a rate that is not above 0.
     """
-    return ExpectedRate.of(scores).threshold(per_hour, confidence)
+    if confidence is not None:
+        return ExpectedRate.of(scores).threshold(per_hour, confidence)
+    if not (len(scores) and per_hour > 0):
+        raise ValueError(f"per_hour: {per_hour} of {len(scores)} episodes; expected both above 0")
+    peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
+    hours = sum(one.seconds for one in scores) / 3600
+    return tail_level(peaks, per_hour * hours, max(2, round(TAIL * len(peaks))))
 
 
 def expected_rate(alarm: CollisionAlarm, traces: Sequence[Trace]) -> ExpectedRate:

@@ -60,7 +60,7 @@ def test_a_law_is_judged_by_what_fresh_motion_gives_and_by_what_it_finds():
         price = price_row(case, "all", case.arms)
         assert (price["sensitivity"]["value"], price["sensitivity_all"]["value"]) == (1.0, 0.5)
         assert price["delay_ms"] == pytest.approx(10.0)
-    row = rows["expected"]
+    row = rows["mean over draws"]
     assert row["found_per_hour"]["low"] < 30 < row["found_per_hour"]["high"]
     assert row["found_per_hour"]["hours"] == pytest.approx(1.0)
     assert sum(map(int, row["by_arm"].split())) == row["found_per_hour"]["n"]
