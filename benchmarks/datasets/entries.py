@@ -184,20 +184,15 @@ def draw(rows: list[Row], figure: Figure) -> None:
     """False alarms an hour against collisions missed from 16 N m up, a point a detector."""
     own = [row for row in rows if row["study"] == "entries"]
     splits = list(dict.fromkeys(row["split"] for row in own))
-    for axes, split in zip(np.atleast_1d(figure.subplots(1, len(splits))), splits, strict=True):
-        for row in (r for r in own if r["split"] == split):
-            missed = 1 - row["from_16"]["value"]
-            (dot,) = axes.plot(row["false_per_hour"]["value"], missed, "o")
-            axes.annotate(
-                row["detector"],
-                (row["false_per_hour"]["value"], missed),
-                xytext=(5, 4),
-                textcoords="offset points",
-                fontsize=8,
-                color=dot.get_color(),
-            )
+    plots = np.atleast_1d(figure.subplots(1, len(splits)))
+    for axes, split in zip(plots, splits, strict=True):
+        for k, row in enumerate(r for r in own if r["split"] == split):
+            missed, alarms = 1 - row["from_16"]["value"], row["false_per_hour"]["value"]
+            axes.plot(alarms, missed, "os^Dv<>"[k % 7], label=row["detector"], alpha=0.8)
         axes.set(xlabel="false alarms per hour", ylabel="share missed from 16 N m up", title=split)
         axes.set_xscale("symlog", linthresh=1)
         axes.set_xlim(left=0)
         axes.set_ylim(bottom=0)
+        axes.margins(x=0.2)
         axes.grid(alpha=0.3)
+    figure.legend(*plots[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)

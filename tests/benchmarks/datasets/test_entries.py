@@ -29,9 +29,9 @@ def test_all_arms_of_a_split_are_judged_together():
     assert row["from_16"]["n"] == 2
     assert row["median"] == pytest.approx(10, abs=1)
     assert row["train_s"] == 2.0
-    figure = matplotlib.figure.Figure()
+    figure = matplotlib.figure.Figure(layout="constrained")
     draw([row], figure)
-    assert figure.axes[0].texts[0].get_text() == "mine"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["mine"]
 
 
 def test_seed_0_is_the_dataset_that_is_published():
