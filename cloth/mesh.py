@@ -11,6 +11,7 @@ come and go (``update_topology``) without a rebuild.
 from __future__ import annotations
 
 import time
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -233,7 +234,7 @@ class MeshCCD:
         Raises:
             ValueError: as :meth:`find`, or a ``fraction`` outside (0, 1).
         """
-        if not 0 < float(fraction) < 1:
+        if not (isinstance(fraction, Real) and 0 < fraction < 1):
             raise ValueError(f"fraction: {fraction!r:.40}, expected a number above 0 and below 1")
         start, end = self._checked_step(x_t0, x_t1)
         share, reach = 1.0, end

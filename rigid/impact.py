@@ -70,10 +70,12 @@ def time_of_impact(
         is common to both then too.
 
     Raises:
-        ValueError: lengths that do not match, polygons, or a coordinate beyond 1e100, whose
-            products would overflow (for bodies beside a mesh beyond 1e30, as for the mesh).
+        ValueError: lengths that do not match, no motion, polygons, or a coordinate beyond 1e100,
+            whose products would overflow (for bodies beside a mesh beyond 1e30, as for the mesh).
     """
     for name, motion in (("motion_a", motion_a), ("motion_b", motion_b)):
+        if not isinstance(motion, Motion):
+            raise ValueError(f"{name}: a {type(motion).__name__}, expected a Motion")
         _bounded(name, motion.pose_t0[:, :3, 3], motion.linear)
     if isinstance(a, MeshTree) or isinstance(b, MeshTree):
         return _of_meshes(a, b, motion_a, motion_b, threads)

@@ -220,7 +220,7 @@ def test_a_safe_step_meets_nothing_and_is_not_timid(numbers, fraction):
         assert share >= 0.5 * fraction * first
 
 
-@pytest.mark.parametrize("fraction", [0, 1, -1, 2, np.nan])
+@pytest.mark.parametrize("fraction", [0, 1, -1, 2, np.nan, "a", None])
 def test_a_fraction_outside_0_1_is_refused(fraction):
     with pytest.raises(ValueError, match="fraction: "):
         MeshCCD([[0, 1, 2]]).safe_step(np.zeros((3, 3)), np.zeros((3, 3)), fraction=fraction)

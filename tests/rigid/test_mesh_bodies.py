@@ -145,3 +145,9 @@ def test_what_is_no_batch_of_bodies_is_named_with_what_works(other):
             ) as error:
                 query(*sides)
             assert "\n" not in str(error.value)
+
+
+def test_a_pose_is_no_motion():
+    tree, ball = MeshTree(np.eye(3), [[0, 1, 2]]), Spheres([[0, 0, 2]], 0.5)
+    with pytest.raises(ValueError, match="motion_a: a ndarray, expected a Motion"):
+        time_of_impact(tree, ball, np.eye(4), REST)
