@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from tauguard.benchmarks.small_detector import thinned
 from tauguard.detectors import ArmModel, RobotNumbers
 from tauguard.detectors.calibration.recording import Recording
 from tauguard.envs import Episode, Simulation
 from tauguard.models import Mismatch, cura6, load_arm, pin_model
-from tauguard.traces import Trace
 
 #: Sample intervals [s]: 100 to 1000 Hz.
 INTERVALS = (10e-3, 8e-3, 4e-3, 2e-3, 1e-3)
@@ -42,14 +42,6 @@ def drawn_arm(seed: int, count: int) -> tuple[ArmModel, dict[str, Recording]]:
             arm=name,
         )
         trace = Simulation(episode).run()
-        recordings[f"log_{k}"] = Recording(_every(trace, INTERVALS[seed % len(INTERVALS)]))
+        recordings[f"log_{k}"] = Recording(thinned(trace, 1 / INTERVALS[seed % len(INTERVALS)]))
     robot = RobotNumbers.from_pin(pin_model(cura6.arm_xml(name)))
     return ArmModel(robot, load_arm(name).facts.drive.gain), recordings
-
-
-def _every(trace: Trace, interval: float) -> Trace:
-    """The samples that a slower logger keeps, without truth."""
-    rows = slice(None, None, max(1, round(interval / trace.dt)))
-    return Trace(
-        trace.joint_names, trace.t[rows], trace.q[rows], trace.qd[rows], trace.current[rows]
-    )

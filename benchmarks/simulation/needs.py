@@ -118,10 +118,16 @@ def _without(job: tuple[Plan, str]) -> TrainedWithout:
     episodes, part = job
     recordings = _simulated(episodes.train, part)
     alarm = train(SrqSvr(), recordings, nominal_arm(recordings), PER_HOUR)
-    found = figures(matchings(alarm, _simulated(episodes.judge, "")))
+    found = figures(matchings(alarm, _whole(episodes.judge)))
     if not part:
         return TrainedWithout(found, found)
     return TrainedWithout(found, figures(matchings(alarm, _simulated(episodes.judge, part))))
+
+
+@functools.lru_cache(1)
+def _whole(episodes: tuple[Episode, ...]) -> list[Trace]:
+    """Recordings of the whole simulation, made once a process for all the parts that it judges."""
+    return _simulated(episodes, "")
 
 
 def _simulated(episodes: Sequence[Episode], part: str) -> list[Trace]:

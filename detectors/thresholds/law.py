@@ -114,9 +114,7 @@ def with_guarantee(
     return replace(alarm, threshold=guarantee.threshold), guarantee
 
 
-def threshold_for_rate(
-    scores: Sequence[FreeScores], per_hour: float, confidence: float | None = None
-) -> float:
+def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     """The threshold that collision-free motion exceeds ``per_hour`` times an hour.
 
     Alarms are counted as blocks of the merge gap that exceed the threshold. Rarer alarms than the
@@ -125,14 +123,10 @@ def threshold_for_rate(
     Args:
         scores: an episode each.
         per_hour: false alarms to accept.
-        confidence: take the threshold that is enough in this share of all sets of as many episodes,
-            see :mod:`.expected_rate`; ``None``: that of the tail that fits best.
 
     Raises:
         ValueError: no scores, or a rate that is not above 0.
     """
-    if confidence is not None:
-        return ExpectedRate.of(scores).threshold(per_hour, confidence)
     if not (len(scores) and per_hour > 0):
         raise ValueError(f"per_hour: {per_hour} of {len(scores)} episodes; expected both above 0")
     peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "frame.hpp"
+#include "hard_numbers.hpp"
 #include "tauguard/geometry/call_lock.hpp"
 #include "tauguard/geometry/signs.hpp"
 #include "too_many.hpp"
@@ -18,27 +19,6 @@ using namespace tauguard::cloth;
 using tauguard::geometry::CallLock;
 using tauguard::geometry::InterruptScope;
 using tauguard::geometry::ThreadPool;
-using Random = std::mt19937_64;
-
-int failures = 0;
-void check(bool right, const char* what) {
-  if (right) return;
-  ++failures;
-  std::printf("wrong: %s\n", what);
-}
-
-double hard_number(Random& random) {
-  switch (random() % 8) {
-    case 0:
-      return 0;
-    case 1:
-      return std::ldexp(1.0 + double(random() % 1024), int(random() % 120) - 60);
-    case 2:
-      return 1e6 + double(random() % 8) * 0x1p-20;
-    default:
-      return double(int(random() % 5)) - 2;
-  }
-}
 
 std::vector<double> numbers(Random& random, std::size_t n, bool hard) {
   std::vector<double> x(n);

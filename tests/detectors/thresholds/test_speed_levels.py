@@ -134,9 +134,10 @@ def test_the_rate_of_a_threshold_lies_in_the_interval_that_its_calibration_state
 
     known = episodes(45)
     threshold = threshold_for_rate(known, 1.0)
-    low, high = ExpectedRate.of(known).interval(threshold)
+    expected = ExpectedRate.of(known)
+    low, high = expected.interval(threshold)
     # Blocks of 25 pieces exceed u with probability 25 exp(-u): 7,200 blocks an hour.
     true = 7200 * 25 * np.exp(-threshold)
     assert low < true < high
     assert low < 1.0 < high
-    assert threshold_for_rate(known, 1.0, confidence=0.9) > threshold
+    assert expected.threshold(1.0, confidence=0.9) > threshold
