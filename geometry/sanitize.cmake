@@ -3,7 +3,8 @@ set(TAUGUARD_SANITIZE "" CACHE STRING "address (and undefined behaviour) or thre
 
 function(tauguard_sanitize target)
   if(TAUGUARD_SANITIZE STREQUAL "address")
-    set(flags -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
+    set(flags -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
+        -fno-omit-frame-pointer)
   elseif(TAUGUARD_SANITIZE STREQUAL "thread")
     set(flags -fsanitize=thread)
   elseif(TAUGUARD_SANITIZE)

@@ -143,6 +143,18 @@ class Person {
     visit(axes_.forward, each), visit(axes_.left, each), visit(axes_.hip, each);
   }
 
+  // Whether phases and rows of the script are some that there are.
+  bool plausible() const {
+    const auto row_of = [](int k, std::size_t rows) {
+      return k >= 0 && static_cast<std::size_t>(k) < std::max<std::size_t>(rows, 1);
+    };
+    for (const Reach& h : hands_)
+      if (h.phase < Reach::resting || h.phase > Reach::returning ||
+          !row_of(h.next, script_.reach_rows))
+        return false;
+    return row_of(next_walk_, script_.walk_rows);
+  }
+
  private:
   Anatomy body_{};
   Script script_;

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -23,6 +25,38 @@ namespace {
 using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Numbers = std::vector<double>;
+// An array that Python made and the plant reads or writes.
+using Array = nb::ndarray<double, nb::c_contig, nb::device::cpu>;
+
+// The same for the plant, which keeps the array alive.
+Held held(const Array& array) {
+  Held out(array.data(), {}, std::make_shared<Array>(array));
+  for (std::size_t k = 0; k < array.ndim(); ++k) out.add_axis(array.shape(k));
+  return out;
+}
+
+// The arrays that MuJoCo's Python binding shows; model and data are kept alive.
+Physics physics_of(nb::object model, nb::object data, std::uintptr_t step,
+                   std::uintptr_t kinematics) {
+  Engine e;
+  const auto address = [](const nb::object& of) {
+    return nb::cast<std::uintptr_t>(of.attr("_address"));
+  };
+  e.model = reinterpret_cast<const void*>(address(model));
+  e.data = reinterpret_cast<void*>(address(data));
+  e.step = reinterpret_cast<Engine::Function>(step);
+  e.kinematics = reinterpret_cast<Engine::Function>(kinematics);
+  const auto array = [&](const char* name) { return nb::cast<Array>(data.attr(name)); };
+  e.nq = array("qpos").size(), e.nv = array("qvel").size();
+  e.qpos = array("qpos").data(), e.qvel = array("qvel").data();
+  e.qfrc_applied = array("qfrc_applied").data(), e.xfrc_applied = array("xfrc_applied").data();
+  e.sensordata = array("sensordata").data(), e.site_xpos = array("site_xpos").data();
+  e.xpos = array("xpos").data(), e.xquat = array("xquat").data(), e.xmat = array("xmat").data();
+  e.xanchor = array("xanchor").data(), e.xaxis = array("xaxis").data();
+  e.mocap_pos = array("mocap_pos").data(), e.mocap_quat = array("mocap_quat").data();
+  e.owner = std::make_shared<nb::tuple>(nb::make_tuple(std::move(model), std::move(data)));
+  return Physics(std::move(e));
+}
 
 void check(const double* action, std::size_t n, std::size_t env) {
   for (std::size_t i = 0; i < n; ++i)
@@ -84,8 +118,8 @@ std::size_t follow(Plant& p, Matrix q_des, Matrix qd_des, Matrix tau_ff, Matrix 
 // Where bodies and joints are along joint positions, without dynamics: a row of each table a row of
 // q, whose columns go to the addresses `qpos`.
 void poses(const Physics& physics, const std::vector<int>& qpos, Matrix q,
-           const std::vector<int>& bodies, const std::vector<int>& joints, Held position,
-           Held rotation, Held anchor, Held axis) {
+           const std::vector<int>& bodies, const std::vector<int>& joints, Array position,
+           Array rotation, Array anchor, Array axis) {
   const std::size_t rows = q.shape(0), n = qpos.size();
   if (q.shape(1) != n) throw nb::value_error("q: expected a column an address");
   if (position.size() != 3 * rows * bodies.size() || rotation.size() != 3 * position.size() ||
@@ -211,11 +245,13 @@ void bind_surroundings(nb::module_& m) {
 void bind_outputs(nb::module_& m) {
   nb::class_<Rows>(m, "Rows").def(
       "__init__",
-      [](Rows* self, Held observation, Held figure, Held tau_ext, Held target, Held q, Held qd,
-         Held current, Held tau, Held contact, Held region, Held tau_peak, Held peak, Held reaches,
-         Held walks) {
-        new (self) Rows{observation, figure,  tau_ext, target,   q,    qd,      current,
-                        tau,         contact, region,  tau_peak, peak, reaches, walks};
+      [](Rows* self, Array observation, Array figure, Array tau_ext, Array target, Array q,
+         Array qd, Array current, Array tau, Array contact, Array region, Array tau_peak,
+         Array peak, Array reaches, Array walks) {
+        new (self)
+            Rows{held(observation), held(figure),  held(tau_ext), held(target),  held(q),
+                 held(qd),          held(current), held(tau),     held(contact), held(region),
+                 held(tau_peak),    held(peak),    held(reaches), held(walks)};
       },
       nb::kw_only(), "observation"_a, "figure"_a, "tau_ext"_a, "target"_a, "q"_a, "qd"_a,
       "current"_a, "tau"_a, "contact"_a, "region"_a, "tau_peak"_a, "peak"_a, "reaches"_a,
@@ -223,9 +259,10 @@ void bind_outputs(nb::module_& m) {
   nb::class_<Track>(m, "Track")
       .def(
           "__init__",
-          [](Track* self, Held q, Held qd, Held current, Held sensors, Held poses,
+          [](Track* self, Array q, Array qd, Array current, Array sensors, Array poses,
              std::vector<int> bodies, int sensor_begin) {
-            new (self) Track{q, qd, current, sensors, poses, std::move(bodies), sensor_begin};
+            new (self) Track{held(q),     held(qd),          held(current), held(sensors),
+                             held(poses), std::move(bodies), sensor_begin};
           },
           nb::kw_only(), "q"_a, "qd"_a, "current"_a, "sensors"_a, "poses"_a, "bodies"_a,
           "sensor_begin"_a);
@@ -251,8 +288,7 @@ void bind_outputs(nb::module_& m) {
 
 void bind_plant(nb::module_& m) {
   nb::class_<Physics>(m, "Physics")
-      .def(nb::init<nb::object, nb::object, std::uintptr_t, std::uintptr_t>(), "model"_a, "data"_a,
-           nb::kw_only(), "step"_a, "kinematics"_a);
+      .def(nb::new_(&physics_of), "model"_a, "data"_a, nb::kw_only(), "step"_a, "kinematics"_a);
   nb::class_<Plant>(m, "Plant")
       .def(
           "__init__",

@@ -12,60 +12,9 @@
 
 #include "control.hpp"
 #include "drive.hpp"
-#include "kinematics.hpp"
-#include "person.hpp"
-#include "physics.hpp"
-#include "regions.hpp"
+#include "surroundings.hpp"
 
 namespace tauguard::envs {
-
-// Columns of the row of figures.
-enum Figure {
-  time_now,
-  distance,
-  force,
-  cost,
-  ratio,
-  region_force,
-  onset,
-  onset_time,
-  link,
-  region,
-  diverged,
-  speed_ratio,
-  figures
-};
-
-// What surrounds the drives: the arms' links and tools, body regions, contact sensors.
-struct Surroundings {
-  Kinematics arms;
-  std::vector<Tool> tools;
-  std::vector<Region> regions;
-  int person_begin = -1;  // the first of a person's regions; -1: nobody is there
-  Person person;
-  std::vector<double> low, high;  // of the observation
-  int sensor_begin = -1;          // of the links' contact sensors; -1: none
-};
-
-// Where an environment's results go: rows of arrays that Python owns.
-struct Rows {
-  Held observation, figure, tau_ext, target;
-  Held q, qd, current, tau;  // physics steps x joints
-  Held contact, region;      // physics steps x contact_width, physics steps x regions x 7
-  Held tau_peak, peak;       // joints; regions x peak_width
-  Held reaches, walks;       // the person's script: hands x rows x reach_width, rows x walk_width
-};
-
-// Where a run along a table of references is written to: row k belongs to the state before step k.
-struct Track {
-  Held q, qd, current;  // rows x joints
-  Held sensors, poses;  // rows x numbers of the links' sensors, rows x bodies x 7
-  std::vector<int> bodies;
-  int sensor_begin = 0;
-  // Force [N] and torque about the centre of mass [N m] on a body, rows x 6; body 0: none.
-  const double* wrench = nullptr;
-  int wrench_body = 0;
-};
 
 class Plant {
  public:
@@ -195,12 +144,18 @@ class Plant {
     return out;
   }
 
-  // Goes back to what state() gave; false where it is of another length.
+  // Goes back to what state() gave; false, and as it was, where no plant of this scene gives that.
   bool restore(const std::vector<double>& saved) {
-    if (saved.size() != state().size()) return false;
+    const std::vector<double> before = state();
+    if (saved.size() != before.size()) return false;
+    bool fits = true;
     std::size_t at = 0;
-    visit([&](auto& value) { value = static_cast<std::decay_t<decltype(value)>>(saved[at++]); });
-    return true;
+    visit([&](auto& value) { fits = holds(value, saved[at++]) && fits; });
+    if (!fits) return false;
+    assign(saved);
+    fits = plausible();
+    if (!fits) assign(before);
+    return fits;
   }
 
  private:
@@ -232,6 +187,32 @@ class Plant {
       row->resize(joints(), 0.0);
       for (double& value : *row) each(value);
     }
+  }
+
+  // Whether a number can be a value of this type; what counts or chooses is a whole number.
+  template <class T>
+  static bool holds(const T&, double number) {
+    if constexpr (std::is_same_v<T, double>) return true;
+    const double most = std::is_same_v<T, bool>   ? 1
+                        : std::is_enum_v<T>       ? static_cast<double>(Override::brake)
+                        : sizeof(T) > sizeof(int) ? 0x1p53
+                                                  : 0x1p31 - 1;
+    const bool below_zero = std::is_integral_v<T> && !std::is_same_v<T, bool>;
+    return number == std::floor(number) && number <= most && number >= (below_zero ? -most : 0);
+  }
+
+  void assign(const std::vector<double>& saved) {
+    std::size_t at = 0;
+    visit([&](auto& value) { value = static_cast<std::decay_t<decltype(value)>>(saved[at++]); });
+  }
+
+  // Whether everything that is an index is one.
+  bool plausible() const {
+    const auto within = [](int k, std::size_t most) {
+      return k >= 0 && static_cast<std::size_t>(k) <= most;
+    };
+    return within(contact_.link, joints()) && within(contact_.region, around_.regions.size()) &&
+           count_ >= 0 && (!peopled() || around_.person.plausible());
   }
 
   // One physics step: the state before it into a row, the drives' torques, mj_step.

@@ -66,6 +66,29 @@ def test_a_state_of_another_scene_is_refused():
         other.set_state(one.get_state())
 
 
+def test_a_state_with_numbers_that_no_plant_gives_is_refused_and_changes_nothing():
+    env = gym.make("tauguard/React-v0", obstacles=("person",)).unwrapped
+    env.reset(seed=3)
+    still = np.zeros((1, *env.action_space.shape))
+    played(env, still)
+    state = env.get_state()
+    strange, plant = (np.nan, np.inf, 1e300, -3.0, 0.5, 2.0**40), state["plant"]
+    refused = []
+    for k in range(len(plant)):
+        state["plant"] = plant.copy()
+        state["plant"][k] = strange[(k + k // len(strange)) % len(strange)]
+        try:
+            env.set_state(state)
+        except ValueError:
+            refused.append(k)
+            np.testing.assert_array_equal(env.get_state()["plant"], plant)
+        else:
+            played(env, still)
+        env.set_state(state | {"plant": plant})
+    # What chooses or counts: two reaches, a walk, the link and region, switches of the drives.
+    assert len(refused) >= 10
+
+
 def test_unknown_options_are_refused():
     env = gym.make("tauguard/Reach-v0").unwrapped
     with pytest.raises(ValueError, match="unknown 'bogus'"):

@@ -1,0 +1,61 @@
+// What surrounds the drives of a plant, and the rows that its results go to.
+#pragma once
+
+#include <vector>
+
+#include "kinematics.hpp"
+#include "person.hpp"
+#include "physics.hpp"
+#include "regions.hpp"
+
+namespace tauguard::envs {
+
+// Columns of the row of figures.
+enum Figure {
+  time_now,
+  distance,
+  force,
+  cost,
+  ratio,
+  region_force,
+  onset,
+  onset_time,
+  link,
+  region,
+  diverged,
+  speed_ratio,
+  figures
+};
+
+// What surrounds the drives: the arms' links and tools, body regions, contact sensors.
+struct Surroundings {
+  Kinematics arms;
+  std::vector<Tool> tools;
+  std::vector<Region> regions;
+  int person_begin = -1;  // the first of a person's regions; -1: nobody is there
+  Person person;
+  std::vector<double> low, high;  // of the observation
+  int sensor_begin = -1;          // of the links' contact sensors; -1: none
+};
+
+// Where an environment's results go: rows of arrays that Python owns.
+struct Rows {
+  Held observation, figure, tau_ext, target;
+  Held q, qd, current, tau;  // physics steps x joints
+  Held contact, region;      // physics steps x contact_width, physics steps x regions x 7
+  Held tau_peak, peak;       // joints; regions x peak_width
+  Held reaches, walks;       // the person's script: hands x rows x reach_width, rows x walk_width
+};
+
+// Where a run along a table of references is written to: row k belongs to the state before step k.
+struct Track {
+  Held q, qd, current;  // rows x joints
+  Held sensors, poses;  // rows x numbers of the links' sensors, rows x bodies x 7
+  std::vector<int> bodies;
+  int sensor_begin = 0;
+  // Force [N] and torque about the centre of mass [N m] on a body, rows x 6; body 0: none.
+  const double* wrench = nullptr;
+  int wrench_body = 0;
+};
+
+}  // namespace tauguard::envs
