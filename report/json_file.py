@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,16 +13,19 @@ from tauguard.whole_file import write_whole
 
 
 def write_json(path: Path, payload: Mapping[str, object]) -> None:
-    """Write ``payload`` to a file, whole or not at all."""
-    text = json.dumps(payload, indent=2, default=_plain, allow_nan=False) + "\n"
+    """Write ``payload`` to a file, whole or not at all; a number that is not finite is null."""
+    text = json.dumps(_finite(payload), indent=2, allow_nan=False) + "\n"
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
     write_whole(path, text)
 
 
-def _plain(value: object) -> object:
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} has no JSON form")
+def _finite(value: object) -> object:
+    """Plain values, with null where JSON has no number."""
+    if isinstance(value, np.ndarray | np.generic):
+        return _finite(value.tolist())
+    if isinstance(value, Mapping):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -66,8 +66,14 @@ def gap_row(pair: str, outcome: str, a: Bodies, b: Bodies, exact: int) -> Row:
 def worst(
     got: NDArray[np.float64], truth: NDArray[np.float64], size: NDArray[np.float64]
 ) -> float | None:
-    """The largest error as a share of the pair's extent, None where no truth is known."""
-    return float((np.abs(got[: len(truth)] - truth) / size).max()) if len(truth) else None
+    """The largest error as a share of the pair's extent, None where no truth is known.
+
+    Two points at one place have no extent: an error of theirs is infinite.
+    """
+    if not len(truth):
+        return None
+    off = np.abs(got[: len(truth)] - truth)
+    return float(np.divide(off, size, out=np.where(off > 0, np.inf, 0.0), where=size > 0).max())
 
 
 def coal_row(

@@ -8,6 +8,7 @@ import pytest
 from tauguard.benchmarks.rigid import claims as rigid_claims
 from tauguard.benchmarks.rigid import coal_motion
 from tauguard.benchmarks.rigid import convex as rigid_convex
+from tauguard.benchmarks.rigid import gap as rigid_gap
 from tauguard.benchmarks.rigid import impact as rigid_impact
 from tauguard.benchmarks.rigid import mesh as rigid_mesh
 from tauguard.benchmarks.rigid import mesh_bodies as rigid_mesh_bodies
@@ -214,3 +215,9 @@ def test_pairs_that_overlap_at_the_start_hide_no_pair_that_met_too_early():
     least = np.array([-1.0, 0.0, 0.0, -1.0, -1.0])
     assert coal_motion.passed_before(least, toi) == 2
     assert coal_motion.passed_before(np.abs(least), toi) == 0
+
+
+def test_an_error_between_points_without_extent_is_a_number():
+    truth, size = np.zeros(2), np.array([0.0, 2.0])
+    assert rigid_gap.worst(np.array([0.0, 0.5]), truth, size) == 0.25
+    assert rigid_gap.worst(np.array([1e-300, 0.5]), truth, size) == np.inf
