@@ -11,9 +11,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts._contacts import all_finite, carried
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
 #: What may touch, by name: MuJoCo's geom types and its flexes.

@@ -8,8 +8,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.contacts._contacts import Scene
-from tauguard.contacts.checker import Array, Index, geom_kinds
+from tauguard.contacts.checker import Index, geom_kinds
 
 #: Numbers of the native cores: plane, sphere, capsule, ellipsoid, cylinder, box, mesh.
 _CORES = {

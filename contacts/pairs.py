@@ -14,7 +14,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.contacts.checker import Array, Index, geom_kinds
+from tauguard.arrays import Array
+from tauguard.contacts.checker import Index, geom_kinds
 
 #: Kinds that MuJoCo never tests against one another.
 _NEVER = ({"plane"}, {"plane", "hfield"}, {"hfield"})

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.contacts.checker import Array, Contacts, Index, State, checked, geom_kinds, pair_kind
+from tauguard.arrays import Array
+from tauguard.contacts.checker import Contacts, Index, State, checked, geom_kinds, pair_kind
 from tauguard.contacts.geoms import CONVEX, native_scene
 from tauguard.contacts.pairs import geom_pairs
 from tauguard.contacts.surface_pairs import SurfacePairs

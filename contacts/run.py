@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.contacts.checker import Array, Contacts, State
+from tauguard.arrays import Array
+from tauguard.contacts.checker import Contacts, State
 from tauguard.contacts.referee import Verdicts
 
 #: Surfaces closer than this touch [m]: swept checkers stop within 1e-10 of the shapes' size, and

@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tauguard.contacts.checker import Array, Contacts, State, geom_kinds
+from tauguard.arrays import Array
+from tauguard.contacts.checker import Contacts, State, geom_kinds
 from tauguard.contacts.geoms import mesh_surface
 from tauguard.rigid import MeshTree, Motion, time_of_impact
 

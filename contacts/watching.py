@@ -8,7 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tauguard.contacts.checker import Array, Checker, Contacts, State, asked, checker
+from tauguard.arrays import Array
+from tauguard.contacts.checker import Checker, Contacts, State, asked, checker
 from tauguard.traces import CheckedContacts
 
 

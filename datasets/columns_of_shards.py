@@ -9,9 +9,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.traces import Collision, Trace, Truth
-
-Array = NDArray[np.float64]
 
 #: Signals of the joints: column ``q_1`` and so on, float32.
 JOINT_SIGNALS = ("q", "qd", "current", "q_des", "qd_des", "qdd_des", "tau_ext")

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tauguard.traces.trace import Array, Trace
+from tauguard.arrays import Array
+from tauguard.traces.trace import Trace
 
 REVERSAL = 0.02  # [rad/s] over which Coulomb friction changes its sign
 

@@ -10,8 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.detectors.faults.inputs import FASTEST
-from tauguard.traces.trace import Array, Trace
+from tauguard.traces.trace import Trace
 
 #: A pause longer than this many samples, and this many seconds, is a gap.
 GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.datasets.columns import PRESETS, Column, ColumnMap, presets_of, presets_of_width
 from tauguard.datasets.log_checks import checked
 from tauguard.strangers import reading
-from tauguard.traces.trace import Array, Trace
+from tauguard.traces.trace import Trace
 
 
 @dataclass(frozen=True)

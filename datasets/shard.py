@@ -12,8 +12,8 @@ from typing import Any, BinaryIO
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.datasets.code_identity import code
 from tauguard.datasets.columns_of_shards import (
     RESIDUAL,
@@ -31,8 +31,6 @@ from tauguard.envs.plant import untimed
 from tauguard.models import Drive, cura6, pin_model
 from tauguard.traces import Trace
 from tauguard.whole_file import whole_file, write_whole
-
-Array = NDArray[np.float64]
 
 #: Rate of the momentum observer [1/s], and slope of the nominal friction at standstill [rad/s].
 OBSERVER_GAIN, STANDSTILL = 50.0, 0.05

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 
 class Detector(Protocol):

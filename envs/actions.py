@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.world import World
-
-Array = NDArray[np.float64]
 
 #: Largest Cartesian increment: at this speed [m/s] and turning at this speed [rad/s].
 CARTESIAN_SPEED, CARTESIAN_TURN = 0.5, 1.5

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.cell import (
     COST,
     DISTANCE,
@@ -29,8 +30,6 @@ from tauguard.envs.rendering import Picture
 from tauguard.envs.settings import Settings, one_of
 from tauguard.envs.world import World, build_world, crossing, opposite, region_pressure
 from tauguard.models import BodyProxy, Person, Scene
-
-Array = NDArray[np.float64]
 
 #: Why a diverged episode ended.
 DIVERGED_REASON = (

@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
-import numpy as np
 from gymnasium.utils import RecordConstructorArgs
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.detecting import arm_env
 from tauguard.envs.settings import positive
-
-Array = NDArray[np.float64]
 
 
 class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):

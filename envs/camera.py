@@ -8,13 +8,12 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.detecting import arm_env
 from tauguard.envs.rendering import Camera
 from tauguard.envs.settings import one_of
 
-Array = NDArray[np.float64]
 Pictures = dict[str, Any]
 
 #: Depths beyond this read as this [m].

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.envs.actions import Entry, action_scale, action_table, observation_table
 from tauguard.envs.people import REACHES, WALKS, anatomy, draw_script
@@ -20,8 +21,6 @@ from tauguard.envs.settings import CONTROLS
 from tauguard.envs.watching import Watching
 from tauguard.envs.world import RegionInfo, World
 from tauguard.models import Person
-
-Array = NDArray[np.float64]
 
 #: Columns of :attr:`Cell.figure`, in the native order.
 FIGURES = (

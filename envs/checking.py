@@ -6,14 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts import Checker, State, watch
 from tauguard.envs.loop import Recording
 from tauguard.models import Scene
 from tauguard.traces import CheckedContacts
-
-Array = NDArray[np.float64]
 
 #: An obstacle that is this much farther after one step was put there and did not move there [m].
 JUMP = 0.25

@@ -8,12 +8,10 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.settings import DETECTORS
-
-Array = NDArray[np.float64]
 
 #: Bound of the residual in the observation [N m].
 RESIDUAL_BOUND = 1e4

@@ -8,12 +8,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.episode import CollisionPlan
 from tauguard.envs.motions import Motion
 from tauguard.envs.poses import Poses, cross
 from tauguard.models import Scene
-
-Array = NDArray[np.float64]
 
 #: A clamp needs a link that moves at least this fast [m/s] to run into it.
 CLAMP_SPEED = 0.005

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 #: A joint this near to an end of its range, or beyond it, may feel its stop [rad].
 MARGIN = 0.005

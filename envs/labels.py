@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.poses import Poses, cross
 from tauguard.traces import Collision
-
-Array = NDArray[np.float64]
 
 #: Contacts closer in time than this are one collision [s].
 MERGE_GAP = 0.5

@@ -6,13 +6,11 @@ from dataclasses import dataclass, fields
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.envs.plant import Gains, make_plant
 from tauguard.models import Drive, Scene
-
-Array = NDArray[np.float64]
 
 #: Numbers per link in a scene's contact sensors: found, force (3), torque (3), position (3).
 SENSOR_WIDTH = _plant.SENSOR_WIDTH

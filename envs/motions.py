@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 #: Peak velocity and acceleration of the quintic 10 s^3 - 15 s^4 + 6 s^5 per unit path and time.
 _PEAK_VELOCITY = 1.875

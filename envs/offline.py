@@ -7,11 +7,9 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
 import tauguard  # noqa: F401  (registers the environments)
-
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 #: What of ``info`` is kept at every step, as ``infos``.
 KEYS = ("cost", "success", "force", "limit_ratio", "tau_ext_peak")

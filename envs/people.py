@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.models import Person
 from tauguard.models.person import SEGMENTS
-
-Array = NDArray[np.float64]
 
 assert len(SEGMENTS) == _plant.PERSON_SEGMENTS
 #: A script has so many reaches of each hand and so many places to walk to, then begins anew.

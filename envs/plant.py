@@ -9,13 +9,11 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.models import Drive, Scene, derive
 from tauguard.models.mujoco_library import function_address, library
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.envs.plant import make_physics
 from tauguard.models import Scene
-
-Array = NDArray[np.float64]
 
 
 class Poses:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.models import Drive, Person, Scene
 from tauguard.models.obstacles import pair_weights
 from tauguard.models.payload import load_body
@@ -18,8 +18,6 @@ from tauguard.models.person import SEGMENTS
 
 if TYPE_CHECKING:
     from tauguard.envs.world import World
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

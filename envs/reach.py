@@ -8,14 +8,12 @@ from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.base import ArmEnv, Task
 from tauguard.envs.cell import DISTANCE, Cell
 from tauguard.envs.vector import VectorArmEnv
 from tauguard.envs.world import LOWEST, NEAREST, pose_box, tool_position
-
-Array = NDArray[np.float64]
 
 #: A target counts as reached this near [m], and is worth this much reward.
 TOLERANCE, BONUS = 0.03, 1.0

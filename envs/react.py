@@ -9,16 +9,14 @@ from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.base import ArmEnv, Task
 from tauguard.envs.cell import FORCE, FREE, ONSET_TIME, RATIO, SPEED, TIME, VELOCITY, Cell
 from tauguard.envs.settings import positive
 from tauguard.envs.vector import VectorArmEnv
 from tauguard.envs.world import World, find_tools, tool_position
 from tauguard.models import BodyProxy, Person, Scene
-
-Array = NDArray[np.float64]
 
 #: The tool swings along y and meets the region at its home pose, this far behind the start [m].
 RUN_UP = 0.25

@@ -8,14 +8,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.cell import BRAKE, FREE, LIMP, VELOCITY
 from tauguard.envs.detecting import arm_env
 from tauguard.envs.settings import one_of
-
-Array = NDArray[np.float64]
 
 #: The reactions, by name.
 REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")

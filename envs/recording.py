@@ -15,13 +15,12 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tauguard.arrays import Array
 from tauguard.detectors import find_alarms
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.detecting import arm_env
 from tauguard.envs.labels import Wrenches, collisions
 from tauguard.traces import Detection, Trace, Truth, write_mcap
-
-Array = NDArray[np.float64]
 
 
 @dataclass

@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array, Bools
 from tauguard.detectors import (
     CollisionAlarm,
     Estimator,
@@ -26,9 +26,6 @@ from tauguard.envs.joint_ends import JointEnds
 from tauguard.envs.settings import DETECTORS
 from tauguard.envs.world import World
 from tauguard.models import Drive, pin_model
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: The plain detector's thresholds: times the breakaway friction, plus a share of the torque limit.
 FRICTION_SHARE, TORQUE_SHARE = 1.5, 0.03

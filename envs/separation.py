@@ -8,14 +8,12 @@ import gymnasium
 import mujoco
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.base import ArmEnv
 from tauguard.envs.cell import FREE, VELOCITY
 from tauguard.envs.detecting import arm_env
 from tauguard.envs.settings import positive
-
-Array = NDArray[np.float64]
 
 #: Distances beyond this are not looked at [m].
 FAR = 3.0

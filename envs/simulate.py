@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import labels
 from tauguard.envs.episode import CollisionPlan, Episode, PayloadPick
@@ -36,7 +36,6 @@ from tauguard.traces import CheckedContacts, Trace, Truth
 if TYPE_CHECKING:
     from tauguard.contacts import Checker
 
-Array = NDArray[np.float64]
 
 #: Poses are drawn this far around the CURA6-like arm's home [rad].
 OWN_SPREAD = (1.6, 0.55, 0.7, 1.0, 1.0, 1.5)

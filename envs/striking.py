@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs import labels
 from tauguard.envs.episode import CollisionPlan
 from tauguard.envs.injection import (
@@ -23,8 +23,6 @@ from tauguard.envs.loop import Recording, SimulationLoop
 from tauguard.envs.motions import Motion
 from tauguard.envs.poses import Poses, cross
 from tauguard.models import Scene
-
-Array = NDArray[np.float64]
 
 #: Out of everybody's way: where an obstacle waits [m].
 PARKED = np.array([0.0, 0.0, 50.0])

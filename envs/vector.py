@@ -11,8 +11,9 @@ import numpy as np
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array, Bools
 from tauguard.envs.base import (
     DIVERGED_REASON,
     RENDER_MODES,
@@ -38,9 +39,6 @@ from tauguard.envs.cell import (
 from tauguard.envs.randomization import check_options
 from tauguard.envs.rendering import Picture
 from tauguard.envs.settings import one_of
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 class VectorArmEnv(VectorEnv[Array, Array, Array]):

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs.plant import Gains
 from tauguard.envs.randomization import check_names
 from tauguard.envs.settings import PERSON, Settings
@@ -25,8 +26,6 @@ from tauguard.models import (
     without_losses,
 )
 from tauguard.models.person import PersonPart
-
-Array = NDArray[np.float64]
 
 #: A tool pose to reach lies at least this high and this far from the base's axis [m].
 LOWEST, NEAREST = 0.12, 0.2

@@ -9,8 +9,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.models import cura6, derive
 from tauguard.models.arm_file import (
     ARM_BITS,
@@ -26,7 +26,6 @@ from tauguard.models.robot import Robot, per_joint
 
 __all__ = ["ARM_BITS", "NAMED", "OBSTACLE_BITS", "STICK_RADIUS", "Arm", "Facts", "load_arm"]
 
-Array = NDArray[np.float64]
 
 #: Arms that need no file.
 NAMED = cura6.NAMES

@@ -10,12 +10,10 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.models.mjcf import SpecText, compiled
 from tauguard.models.robot_check import checked_robot, checked_text
-
-Array = NDArray[np.float64]
 
 #: Collision bits: what the arm has and what obstacles have, so that the arm never meets itself.
 ARM_BITS, OBSTACLE_BITS = 1, 2

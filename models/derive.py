@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 #: Rotor inertia at the joint per torque limit [kg m^2 / (N m)]: between geared cobot drives with
 #: small motors (about 0.002: 1e-5 kg m^2 behind a gear of 101 for 54 N m) and the DLR arm's

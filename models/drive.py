@@ -8,12 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.models import cura6
 from tauguard.models.checks import above_zero, not_negative, shaped
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

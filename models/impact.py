@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.models.scene import Scene
-
-Array = NDArray[np.float64]
 
 
 def reflected_mass(

@@ -10,9 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.models.nominal import compiled
-
-Array = NDArray[np.float64]
 
 #: Points on each link, and lines that may be tried for each of them (thin links are often missed).
 POINTS, TRIES = 150, 40

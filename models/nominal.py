@@ -13,13 +13,13 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.models.checks import rigid_pose
 from tauguard.models.robot_check import checked_robot, checked_text
 from tauguard.strangers import read_text
 
-Array = NDArray[np.float64]
 #: Elements of a robot file inside one another, at most.
 MOST_DEPTH = 200
 

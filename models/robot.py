@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.strangers import read_text, reading
 
-Array = NDArray[np.float64]
 Numbers = tuple[float, ...]
 
 #: What becomes of the joints below the flange.

@@ -7,13 +7,11 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.models.robot_check import checked_robot
 from tauguard.strangers import read_text
 from tauguard.whole_file import write_whole
-
-Array = NDArray[np.float64]
 
 #: Name of the element (URDF) or of the custom text (MJCF) that holds a note.
 TAG = "tauguard"

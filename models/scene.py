@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.models.arm import NAMED, Arm, Facts, load_arm
 from tauguard.models.checks import rigid_pose
 from tauguard.models.cloth import Cloth, add_cloth
@@ -29,8 +30,6 @@ from tauguard.models.obstacles import (
 from tauguard.models.payload import add_payload_body
 from tauguard.models.person import Person, add_person
 from tauguard.models.robot import Robot
-
-Array = NDArray[np.float64]
 
 #: Integrators by MuJoCo's names.
 INTEGRATORS = {

@@ -13,9 +13,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.replay.robot import Motion, bodies, quats_wxyz
 from tauguard.replay.rrd import COLOURS, TIMELINE, drawn, entity, log_pose, times
-from tauguard.traces.trace import Array
 
 #: Contacts of one checker: their times [s], shape (K,), points [m] and normals, shape (K, 3).
 Marks = tuple[Array, Array, Array]

@@ -7,7 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tauguard.traces.trace import Alarm, Array
+from tauguard.arrays import Array
+from tauguard.traces.trace import Alarm
 
 #: An estimate is shown from its alarm on for at least so long [s].
 SHOWN = 0.5

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.traces.trace import Array
+from tauguard.arrays import Array
 
 LARGEST_SHOWN_GROUP = 2  # the menagerie's convention, and MuJoCo's viewer's: 3 is for collisions
 STICK_RADIUS = 0.02  # [m] of the lines that stand for links without geometry

@@ -13,10 +13,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.replay.estimates import Explained, arrows, during
 from tauguard.replay.robot import Body, Motion, Shape, bodies, load_model, motion, quats_wxyz
 from tauguard.replay.story import cut, first_moment, page
-from tauguard.traces.trace import Array, Detection, Trace
+from tauguard.traces.trace import Detection, Trace
 
 TIMELINE = "time"
 FRAME_RATE = 60.0  # [Hz] of the moving bodies

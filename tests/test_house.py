@@ -38,6 +38,10 @@ ALLOWED = {
     "hard_cases": PRODUCT,
     "cli": PRODUCT | {"report", "benchmarks", "hard_cases"},
 }
+#: Modules at the top that every room may use: they use each other and no room.
+SHARED = {"arrays", "lazy", "strangers", "whole_file"}
+#: The front door: what it does stands in the rooms.
+DOOR = {"__init__", "__main__", "environments"}
 FOLDERS = {room: ROOT / ("src/tauguard/cli" if room == "cli" else room) for room in ALLOWED}
 
 
@@ -61,6 +65,18 @@ def test_imports_point_one_way(room):
     for path in FOLDERS[room].rglob("*.py"):
         backward = (rooms_imported(path) & ALLOWED.keys()) - ALLOWED[room] - {room}
         assert not backward, f"{path.relative_to(ROOT)} imports {sorted(backward)}"
+
+
+def test_shared_modules_stand_on_no_room_and_nothing_else_stands_beside_them():
+    top = ROOT / "src" / "tauguard"
+    assert {path.stem for path in top.glob("*.py")} == SHARED | DOOR
+    for name in SHARED:
+        assert rooms_imported(top / f"{name}.py") <= SHARED, name
+    for room in ALLOWED:
+        for path in FOLDERS[room].rglob("*.py"):
+            beside = rooms_imported(path) - ALLOWED.keys() - SHARED
+            beside -= DOOR | {"__version__"} if room == "cli" else set()
+            assert not beside, f"{path.relative_to(ROOT)} imports {sorted(beside)}"
 
 
 def test_every_study_of_the_command_line_is_reached_through_its_one_command():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.traces.mcap_cdr import Anything
-from tauguard.traces.trace import Array
 
 
 def nanoseconds(t: Array) -> NDArray[np.uint64]:

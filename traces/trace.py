@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array, Bools
 from tauguard.traces.contacts import CheckedContacts
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 KINDS = ("strike", "clamp", "pulse")
 

@@ -8,8 +8,8 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.cloth.peer import load_ipctk
 from tauguard.benchmarks.cloth.rational import point_edge_time, point_point_time
 from tauguard.benchmarks.cloth.scaling import bound, scaled, scenes, step_at
@@ -17,7 +17,6 @@ from tauguard.benchmarks.harness import measure
 from tauguard.cloth import Impacts, MeshCCD, point_edge, point_point
 from tauguard.report import Row
 
-Array = NDArray[np.float64]
 Query = Callable[..., Impacts]
 Truth = Callable[[Array, Array], float]
 QUERIES: dict[str, tuple[Query, int, Truth]] = {

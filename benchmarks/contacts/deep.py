@@ -13,13 +13,11 @@ from typing import Any
 import coal
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
+from tauguard.arrays import Array
 from tauguard.contacts.pairs import geom_flex_pairs, geom_pairs
-
-Array = NDArray[np.float64]
 
 #: Share of the half thickness that is left.
 LEFT = 0.03

@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 import pyarrow.parquet as pq
 from mujoco import rollout
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.datasets.columns_of_shards import RESIDUAL, rounded, schema, stored, table
 from tauguard.datasets.configuration import load
 from tauguard.datasets.schedule import Planned, planned
@@ -24,8 +24,6 @@ from tauguard.envs import Simulation
 from tauguard.envs.plant import untimed
 from tauguard.models import pin_model
 from tauguard.report import Row
-
-Array = NDArray[np.float64]
 
 #: The rollout's batches begin at states of the recorded motion this far apart [steps].
 PIECE = 100

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.detection.fleet import CALIBRATE, TEST, Training, stream, train
 from tauguard.benchmarks.detection.pool import SPEEDS, Conditions, Struck, free_pool, struck_pool
-from tauguard.benchmarks.detection.thresholds import Array, free_scores, joined
+from tauguard.benchmarks.detection.thresholds import free_scores, joined
 from tauguard.datasets.plans import TRAINING_PAYLOADS
 from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores, find_alarms
 from tauguard.detectors.evaluation.events import MERGE_GAP, detection_window

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.detection.diagnosis_pool import (
     Event,
     payload_events,
@@ -45,7 +45,6 @@ from tauguard.traces import STRATA, Collision, stratum
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 #: The detector whose alarms are explained, and its false alarms per hour.
 DETECTOR, PER_HOUR = "moving-thresholds", 5.0

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.detection.pool import Struck
-from tauguard.benchmarks.detection.thresholds import Array, Fleet
+from tauguard.benchmarks.detection.thresholds import Fleet
 from tauguard.datasets.plans import BEGIN
 from tauguard.detectors import find_alarms, match
 from tauguard.detectors.evaluation.events import detection_window

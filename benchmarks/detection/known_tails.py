@@ -11,16 +11,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.detection.threshold_laws import LAWS
 from tauguard.detectors import FreeScores
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.report import Row
 from tauguard.report import rate as wilson
-
-Array = NDArray[np.float64]
 
 #: Episodes of a calibration, and blocks in a minute.
 EPISODES, BLOCKS = 45, 120

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.harness import measure
 from tauguard.report import Row
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from tauguard.detectors.methods.svr_regressor import SrqSVR
     from tauguard.traces import Trace
 
-Array = NDArray[np.float64]
 
 #: Shares of the support vectors that are kept.
 SHARES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75)

@@ -8,13 +8,11 @@ what is left above its delay is the detector's own. One that needs less torque c
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.detection.thresholds import Operated
 from tauguard.detectors import ArmModel, CollisionAlarm, ScoreStream
 from tauguard.traces import Trace
-
-Array = NDArray[np.float64]
 
 ORACLE = "oracle"
 #: Levels of the true torque, the largest of joints 1-4 [N m].

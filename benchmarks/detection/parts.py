@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.detection.arm_scores import Arm, Extent, scored
 from tauguard.benchmarks.detection.fleet import TEST, Training, fitted, stream
 from tauguard.benchmarks.detection.pool import free_pool
 from tauguard.benchmarks.detection.threshold_laws import judged, price_row, rate_row
-from tauguard.benchmarks.detection.thresholds import Array
 from tauguard.benchmarks.harness import measure
 from tauguard.benchmarks.kept import Kept
 from tauguard.benchmarks.workers import Workers

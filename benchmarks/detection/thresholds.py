@@ -11,16 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.datasets.plans import BEGIN
 from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores
 from tauguard.detectors.thresholds.free_scores import speed_levels
 from tauguard.detectors.thresholds.law import threshold_for_rate
 from tauguard.detectors.thresholds.rates import tail_level
 from tauguard.traces import Trace
-
-Array = NDArray[np.float64]
 
 #: The dissertation's thresholds on the network's residual current [A].
 AMPERES = (1.6, 2.0)

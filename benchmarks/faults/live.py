@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from tauguard.detectors.faults.monitor import Answer
     from tauguard.traces import Trace
 
-Array = NDArray[np.float64]
 
 #: Samples a second: of UR's CB and e-Series; blows in the log of a full and of a quick run.
 RATES, BLOWS = (125.0, 500.0), (195, 6)

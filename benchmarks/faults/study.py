@@ -21,9 +21,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.faults.arms import Watched, arms
 from tauguard.datasets.live.lateness import Lateness
 from tauguard.datasets.live.packets import FAULTS, Fault, Packets
@@ -35,7 +35,6 @@ from tauguard.traces.trace import Trace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 #: Moments of each fault, an arm, drawn at random and again at collisions: full run, quick one.
 MOMENTS = (8, 3)

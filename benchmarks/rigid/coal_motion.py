@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.harness import measure
 from tauguard.benchmarks.rigid.convex import nanoseconds, take
 from tauguard.report import Row
 from tauguard.rigid import Impacts, Motion, coal_peer
 from tauguard.rigid.rounded import Solid
 
-Array = NDArray[np.float64]
 #: coal's shapes, each with its pose in the body's frame.
 Shapes = list[tuple[Any, Any]]
 #: Distance at which advancement over coal's stops, and what counts as coal's own tolerance.

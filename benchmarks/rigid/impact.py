@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.harness import measure
 from tauguard.benchmarks.rigid.convex import take
 from tauguard.benchmarks.rigid.mesh import scaled
@@ -29,7 +30,6 @@ from tauguard.report import Row, rate
 from tauguard.rigid import Boxes, Motion, Tetrahedra, coal_peer, time_of_impact
 from tauguard.rigid.shapes import Bodies
 
-Array = NDArray[np.float64]
 LEVELS = 36
 #: Distance at which the peer's advancement stops [m]: coal's own tolerance.
 STOP = 1e-6

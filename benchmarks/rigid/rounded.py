@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.harness import measure
 from tauguard.benchmarks.rigid.coal_motion import coal_shapes, in_motion
 from tauguard.benchmarks.rigid.convex import nanoseconds
@@ -35,7 +36,6 @@ from tauguard.rigid import (
 )
 from tauguard.rigid.rounded import Solid, parts
 
-Array = NDArray[np.float64]
 PAIRS = (
     ("spheres", "spheres"),
     ("capsules", "capsules"),

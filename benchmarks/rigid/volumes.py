@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from scipy.spatial.transform import Rotation
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.harness import measure
 from tauguard.benchmarks.rigid.mesh import Mesh, load, scaled
 from tauguard.report import Row, rate
 from tauguard.rigid import Hulls, _rigid_mesh
 from tauguard.rigid.queries import native_overlap
 
-Array = NDArray[np.float64]
 NATIVE: dict[str, Any] = {
     "sphere": _rigid_mesh.BallVolumes,
     "aabb": _rigid_mesh.AabbVolumes,

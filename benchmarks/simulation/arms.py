@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.envs import CollisionPlan, Episode, Simulation
 from tauguard.envs.sensing import listening
 from tauguard.envs.settings import CONTROLS, Settings
@@ -23,7 +24,6 @@ from tauguard.traces import Trace
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 #: Arms that are asked for without `--robot`; a file of the data folder stands for the UR10e.
 ARMS = ("cura6", "ur3", "ur5", "ur10", "ur10e", "panda", "xarm7", "z1", "j2s6s200", "iiwa14")

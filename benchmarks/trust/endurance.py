@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from tauguard.envs.base import ArmEnv
 
-Array = NDArray[np.float64]
 
 #: Simulated hours and resets of a full and of a quick run; rows of the table in each.
 HOURS, RESETS, PARTS = (10.0, 0.02), (100_000, 500), (20, 4)

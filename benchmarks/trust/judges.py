@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 
 def unchanged(path: Path, found: Any, intact: Any) -> str:

@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.benchmarks.small_detector import bare_arm
-
-Array = NDArray[np.float64]
 
 COLUMNS = {"t": 0, "q": [1, 2], "qd": [3, 4], "current": [5, 6], "repair": ["nan"]}
 JOINTS = ("one", "two")

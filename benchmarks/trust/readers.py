@@ -8,12 +8,8 @@ import threading
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tauguard.arrays import Array
 from tauguard.benchmarks.trust.originals import JOINTS
-
-Array = NDArray[np.float64]
 
 
 def signals(trace: Any) -> list[Array]:

@@ -10,9 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts.guard.report import Pair
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

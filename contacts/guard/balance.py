@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 
 @dataclass(frozen=True)

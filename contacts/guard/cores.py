@@ -6,14 +6,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
+from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
 from tauguard.contacts.geoms import CONVEX, hull_vertices
 
-Array = NDArray[np.float64]
 _NONE = np.zeros((0, 3))
 
 

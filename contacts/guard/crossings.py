@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.cloth import Groups, MeshCCD
-
-Array = NDArray[np.float64]
 
 
 class Crossings:

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
 from tauguard.contacts.guard.arrest import Hit, arrest
 from tauguard.contacts.guard.balance import Balance, Books, sheets_of
@@ -18,8 +19,6 @@ from tauguard.contacts.guard.covered import Covered, names
 from tauguard.contacts.guard.crossings import Crossings, elements
 from tauguard.contacts.guard.engine import INTEGRATION, addresses
 from tauguard.contacts.guard.report import Cut, Pair, StepReport
-
-Array = NDArray[np.float64]
 
 #: What the native part goes by.
 SETTINGS = {

@@ -10,13 +10,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts.checker import State, geom_kinds, pair_kind
 from tauguard.contacts.referee import triangles
 from tauguard.contacts.referee.motion import Step
 from tauguard.contacts.referee.pairs import Index, flex_geoms, geom_pairs
 from tauguard.contacts.referee.search import Found, search
-
-Array = NDArray[np.float64]
 
 #: A pair that is never deeper than this is nobody's mistake, reported or not [m].
 TOLERANCE = 1e-5

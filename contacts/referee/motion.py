@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tauguard.arrays import Array
 from tauguard.contacts.checker import State
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

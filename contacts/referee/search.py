@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
+
 #: Signed distance [m] of the pairs ``rows`` at ``s``: both shape (K,), result (K,).
 Distance = Callable[[NDArray[Any], Array], Array]
 

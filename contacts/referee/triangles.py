@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 
 def point_triangle(point: Array, corners: Array) -> Array:

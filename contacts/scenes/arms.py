@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.contacts.scenes.drives import follow, sway
 from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import SceneSpec, Table, compose, load_arm
 from tauguard.models.scene import INTEGRATORS
-
-Array = NDArray[np.float64]
 
 #: Between the pedestals of both arms [m].
 DISTANCE = 1.0

@@ -9,9 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts.scenes.scene import Control
-
-Array = NDArray[np.float64]
 
 #: Where the joints should be and how fast at a time: ``reference(t) -> (q, qd)``, rad and rad/s.
 Reference = Callable[[float], tuple[Array, Array]]

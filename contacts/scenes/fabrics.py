@@ -6,12 +6,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts.scenes.drives import Reference, follow, sway, turn
 from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import BodyProxy, Cloth, Scene, SceneSpec, compose
 from tauguard.models.cloth import add_sheet
-
-Array = NDArray[np.float64]
 
 #: Of the fabrics here: 400 N/m over their width, a soft knit [Pa].
 FABRIC_YOUNG = 2e5

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models.cloth import Cloth, add_cloth
 from tauguard.models.scene import INTEGRATORS
-
-Array = NDArray[np.float64]
 
 BALL_RADIUS = 0.010  #: [m]
 PLATE_HALF_THICKNESS = 0.001  #: [m]

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 #: Called before every step; writes ``data.ctrl`` or ``data.qfrc_applied`` from the state alone.
 Control = Callable[[mujoco.MjModel, mujoco.MjData], None]

@@ -9,13 +9,12 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import Table
 from tauguard.models.obstacles import add_table
 from tauguard.models.scene import INTEGRATORS
 from tauguard.strangers import reading
-
-Array = NDArray[np.float64]
 
 SIZE = 0.15  #: longest side of the thing [m]
 HEIGHT = 0.05  #: of its lowest point above the table at the start [m]

@@ -16,8 +16,6 @@ from tauguard.detectors.faults.monitor import FAULT, Answer, Monitor
 from tauguard.detectors.faults.spans import Spans
 from tauguard.traces.trace import Trace
 
-Array = NDArray[np.float64]
-
 #: Latencies are counted in bins of a microsecond, so many; what takes longer is in one more.
 BINS = 100_000
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.traces.trace import Trace
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 

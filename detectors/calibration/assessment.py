@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.identification import REAL_FRICTION, Beliefs, identify
 from tauguard.detectors.calibration.recording import Recording, moving_span
 from tauguard.detectors.dynamics.friction import FrictionModel
@@ -16,8 +16,6 @@ from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: Share of a joint's torque that a calibration may leave, and from which on a note says so. Right
 #: logs leave 5 % on a UR10e, 17 % on a UR5 and 23 to 31 % of a wrist joint on a UR3 whose friction

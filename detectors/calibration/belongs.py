@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.recording import moves, moving_span
 from tauguard.detectors.dynamics.robot import RobotNumbers, gravity_torque, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: A joint is judged where it is faster than this [rad/s], and changes direction over that.
 FAST, REVERSAL = 0.05, 0.05

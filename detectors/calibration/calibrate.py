@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array, Bools
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import (
     INERTIAL,
@@ -27,9 +28,7 @@ from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.detectors.estimation.velocity import SLOWEST, SensorNoise
 from tauguard.detectors.evaluation.events import occupied
-from tauguard.traces.trace import Bools, Trace
-
-Array = NDArray[np.float64]
+from tauguard.traces.trace import Trace
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 _LOWER = np.tril_indices(4)
 _DIAGONAL = np.flatnonzero(_LOWER[0] == _LOWER[1])

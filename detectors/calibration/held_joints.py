@@ -6,12 +6,10 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.consistent import inertial_numbers, pseudo_inertia
 from tauguard.detectors.dynamics.robot import RobotNumbers
-
-Array = NDArray[np.float64]
 
 
 def holding(robot: RobotNumbers, held: Collection[str]) -> RobotNumbers:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.consistent import solve_consistent
 from tauguard.detectors.calibration.recording import Recording, is_known, known_load, moving_span
 from tauguard.detectors.calibration.regression import Filtered, System, filtered
@@ -31,8 +32,6 @@ from tauguard.detectors.dynamics.robot import (
     mass_matrix,
 )
 from tauguard.detectors.estimation.estimator import ArmModel
-
-Array = NDArray[np.float64]
 
 #: Columns that a real geared joint needs: presliding of several lengths, Stribeck, viscous friction
 #: that flattens at speed, and load-dependent friction. A torque per ampere that changes with the

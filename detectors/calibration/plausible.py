@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from tauguard.arrays import Array, Bools
 from tauguard.detectors.dynamics.robot import RobotNumbers, gravity_torque, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals, low_pass
-from tauguard.traces.trace import Array, Bools, Trace
+from tauguard.traces.trace import Trace
 
 #: Share of the torque left over that is refused, and from which on it is said. A UR10e with
 #: published gains and friction leaves 0.1 to 0.2, with gains alone up to 0.53, with two joints

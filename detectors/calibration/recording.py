@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tauguard.traces.trace import Bools, Trace
-
-Array = NDArray[np.float64]
+from tauguard.arrays import Array, Bools
+from tauguard.traces.trace import Trace
 
 #: An axis slower than this in every sample of a log does not move in it [rad/s].
 MOVING = 0.01

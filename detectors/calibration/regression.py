@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.calibration.recording import MOVING, Recording, known_load, moving_span
 from tauguard.detectors.dynamics.friction import FrictionModel
@@ -19,8 +20,6 @@ from tauguard.detectors.dynamics.robot import (
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.detectors.thresholds.confirmation import confirmed
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

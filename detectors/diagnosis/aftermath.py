@@ -12,14 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.dynamics.robot import momentum_regressor
 from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel, Estimate, Estimator
 from tauguard.detectors.estimation.gains import DETECTION_GAIN
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: Slower logs get an observer of this share of their rate.
 PER_SAMPLE = 0.2

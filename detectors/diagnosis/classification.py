@@ -16,12 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 
+from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.aftermath import Aftermath
-
-Array = NDArray[np.float64]
 
 #: What there is; a payload change is no collision, a push is one that somebody intends.
 KINDS = ("impact", "clamp", "push", "payload")

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import log_ndtr
 
+from tauguard.arrays import Array
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
-
-Array = NDArray[np.float64]
 
 #: Forces expected before anything is known: standard deviations along the normal [N], all alike.
 SCALES = (10.0, 30.0, 100.0, 300.0)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.aftermath import AFTER, Aftermath, AftermathOf
 from tauguard.detectors.diagnosis.classification import Signs, signs
 from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
@@ -19,8 +19,6 @@ from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.traces.trace import Alarm, Detection, Trace
-
-Array = NDArray[np.float64]
 
 #: Link and point are found from the samples up to this long after the alarm, and from those this
 #: long before it [s]; longer after it, by so many lags, where the observer is slow.

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.diagnosis import Diagnosis
 from tauguard.detectors.evaluation.events import detection_window
 from tauguard.report import rate as wilson
 from tauguard.traces.trace import Collision, Trace
-
-Array = NDArray[np.float64]
 
 #: An estimate lags: it is compared with the largest true force of so many seconds before it.
 LAG = 0.015

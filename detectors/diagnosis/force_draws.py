@@ -8,9 +8,10 @@ that: where the size is not identifiable, theirs spread as far as the prior.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import log_ndtr, ndtr, ndtri
 
+from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import (
     FRICTION,
     SCALES,
@@ -19,8 +20,6 @@ from tauguard.detectors.diagnosis.contact_force import (
 )
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
-
-Array = NDArray[np.float64]
 
 #: Draws, and their seed: the same residual has the same answer.
 DRAWS, SEED = 600, 5

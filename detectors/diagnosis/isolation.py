@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import ContactBelief, contact_belief
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
-
-Array = NDArray[np.float64]
 
 #: The usual rule counts torques above this many envelopes and this share of the largest torque:
 #: its best values on simulated arms that no study judges.

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.aftermath import Aftermath
 from tauguard.detectors.diagnosis.contact_force import ContactBelief
 from tauguard.detectors.diagnosis.force_draws import SEED, force_draws
@@ -23,8 +23,6 @@ from tauguard.detectors.diagnosis.isolation import Trust
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 from tauguard.report import two_digits
-
-Array = NDArray[np.float64]
 
 #: Share of the true values that the intervals are to hold.
 COVERAGE = 0.9

@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.robot import same_rows
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

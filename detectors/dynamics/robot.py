@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors import _observer
-
-Array = NDArray[np.float64]
 
 #: Inertial numbers a link: mass, mass times centre of mass (3), Ixx Ixy Iyy Ixz Iyz Izz.
 INERTIAL = 10

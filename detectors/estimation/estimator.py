@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers, same_rows
@@ -21,8 +22,6 @@ from tauguard.detectors.estimation.gains import PLAIN_GAIN
 from tauguard.detectors.estimation.observer import intervals, per_joint
 from tauguard.detectors.estimation.velocity import SensorNoise
 from tauguard.detectors.features.envelope import Envelope
-
-Array = NDArray[np.float64]
 
 #: Unknowns of a joint's own: torque offset [N m], relative viscous and Coulomb error.
 PER_JOINT = 3

@@ -11,13 +11,12 @@ which is the exact discretisation for a tau that is held over the step: stable a
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms, rows, same_rows
 from tauguard.detectors.estimation.gains import PLAIN_GAIN
-
-Array = NDArray[np.float64]
 
 
 def per_joint(name: str, value: ArrayLike, joints: int) -> Array:

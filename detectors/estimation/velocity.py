@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from tauguard.arrays import Array
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: How fast an acceleration may wander: (rad/s^2) per root second. Higher follows a blow sooner,
 #: lower passes less noise.

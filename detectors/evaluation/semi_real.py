@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array, Bools
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.dynamics.robot import RobotNumbers
-from tauguard.traces.trace import Array, Bools, Trace
+from tauguard.traces.trace import Trace
 
 #: Time course of a contact over its duration, 0 to 1, by name.
 SHAPES: dict[str, Callable[[Array], Array]] = {

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.evaluation.metrics import poisson_rate
 from tauguard.detectors.methods.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: A regime that all logs together show for less is not known [s].
 SEEN = 3.0

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors._faults import Check
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.faults.torques import torque_ratios
 from tauguard.traces.trace import Trace
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 #: No arm's joint turns faster [rad/s]; degrees per second do.

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.detector import same_rate
 from tauguard.detectors.faults.inputs import SPAN, FaultCheck, UsualInput
 from tauguard.detectors.faults.torques import TorqueCheck
 from tauguard.detectors.thresholds.alarm import AlarmStream, CollisionAlarm
-
-Array = NDArray[np.float64]
 
 FREE, COLLISION, FAULT = "free", "collision", "fault"
 #: So many samples in a row that are missing or faulty are interpolated, or as many as last SPAN;

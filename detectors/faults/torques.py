@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors._faults import Torques
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: Rate of the observer whose residual is looked at [1/s].
 RATE = 20.0

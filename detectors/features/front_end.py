@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.calibrate import calibrate, free_rows
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
@@ -17,8 +17,6 @@ from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.frozen import Frozen
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: Every so many samples of collision-free motion are enough to fit an envelope.
 THIN = 5

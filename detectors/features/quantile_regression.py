@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 #: More rows than this are thinned out.
 ROWS = 2000

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Bools
 from tauguard.detectors.thresholds.confirmation import confirmed
-from tauguard.traces.trace import Bools
 
 #: A joint slower than this [rad/s] for this long [s] stands still.
 STILL_SPEED, STILL_TIME = 0.01, 0.15

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array, Bools
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.detectors.features.windows import WindowShape
-from tauguard.traces.trace import Bools, Trace
-
-Array = NDArray[np.float64]
+from tauguard.traces.trace import Trace
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.detectors import _kernel
-
-Array = NDArray[np.float64]
 
 #: The dissertation's window [s].
 WINDOW, INTERVAL = 80e-3, 8e-3

@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tauguard.arrays import Array
 from tauguard.detectors.methods.forest import Forest
 from tauguard.detectors.methods.windowed import Windowed
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

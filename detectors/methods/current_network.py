@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel
@@ -24,8 +25,6 @@ from tauguard.detectors.features.low_pass import LowPass, smoothed
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.methods.network import Network
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: The original's thresholds on the residual current [A].
 THRESHOLDS = (1.6, 2.0)

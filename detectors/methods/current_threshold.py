@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.features.low_pass import LowPass, smoothed
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array, Bools
 from tauguard.detectors import _ranking
 from tauguard.detectors.features.front_end import FrontEnd
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.methods.per_joint import FittedPerJoint, PerJoint
-from tauguard.traces.trace import Bools, Trace
-
-Array = NDArray[np.float64]
+from tauguard.traces.trace import Trace
 
 #: The statistic is bounded to what this much time without a residual takes away again [s]: a long
 #: contact would otherwise leave an alarm that lasts longer than the contact.

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import GradientBoostingRegressor
 
+from tauguard.arrays import Array
 from tauguard.detectors import _ranking
 
-Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors import _kernel
 from tauguard.detectors.frozen import Frozen
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
 
+from tauguard.arrays import Array
 from tauguard.detectors import _ranking
 from tauguard.detectors.frozen import Frozen
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.svm import OneClassSVM
 
+from tauguard.arrays import Array
 from tauguard.detectors.features.training import Prepared
 from tauguard.detectors.features.windows import WindowShape
 from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.methods.svr_regressor import srq_kernel
 from tauguard.detectors.methods.windowed import Windowed
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

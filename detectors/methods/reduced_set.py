@@ -9,12 +9,10 @@ projection onto the span of the picked ones.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from tauguard.arrays import Array
 from tauguard.detectors.methods.svr_regressor import srq_kernel
-
-Array = NDArray[np.float64]
 
 #: A vector whose distance from the span of the picked ones is below this share of its norm is not
 #: picked: it would add nothing but rounding. Its norm is 1 in the SRQ kernel.

@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.estimation.gains import PLAIN_GAIN
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.methods.per_joint import FittedPerJoint, PerJoint
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

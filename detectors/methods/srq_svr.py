@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.features.training import Prepared, binary_target, draw_windows
@@ -17,8 +17,6 @@ from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.methods.svr_regressor import SrqSVR
 from tauguard.detectors.methods.windowed import Regressor, Windowed
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: Windows that the scale of the features is found with.
 SAMPLED = 1000

@@ -7,15 +7,14 @@ epsilon = 0.02. scikit-learn fits it on the precomputed kernel; evaluation is na
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.svm import SVR
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from tauguard.arrays import Array
 from tauguard.detectors import _kernel
 from tauguard.detectors.methods.kernel_machine import KernelMachine
-
-Array = NDArray[np.float64]
 
 
 def srq_kernel(a: ArrayLike, b: ArrayLike, sigma: float = 3.0, *, threads: int = 0) -> Array:

@@ -10,14 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from tauguard.arrays import Array
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.methods.network import Network
 from tauguard.detectors.methods.windowed import Windowed
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
@@ -18,8 +19,6 @@ from tauguard.detectors.features.training import Prepared, draw_windows, peaks, 
 from tauguard.detectors.features.windows import WindowShape
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: Torque that counts 1 in the training target, one a joint; the last is repeated [N m].
 REFERENCE = (20.0, 20.0, 15.0, 6.0)

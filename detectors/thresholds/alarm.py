@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.detector import FittedDetector, same_rate
 from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.faults.inputs import UsualInput
@@ -24,8 +25,6 @@ from tauguard.detectors.thresholds.confirmation import (
 from tauguard.detectors.thresholds.rates import sustained
 from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels, recent_speed
 from tauguard.traces.trace import Detection, Trace
-
-Array = NDArray[np.float64]
 
 #: A signal that is finite but absurd has left numbers in the detector that are not.
 LOST = "the score is not a number: a sample was out of any arm's range; begin anew without it"

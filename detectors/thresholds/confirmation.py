@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Bools = NDArray[np.bool_]
+from tauguard.arrays import Bools
 
 #: Default t_c [s] (Park et al. 2021; the dissertation's value).
 CONFIRMATION = 3e-3

@@ -21,10 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
+from tauguard.arrays import Array
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.rates import Tail
-
-Array = NDArray[np.float64]
 
 #: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
 TAIL = 0.05

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.evaluation.events import CASE_SECONDS, MERGE_GAP, find_alarms
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.rates import block_maxima
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels, recent_speed
 from tauguard.traces.trace import Trace
-
-Array = NDArray[np.float64]
 
 #: Motion is kept as the peaks of pieces this long [s], or of single samples that are longer: ten
 #: hours are two million numbers.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tauguard.arrays import Array, Bools
 from tauguard.detectors.calibration.plausible import drive_torque, plausible
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.gains import LOG_GAIN
@@ -16,7 +17,7 @@ from tauguard.detectors.faults.detection import detect_with_faults
 from tauguard.detectors.faults.spans import Span
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
-from tauguard.traces.trace import Array, Bools, Detection, Trace
+from tauguard.traces.trace import Detection, Trace
 
 CONFIRMATION = 0.05  # [s]
 FACTOR = 1.5  # threshold over the largest residual of the quiet seconds

@@ -12,11 +12,11 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter1d
 from sklearn.isotonic import IsotonicRegression
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 #: A motion counts for this long after it [s]: what stiction causes comes after a stop.
 MEMORY = 0.5

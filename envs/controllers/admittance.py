@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.envs.controllers.checks import per_joint
-
-Array = NDArray[np.float64]
 
 
 class Admittance:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 
 class ComputedTorque:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tauguard.arrays import Array
 from tauguard.models import Friction
-
-Array = NDArray[np.float64]
 
 #: The Coulomb part rises over this speed [rad/s].
 SMOOTHING = 0.02

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.envs.controllers.checks import per_joint
-
-Array = NDArray[np.float64]
 
 #: A direction that is this much less mobile than the most mobile one counts as nearly lost: there
 #: the tool grows soft instead of the torque growing without bound. Elsewhere nothing is damped.

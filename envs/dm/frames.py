@@ -6,9 +6,8 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tauguard.arrays import Array
 
 #: Elements that a frame can hold and that have a place of their own.
 _PLACED = ("body", "geom", "site", "camera", "light", "inertial", "joint")

@@ -7,12 +7,10 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tauguard.arrays import Array
 from tauguard.contacts.scenes.impacts import STIFF
-
-Array = NDArray[np.float64]
 
 #: Timesteps that scenes are drawn with [s].
 TIMESTEPS = (5e-4, 1e-3, 2e-3, 5e-3, 1e-2)
