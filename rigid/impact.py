@@ -2,32 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import cast, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid_mesh
-from tauguard.rigid.mesh import MeshTree
-from tauguard.rigid.mesh_bodies import first_contact
-from tauguard.rigid.motion import Motion, common_length
+from tauguard.rigid.mesh import MeshTree, first_touch
+from tauguard.rigid.mesh_bodies import first_contact, mesh_beside
+from tauguard.rigid.motion import Motion, bounded, common_length
 from tauguard.rigid.queries import native, rows
-from tauguard.rigid.results import Impacts
+from tauguard.rigid.results import Impacts, MeshImpacts
 from tauguard.rigid.rounded import Solid, solid_parts
-
-
-@dataclass(frozen=True, eq=False)
-class MeshImpacts(Impacts):
-    """First contact of two moving meshes, or of one and convex bodies, row by row.
-
-    Attributes:
-        faces: The triangles that touch first, (face of a, face of b); -1 where there is no hit, and
-            for a side that is no mesh. Shape (N, 2).
-    """
-
-    faces: NDArray[np.int32]
 
 
 @overload
@@ -76,10 +62,13 @@ def time_of_impact(
     for name, motion in (("motion_a", motion_a), ("motion_b", motion_b)):
         if not isinstance(motion, Motion):
             raise ValueError(f"{name}: a {type(motion).__name__}, expected a Motion")
-        _bounded(name, motion.pose_t0[:, :3, 3], motion.linear)
-    if isinstance(a, MeshTree) or isinstance(b, MeshTree):
-        return _of_meshes(a, b, motion_a, motion_b, threads)
-    (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
+        bounded(name, motion)
+    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
+        return first_touch(a, b, motion_a, motion_b, threads)
+    if beside := mesh_beside(a, b):
+        return first_contact(*beside, motion_a, motion_b, threads)
+    core_a, radius_a = solid_parts("a", cast(Solid, a))
+    core_b, radius_b = solid_parts("b", cast(Solid, b))
     lengths = {
         "bodies": rows(core_a, core_b),
         "motion_a": len(motion_a),
@@ -91,25 +80,3 @@ def time_of_impact(
         *(*motion_a.packed, *motion_b.packed, out, thread_count(threads)),
     )
     return Impacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7])
-
-
-def _of_meshes(
-    a: Solid | MeshTree, b: Solid | MeshTree, motion_a: Motion, motion_b: Motion, threads: int
-) -> MeshImpacts:
-    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
-        count = common_length({"motion_a": len(motion_a), "motion_b": len(motion_b)})
-        out, faces = np.empty((count, 7)), np.empty((count, 2), dtype=np.int32)
-        a._mesh.time_of_impact(
-            b._mesh, *motion_a.packed, *motion_b.packed, out, faces, thread_count(threads)
-        )
-    elif isinstance(a, MeshTree):
-        out, faces = first_contact(a, cast(Solid, b), motion_a, motion_b, threads)
-    else:
-        mesh = cast(MeshTree, b)
-        out, faces = first_contact(mesh, a, motion_b, motion_a, threads, swapped=True)
-    return MeshImpacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7], faces)
-
-
-def _bounded(name: str, *values: NDArray[np.float64]) -> None:
-    if max(np.abs(value).max(initial=0.0) for value in values) > 1e100:
-        raise ValueError(f"{name}: a coordinate beyond 1e100; scale the scene down")

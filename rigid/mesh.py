@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.geometry import finite, frozen_finite, frozen_indices, thread_count
 from tauguard.rigid import _rigid_mesh
-from tauguard.rigid.motion import Motion, poses
-
-if TYPE_CHECKING:
-    from tauguard.rigid.impact import MeshImpacts
+from tauguard.rigid.motion import Motion, bounded, common_length, poses
+from tauguard.rigid.results import MeshImpacts
 
 Volume = Literal["obb", "aabb", "k_dop", "sphere"]
 
@@ -177,10 +175,9 @@ class MeshTree:
 
         See :func:`tauguard.rigid.time_of_impact`; this mesh is at rest.
         """
-        from tauguard.rigid.impact import time_of_impact
-
+        bounded("motion", motion)
         rest = Motion(np.eye(4), np.zeros(3), np.zeros(3))
-        return time_of_impact(self, other, rest, motion, threads)
+        return first_touch(self, other, rest, motion, threads)
 
     def sweep(
         self, other: MeshTree, pose: ArrayLike, displacement: ArrayLike, threads: int = 1
@@ -205,3 +202,14 @@ class MeshTree:
             )
         finite("displacement", np.atleast_2d(move), (None, 3))
         return self.time_of_impact(other, Motion(start, move, np.zeros(3)), threads)
+
+
+def first_touch(
+    a: MeshTree, b: MeshTree, motion_a: Motion, motion_b: Motion, threads: int
+) -> MeshImpacts:
+    """When two moving meshes first touch; their volumes may differ."""
+    count = common_length({"motion_a": len(motion_a), "motion_b": len(motion_b)})
+    out, faces = np.empty((count, 7)), np.empty((count, 2), dtype=np.int32)
+    moved = (*motion_a.packed, *motion_b.packed)
+    a._mesh.time_of_impact(b._mesh, *moved, out, faces, thread_count(threads))
+    return MeshImpacts(np.isfinite(out[:, 0]), out[:, 0], out[:, 1:4], out[:, 4:7], faces)

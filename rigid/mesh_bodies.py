@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from tauguard.rigid.gap import Gaps
 from tauguard.rigid.mesh import MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion, common_length
 from tauguard.rigid.queries import native
+from tauguard.rigid.results import MeshImpacts
 from tauguard.rigid.rounded import Solid, solid_parts
 
 #: Coordinates and radii beyond this are refused beside a mesh, whose own bound it is.
@@ -32,6 +34,19 @@ class MeshGaps(Gaps):
     face: NDArray[np.int32]
 
 
+def mesh_beside(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[MeshTree, Solid, bool] | None:
+    """The mesh, the bodies and whether the mesh is ``b``; ``None`` where neither is one.
+
+    Raises:
+        ValueError: both are.
+    """
+    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
+        raise ValueError("b: a mesh, as a is; MeshTree.overlap is for two meshes and their poses")
+    if isinstance(a, MeshTree):
+        return a, cast(Solid, b), False
+    return (b, a, True) if isinstance(b, MeshTree) else None
+
+
 Native = tuple[int, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]
 
 
@@ -41,7 +56,7 @@ def bodies_of(name: str, solid: Solid) -> Native:
     return *native(core), radius
 
 
-def overlap(mesh: MeshTree, solid: Solid, threads: int = 1, swapped: bool = False) -> MeshOverlap:
+def overlap(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshOverlap:
     """Which bodies the surface meets, and a triangle of each."""
     bodies = bodies_of(_other(swapped), solid)
     face = np.empty(len(solid), dtype=np.int32)
@@ -49,7 +64,7 @@ def overlap(mesh: MeshTree, solid: Solid, threads: int = 1, swapped: bool = Fals
     return MeshOverlap(face >= 0, faces_of(face, swapped))
 
 
-def distance(mesh: MeshTree, solid: Solid, threads: int = 1, swapped: bool = False) -> MeshGaps:
+def distance(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshGaps:
     """How far the surface is from each body."""
     bodies = bodies_of(_other(swapped), solid)
     out, face = np.empty((len(solid), 10)), np.empty(len(solid), dtype=np.int32)
@@ -63,18 +78,15 @@ def distance(mesh: MeshTree, solid: Solid, threads: int = 1, swapped: bool = Fal
 def first_contact(
     mesh: MeshTree,
     solid: Solid,
-    motion_mesh: Motion,
-    motion_solid: Motion,
-    threads: int = 1,
-    swapped: bool = False,
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Rows of toi, point and normal (N, 7), and the faces (N, 2)."""
+    swapped: bool,
+    motion_a: Motion,
+    motion_b: Motion,
+    threads: int,
+) -> MeshImpacts:
+    """When the surface first touches each body; the mesh is ``b`` where ``swapped``."""
+    motion_mesh, motion_solid = (motion_b, motion_a) if swapped else (motion_a, motion_b)
     bodies = bodies_of(_other(swapped), solid)
-    lengths = {
-        f"motion_{'b' if swapped else 'a'}": len(motion_mesh),
-        "bodies": len(solid),
-        f"motion_{'a' if swapped else 'b'}": len(motion_solid),
-    }
+    lengths = {"bodies": len(solid), "motion_a": len(motion_a), "motion_b": len(motion_b)}
     count = common_length(lengths)
     out, face = np.empty((count, 7)), np.empty(count, dtype=np.int32)
     mesh._mesh.time_of_impact_of_bodies(
@@ -87,7 +99,8 @@ def first_contact(
     )
     if swapped:
         out[:, 4:7] *= -1
-    return out, faces_of(face, swapped)
+    parts = out[:, 0], out[:, 1:4], out[:, 4:7]
+    return MeshImpacts(np.isfinite(out[:, 0]), *parts, faces_of(face, swapped))
 
 
 def faces_of(face: NDArray[np.int32], swapped: bool) -> NDArray[np.int32]:

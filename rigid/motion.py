@@ -97,6 +97,13 @@ class Motion(Rebuilt):
         return out
 
 
+def bounded(name: str, motion: Motion) -> None:
+    """Nothing: a coordinate beyond 1e100, whose products would overflow, is a ``ValueError``."""
+    for value in (motion.pose_t0[:, :3, 3], motion.linear):
+        if np.abs(value).max(initial=0.0) > 1e100:
+            raise ValueError(f"{name}: a coordinate beyond 1e100; scale the scene down")
+
+
 def common_length(lengths: dict[str, int]) -> int:
     """The common length of several batches by name, each being that or 1.
 

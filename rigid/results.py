@@ -58,3 +58,15 @@ class Impacts:
     toi: NDArray[np.float64]
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshImpacts(Impacts):
+    """First contact of two moving meshes, or of one and convex bodies, row by row.
+
+    Attributes:
+        faces: The triangles that touch first, (face of a, face of b); -1 where there is no hit, and
+            for a side that is no mesh. Shape (N, 2).
+    """
+
+    faces: NDArray[np.int32]

@@ -60,13 +60,9 @@ def overlap(
         raise ValueError(f"method: {method!r} knows sharp bodies only, {special[0]} is none; auto")
     if not special:
         return sharp_overlap(cast(Bodies, a), cast(Bodies, b), method, threads)
-    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
-        raise ValueError("b: a mesh, as a is; MeshTree.overlap is for two meshes and their poses")
-    if isinstance(a, MeshTree):
-        return mesh_bodies.overlap(a, cast(Solid, b), threads)
-    if isinstance(b, MeshTree):
-        return mesh_bodies.overlap(b, a, threads, swapped=True)
-    return rounded_overlap(a, b, threads)
+    if beside := mesh_bodies.mesh_beside(a, b):
+        return mesh_bodies.overlap(*beside, threads)
+    return rounded_overlap(cast(Solid, a), cast(Solid, b), threads)
 
 
 @overload
@@ -94,10 +90,6 @@ def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Gaps
         ValueError: lengths that do not match, polygons, two meshes, or a coordinate beyond 1e100
             (1e30 beside a mesh).
     """
-    if isinstance(a, MeshTree) and isinstance(b, MeshTree):
-        raise ValueError("b: a mesh, as a is; distances are of a mesh and convex bodies")
-    if isinstance(a, MeshTree):
-        return mesh_bodies.distance(a, cast(Solid, b), threads)
-    if isinstance(b, MeshTree):
-        return mesh_bodies.distance(b, a, threads, swapped=True)
-    return solid_gaps(a, b, threads)
+    if beside := mesh_bodies.mesh_beside(a, b):
+        return mesh_bodies.distance(*beside, threads)
+    return solid_gaps(cast(Solid, a), cast(Solid, b), threads)

@@ -1,9 +1,15 @@
 """Shared fixtures."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
+
+# Many tests start processes. Where nobody lets Python keep compiled modules, each of them would
+# compile 1,500 again before it begins: 4 to 8 s.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 ROOT = Path(__file__).resolve().parents[1]
 

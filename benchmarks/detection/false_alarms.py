@@ -40,7 +40,8 @@ NOTES = {
     "arms": "thresholds that aim at asked [1/h], from the calibration motion of each arm. found: "
     "in these arms' fresh motion together, with its exact 95 % interval. stated: what the "
     "calibration alone allows (95 %, per hour), median over the arms. kept: share of arms whose "
-    "interval of found reaches down to asked; inside: whose intervals of found and stated meet.",
+    "interval of found reaches down to asked; inside: whose intervals of found and stated meet; "
+    "alarms_an_arm: median [least, most].",
     "price": "what the same thresholds find of the collisions from 16 N m up, and of all from "
     "4 N m up; the delay of the former [ms].",
 }

@@ -51,8 +51,13 @@ UNKNOWNS: dict[str, dict[str, float]] = {
     "torque offsets": {"offset": 0.0},
     "weight of an uncertain payload": {"payload_weight": 0.0},
 }
+#: Columns of the laws that say nothing of the parts.
+LEFT_OUT = ("detector", "law", "arms", "inside", "stated_low", "stated_high", "alarms_an_arm")
 #: Samples of a timing, and how often it is repeated.
 TIMED, REPEATS = 3000, 7
+
+
+Forms = dict[str, FittedDetector]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,17 +124,20 @@ def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     """Rows ``parts``: one for every part that is left out."""
     size = QUICK if quick else FULL
     kept = Kept.of(keep, "detection_parts", seed, size)
-    jobs = [(size.extent, seed, 61_000 + 100 * seed + k) for k in range(size.arms)]
+    seeds = [61_000 + 100 * seed + k for k in range(size.arms)]
     with Workers() as each:
+        training = [(size.extent.training, seed, arm) for arm in seeds]
+        detectors = list(kept.over(each, "train")(trained, training))
+        jobs = [(size.extent, seed, *one) for one in zip(seeds, detectors, strict=True)]
         arms = list(kept.over(each, "arm")(of_arm, jobs))
-    times = timing(*jobs[0])
+    times = timing(seed, seeds[0], detectors[0])
     cases = [(name, name, True) for name in size.extent.names] + [(LEVELS, WHOLE, False)]
     rows = []
     for part, name, normalised in cases:
         case = judged(arms, name, "likeliest tail", size.asked, normalised)
         price = price_row(case, "all", case.arms) or {}
         row = {**rate_row(case, "all", case.arms), **price, "study": "parts"}
-        for column in ("detector", "law", "arms", "inside", "stated", "by_arm"):
+        for column in LEFT_OUT:
             del row[column]
         # The levels are a table's look-up: no form of the detector is without them.
         own = None if part == LEVELS else times[name]
@@ -137,19 +145,24 @@ def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     return rows
 
 
-def of_arm(job: tuple[Extent, int, int]) -> Arm:
+def trained(job: tuple[Training, int, int]) -> Forms:
+    """Every form, trained for one arm."""
+    training, seed, arm = job
+    return fitted(seed, arm, forms(), training)
+
+
+def of_arm(job: tuple[Extent, int, int, Forms]) -> Arm:
     """Scores of every form on one arm."""
-    extent, seed, arm = job
-    return scored(extent, seed, arm, fitted(seed, arm, forms(), extent.training))
+    return scored(*job)
 
 
-def timing(extent: Extent, seed: int, arm: int) -> dict[str, dict[str, float]]:
+def timing(seed: int, arm: int, detectors: Forms) -> dict[str, dict[str, float]]:
     """Time of a sample of each form on one arm, relative to the whole detector's."""
     (_, episode), *_ = free_pool(stream(seed, TEST, 11), 30.0, (arm,), 1e-4, seconds=5.0)
-    return relative(fitted(seed, arm, forms(), extent.training), simulate(episode))
+    return relative(detectors, simulate(episode))
 
 
-def relative(detectors: dict[str, FittedDetector], trace: Trace) -> dict[str, dict[str, float]]:
+def relative(detectors: Forms, trace: Trace) -> dict[str, dict[str, float]]:
     """Processor time of each detector's stream over the median of the whole one's.
 
     Returns:

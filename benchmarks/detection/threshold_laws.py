@@ -14,7 +14,7 @@ from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
 from tauguard.detectors.thresholds.law import threshold_for_rate
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels
-from tauguard.report import Row, two_digits
+from tauguard.report import Row
 from tauguard.report import rate as wilson
 
 #: The score at every speed.
@@ -79,17 +79,23 @@ def _of_arm(arm: Arm, name: str, law: str, asked: float, normalised: bool) -> Ar
 def rate_row(case: Judged, group: str, arms: Sequence[ArmOutcome]) -> Row:
     """``arms``: the rate found on these arms."""
     low, high = np.median([arm.stated for arm in arms], axis=0)
+    alarms = [arm.alarms for arm in arms]
     return {
         "study": "arms",
         "detector": case.detector,
         "law": case.law,
         "asked": case.asked,
         "arms": group,
-        "found_per_hour": poisson_rate(sum(a.alarms for a in arms), sum(a.hours for a in arms)),
-        "stated": f"{two_digits(low)} to {two_digits(high)}",
+        "found_per_hour": poisson_rate(sum(alarms), sum(a.hours for a in arms)),
+        "stated_low": float(low),
+        "stated_high": float(high),
         "kept": wilson(sum(a.found[0] <= case.asked for a in arms), len(arms)),
         "inside": wilson(sum(_meet(a.found, a.stated) for a in arms), len(arms)),
-        "by_arm": " ".join(str(a.alarms) for a in arms),
+        "alarms_an_arm": {
+            "median": float(np.median(alarms)),
+            "low": min(alarms),
+            "high": max(alarms),
+        },
     }
 
 

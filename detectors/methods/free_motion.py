@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from tauguard.arrays import Bools
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
 from tauguard.detectors.calibration.recording import Load, Recording, known_load, moves, pieces
 from tauguard.detectors.calibration.regression import filtered
@@ -34,7 +35,7 @@ from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
 from tauguard.detectors.thresholds.quiet_start import SERIES
 from tauguard.detectors.thresholds.rates import sustained
-from tauguard.traces.trace import Bools, Trace
+from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,6 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
-from tauguard.detectors.thresholds.expected_rate import ExpectedRate
 from tauguard.detectors.thresholds.free_scores import FreeScores, speed_levels
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
 from tauguard.detectors.thresholds.rates import tail_level
@@ -60,9 +59,16 @@ def train(
     Raises:
         ValueError: traces that do not fit or lack what the method needs.
     """
+    return train_and_score(detector, traces, arm, per_hour)[0]
+
+
+def train_and_score(
+    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float
+) -> tuple[CollisionAlarm, list[FreeScores]]:
+    """As :func:`train`, with the normalised scores that the threshold comes from."""
     own, rest = held_out(traces)
-    alarm = with_rate(detector.fit(own, arm), rest, per_hour)
-    return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm))
+    alarm, scores = _with_rate(detector.fit(own, arm), rest, per_hour, CONFIRMATION)
+    return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm)), scores
 
 
 def with_rate(
@@ -82,11 +88,17 @@ def with_rate(
     Raises:
         ValueError: no collision-free motion, or a rate that is not above 0.
     """
+    return _with_rate(detector, traces, per_hour, confirmation)[0]
+
+
+def _with_rate(
+    detector: FittedDetector, traces: Sequence[Trace], per_hour: float, confirmation: float
+) -> tuple[CollisionAlarm, list[FreeScores]]:
     plain = CollisionAlarm(detector, np.inf, confirmation)
-    scores = [FreeScores.of(plain, trace) for trace in long_enough(plain, traces)]
-    levels = speed_levels(scores)
-    threshold = threshold_for_rate([one.over(levels) for one in scores], per_hour)
-    return replace(plain, levels=levels, threshold=threshold)
+    found = [FreeScores.of(plain, trace) for trace in long_enough(plain, traces)]
+    levels = speed_levels(found)
+    scores = [one.over(levels) for one in found]
+    return replace(plain, levels=levels, threshold=threshold_for_rate(scores, per_hour)), scores
 
 
 def with_guarantee(
@@ -132,19 +144,6 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
     hours = sum(one.seconds for one in scores) / 3600
     return tail_level(peaks, per_hour * hours, max(2, round(TAIL * len(peaks))))
-
-
-def expected_rate(alarm: CollisionAlarm, traces: Sequence[Trace]) -> ExpectedRate:
-    """How many false alarms an hour an alarm may give, by threshold.
-
-    Args:
-        alarm: detector and speed levels.
-        traces: that the threshold came from, or others that the detector was not trained on.
-
-    Raises:
-        ValueError: no collision-free motion.
-    """
-    return ExpectedRate.of([FreeScores.of(alarm, t) for t in long_enough(alarm, traces)])
 
 
 def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:

@@ -34,7 +34,7 @@ SHAPES = (-0.5, 0.2)
 
 @dataclass(frozen=True)
 class Tail:
-    """A generalised Pareto tail of peaks: how many are expected above a level.
+    """A generalised Pareto tail of peaks: the level that a number of them is expected to exceed.
 
     Unlike an exponential tail it can end: a score that has a highest value is not extrapolated far
     beyond it.
@@ -76,15 +76,6 @@ class Tail:
         ratio, shape = self.count / allowed, self.shape
         grown = np.log(ratio) if abs(shape) < 1e-9 else (ratio**shape - 1) / shape
         return self.base + self.scale * float(grown)
-
-    def above(self, level: float) -> float:
-        """How many peaks are expected above a level, which is not below the base."""
-        if not self.scale:
-            return 0.0
-        far = (level - self.base) / self.scale
-        if abs(self.shape) < 1e-9:
-            return self.count * float(np.exp(-far))
-        return float(self.count * max(1 + self.shape * far, 0.0) ** (-1 / self.shape))
 
 
 def tail_level(peaks: Array, allowed: float, count: int) -> float:

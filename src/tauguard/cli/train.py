@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tauguard.detectors import CollisionAlarm
+    from tauguard.detectors import CollisionAlarm, FreeScores
     from tauguard.detectors.methods.free_motion import FittedFreeMotion
     from tauguard.traces import Trace
 
@@ -110,9 +110,10 @@ def labelled_motion(
 ) -> None:
     """Train on labelled recordings."""
     from tauguard.datasets.labelled import labelled
-    from tauguard.detectors import make_detector, save_model, train, with_guarantee
+    from tauguard.detectors import make_detector, save_model, with_guarantee
     from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.detectors.thresholds.guarantee import check_guarantee
+    from tauguard.detectors.thresholds.law import train_and_score
     from tauguard.report import two_digits
 
     # First: what cannot be used, or cannot be guaranteed, is better named before training.
@@ -123,7 +124,8 @@ def labelled_motion(
     if free:
         check_guarantee([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
     recordings = labelled(traces, arm)
-    alarm, guarantee = train(method, recordings, nominal_arm(recordings), rate), None
+    alarm, scores = train_and_score(method, recordings, nominal_arm(recordings), rate)
+    guarantee = None
     if free:
         alarm, guarantee = with_guarantee(alarm, free, rate, confidence)
     save_model(alarm, model)
@@ -133,7 +135,7 @@ def labelled_motion(
         f"threshold {alarm.threshold:.3g}"
     )
     if guarantee is None:
-        print(_aimed_at(alarm, recordings, rate))
+        print(_aimed_at(alarm, scores, rate))
     else:
         hours = two_digits(guarantee.hours)
         print(
@@ -143,12 +145,12 @@ def labelled_motion(
         )
 
 
-def _aimed_at(alarm: CollisionAlarm, recordings: Sequence[Trace], rate: float) -> str:
+def _aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -> str:
     """What the threshold aims at, and what its motion can tell of it."""
-    from tauguard.detectors.thresholds.law import expected_rate, held_out
+    from tauguard.detectors.thresholds.expected_rate import ExpectedRate
     from tauguard.report import two_digits
 
-    expected = expected_rate(alarm, held_out(recordings)[1])
+    expected = ExpectedRate.of(scores)
     low, high = map(two_digits, expected.interval(alarm.threshold))
     minutes = max(1, round(60 * expected.hours))
     return (

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauguard.detectors.thresholds.expected_rate import ExpectedRate
+from tauguard.detectors.thresholds.expected_rate import ExpectedRate, Tails
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.law import threshold_for_rate, with_rate
 from tauguard.detectors.thresholds.rates import Tail, block_maxima, tail_level
@@ -120,8 +120,9 @@ def test_a_tail_of_too_few_peaks_is_the_largest():
 def test_a_tail_says_how_many_peaks_to_expect_above_the_level_that_it_gives():
     peaks = np.sort(np.random.default_rng(3).exponential(size=5000))[::-1]
     tail = Tail.of(peaks, 100)
+    of_many = Tails(*np.array([[tail.base, tail.scale, tail.shape, tail.count]]).T)
     for allowed in (0.1, 1.0, 30.0):
-        assert tail.above(tail.level(allowed)) == pytest.approx(allowed)
+        assert of_many.above(tail.level(allowed)) == pytest.approx(allowed)
     # An exponential's level that 0.1 of 5,000 exceed is log(50,000).
     assert tail.level(0.1) == pytest.approx(np.log(50_000), rel=0.25)
 
