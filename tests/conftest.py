@@ -1,6 +1,7 @@
 """Shared fixtures."""
 
 import os
+import pickle
 import sys
 from pathlib import Path
 
@@ -21,3 +22,23 @@ def data_dir() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real data at {folder.name}: set TAUGUARD_DATA")
     return folder
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory):
+    """``made_once(name, make)``: what one process of a parallel run makes, the others read."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return lambda name, make: make()
+    import fcntl
+
+    folder = tmp_path_factory.getbasetemp().parent
+
+    def found(name, make):
+        path = folder / f"{name}.pickle"
+        with open(folder / f"{name}.lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not path.exists():
+                path.write_bytes(pickle.dumps(make()))
+        return pickle.loads(path.read_bytes())
+
+    return found

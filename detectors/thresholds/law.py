@@ -66,6 +66,8 @@ def train_and_score(
     detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """As :func:`train`, with the normalised scores that the threshold comes from."""
+    if not per_hour > 0:
+        raise ValueError(f"per_hour: {per_hour}, expected above 0")
     own, rest = held_out(traces)
     alarm, scores = _with_rate(detector.fit(own, arm), rest, per_hour, CONFIRMATION)
     return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm)), scores

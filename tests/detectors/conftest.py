@@ -39,6 +39,11 @@ def arm(robot, drive_gain):
 
 
 @pytest.fixture(scope="session")
-def alarm(training, arm):
+def alarm(made_once, request):
     """A trained detector with its threshold."""
-    return train(SrqSvr(windows=1200, mined=200), training, arm, 20.0)
+
+    def trained():
+        training, arm = request.getfixturevalue("training"), request.getfixturevalue("arm")
+        return train(SrqSvr(windows=1200, mined=200), training, arm, 20.0)
+
+    return made_once("alarm", trained)

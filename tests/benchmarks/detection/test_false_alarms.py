@@ -102,6 +102,7 @@ def test_arms_are_kept_and_not_made_again(tmp_path, monkeypatch):
     little = Training(slices=1, collisions=1, free=1, free_seconds=8.0)
     extent = Extent(("moving-thresholds",), little, 0.001, 0.001, 0)
     monkeypatch.setattr(false_alarms, "NAMES", extent.names)
+    monkeypatch.setattr(arm_scores, "SPEEDS", (60.0,))  # an episode of a minute each
     size = replace(false_alarms.QUICK, arms=1, extent=extent, calibrations=2)
     monkeypatch.setattr(false_alarms, "QUICK", size)
     monkeypatch.setattr(false_alarms, "KNOWN", 1)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.detection import parts
+from tauguard.benchmarks.detection import arm_scores, parts
 from tauguard.benchmarks.detection.fleet import Training
 from tauguard.detectors import SrqSvr
 from tauguard.detectors.calibration.nominal import nominal_design
@@ -39,6 +39,7 @@ def test_a_small_run_prints_a_row_for_every_part(monkeypatch, tmp_path):
     monkeypatch.setattr(parts, "forms", lambda: few)
     monkeypatch.setattr(parts, "Workers", lambda: parts_in_place())
     monkeypatch.setattr(parts, "TIMED", 200)
+    monkeypatch.setattr(arm_scores, "SPEEDS", (60.0,))  # an episode of a minute each
     little = Training(slices=2, collisions=2, free=2, free_seconds=8.0)
     extent = replace(parts.QUICK.extent, names=names, training=little, calibration_hours=0.001)
     size = replace(parts.QUICK, extent=replace(extent, hours=0.001))

@@ -45,10 +45,12 @@ def answers(alarm, packets):
 
 
 def test_without_a_fault_it_says_what_the_detector_says(alarm, struck):
-    said = answers(alarm, Packets.of(struck))
+    rows = 12_000
+    said = answers(alarm, Packets.of(struck).rows(np.arange(rows)))
     found = alarm.detect(struck)
-    assert [a.alarm for a in said] == found.alarm.tolist()
-    assert np.array([a.score for a in said]).tobytes() == found.score.tobytes()
+    assert found.alarm[:rows].any()
+    assert [a.alarm for a in said] == found.alarm[:rows].tolist()
+    assert np.array([a.score for a in said]).tobytes() == found.score[:rows].tobytes()
     assert not any(a.reason for a in said)
 
 
@@ -104,8 +106,8 @@ def test_a_fault_does_not_hide_the_collision_before_it(alarm, struck):
 
 
 def test_a_clock_that_begins_anew_does_not_blind_it(alarm, struck, quiet):
-    begin = int(np.searchsorted(struck.t, quiet))
-    packets = Packets.of(struck)
+    packets = part(Packets.of(struck), quiet - struck.t[0] - 3.5, quiet - struck.t[0] + 4)
+    begin = int(np.searchsorted(packets.t, quiet))
     t = packets.t.copy()
     t[begin:] -= t[begin]
     said = answers(alarm, Packets(packets.due, t, packets.q, packets.qd, packets.current))
