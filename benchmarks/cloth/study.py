@@ -36,7 +36,8 @@ NOTES = {
     "and vcd on ab2pf's. frame_ms: broad and narrow phase; times_ab2pf: over ab2pf's; missed and "
     "added: hits that ab2pf has and the method has not, and the reverse; late: common hits whose "
     "time is more than 1e-9 after ab2pf's, late_most by how much of the step.",
-    "frame mean": "times_ab2pf of the table above over its scenes.",
+    "frame mean": "times_ab2pf of the table above over its cloths (cloth-ball among them).",
+    "frame mean of all": "the same over all of its scenes.",
     "frame peer": "the same step by ipctk: broad phase, then its candidates (vf_ns and ee_ns "
     "each); peer_ms is both, speedup is that over ab2pf's whole frame.",
     "query": "n candidates of ipctk's broad phase (of so many). ns: a query, gather included; "

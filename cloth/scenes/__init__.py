@@ -11,9 +11,12 @@ from collections.abc import Callable
 
 from tauguard.cloth.scenes.ball import turning_ball
 from tauguard.cloth.scenes.crumple import crumpling
+from tauguard.cloth.scenes.cubes import cubes_on_cloth, packed_cubes
 from tauguard.cloth.scenes.mats import twisting_mats
 from tauguard.cloth.scenes.pleats import pleats
 from tauguard.cloth.scenes.recorded import Recording, load_recording
+from tauguard.cloth.scenes.rod import twisting_rod
+from tauguard.cloth.scenes.rollers import rollers
 from tauguard.cloth.scenes.scene import Scene
 from tauguard.cloth.scenes.skirt import seated_skirt
 
@@ -24,6 +27,10 @@ SCENES: dict[str, Callable[[int, int], Scene]] = {
     "seated_skirt": seated_skirt,
     "twisting_mats": twisting_mats,
     "crumpling": crumpling,
+    "cubes_on_cloth": cubes_on_cloth,
+    "packed_cubes": packed_cubes,
+    "rollers": rollers,
+    "twisting_rod": twisting_rod,
 }
 
 __all__ = ["SCENES", "Recording", "Scene", "load_recording"]

@@ -125,3 +125,17 @@ def test_real_recordings(data_dir, name, pattern):
     ((x_t0, x_t1),) = recording.steps()
     assert (len(x_t0), len(recording.faces)) == sizes[name]
     assert len(x_t1) == len(x_t0)
+
+
+def test_faces_that_slide_on_each_other_are_all_found():
+    """Every contact lies in one plane throughout: a cubic that is zero, which comparators skip."""
+    scene = SCENES["packed_cubes"](400, 1)
+    step = scene.positions(0.8), scene.positions(0.85)
+    found = {
+        method: MeshCCD(scene.faces, method, groups=scene.groups).find(*step)
+        for method in ("ab2pf", "exact", "iccd")
+    }
+    assert found["ab2pf"].vf.tobytes() == found["exact"].vf.tobytes()
+    assert found["ab2pf"].ee.tobytes() == found["exact"].ee.tobytes()
+    assert (found["ab2pf"].vf_impacts.toi == 0).all()
+    assert len(found["iccd"].ee) < len(found["ab2pf"].ee)
