@@ -135,6 +135,7 @@ void add_counts(nb::dict& d, const Stats& s) {
   d["cubic_sign"] = s.cubic_sign;
   d["roots"] = s.roots;
   d["at_start"] = s.at_start;
+  d["sliding"] = s.sliding;
   d["resolved"] = s.resolved;
   d["intervals"] = s.intervals;
   d["exact"] = s.exact;

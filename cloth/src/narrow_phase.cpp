@@ -16,6 +16,7 @@
 #include "integer_contact.hpp"
 #include "intervals.hpp"
 #include "query.hpp"
+#include "sliding_contact.hpp"
 #include "start_contact.hpp"
 #include "tauguard/geometry/interrupt.hpp"
 #include "tauguard/geometry/scratch.hpp"
@@ -201,6 +202,19 @@ bool may_touch_at_start(const Batch& b, std::int32_t query) {
          !(std::fabs(group.value[Group::cubic][lane]) > group.value[Group::error][lane]);
 }
 
+// Of a query that is apart at the start. A cubic that is zero there may be zero throughout: what
+// slides on a plane across an axis is then told in two dimensions.
+template <bool vf>
+double later(const Batch& b, std::int32_t query, const Ends& x, const std::int32_t* row,
+             Stats& stats) {
+  if (may_touch_at_start(b, query)) {
+    const double t = sliding_contact(vf, x, row);
+    stats.sliding += !std::isnan(t);
+    if (!std::isnan(t)) return t;
+  }
+  return resolve<vf>(x, row, 0, stats);
+}
+
 // One batch: the time of contact of each query, or `never`.
 template <bool vf>
 void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& stats) {
@@ -239,7 +253,7 @@ void ab2pf(const Ends& x, const std::int32_t* rows, int n, double* toi, Stats& s
     const std::int32_t query = b.open[i], *row = rows + 4 * query;
     const bool touching = may_touch_at_start(b, query) && at_start(vf, x, row) == AtStart::touching;
     stats.at_start += touching;
-    toi[query] = touching ? 0 : resolve<vf>(x, row, 0, stats);
+    toi[query] = touching ? 0 : later<vf>(b, query, x, row, stats);
   }
 }
 

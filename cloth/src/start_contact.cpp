@@ -1,12 +1,13 @@
 // Contact is the origin in the hull of the features' differences, as in exact.cpp, at one time. In
 // most that touch a coordinate is the same in all four vertices, and two dimensions are left, in
-// which products of doubles tell; the others are decided in integers.
+// which signs of differences tell, or a filtered determinant; the others are decided in integers.
 #include "start_contact.hpp"
 
 #include <array>
-#include <cmath>
 
 #include "binary.hpp"
+
+#include "tauguard/geometry/signs.hpp"
 
 namespace tauguard::cloth {
 namespace {
@@ -15,50 +16,41 @@ using geometry::FixedInt;
 
 // The hull's corners in order around it: the first vertex as seen from the second.
 constexpr int of_vf[][2] = {{0, 1}, {0, 2}, {0, 3}}, of_ee[][2] = {{2, 0}, {3, 0}, {3, 1}, {2, 1}};
-constexpr int unknown_sign = 2;
-
-// a - b, and whether that is exact (Knuth's sum and its error).
-bool exact_difference(double a, double b, double& d) {
-  d = a - b;
-  const double z = d - a;
-  return (a - (d - z)) - (b + z) == 0;
-}
-
-// The sign of a x b. Rounding keeps the order of two products; where they round to the same, their
-// errors tell, which are exact for products in this range.
-int turn(const double* a, const double* b) {
-  const double left = a[0] * b[1], right = a[1] * b[0];
-  if (left != right) return left > right ? 1 : -1;
-  if (left == 0 && (a[0] == 0 || b[1] == 0) && (a[1] == 0 || b[0] == 0)) return 0;
-  if (!(std::fabs(left) > 0x1p-900 && std::fabs(left) < 0x1p1000)) return unknown_sign;
-  const double e = std::fma(a[0], b[1], -left), f = std::fma(a[1], b[0], -right);
-  return (e > f) - (e < f);
-}
+// Neighbouring corners share a vertex: their cross product is of the others, as seen from it.
+constexpr int sides_of_vf[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
+constexpr int sides_of_ee[][3] = {{0, 2, 3}, {3, 0, 1}, {1, 3, 2}, {2, 1, 0}};
 
 bool opposite(double a, double b) { return !((a > 0 && b > 0) || (a < 0 && b < 0)); }
+
+// The sign of (a - o) x (b - o). Faces that lie on one another share lines along the axes: there
+// differences are zero, which no rounding hides, and no product is needed.
+int turn(const double* o, const double* a, const double* b, int i, int j) {
+  const double ux = a[i] - o[i], uy = a[j] - o[j], vx = b[i] - o[i], vy = b[j] - o[j];
+  const int left = geometry::sign_of(ux) * geometry::sign_of(vy),
+            right = geometry::sign_of(uy) * geometry::sign_of(vx);
+  if (left == 0 || right == 0 || left != right) return geometry::sign_of(left - right);
+  const double flat[3][2] = {{o[i], o[j]}, {a[i], a[j]}, {b[i], b[j]}};
+  return geometry::orient2d(flat[0], flat[1], flat[2]);
+}
 
 // Where one coordinate is the same in all: the others, i and j, tell.
 AtStart in_plane(bool vf, const double* const* p, int i, int j) {
   const int corners = vf ? 3 : 4;
-  double g[4][2];
-  for (int c = 0; c < corners; ++c) {
-    const int* pair = vf ? of_vf[c] : of_ee[c];
-    if (!exact_difference(p[pair[0]][i], p[pair[1]][i], g[c][0]) ||
-        !exact_difference(p[pair[0]][j], p[pair[1]][j], g[c][1]))
-      return AtStart::unknown;
-  }
   bool left = false, right = false;
   for (int c = 0; c < corners; ++c) {
-    const int side = turn(g[c], g[(c + 1) % corners]);
-    if (side == unknown_sign) return AtStart::unknown;
-    left = left || side > 0;
-    right = right || side < 0;
+    const int* side = vf ? sides_of_vf[c] : sides_of_ee[c];
+    const int sign = turn(p[side[0]], p[side[1]], p[side[2]], i, j);
+    left = left || sign > 0;
+    right = right || sign < 0;
+    if (left && right) return AtStart::apart;
   }
-  if (left || right) return left && right ? AtStart::apart : AtStart::touching;
+  if (left || right) return AtStart::touching;
   // All corners on one line through the origin: the way around them covers their hull.
   for (int c = 0; c < corners; ++c) {
-    const double *a = g[c], *b = g[(c + 1) % corners];
-    if (opposite(a[0], b[0]) && opposite(a[1], b[1])) return AtStart::touching;
+    const int *a = vf ? of_vf[c] : of_ee[c],
+              *b = vf ? of_vf[(c + 1) % corners] : of_ee[(c + 1) % corners];
+    const auto on = [&](const int* pair, int k) { return p[pair[0]][k] - p[pair[1]][k]; };
+    if (opposite(on(a, i), on(b, i)) && opposite(on(a, j), on(b, j))) return AtStart::touching;
   }
   return AtStart::apart;
 }
@@ -116,8 +108,7 @@ AtStart at_start(bool vf, const Ends& x, const std::int32_t* row) {
   for (int v = 0; v < 4; ++v) p[v] = x.at(false, row[v]);
   for (int k = 0; k < 3; ++k) {
     if (!(p[0][k] == p[1][k] && p[0][k] == p[2][k] && p[0][k] == p[3][k])) continue;
-    const AtStart found = in_plane(vf, p, (k + 1) % 3, (k + 2) % 3);
-    if (found != AtStart::unknown) return found;
+    return in_plane(vf, p, (k + 1) % 3, (k + 2) % 3);
   }
   FixedInt<2> whole[3][4];
   for (int k = 0; k < 3; ++k) {

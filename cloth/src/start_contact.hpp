@@ -10,7 +10,8 @@ namespace tauguard::cloth {
 
 enum class AtStart { apart, touching, unknown };
 
-// unknown where the coordinates on one axis span more than 116 bits. row: 4 vertices.
+// unknown where no coordinate is the same in all and those on one axis span more than 116 bits.
+// row: 4 vertices.
 AtStart at_start(bool vf, const Ends& x, const std::int32_t* row);
 
 }  // namespace tauguard::cloth

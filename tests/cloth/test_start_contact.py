@@ -76,3 +76,34 @@ def test_bodies_at_rest_on_one_another_are_decided_at_the_start():
     ):
         assert stats["at_start"] == stats["hits"] == (toi == 0).sum() > 100
         assert stats["exact"] == 0
+
+
+def sliding(rng, n, kind):
+    """Queries whose vertices stay in a plane across an axis, which may move itself."""
+    x = rng.normal(size=(n, 2, 4, 3))
+    if kind == "lattice":  # vertices that meet vertices, edges that lie on edges
+        x = rng.integers(-3, 4, size=x.shape).astype(float)
+    elif kind == "thirds":
+        x = rng.integers(-3, 4, size=x.shape) / 3 + np.array([1e3, 0.1, 0.7])
+    elif kind == "rigid":  # two pieces, each without a turn
+        x[:, 1] = x[:, 0] + np.repeat(rng.normal(size=(n, 2, 3)), 2, axis=1)
+    elif kind == "slow":
+        x[:, 1] = x[:, 0] + 1e-6 * rng.normal(size=(n, 4, 3))
+    elif kind == "far":
+        x += 1e6
+    elif kind == "tiny":
+        x *= 1e-200
+    x[np.arange(n), :, :, rng.integers(3, size=n)] = rng.normal(size=(n, 2, 1))
+    return x
+
+
+@pytest.mark.parametrize("kind", ["any", "lattice", "thirds", "rigid", "slow", "far", "tiny"])
+@pytest.mark.parametrize("query", QUERIES)
+def test_what_slides_on_a_plane_has_the_hits_and_times_of_exact_arithmetic(query, kind):
+    x = sliding(np.random.default_rng(11), 600, kind)
+    ours = QUERIES[query](x[:, 0], x[:, 1])
+    exact = QUERIES[query](x[:, 0], x[:, 1], method="exact")
+    assert np.array_equal(ours.hit, exact.hit)
+    assert exact.hit.sum() > 20
+    assert np.all(ours.toi[ours.hit] <= exact.toi[ours.hit])
+    assert np.all(ours.toi[ours.hit] >= exact.toi[ours.hit] - 1e-9)
