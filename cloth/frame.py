@@ -21,8 +21,9 @@ class FrameStats:
             apart on an axis (``axes``: asked where the volumes sweep the step), how many the
             cubic cleared (``cubic_sign``: no root) and its roots (``roots``: no contact at any);
             how many touch ``at_start``; how many were told while ``sliding`` on a plane across an
-            axis; how many were ``resolved`` one by one, cut into how many ``intervals`` of time; how many ``exact`` arithmetic decided, and of these with integers
-            of any length (``long_exact``), the others with integers of fixed width; ``hits``.
+            axis; how many were ``resolved`` one by one, cut into how many ``intervals`` of time;
+            how many ``exact`` arithmetic decided, and of these with integers of any length
+            (``long_exact``), the others with integers of fixed width; ``hits``.
         ee: The same of the edge-edge side.
         seconds: Wall time of each phase: ``project`` (positions onto the axes), ``build``,
             ``refit``, ``traverse``, ``vf`` and ``ee`` (candidates and narrow phase of each side),
