@@ -72,9 +72,9 @@ def cubes_on_cloth(triangles: int = 20_000, seed: int = 0) -> Scene:
         cloth = np.column_stack([flat[:, 0] * drawn + wave, flat[:, 1] * drawn, height])
         under = low * (1 - (centres**2).prod(axis=1)) - 0.12 * fall
         above = (1 - fall) * 0.9 + half * 0.95
-        turns = 1.2 * (1 - 0.7 * fall) + time
+        turned = 1.2 * (1 - 0.7 * float(fall)) + time
         bodies = [
-            2 * half * (cube - 0.5) @ _rotation(axis[i], turns).T
+            np.dot(2 * half * (cube - 0.5), _rotation(axis[i], turned).T)
             + [*(centres[i] * drawn), under[i] + above]
             for i in range(DROPPED)
         ]
@@ -103,7 +103,8 @@ def _cube(fine: int) -> tuple[Points, NDArray[np.int32]]:
     """The unit cube with ``fine`` squares along each edge, its faces closed."""
     square = sheet(fine + 1, fine + 1)
     i, j = np.divmod(np.arange((fine + 1) ** 2), fine + 1)
-    corners, faces = [], []
+    corners: list[NDArray[np.intp]] = []
+    faces: list[NDArray[np.int32]] = []
     for axis in range(3):
         for level in (0, fine):
             at = np.insert(np.stack([i, j], axis=1), axis, level, axis=1)
