@@ -73,9 +73,9 @@ def cubes_on_cloth(triangles: int = 20_000, seed: int = 0) -> Scene:
         under = low * (1 - (centres**2).prod(axis=1)) - 0.12 * fall
         above = (1 - fall) * 0.9 + half * 0.95
         turned = 1.2 * (1 - 0.7 * float(fall)) + time
+        places = np.column_stack([centres * drawn, under + above])
         bodies = [
-            np.dot(2 * half * (cube - 0.5), _rotation(axis[i], turned).T)
-            + [*(centres[i] * drawn), under[i] + above]
+            np.dot(2 * half * (cube - 0.5), _rotation(axis[i], turned).T) + places[i]
             for i in range(DROPPED)
         ]
         return np.concatenate([cloth, *bodies])
