@@ -35,7 +35,7 @@ STUDIES: dict[str, Study] = {
     ),
     "detection_conformal": Study(
         "detection.conformal",
-        "false alarms per hour: what calibration promises, and what is counted",
+        "false alarms per hour: what calibration guarantees, and what is counted",
     ),
     "false_alarms": Study(
         "detection.false_alarms",

@@ -1,5 +1,6 @@
 """Plug-in contact checkers, their comparison and the guarded stepper."""
 
+from tauguard.contacts.check_states import check_states
 from tauguard.contacts.checker import (
     KINDS,
     Checker,
@@ -18,7 +19,6 @@ from tauguard.contacts.mujoco_checker import MujocoChecker, contacts_of
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
 from tauguard.contacts.report import Disagreement, Outcome, Report, Score
 from tauguard.contacts.rigid_checker import RigidChecker
-from tauguard.contacts.watching import watch
 
 register("mujoco", MujocoChecker)
 register("cloth", ClothChecker)
@@ -41,6 +41,7 @@ __all__ = [
     "Score",
     "State",
     "StepReport",
+    "check_states",
     "checker",
     "compare",
     "contacts_of",
@@ -51,5 +52,4 @@ __all__ = [
     "pair_kind",
     "register",
     "registered",
-    "watch",
 ]

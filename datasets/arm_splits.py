@@ -30,7 +30,7 @@ def training(folder: Path, arm: str | None) -> list[Trace]:
     return list(read(folder, first, arm))
 
 
-def judged(
+def episodes_of_splits(
     folder: Path, robot: RobotNumbers, splits: Sequence[str]
 ) -> Iterator[tuple[str, Iterator[Trace]]]:
     """The splits to judge on and the episodes in them of the arm that a detector knows.

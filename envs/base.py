@@ -279,7 +279,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             "alarm_delay": cell.alarm_delay.item(0),
             "reason": DIVERGED_REASON if figure[DIVERGED] else "",
         } | touches(cell, 0)
-        if cell.watching:
+        if cell.checks:
             info["contacts"] = cell.contacts[0].copy()
         return info
 

@@ -18,7 +18,7 @@ from tauguard.envs.plant import make_plant
 from tauguard.envs.randomization import Variant, draw, own_model, vary
 from tauguard.envs.sensing import Sensing, listening
 from tauguard.envs.settings import CONTROLS
-from tauguard.envs.watching import Watching
+from tauguard.envs.step_checks import StepChecks
 from tauguard.envs.world import RegionInfo, World
 from tauguard.models import Person
 
@@ -112,7 +112,7 @@ class Cell:
         self.sensing: list[Sensing] | None = None
         self.attach(world.settings.detector)
         names = world.settings.checkers
-        self.watching = [Watching(world, names) for _ in range(rows)] if names else []
+        self.checks = [StepChecks(world, names) for _ in range(rows)] if names else []
         self.contacts = np.zeros((rows, len(names)), dtype=np.int64)
 
     def attach(self, detector: object) -> None:
@@ -211,7 +211,7 @@ class Cell:
 
     def step(self, i: int, action: Array, rng: np.random.Generator) -> None:
         """One action of copy ``i``, shape (m,)."""
-        if self.watching:
+        if self.checks:
             self._watched(i, action)
         else:
             self.plants[i].step(action)
@@ -223,7 +223,7 @@ class Cell:
         self, actions: Array, mask: NDArray[np.bool_], rngs: list[np.random.Generator], threads: int
     ) -> None:
         """One action of every copy that ``mask`` chooses, shape (rows, m), on a thread pool."""
-        if self.watching:
+        if self.checks:
             for i in np.flatnonzero(mask):
                 self._watched(int(i), actions[i])
         else:
@@ -265,15 +265,15 @@ class Cell:
 
     def _watched(self, i: int, action: Array) -> None:
         """A step with contact checkers: each sees every physics step."""
-        plant, data, watching = self.plants[i], self.datas[i], self.watching[i]
+        plant, data, checks = self.plants[i], self.datas[i], self.checks[i]
         plant.begin(action)
-        watching.begin(data)
+        checks.begin(data)
         for _ in range(self.world.settings.substeps):
             plant.run(1)
             if not np.isfinite(data.qpos).all():
                 break
-            watching.see(data)
-        self.contacts[i] = watching.counts
+            checks.see(data)
+        self.contacts[i] = checks.counts
         plant.finish()
 
     def _make_plant(self, i: int) -> _plant.Plant:

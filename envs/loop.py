@@ -21,7 +21,7 @@ class SimulationDiverged(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Recording:
+class Rollout:
     """What the loop saw; row k belongs to the state before step k."""
 
     q: Array  #: true joint positions [rad], shape (T, n)
@@ -30,9 +30,9 @@ class Recording:
     contact: Array  #: contact sensors [found, N, N m, m], shape (T, links, SENSOR_WIDTH)
     poses: Array  #: obstacle positions and quaternions (wxyz), shape (T, obstacles, 7)
 
-    def rows(self, begin: int, end: int) -> Recording:
+    def rows(self, begin: int, end: int) -> Rollout:
         """A view of some of the rows."""
-        return Recording(*(getattr(self, f.name)[begin:end] for f in fields(self)))
+        return Rollout(*(getattr(self, f.name)[begin:end] for f in fields(self)))
 
 
 class SimulationLoop:
@@ -83,10 +83,10 @@ class SimulationLoop:
         mujoco.mj_setState(self.model, self.data, saved[0], mujoco.mjtState.mjSTATE_INTEGRATION)
         self._plant.restore(saved[1].tolist())
 
-    def recording(self, rows: int) -> Recording:
+    def room_for(self, rows: int) -> Rollout:
         """Room for so many rows."""
         joints, links = len(self.scene.joint_names), self._sensors[1] // SENSOR_WIDTH
-        return Recording(
+        return Rollout(
             q=np.empty((rows, joints)),
             qd=np.empty((rows, joints)),
             current=np.empty((rows, joints)),
@@ -101,8 +101,8 @@ class SimulationLoop:
         tau_ff: Array,
         wrench: Array | None = None,
         wrench_body: int = -1,
-        out: Recording | None = None,
-    ) -> Recording:
+        out: Rollout | None = None,
+    ) -> Rollout:
         """Run one step per row of the references.
 
         Args:
@@ -118,7 +118,7 @@ class SimulationLoop:
             SimulationDiverged: a joint position is not finite or a velocity beyond 1000 rad/s.
         """
         rows = len(q_des)
-        out = self.recording(rows) if out is None else out
+        out = self.room_for(rows) if out is None else out
         track = _plant.Track(
             q=out.q,
             qd=out.qd,

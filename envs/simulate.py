@@ -15,7 +15,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import labels
 from tauguard.envs.episode import CollisionPlan, Episode, PayloadPick
-from tauguard.envs.loop import Recording, SimulationLoop
+from tauguard.envs.loop import Rollout, SimulationLoop
 from tauguard.envs.motions import Workspace, random_motion
 from tauguard.envs.poses import Poses
 from tauguard.envs.striking import Striking, Window
@@ -150,7 +150,7 @@ class Simulation:
         self._feed_forward = self._feed_forward + self._known_friction()
         self.loop = SimulationLoop(self.scene, self.nominal)
         self.loop.reset(self.motion.q[0])
-        self._recording = self.loop.recording(len(self.motion.t))
+        self._rollout = self.loop.room_for(len(self.motion.t))
         self.striking = Striking(self.scene, self.motion, self.loop, self._follow, aim_rng)
         self._payload = 0.0
         self._windows: list[Window] = []
@@ -170,14 +170,14 @@ class Simulation:
                 if window is not None:
                     injected.append((window.begin * self.episode.timestep, job.kind))
                     self._windows.append(window)
-                    start = window.begin + len(window.recording.q)
+                    start = window.begin + len(window.rollout.q)
             else:
                 self._follow(row, start)
                 self._carry(job.payload_g)
                 payload[start:] = job.payload_g / 1000
             row = start
         self._follow(row, len(payload))
-        return self._trace(self._recording, payload, injected)
+        return self._trace(self._rollout, payload, injected)
 
     def _known_friction(self) -> Array:
         """What the servo adds to make up for the friction that it knows of [N m], (T, n)."""
@@ -198,7 +198,7 @@ class Simulation:
 
     def _follow(
         self, start: int, stop: int, wrench: Array | None = None, body: int = -1
-    ) -> Recording:
+    ) -> Rollout:
         rows = slice(start, stop)
         return self.loop.run(
             self.motion.q[rows],
@@ -206,33 +206,31 @@ class Simulation:
             self._feed_forward[rows],
             wrench,
             body,
-            self._recording.rows(start, stop),
+            self._rollout.rows(start, stop),
         )
 
-    def _contacts(self, recording: Recording) -> tuple[CheckedContacts, ...]:
+    def _contacts(self, rollout: Rollout) -> tuple[CheckedContacts, ...]:
         if not self._checkers:
             return ()
         from tauguard.envs.checking import checked
 
-        return checked(self.scene, self.motion.t, recording, self._checkers)
+        return checked(self.scene, self.motion.t, rollout, self._checkers)
 
-    def _trace(
-        self, recording: Recording, payload: Array, injected: list[tuple[float, str]]
-    ) -> Trace:
+    def _trace(self, rollout: Rollout, payload: Array, injected: list[tuple[float, str]]) -> Trace:
         scene, episode, motion = self.scene, self.episode, self.motion
-        wrenches = labels.Wrenches.from_contacts(recording.contact)
-        if not recording.contact.shape[1]:  # links are listed where something pushes one
+        wrenches = labels.Wrenches.from_contacts(rollout.contact)
+        if not rollout.contact.shape[1]:  # links are listed where something pushes one
             links = len(scene.link_bodies) if self._windows else 0
             wrenches = labels.Wrenches.empty(len(motion.t), links)
         for window in self._windows:
-            rows = slice(window.begin, window.begin + len(window.recording.q))
+            rows = slice(window.begin, window.begin + len(window.rollout.q))
             wrenches.force[rows] = window.wrenches.force
             wrenches.torque[rows] = window.wrenches.torque
             wrenches.point[rows] = window.wrenches.point
-        tau_ext = labels.external_torque(Poses(scene), recording.q, wrenches)
-        truth = _truth(motion.t, scene, recording, wrenches, tau_ext, payload, injected)
+        tau_ext = labels.external_torque(Poses(scene), rollout.q, wrenches)
+        truth = _truth(motion.t, scene, rollout, wrenches, tau_ext, payload, injected)
         sensors = scene.drive.sensors
-        q, qd, current = recording.q, recording.qd, recording.current
+        q, qd, current = rollout.q, rollout.qd, rollout.current
         if sensors is not None:
             q, qd, current = sensors.measure(self._sensor_rng, q, qd, current)
         return Trace(
@@ -245,7 +243,7 @@ class Simulation:
             qd_des=motion.qd,
             qdd_des=motion.qdd,
             truth=truth,
-            contacts=self._contacts(recording),
+            contacts=self._contacts(rollout),
             meta={
                 "seed": str(episode.seed),
                 "config_sha256": episode.config_hash,
@@ -266,7 +264,7 @@ class Simulation:
 def _truth(
     t: Array,
     scene: Scene,
-    recording: Recording,
+    rollout: Rollout,
     wrenches: labels.Wrenches,
     tau_ext: Array,
     payload: Array,
@@ -292,7 +290,7 @@ def _truth(
         contact_point=where,
         contact_vector=vector,
         obstacle_names=tuple(scene.obstacle_names),
-        obstacle_poses=_matrices(recording.poses),
+        obstacle_poses=_matrices(rollout.poses),
     )
 
 

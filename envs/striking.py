@@ -19,7 +19,7 @@ from tauguard.envs.injection import (
     launch,
     pulse_wrench,
 )
-from tauguard.envs.loop import Recording, SimulationLoop
+from tauguard.envs.loop import Rollout, SimulationLoop
 from tauguard.envs.motions import Motion
 from tauguard.envs.poses import Poses, cross
 from tauguard.models import Scene
@@ -48,7 +48,7 @@ class Window:
     """One injected collision as it was carried out."""
 
     begin: int  #: first row
-    recording: Recording
+    rollout: Rollout
     wrenches: labels.Wrenches
     peak_tau: float  #: [N m]
     peak_force: float  #: [N]
@@ -59,7 +59,7 @@ class Follow(Protocol):
 
     def __call__(
         self, start: int, stop: int, wrench: Array | None = None, body: int = -1
-    ) -> Recording:
+    ) -> Rollout:
         """Rows ``start`` to ``stop``, with a wrench on a body if one is given."""
 
 
@@ -170,19 +170,19 @@ class Striking:
             self._launch(target, strength)
         else:
             self._place_clamp(target, strength - CLAMP_OFFSET, end)
-        recording = self._follow(begin, end, wrench, body)
+        rollout = self._follow(begin, end, wrench, body)
         self._park(plan.kind)
         wrenches = (
-            self._pulse_truth(wrench, target, recording, dt)
+            self._pulse_truth(wrench, target, rollout, dt)
             if wrench is not None
-            else labels.Wrenches.from_contacts(recording.contact)
+            else labels.Wrenches.from_contacts(rollout.contact)
         )
         if plan.kind != "pulse" and (wrenches.force[: self._row(CLEAR)] != 0).any():
             return None
-        tau = labels.external_torque(self._poses, recording.q, wrenches)
+        tau = labels.external_torque(self._poses, rollout.q, wrenches)
         peak_tau = float(np.abs(tau[:, :4]).max(initial=0.0))
         peak_force = float(np.linalg.norm(wrenches.force, axis=2).max(initial=0.0))
-        return Window(begin, recording, wrenches, peak_tau, peak_force)
+        return Window(begin, rollout, wrenches, peak_tau, peak_force)
 
     def _launch(self, target: Target, speed: float) -> None:
         model, data = self._scene.model, self._loop.data
@@ -210,7 +210,7 @@ class Striking:
             data.mocap_pos[model.body("clamp").mocapid[0]] = -PARKED
 
     def _pulse_truth(
-        self, wrench: Array, target: Target, recording: Recording, dt: float
+        self, wrench: Array, target: Target, rollout: Rollout, dt: float
     ) -> labels.Wrenches:
         """The wrench that acted, told about the pushed point instead of the centre of mass."""
         rows = len(wrench)
@@ -218,7 +218,7 @@ class Striking:
         link = int(np.flatnonzero(np.asarray(self._scene.link_bodies) == target.body)[0])
         force = wrench[:, :3]
         point = target.point + np.outer(np.arange(rows) * dt, target.velocity)
-        com = self._poses.points(recording.q, target.body)
+        com = self._poses.points(rollout.q, target.body)
         found.force[:, link] = force
         found.torque[:, link] = wrench[:, 3:] - cross(point - com, force)
         found.point[:, link] = point

@@ -225,7 +225,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "alarm_delay": cell.alarm_delay.copy(),
             "reason": reason,
         } | touches(cell, slice(None))
-        if cell.watching:
+        if cell.checks:
             infos["contacts"] = cell.contacts.copy()
         for key in list(infos):
             infos[f"_{key}"] = mask.copy()

@@ -17,7 +17,7 @@ from tauguard.benchmarks.cloth.scaling import CLOTHS, Step, bound, scaled, step_
 from tauguard.benchmarks.harness import measure
 from tauguard.cloth import Frame as FrameAnswer
 from tauguard.cloth import Groups, MeshCCD
-from tauguard.cloth.scenes import SCENES, load_recording
+from tauguard.cloth.scenes import SCENES, load_sequence
 from tauguard.report import Row
 
 #: Method and volume: what each was published with, then all on the same candidates.
@@ -49,8 +49,8 @@ def frames(triangles: int, seed: int, data: Path | None) -> list[Frame]:
     found = [Frame(s.name, s.faces, s.groups, step_at(s, 0.85)) for s in built]
     folder = None if data is None else data / "ccd" / "cloth-ball" / "frames"
     if folder is not None and folder.is_dir():
-        recording = load_recording(folder)
-        found.append(Frame("cloth-ball", recording.faces, None, next(recording.steps())))
+        sequence = load_sequence(folder)
+        found.append(Frame("cloth-ball", sequence.faces, None, next(sequence.steps())))
     return found
 
 

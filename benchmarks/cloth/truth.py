@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tauguard.benchmarks.cloth.frames import compare, lateness
 from tauguard.cloth import MeshCCD
 from tauguard.cloth.impacts import METHODS
-from tauguard.cloth.scenes import load_recording
+from tauguard.cloth.scenes import load_sequence
 from tauguard.report import Row
 
 #: Frames and number of the lists of each scene (Sample-Scalable-CCD-Data, Belgrod et al. 2023).
@@ -22,13 +22,13 @@ def on_listed_frames(folder: Path) -> list[Row]:
     """What each method misses and adds; "exact" where that takes seconds, not minutes."""
     rows: list[Row] = []
     for name, (pattern, number) in SCENES.items():
-        recording = load_recording(folder / name / "frames", pattern)
-        step = next(recording.steps())
-        edges = MeshCCD(recording.faces).edges
+        sequence = load_sequence(folder / name / "frames", pattern)
+        step = next(sequence.steps())
+        edges = MeshCCD(sequence.faces).edges
         vf, ee = listed(folder / name, number, edges, len(step[0]))
-        ours = MeshCCD(recording.faces).find(*step)
+        ours = MeshCCD(sequence.faces).find(*step)
         for method in METHODS:
-            ccd = MeshCCD(recording.faces, method)
+            ccd = MeshCCD(sequence.faces, method)
             if method == "exact" and len(ccd.faces) > 50_000:
                 continue
             frame = ccd.find(*step)

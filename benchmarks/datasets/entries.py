@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tauguard.benchmarks.workers import Workers
-from tauguard.datasets.arm_splits import judged
+from tauguard.datasets.arm_splits import episodes_of_splits
 from tauguard.datasets.configuration import Configuration, load
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.labelled import labelled
@@ -120,7 +120,7 @@ def _entry(job: tuple[Path, str, str]) -> Entry:
     seconds = time.process_time() - begin
     splits = tuple(
         (split, tuple(matchings(alarm, traces)))
-        for split, traces in judged(folder, alarm.detector.arm.robot, ())
+        for split, traces in episodes_of_splits(folder, alarm.detector.arm.robot, ())
     )
     return Entry(name, arm, seconds, splits)
 
@@ -174,7 +174,7 @@ def by_path(wanted: Configuration, folder: Path, arm: str, name: str) -> list[Ro
         alarm = trained(recordings, name)
         judge: Iterator[Trace] | Sequence[Trace] = traces["test"]
         if source == "path":
-            judge = dict(judged(folder, alarm.detector.arm.robot, ("test",)))["test"]
+            judge = dict(episodes_of_splits(folder, alarm.detector.arm.robot, ("test",)))["test"]
         columns = _columns(matchings(alarm, judge))
         rows.append({"study": "by path", "from": source, "threshold": alarm.threshold, **columns})
     return rows

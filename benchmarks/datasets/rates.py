@@ -71,8 +71,8 @@ def _timed(one: Planned) -> dict[str, float]:
             shard = table(stored(trace, 1), one.number, rounded(RESIDUAL, residual), like)
             with pq.ParquetWriter(io.BytesIO(), like, **writing(like)) as writer:
                 writer.write_table(shard, len(trace.t))
-    recording: Any = simulation._recording
-    peer, error = _rolled_out(simulation, recording.q, recording.qd)
+    seen: Any = simulation._rollout
+    peer, error = _rolled_out(simulation, seen.q, seen.qd)
     return {**spent, "rollout": peer, "error": error, "samples": float(len(trace.t))}
 
 

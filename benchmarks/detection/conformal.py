@@ -1,8 +1,8 @@
-"""Whether a detector keeps the promise of its conformal calibration on fresh motion.
+"""Whether a detector keeps the guarantee of its conformal calibration on fresh motion.
 
 Episodes of collision-free motion are drawn alike: speed, payload (never told), temperature and path
 at random. Some calibrate the threshold for a number of false alarms per hour, others are fresh. The
-promise is kept where the rate asked for lies inside or above the exact Poisson 95 % interval of
+guarantee is kept where the rate asked for lies inside or above the exact Poisson 95 % interval of
 the alarms counted. The same pool is then split anew, again and again: how many draws kept it.
 """
 
@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from tauguard.report import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,18 +24,16 @@ if TYPE_CHECKING:
     from tauguard.envs import Episode
     from tauguard.models import Mismatch
 
-Row = dict[str, Any]
-
 #: Detectors of the study when it runs by itself.
 NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds", "current-network")
 
 #: What the columns of each table mean.
 NOTES = {
-    "conformal": "a threshold from calibration motion promises asked_per_hour; "
+    "conformal": "a threshold from calibration motion guarantees asked_per_hour; "
     "false_alarms_per_hour counts what came in fresh_hours of fresh motion, drawn alike. kept: the "
     "rate asked lies in or above its exact 95 % interval; draws_kept: in how many other splits of "
     "the same motion. refused: the calibration motion cannot guarantee the rate, since this "
-    "detector's alarms come in crowds. Motion that is not drawn alike is promised nothing, and "
+    "detector's alarms come in crowds. Motion that is not drawn alike has no guarantee, and "
     "missed collisions are not in it.",
 }
 
@@ -79,7 +79,7 @@ def levels_of(job: tuple[Sequence[FittedDetector], Episode]) -> list[FreeScores]
     return [FreeScores.of(CollisionAlarm(d, float("inf")), trace) for d in detectors]
 
 
-def promise_rows(
+def guarantee_rows(
     detectors: Sequence[FittedDetector],
     arm: Mismatch,
     plan: Plan,
@@ -126,22 +126,22 @@ def _row(name: str, levels: Sequence[FreeScores], asked: float, plan: Plan, seed
         order = np.arange(len(levels)) if draw == 0 else rng.permutation(len(levels))
         picked = [levels[i] for i in order]
         try:
-            promise = guaranteed_threshold(picked[: plan.calibration], asked, plan.confidence)
+            guarantee = guaranteed_threshold(picked[: plan.calibration], asked, plan.confidence)
         except ValueError as refusal:
             if draw == 0:
                 return {**row, "refused": str(refusal)}
             continue
         fresh = picked[plan.calibration :]
-        alarms = sum(episode.alarms(promise.threshold) for episode in fresh)
+        alarms = sum(episode.alarms(guarantee.threshold) for episode in fresh)
         counted = poisson_rate(alarms, sum(episode.seconds for episode in fresh) / 3600)
-        outcomes.append((promise, counted, bool(counted["low"] <= asked)))
-    promise, counted, kept = outcomes[0]
+        outcomes.append((guarantee, counted, bool(counted["low"] <= asked)))
+    guarantee, counted, kept = outcomes[0]
     rates = [c["value"] for _, c, _ in outcomes[1:]]
     return {
         **row,
-        "alarms_an_episode": promise.alarms_an_episode,
-        "allowed": promise.allowed,
-        "score_threshold": promise.threshold,
+        "alarms_an_episode": guarantee.alarms_an_episode,
+        "allowed": guarantee.allowed,
+        "score_threshold": guarantee.threshold,
         "fresh_hours": counted["hours"],
         "false_alarms_per_hour": counted,
         "kept": kept,
@@ -155,18 +155,16 @@ def _row(name: str, levels: Sequence[FreeScores], asked: float, plan: Plan, seed
 def trained(names: Sequence[str], arm: Mismatch, seed: int, *, quick: bool) -> list[FittedDetector]:
     """Detectors by name, fitted on simulated motion of ``arm`` with and without collisions."""
     from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
-    from tauguard.detectors import ArmModel, RobotNumbers, make_detector
+    from tauguard.detectors import make_detector
+    from tauguard.detectors.calibration.nominal import nominal_design
     from tauguard.envs import simulate
-    from tauguard.models import cura6, cura6_drive, pin_model
 
     speeds = (10.0, 30.0, 60.0, 20.0, 45.0)
     struck, free, seconds = (4, 8, 20.0) if quick else (15, 20, 40.0)
     planned = struck_episodes(seed, struck, 5, speeds, TRAINING_PAYLOADS[:: 15 // struck], arm)
     planned += free_episodes(seed, free, seconds, speeds, TRAINING_PAYLOADS[::2], arm)
     traces = [simulate(episode) for episode in planned]
-    nominal = RobotNumbers.from_pin(pin_model(cura6.arm_xml()))
-    believed = ArmModel(nominal, np.array(cura6_drive().gain))
-    return [make_detector(name).fit(traces, believed) for name in names]
+    return [make_detector(name).fit(traces, nominal_design()) for name in names]
 
 
 def run(quick: bool, seed: int) -> list[Row]:
@@ -176,7 +174,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     arm = Mismatch(seed=seed)
     names = ("moving-thresholds", "current-network") if quick else NAMES
     detectors = trained(names, arm, 40 + 4 * seed, quick=quick)
-    return promise_rows(detectors, arm, QUICK if quick else Plan(), 41 + 4 * seed, None)
+    return guarantee_rows(detectors, arm, QUICK if quick else Plan(), 41 + 4 * seed, None)
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
@@ -196,5 +194,5 @@ def draw(rows: list[Row], figure: Figure) -> None:
         axes.hlines(rate, k - 0.4, k + 0.4, colors="black", linestyles="dashed")
     axes.set_xticks(range(len(asked)), [f"{rate:g} asked" for rate in asked])
     axes.set_ylabel("false alarms per hour, counted on fresh motion")
-    axes.set_title("The promise of conformal calibration (dashed: what was asked for)")
+    axes.set_title("The guarantee of conformal calibration (dashed: what was asked for)")
     axes.legend()

@@ -121,28 +121,28 @@ def run(quick: bool, seed: int) -> list[Row]:
     size = QUICK if quick else FULL
     # Arms and streams of seeds that nothing was tuned on.
     arms = [31_000 + 100 * seed + k for k in range(size.arms)]
-    watchers = {arm: watcher(seed, arm, size) for arm in arms}
+    trained = {arm: trained_for(seed, arm, size) for arm in arms}
     surface = link_surface(cura6.arm_xml())
     judged: list[Judged] = []
     sample: Event | None = None
     for speed in size.speeds:
         test = stream(seed, TEST, 5)
         for events in (
-            struck_events(test, speed, watchers, size.per_stratum),
-            push_events(test, speed, watchers, size.pushes),
-            payload_events(test, speed, watchers, size.payloads),
+            struck_events(test, speed, trained, size.per_stratum),
+            push_events(test, speed, trained, size.pushes),
+            payload_events(test, speed, trained, size.payloads),
         ):
             for event in events:
-                judged.append(judge(event, watchers[event.arm], surface))
+                judged.append(judge(event, trained[event.arm], surface))
                 sample = sample or (event if event.alarm is not None else None)
     contacts = [j for j in judged if j.collision is not None]
     rows = [*link_rows(contacts), *confusion_rows(contacts), *contact_rows(contacts)]
     rows += [*sizes(contacts), *kind_rows(judged), *payload_rows(judged)]
     assert sample is not None
-    return [*rows, cost_row(sample, watchers[sample.arm], surface)]
+    return [*rows, cost_row(sample, trained[sample.arm], surface)]
 
 
-def watcher(seed: int, arm: int, size: Size) -> CollisionAlarm:
+def trained_for(seed: int, arm: int, size: Size) -> CollisionAlarm:
     """The detector of one arm, trained and thresholded on motion of its own."""
     detector = make_detector(DETECTOR).fit(size.training.traces(seed, arm), nominal_design())
     hours = size.calibration_hours / len(size.speeds)
@@ -150,12 +150,12 @@ def watcher(seed: int, arm: int, size: Size) -> CollisionAlarm:
     return with_rate(detector, [simulate(e) for pool in pools for _, e in pool], PER_HOUR)
 
 
-def judge(event: Event, watching: CollisionAlarm, surface: LinkSurface) -> Judged:
+def judge(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Judged:
     """All methods' answers to one event."""
     known = (event.kind, event.speed, event.collision, event.mass)
     if event.alarm is None:
         return Judged(*known, None, {}, {})
-    diagnoser = Diagnoser.of(watching.detector.arm, surface)
+    diagnoser = Diagnoser.of(trained.detector.arm, surface)
     after = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace).at(event.alarm.start)
     found = diagnoser.explain(event.alarm, after)
     if event.collision is None:
@@ -304,11 +304,11 @@ def payload_rows(judged: Sequence[Judged]) -> list[Row]:
     return rows
 
 
-def cost_row(event: Event, watching: CollisionAlarm, surface: LinkSurface) -> Row:
+def cost_row(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Row:
     """Microseconds of a diagnosis, and of what must be computed before."""
     alarm = event.alarm
     assert alarm is not None
-    diagnoser = Diagnoser.of(watching.detector.arm, surface)
+    diagnoser = Diagnoser.of(trained.detector.arm, surface)
     looked = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace)
     after = looked.at(alarm.start)
     times: dict[str, Any] = measure(

@@ -39,11 +39,11 @@ class Event:
 
 
 def struck_events(
-    seed: int, speed: float, watchers: dict[int, CollisionAlarm], per_stratum: int
+    seed: int, speed: float, trained: dict[int, CollisionAlarm], per_stratum: int
 ) -> Iterator[Event]:
     """Collisions of the detection study: strikes, pulses and clamps, every severity alike."""
-    for struck in struck_pool(seed, speed, list(watchers), per_stratum):
-        alarms = watchers[struck.arm].detect(struck.trace).alarms
+    for struck in struck_pool(seed, speed, list(trained), per_stratum):
+        alarms = trained[struck.arm].detect(struck.trace).alarms
         assert struck.trace.truth is not None
         for collision, kept in zip(struck.trace.truth.collisions, struck.kept, strict=True):
             if kept:
@@ -53,11 +53,11 @@ def struck_events(
 
 
 def push_events(
-    seed: int, speed: float, watchers: dict[int, CollisionAlarm], episodes: int, each: int = 5
+    seed: int, speed: float, trained: dict[int, CollisionAlarm], episodes: int, each: int = 5
 ) -> Iterator[Event]:
     """Intended pushes of a hand, half of them while the arm dwells."""
     rng = np.random.default_rng([seed, round(100 * speed), 21])
-    arms = list(watchers)
+    arms = list(trained)
     for k in range(episodes):
         plans = tuple(
             replace(
@@ -72,23 +72,23 @@ def push_events(
         )
         arm = arms[k % len(arms)]
         trace = simulate(_episode(rng, speed, arm, PAYLOADS[k % len(PAYLOADS)], plans=plans))
-        alarms = watchers[arm].detect(trace).alarms
+        alarms = trained[arm].detect(trace).alarms
         assert trace.truth is not None
         for collision in trace.truth.collisions:
             yield Event(arm, speed, "push", trace, first_alarm(alarms, collision), collision)
 
 
 def payload_events(
-    seed: int, speed: float, watchers: dict[int, CollisionAlarm], episodes: int
+    seed: int, speed: float, trained: dict[int, CollisionAlarm], episodes: int
 ) -> Iterator[Event]:
     """Payloads that are taken up and put down again without a word."""
     rng = np.random.default_rng([seed, round(100 * speed), 22])
-    arms = list(watchers)
+    arms = list(trained)
     for k in range(episodes):
         arm, grams = arms[k % len(arms)], PICKED[k % len(PICKED)]
         picks = (PayloadPick(UP, grams), PayloadPick(DOWN, 0.0))
         trace = simulate(_episode(rng, speed, arm, 0.0, picks=picks))
-        alarms = watchers[arm].detect(trace).alarms
+        alarms = trained[arm].detect(trace).alarms
         for time, mass in ((UP, grams / 1000), (DOWN, -grams / 1000)):
             raised = [a for a in alarms if time <= a.start <= time + 0.5]
             alarm = raised[0] if raised else None

@@ -64,7 +64,7 @@ def rows(by_speed: BySpeed, thresholds: Spread) -> list[Row]:
     ]
 
 
-def judged(tally: Tally) -> list[Outcome]:
+def countable(tally: Tally) -> list[Outcome]:
     """The outcomes of the 65, without the faint ones."""
     return [o for o in tally.outcomes if o.collision.peak_tau >= LOWEST]
 
@@ -100,7 +100,7 @@ def tau98(outcomes: Sequence[Outcome]) -> float | None:
 
 def _figures(tally: Tally) -> Row:
     """The common part of a row: the headline strata, then all 65."""
-    own = judged(tally)
+    own = countable(tally)
     hard = [o for o in own if o.collision.peak_tau >= HEADLINE]
     hits = sum(o.delay is not None for o in hard)
     return {
@@ -124,7 +124,7 @@ def headline(tally: Tally) -> Row:
     own = [o for o in tally.outcomes if o.collision.peak_tau >= HEADLINE]
     return {
         "sensitivity": found(own),
-        "sensitivity_all": found(judged(tally)),
+        "sensitivity_all": found(countable(tally)),
         "delay_ms": delays(own),
         "false_alarms_per_hour": poisson_rate(tally.false_alarms, tally.free_seconds / 3600),
     }
@@ -185,8 +185,8 @@ def floor(by_speed: BySpeed) -> list[Row]:
                     "sensitivity": found(hard),
                     "median_ms": delays(hard)["median"],
                     "p95_ms": delays(hard)["p95"],
-                    "median_ms from 4 N m": delays(judged(whole))["median"],
-                    "p95_ms from 4 N m": delays(judged(whole))["p95"],
+                    "median_ms from 4 N m": delays(countable(whole))["median"],
+                    "p95_ms from 4 N m": delays(countable(whole))["p95"],
                 }
             )
     return found_rows
@@ -251,8 +251,8 @@ def mcnemar(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
     found_rows: list[Row] = []
     for point in POINTS:
         for name in names[1:]:
-            first = [o for t in by_speed.values() for o in judged(t[names[0], point])]
-            other = [o for t in by_speed.values() for o in judged(t[name, point])]
+            first = [o for t in by_speed.values() for o in countable(t[names[0], point])]
+            other = [o for t in by_speed.values() for o in countable(t[name, point])]
             hits = [(a.delay is not None, b.delay is not None) for a, b in _paired(first, other)]
             only, missed = hits.count((True, False)), hits.count((False, True))
             n = only + missed

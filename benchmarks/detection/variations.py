@@ -64,7 +64,7 @@ def pools(seed: int, speed: float, arms: Sequence[int], extent: Extent, under: C
     return struck, free
 
 
-def judged(fleet: Fleet, both: Pools) -> dict[str, Tally]:
+def tallies_of(fleet: Fleet, both: Pools) -> dict[str, Tally]:
     """Tallies at the third operating point, by detector."""
     struck, free = both
     parts = [judge_struck(fleet, s) for s in struck]
@@ -94,7 +94,7 @@ def conditions(fleet: Fleet, arm: int, seed: int, extent: Extent) -> list[Row]:
     rows = []
     for name, (speed, under) in cases.items():
         both = pools(seed, speed, [arm], extent, under)
-        tallies = judged(fleet, both)
+        tallies = tallies_of(fleet, both)
         rows += [_row("conditions", {"condition": name}, d, t) for d, t in tallies.items()]
     rows += _picks(fleet, arm, seed, extent)
     return rows
@@ -151,7 +151,7 @@ def training_size(bench: Bench, names: Sequence[str]) -> list[Row]:
             fitted = make_detector(name).fit(traces, nominal_design())
             own: dict[str, FittedDetector] = {name: fitted}
             fleet = own_thresholds(own, calibration, bench.extent.target)
-            tally = judged(fleet, both)[name]
+            tally = tallies_of(fleet, both)[name]
             rows.append(_row("training_size", {"collisions": 15 * count}, name, tally))
     return rows
 
@@ -169,7 +169,7 @@ def sigmas(bench: Bench) -> list[Row]:
     for name, settings in cases:
         own: dict[str, FittedDetector] = {name: settings.fit(traces, nominal_design())}
         fleet = own_thresholds(own, calibration, bench.extent.target)
-        tally = judged(fleet, both)[name]
+        tally = tallies_of(fleet, both)[name]
         rows.append(_row("sigma", {"sigma": settings.sigma}, name, tally))
     return rows
 
@@ -185,7 +185,7 @@ def sample_rate(bench: Bench) -> list[Row]:
         fleet = own_thresholds(own, [every(t, stride) for t in calibration], bench.extent.target)
         struck = [replace(s, trace=every(s.trace, stride)) for s in both[0]]
         free = [every(t, stride) for t in both[1]]
-        tally = judged(fleet, (struck, free))["srq-svr"]
+        tally = tallies_of(fleet, (struck, free))["srq-svr"]
         rows.append(_row("sample_rate", {"hz": 1000 / stride}, "srq-svr", tally))
     return rows
 

@@ -23,7 +23,7 @@ LEFT_OUT = 3
 
 
 @dataclass(frozen=True)
-class Watched:
+class ArmLogs:
     """A trained detector and logs that neither it nor its fault checks have seen."""
 
     name: str
@@ -41,7 +41,7 @@ class Watched:
         }
 
     @classmethod
-    def struck(cls, name: str, alarm: CollisionAlarm, episodes: Sequence[Episode]) -> Watched:
+    def struck(cls, name: str, alarm: CollisionAlarm, episodes: Sequence[Episode]) -> ArmLogs:
         """With simulated episodes as its logs."""
         logs, contacts = {}, {}
         for k, episode in enumerate(episodes):
@@ -52,7 +52,7 @@ class Watched:
         return cls(name, alarm, logs, contacts)
 
 
-def arms(quick: bool, seed: int) -> Iterator[Watched]:
+def arms(quick: bool, seed: int) -> Iterator[ArmLogs]:
     """The simulated arm, then the real ones whose logs are there; quick: the simulated one."""
     yield simulated(quick, seed)
     if quick:
@@ -63,17 +63,17 @@ def arms(quick: bool, seed: int) -> Iterator[Watched]:
             yield real(arm.name)
 
 
-def simulated(quick: bool, seed: int) -> Watched:
+def simulated(quick: bool, seed: int) -> ArmLogs:
     """A CURA6 drawn by the seed, 500 Hz; logs with collisions and other loads."""
     drawn = Mismatch(seed=1000 + seed)
     speeds, loads = (20.0, 60.0), (0.0, 2000.0)
     free = free_episodes(seed, 3 if quick else 8, 20.0 if quick else 40.0, speeds, loads, drawn)
     struck = struck_episodes(500 + seed, 1 if quick else 4, 8, (40.0,), (0.0, 1000.0), drawn)
     alarm = trained([simulate(episode) for episode in free], RATE, 5.0)
-    return Watched.struck("simulated", alarm, struck)
+    return ArmLogs.struck("simulated", alarm, struck)
 
 
-def real(name: str) -> Watched:
+def real(name: str) -> ArmLogs:
     """A real arm, trained on two thirds of its collision-free logs; the rest and contacts judge."""
     arm = next(arm for arm in ARMS if arm.name == name)
     free = recordings(arm, ("free",))
@@ -84,4 +84,4 @@ def real(name: str) -> Watched:
     alarm = CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual)
     others = recordings(arm, ("contact", "jointwise", "validation"))
     logs = {log: r.trace for log, r in (free | others).items() if log not in own}
-    return Watched(name, alarm, logs)
+    return ArmLogs(name, alarm, logs)

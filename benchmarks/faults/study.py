@@ -24,7 +24,7 @@ import numpy as np
 from tqdm import tqdm
 
 from tauguard.arrays import Array
-from tauguard.benchmarks.faults.arms import Watched, arms
+from tauguard.benchmarks.faults.arms import ArmLogs, arms
 from tauguard.datasets.live.lateness import Lateness
 from tauguard.datasets.live.packets import FAULTS, Fault, Packets
 from tauguard.detectors.faults.monitor import COLLISION, FREE, Monitor
@@ -67,11 +67,11 @@ class Heard:
     starts: list[float] = field(default_factory=list)  #: of alarms
 
 
-def heard(watched: Watched, packets: Packets) -> Heard:
+def heard(tested: ArmLogs, packets: Packets) -> Heard:
     """What the monitor says of packets, as ``listen`` counts it."""
-    assert watched.alarm.inputs is not None
-    monitor, out = Monitor(watched.alarm, watched.alarm.inputs), Heard()
-    lateness = Lateness(watched.alarm.inputs.dt)
+    assert tested.alarm.inputs is not None
+    monitor, out = Monitor(tested.alarm, tested.alarm.inputs), Heard()
+    lateness = Lateness(tested.alarm.inputs.dt)
     up, last = False, float(packets.due[0])
     rows = zip(packets.due, packets.t, packets.q, packets.qd, packets.current, strict=True)
     for due, t, q, qd, current in rows:
@@ -103,23 +103,23 @@ class Tally:
     struck: int = 0  #: collisions within faults
     missed: int = 0  #: of them, with no answer but "free"
 
-    def add(self, watched: Watched, log: str, name: str, start: float) -> None:
+    def add(self, tested: ArmLogs, log: str, name: str, start: float) -> None:
         """The fault at one moment, beside the same stretch without it."""
-        trace = watched.logs[log]
-        settle = watched.alarm.settle
+        trace = tested.logs[log]
+        settle = tested.alarm.settle
         whole = Packets.of(trace)
         inside = (whole.due >= start - settle - 1.5) & (whole.due < start + LASTS + settle + AFTER)
         intact = whole.rows(np.flatnonzero(inside))
         begin = float(intact.due[0])
         broken = Fault(name, start, LASTS).apply(whole)
         keep = (broken.due >= begin) & (broken.due <= intact.due[-1])
-        a, b = heard(watched, intact), heard(watched, broken.rows(np.flatnonzero(keep)))
+        a, b = heard(tested, intact), heard(tested, broken.rows(np.flatnonzero(keep)))
         self.moments += 1
         times = [t for t in b.reasons if start - 1e-9 <= t <= start + LASTS + 0.15]
         self.delays += [1e3 * (times[0] - start)] if times else []
         said = [s.start for s in b.spans.of(COLLISION)]
         true = [s.start for s in a.spans.of(COLLISION)]
-        near = [(s.start, s.end) for s in a.spans.of(COLLISION)] + watched.contacts.get(log, [])
+        near = [(s.start, s.end) for s in a.spans.of(COLLISION)] + tested.contacts.get(log, [])
         self.false += sum(
             t >= start and not any(u - 0.3 <= t <= v + 0.3 for u, v in near) for t in said
         )
@@ -155,30 +155,30 @@ def run(quick: bool, seed: int) -> list[Row]:
     """All rows."""
     rng = np.random.default_rng([seed, 15])
     rows: list[Row] = []
-    known: list[Watched] = []
-    for watched in arms(quick, seed):
-        known.append(watched)
-        rows += loop(watched)
-        rows += [clean(watched, name, trace) for name, trace in watched.logs.items()]
-        for name in tqdm(FAULTS, desc=watched.name, disable=None, leave=False):
+    known: list[ArmLogs] = []
+    for tested in arms(quick, seed):
+        known.append(tested)
+        rows += loop(tested)
+        rows += [clean(tested, name, trace) for name, trace in tested.logs.items()]
+        for name in tqdm(FAULTS, desc=tested.name, disable=None, leave=False):
             tally = Tally()
-            for log, start in moments(watched, rng, MOMENTS[quick]):
-                tally.add(watched, log, name, start)
-            rows.append(tally.row(watched.name, name))
+            for log, start in moments(tested, rng, MOMENTS[quick]):
+                tally.add(tested, log, name, start)
+            rows.append(tally.row(tested.name, name))
     rows.sort(key=lambda row: row["study"])
     return rows + others(known)
 
 
-def moments(watched: Watched, rng: np.random.Generator, count: int) -> list[tuple[str, float]]:
+def moments(tested: ArmLogs, rng: np.random.Generator, count: int) -> list[tuple[str, float]]:
     """Logs and starts in them: so many at random, in motion, and as many just before alarms."""
-    margin = watched.alarm.settle
+    margin = tested.alarm.settle
     starts, struck = {}, []
-    for name, trace in watched.logs.items():
+    for name, trace in tested.logs.items():
         since, whole = trace.t - trace.t[0], trace.t[-1] - trace.t[0]
         fits = (since > margin + 1.5) & (since < whole - margin - LASTS - AFTER)
         if (fits & moving(trace)).any():
             starts[name] = since[fits & moving(trace)]
-        for alarm in watched.alarms[name]:
+        for alarm in tested.alarms[name]:
             begin = alarm - float(trace.t[0]) - 0.5 * LASTS
             struck += [(name, begin)] if fits[np.searchsorted(since, begin)] else []
     if not starts:
@@ -194,13 +194,13 @@ def moving(trace: Trace) -> np.ndarray:
     return np.asarray(np.abs(trace.qd).max(axis=1) > 0.1)
 
 
-def clean(watched: Watched, name: str, trace: Trace) -> Row:
+def clean(tested: ArmLogs, name: str, trace: Trace) -> Row:
     """A log without a fault."""
-    found = heard(watched, Packets.of(trace))
-    batch = watched.alarm.detect(trace).alarm
+    found = heard(tested, Packets.of(trace))
+    batch = tested.alarm.detect(trace).alarm
     return {
         "study": "clean",
-        "arm": watched.name,
+        "arm": tested.name,
         "log": name,
         "seconds": float(trace.t[-1] - trace.t[0]),
         "false_fault_s": len(found.reasons) * trace.dt,
@@ -209,11 +209,11 @@ def clean(watched: Watched, name: str, trace: Trace) -> Row:
     }
 
 
-def loop(watched: Watched) -> list[Row]:
+def loop(tested: ArmLogs) -> list[Row]:
     """Microseconds from a sample to its answer: the monitor, and the alarm inside it alone."""
-    assert watched.alarm.inputs is not None
-    trace = max(watched.logs.values(), key=lambda one: len(one.t))
-    monitor, stream = Monitor(watched.alarm, watched.alarm.inputs), watched.alarm.stream()
+    assert tested.alarm.inputs is not None
+    trace = max(tested.logs.values(), key=lambda one: len(one.t))
+    monitor, stream = Monitor(tested.alarm, tested.alarm.inputs), tested.alarm.stream()
     calls: dict[str, Callable[[float, Array, Array, Array], object]] = {
         "monitor": monitor.step,
         "alarm alone": lambda _, q, qd, current: stream.step(q, qd, current),
@@ -231,17 +231,17 @@ def loop(watched: Watched) -> list[Row]:
     return [
         {
             "study": "loop",
-            "arm": watched.name,
+            "arm": tested.name,
             "call": name,
             "samples": len(own),
-            "detector": watched.alarm.detector.name,
+            "detector": tested.alarm.detector.name,
         }
         | {f"p{q}_us": float(np.percentile(own, q)) / 1e3 for q in (50, 99, 99.9, 99.99)}
         for name, own in times.items()
     ]
 
 
-def others(known: Sequence[Watched]) -> list[Row]:
+def others(known: Sequence[ArmLogs]) -> list[Row]:
     """One arm's samples to another's model, where the rates are alike to a quarter."""
     rows: list[Row] = []
     for model in known:

@@ -48,7 +48,7 @@ from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.methods.free_motion import CONFIRMATION, FittedFreeMotion, FreeMotion
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
-from tauguard.detectors.thresholds.quiet_start import SERIES, watch
+from tauguard.detectors.thresholds.quiet_start import SERIES, detect_after_quiet
 from tauguard.report import Row, rate
 from tauguard.traces import Trace
 
@@ -122,7 +122,7 @@ def detectors(fitted: FittedFreeMotion, start: ArmModel, recording: Recording) -
     def plain(trace: Trace) -> NDArray[np.bool_]:
         tau = trace.current * start.drive_gain
         try:
-            return watch(trace, start.robot, tau, QUIET).detection.alarm
+            return detect_after_quiet(trace, start.robot, tau, QUIET).detection.alarm
         except ValueError:  # the motion does not explain the torques, or the log is too short
             return np.zeros(len(trace.t), dtype=np.bool_)
 

@@ -98,10 +98,10 @@ def swing(speed: float, detector: Any, reaction: str, arm: int, seed: int) -> di
         force, onset = max(force, info["force"]), info["onset_time"] if onset < 0 else onset
         if begun < 0 and info["reacting"]:
             begun = info["time"]
-    return judged(np.array(tools), np.array(times), force, onset, begun)
+    return swing_figures(np.array(tools), np.array(times), force, onset, begun)
 
 
-def judged(
+def swing_figures(
     tools: np.ndarray, times: np.ndarray, force: float, onset: float, begun: float
 ) -> dict[str, float]:
     """The figures of one swing, which goes along y.

@@ -14,7 +14,7 @@ from tauguard.cloth.scenes.crumple import crumpling
 from tauguard.cloth.scenes.cubes import cubes_on_cloth, packed_cubes
 from tauguard.cloth.scenes.mats import twisting_mats
 from tauguard.cloth.scenes.pleats import pleats
-from tauguard.cloth.scenes.recorded import Recording, load_recording
+from tauguard.cloth.scenes.recorded import MeshSequence, load_sequence
 from tauguard.cloth.scenes.rod import twisting_rod
 from tauguard.cloth.scenes.rollers import rollers
 from tauguard.cloth.scenes.scene import Scene
@@ -33,4 +33,4 @@ SCENES: dict[str, Callable[[int, int], Scene]] = {
     "twisting_rod": twisting_rod,
 }
 
-__all__ = ["SCENES", "Recording", "Scene", "load_recording"]
+__all__ = ["SCENES", "MeshSequence", "Scene", "load_sequence"]

@@ -17,7 +17,7 @@ Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class MeshSequence:
     """Frames of one mesh, read when they are asked for.
 
     Attributes:
@@ -55,7 +55,7 @@ class Recording:
             yield start, end
 
 
-def load_recording(folder: str | Path, pattern: str = "*") -> Recording:
+def load_sequence(folder: str | Path, pattern: str = "*") -> MeshSequence:
     """The PLY or OBJ files of a folder as one sequence, ordered by the last number in their names.
 
     Args:
@@ -71,7 +71,7 @@ def load_recording(folder: str | Path, pattern: str = "*") -> Recording:
     if not files:
         missing = "" if Path(folder).is_dir() else ": there is no such folder"
         raise ValueError(f"{folder}: no .ply or .obj file matches {pattern!r}{missing}")
-    return Recording(read_mesh(files[0])[1], tuple(files))
+    return MeshSequence(read_mesh(files[0])[1], tuple(files))
 
 
 def read_mesh(path: str | Path) -> tuple[Points, NDArray[np.int32]]:

@@ -225,10 +225,12 @@ def _fit(
         solution = solve_consistent(
             matrix, system.vector + precision * means, robot.inertial, robot.armature
         )
-        left = np.concatenate([system.left(d, k, solution, known[k]) for k, d in enumerate(data)])
+        unexplained = np.concatenate(
+            [system.residual(d, k, solution, known[k]) for k, d in enumerate(data)]
+        )
         loads = solution[system.load :].reshape(-1, INERTIAL)
         seen = np.concatenate([d.weight for d in data])
-        rms = np.sqrt((seen * left**2).sum(axis=0) / np.maximum(seen.sum(axis=0), 1.0))
+        rms = np.sqrt((seen * unexplained**2).sum(axis=0) / np.maximum(seen.sum(axis=0), 1.0))
         level = np.maximum(rms, beliefs.evenness * rms.max())
         if not held:
             error = np.sqrt(np.diag(np.linalg.inv(matrix))[system.gain : system.load])

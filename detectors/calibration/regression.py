@@ -146,7 +146,7 @@ class System:
             self.matrix[np.ix_(at, at)] += x.T @ (w * x)
             self.vector[at] += x.T @ (w[:, 0] * self.target(data, joint))
 
-    def left(self, data: Filtered, recording: int, solution: Array, known: Array) -> Array:
+    def residual(self, data: Filtered, recording: int, solution: Array, known: Array) -> Array:
         """What the solution does not explain [N m], shape (R, n)."""
         out = np.empty_like(data.current)
         for joint in range(self.n):

@@ -21,19 +21,19 @@ class Envelope:
     weights: Array  #: shape (n, 4), not negative [N m per unit]
 
     @classmethod
-    def fit(cls, left: Array, qd: Array, acceleration: Array) -> Envelope:
-        """Non-negative least squares of ``|left|``, scaled to its standard deviation.
+    def fit(cls, residual: Array, qd: Array, acceleration: Array) -> Envelope:
+        """Non-negative least squares of ``|residual|``, scaled to its standard deviation.
 
         Args:
-            left: residual of free motion [N m], shape (T, n).
+            residual: residual of free motion [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
             acceleration: [rad/s^2], shape (T, n).
         """
         columns = cls._columns(qd, acceleration)
-        weights = np.zeros((left.shape[1], 4))
-        for j in range(left.shape[1]):
-            weights[j] = nnls(columns[:, j], np.abs(left[:, j]))[0]
-            weights[j, 0] = max(weights[j, 0], 1e-3 * float(np.abs(left[:, j]).mean()), 1e-9)
+        weights = np.zeros((residual.shape[1], 4))
+        for j in range(residual.shape[1]):
+            weights[j] = nnls(columns[:, j], np.abs(residual[:, j]))[0]
+            weights[j, 0] = max(weights[j, 0], 1e-3 * float(np.abs(residual[:, j]).mean()), 1e-9)
         return cls(weights * np.sqrt(np.pi / 2))
 
     @classmethod

@@ -29,7 +29,7 @@ SETTLING = 3.0  # time constants of the observer that are not looked at
 
 
 @dataclass(frozen=True)
-class Watch:
+class LogDetection:
     """What was found in a log, and by which thresholds."""
 
     detection: Detection
@@ -42,7 +42,7 @@ class Watch:
     fault_seconds: float = 0.0  #: in which collisions may be missed
 
 
-def watch(
+def detect_after_quiet(
     trace: Trace,
     robot: RobotNumbers,
     tau: Array,
@@ -52,7 +52,7 @@ def watch(
     confirmation: float = CONFIRMATION,
     factor: float = FACTOR,
     joints: Sequence[int] | None = None,
-) -> Watch:
+) -> LogDetection:
     """Look for collisions with thresholds that are learned from the log's own beginning.
 
     The score is the largest ratio of |residual| to its joint's threshold; above 1 for
@@ -96,7 +96,7 @@ def watch(
         alarm=alarm,
         alarms=find_alarms(trace.t, alarm),
     )
-    return Watch(detection, thresholds, float(until), (note, *doubts))
+    return LogDetection(detection, thresholds, float(until), (note, *doubts))
 
 
 def _learning(trace: Trace, gain: float, quiet: float) -> Bools:
@@ -126,7 +126,7 @@ def used(joints: Sequence[int] | None, count: int) -> np.ndarray:
     return np.isin(np.arange(1, count + 1), list(chosen))
 
 
-def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
+def detect_with(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
     """Look for collisions with a trained detector.
 
     Raises:
@@ -154,7 +154,7 @@ def watch_with(alarm: CollisionAlarm, trace: Trace) -> Watch:
             "held all the time, or this is not the arm, the joints' order, the sign or the unit of "
             "the currents that the detector was trained on"
         )
-    return Watch(
+    return LogDetection(
         detection,
         np.asarray(arm.noise),
         settled,
@@ -172,7 +172,7 @@ def _near(detection: Detection) -> Bools:
     return near
 
 
-def loudest_joint(found: Watch, start: float, end: float) -> int:
+def loudest_joint(found: LogDetection, start: float, end: float) -> int:
     """Index of the joint whose residual changes most in an alarm, over its threshold."""
     detection = found.detection
     rows = (detection.t >= start - BEFORE) & (detection.t <= end)

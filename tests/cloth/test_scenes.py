@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tauguard.cloth import MeshCCD
-from tauguard.cloth.scenes import SCENES, load_recording
+from tauguard.cloth.scenes import SCENES, load_sequence
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -84,13 +84,13 @@ class TestRecorded:
                 write_obj(path, self.frame(i), self.faces)
             else:
                 write_ply(path, self.frame(i), self.faces, kind == "big")
-        recording = load_recording(tmp_path)
-        assert len(recording) == 4
-        assert np.array_equal(recording.faces, self.faces)
+        sequence = load_sequence(tmp_path)
+        assert len(sequence) == 4
+        assert np.array_equal(sequence.faces, self.faces)
         for frame, i in enumerate((9, 10, 11, 100)):
-            assert np.array_equal(recording.positions(frame), self.frame(i))
+            assert np.array_equal(sequence.positions(frame), self.frame(i))
         for (start, end), (i, j) in zip(
-            recording.steps(), ((9, 10), (10, 11), (11, 100)), strict=True
+            sequence.steps(), ((9, 10), (10, 11), (11, 100)), strict=True
         ):
             assert np.array_equal(start, self.frame(i))
             assert np.array_equal(end, self.frame(j))
@@ -99,20 +99,20 @@ class TestRecorded:
         write_obj(tmp_path / "a1.obj", self.frame(1), self.faces)
         write_obj(tmp_path / "a2.obj", self.frame(2), self.faces[::-1])
         with pytest.raises(ValueError, match=r"a2\.obj: its faces differ from .*a1\.obj"):
-            list(load_recording(tmp_path).steps())
+            list(load_sequence(tmp_path).steps())
 
     def test_frames_that_differ_in_size_are_named(self, tmp_path):
         write_obj(tmp_path / "a1.obj", self.frame(1), self.faces)
         write_obj(tmp_path / "a2.obj", self.frame(2)[:4], self.faces)
         with pytest.raises(ValueError, match=r"a2\.obj: 4 vertices, .*a1\.obj has 5"):
-            list(load_recording(tmp_path).steps())
+            list(load_sequence(tmp_path).steps())
 
     def test_nothing_to_read(self, tmp_path):
         with pytest.raises(ValueError, match=r"no \.ply or \.obj file matches 'x\*'"):
-            load_recording(tmp_path, "x*")
+            load_sequence(tmp_path, "x*")
         (tmp_path / "x1.ply").write_bytes(b"ply\nnonsense")
         with pytest.raises(ValueError, match=r"x1\.ply: "):
-            load_recording(tmp_path, "x*")
+            load_sequence(tmp_path, "x*")
 
 
 @pytest.mark.data
@@ -120,10 +120,10 @@ class TestRecorded:
     ("name", "pattern"), [("cloth-ball", "cloth_ball*"), ("cloth-funnel", "*")]
 )
 def test_real_recordings(data_dir, name, pattern):
-    recording = load_recording(data_dir / "ccd" / name / "frames", pattern)
+    sequence = load_sequence(data_dir / "ccd" / name / "frames", pattern)
     sizes = {"cloth-ball": (46_598, 92_230), "cloth-funnel": (9_450, 18_484)}
-    ((x_t0, x_t1),) = recording.steps()
-    assert (len(x_t0), len(recording.faces)) == sizes[name]
+    ((x_t0, x_t1),) = sequence.steps()
+    assert (len(x_t0), len(sequence.faces)) == sizes[name]
     assert len(x_t1) == len(x_t0)
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tauguard.cloth.scenes import load_recording
+from tauguard.cloth.scenes import load_sequence
 from tests.cloth.brute_force import edges_of
 
 FILES = {"cloth-funnel": ("*", "227"), "cloth-ball": ("cloth_ball*", "92")}
@@ -28,9 +28,9 @@ def keys(pairs):
 def load_scene(data_dir, name):
     folder = data_dir / "ccd" / name
     pattern, number = FILES[name]
-    recording = load_recording(folder / "frames", pattern)
-    ((x_t0, x_t1),) = recording.steps()
-    faces = recording.faces
+    sequence = load_sequence(folder / "frames", pattern)
+    ((x_t0, x_t1),) = sequence.steps()
+    faces = sequence.faces
     edges = edges_of(faces)
     # Boxes: vertices, then edges ordered by (larger, smaller) vertex, then faces.
     theirs = np.lexsort((edges[:, 0], edges[:, 1]))

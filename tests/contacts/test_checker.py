@@ -8,12 +8,12 @@ from tauguard.contacts import (
     Checker,
     Contacts,
     State,
+    check_states,
     checker,
     geom_kinds,
     pair_kind,
     register,
     registered,
-    watch,
 )
 
 SCENE = """<mujoco><option timestep="0.002"/><worldbody>
@@ -120,7 +120,7 @@ def test_a_checker_that_returns_no_contacts_is_named():
     model = mujoco.MjModel.from_xml_string(SCENE)
     state = State.of(model, mujoco.MjData(model))
     with pytest.raises(TypeError, match="'mute': check returned NoneType, expected Contacts"):
-        watch(model, [state, state], [Mute(model)])
+        check_states(model, [state, state], [Mute(model)])
 
 
 def test_bad_names_say_what_there_is():

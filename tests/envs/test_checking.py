@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tauguard.contacts import Contacts, State, checker, watch
+from tauguard.contacts import Contacts, State, check_states, checker
 from tauguard.contacts.scenes import arm_boxes
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.replay import write_rrd
@@ -125,7 +125,9 @@ def test_no_step_is_judged_across_a_gap():
     for _ in range(4):
         states.append(State.of(model, data))
         mujoco.mj_step(model, data)
-    late, rigid = watch(model, [*states[:2], None, *states[2:]], [Late(), checker("rigid", model)])
+    late, rigid = check_states(
+        model, [*states[:2], None, *states[2:]], [Late(), checker("rigid", model)]
+    )
     np.testing.assert_allclose(late.t, [0.5e-3, 2.5e-3])
     assert len(rigid) == 0
     assert rigid.partners == ()

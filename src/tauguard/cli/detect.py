@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from tauguard.detectors import Diagnosis
     from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90
-    from tauguard.detectors.thresholds.quiet_start import Watch
+    from tauguard.detectors.thresholds.quiet_start import LogDetection
     from tauguard.traces import Trace
 
 
@@ -114,12 +114,12 @@ def command(
 
 def watched(
     model: Path, trace: Trace, payload: str | None, robot: Path
-) -> tuple[Trace, Any, Watch]:
+) -> tuple[Trace, Any, LogDetection]:
     """The log in the joints of a trained detector, the detector, and what it saw."""
     from tauguard.cli.real_logs import carried, check_robot, is_torque, matched
     from tauguard.detectors import load_model
     from tauguard.detectors.methods.free_motion import carrying
-    from tauguard.detectors.thresholds.quiet_start import watch_with
+    from tauguard.detectors.thresholds.quiet_start import detect_with
 
     alarm = load_model(model)
     if payload is not None:
@@ -129,16 +129,16 @@ def watched(
     trace = matched(trace, arm.robot.joint_names)
     if is_torque(trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"the log holds torques, {model} was trained on currents")
-    return trace, alarm.detector, watch_with(alarm, trace)
+    return trace, alarm.detector, detect_with(alarm, trace)
 
 
 def plainly(
     log: Path, trace: Trace, robot: Path, columns: str | None, plain: Plain
-) -> tuple[Trace, Watch, tuple[str, ...]]:
+) -> tuple[Trace, LogDetection, tuple[str, ...]]:
     """The log, what a detector that nobody trained saw in it, and where its numbers come from."""
     from tauguard.cli.real_logs import matched, robot_numbers, watched_arm
     from tauguard.detectors.calibration.plausible import drive_torque
-    from tauguard.detectors.thresholds.quiet_start import watch
+    from tauguard.detectors.thresholds.quiet_start import detect_after_quiet
 
     numbers = robot_numbers(robot, trace.joint_names)
     trace = matched(trace, numbers.joint_names)
@@ -146,7 +146,7 @@ def plainly(
         robot, columns, plain.gains, plain.viscous, plain.coulomb, trace, numbers
     )
     try:
-        found = watch(
+        found = detect_after_quiet(
             trace,
             arm.robot,
             drive_torque(arm, trace),
@@ -162,7 +162,7 @@ def plainly(
 
 
 def explained(
-    detector: Any, trace: Trace, found: Watch, robot: Path
+    detector: Any, trace: Trace, found: LogDetection, robot: Path
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """What each alarm was; its torques alone where the robot's file has no shapes."""
     from tauguard.detectors import Diagnoser
@@ -213,7 +213,7 @@ def cause(one: Diagnosis) -> dict[str, Any]:
 
 
 def summary(
-    log: Path, trace: Trace, found: Watch, causes: Sequence[dict[str, Any]] = ()
+    log: Path, trace: Trace, found: LogDetection, causes: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
     """The figures of a run, ready for JSON."""
     import numpy as np
@@ -278,7 +278,9 @@ def report(result: dict[str, Any]) -> None:
     )
 
 
-def leave(out: Path, trace: Trace, found: Watch, result: dict[str, Any], robot: Path) -> None:
+def leave(
+    out: Path, trace: Trace, found: LogDetection, result: dict[str, Any], robot: Path
+) -> None:
     """Write events, MCAP and recording into the folder ``out``."""
     from tauguard.replay import write_rrd
     from tauguard.report import write_json

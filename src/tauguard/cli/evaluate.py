@@ -42,7 +42,7 @@ def command(
     """
     from tauguard.cli.events import EventFolder
     from tauguard.cli.summary import diagnosis_text, draw, text
-    from tauguard.datasets.arm_splits import judged
+    from tauguard.datasets.arm_splits import episodes_of_splits
     from tauguard.datasets.labelled import labelled
     from tauguard.detectors import figures, load_model
     from tauguard.detectors.registry import make_detector
@@ -54,7 +54,7 @@ def command(
         make_detector(detector)  # allows the file to hold its classes
     alarm = load_model(model)
     parts = (
-        judged(data, alarm.detector.arm.robot, splits)
+        episodes_of_splits(data, alarm.detector.arm.robot, splits)
         if data is not None
         else iter([(str(traces), iter(labelled(Path(str(traces)))))])
     )

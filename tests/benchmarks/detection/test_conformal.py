@@ -1,4 +1,4 @@
-"""The study of the promise, on a pool that is too small to mean much and large enough to run."""
+"""The study of the guarantee, on a pool that is too small to mean much and large enough to run."""
 
 import dataclasses
 
@@ -19,7 +19,7 @@ class Loudness:
 
 def test_rows_say_what_was_asked_and_counted():
     plan = dataclasses.replace(study.QUICK, seconds=4.0, asked=(600.0,), draws=5)
-    (row,) = study.promise_rows([Loudness()], Mismatch(seed=3), plan, 2)
+    (row,) = study.guarantee_rows([Loudness()], Mismatch(seed=3), plan, 2)
     assert row["detector"] == "loudness"
     counted = row["false_alarms_per_hour"]
     assert row["fresh_hours"] == counted["hours"]
@@ -39,6 +39,6 @@ def test_episodes_are_drawn_alike_and_again_the_same():
 
 def test_a_rate_that_the_motion_cannot_guarantee_is_said_in_its_row():
     plan = dataclasses.replace(study.QUICK, seconds=4.0, asked=(1.0,), calibration=3, fresh=2)
-    (row,) = study.promise_rows([Loudness()], Mismatch(seed=3), plan, 2)
+    (row,) = study.guarantee_rows([Loudness()], Mismatch(seed=3), plan, 2)
     assert "3 episodes" in row["refused"]
     assert "kept" not in row

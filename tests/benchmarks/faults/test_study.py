@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.faults.arms import RATE, Watched
+from tauguard.benchmarks.faults.arms import RATE, ArmLogs
 from tauguard.benchmarks.faults.study import Tally, clean, moments
 from tauguard.benchmarks.small_detector import trained
 from tauguard.datasets.plans import free_episodes, struck_episodes
@@ -12,26 +12,26 @@ from tauguard.models import Mismatch
 
 
 @pytest.fixture(scope="module")
-def watched():
+def tested():
     drawn = Mismatch(seed=4)
     free = [simulate(e) for e in free_episodes(9, 3, 8.0, (40.0,), (0.0,), drawn)]
     alarm = trained(free, RATE, 5.0, "residual-thresholds")
-    return Watched.struck("small", alarm, struck_episodes(2, 1, 3, (40.0,), (0.0,), drawn))
+    return ArmLogs.struck("small", alarm, struck_episodes(2, 1, 3, (40.0,), (0.0,), drawn))
 
 
-def test_a_log_without_a_fault_has_none_and_the_alarms_of_detect(watched):
-    row = clean(watched, "struck_0", watched.logs["struck_0"])
+def test_a_log_without_a_fault_has_none_and_the_alarms_of_detect(tested):
+    row = clean(tested, "struck_0", tested.logs["struck_0"])
     assert row["false_fault_s"] == 0
     assert row["alarms"] == row["alarms_of_detect"] > 0
 
 
 @pytest.mark.parametrize("name", ["nan", "frozen", "missing", "late"])
-def test_a_fault_is_seen_and_leaves_nothing_untold(watched, name):
+def test_a_fault_is_seen_and_leaves_nothing_untold(tested, name):
     tally = Tally()
-    chosen = moments(watched, np.random.default_rng(1), 2)
+    chosen = moments(tested, np.random.default_rng(1), 2)
     assert 2 <= len(chosen) <= 4  # two at random, and what collisions there are
     for log, start in chosen:
-        tally.add(watched, log, name, start)
+        tally.add(tested, log, name, start)
     row = tally.row("small", name)
     assert row["seen"]["value"] == 1
     # The last samples of a burst are no more than 20 ms old, and all come at one moment.
@@ -42,8 +42,8 @@ def test_a_fault_is_seen_and_leaves_nothing_untold(watched, name):
     assert row["found_after"]["value"] in (None, 1)
 
 
-def test_the_moments_follow_from_the_seed(watched):
-    one, two = (moments(watched, np.random.default_rng(3), 3) for _ in range(2))
+def test_the_moments_follow_from_the_seed(tested):
+    one, two = (moments(tested, np.random.default_rng(3), 3) for _ in range(2))
     assert [start for _, start in one] == [start for _, start in two]
 
 

@@ -13,7 +13,7 @@ from tauguard.contacts.checker import Checker, Contacts, State, asked, checker
 from tauguard.traces import CheckedContacts
 
 
-def watch(
+def check_states(
     model: Any, states: Iterable[State | None], checkers: Sequence[str | Checker]
 ) -> tuple[CheckedContacts, ...]:
     """What each checker sees in a sequence of states.

@@ -13,7 +13,7 @@ from tauguard.contacts.checker import asked
 from tauguard.envs.world import World
 
 
-class Watching:
+class StepChecks:
     """The checkers of one copy of a world.
 
     Attributes:
