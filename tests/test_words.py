@@ -22,6 +22,16 @@ def glossary() -> set[str]:
     return {name for row in rows for name in re.findall(r"`(\w+)`", row)}
 
 
+def test_what_the_map_names_is_there():
+    table = (ROOT / "CONTRIBUTING.md").read_text().partition("## Where to change what")[2]
+    rows = [line.split("|") for line in table.partition("\n\nOne ")[0].splitlines()[4:]]
+    assert len(rows) > 8
+    for _, _, files, names, _ in rows:
+        text = "".join((ROOT / file).read_text() for file in re.findall(r"`([^`]+)`", files))
+        for name in re.findall(r"`(\w+)`", names):
+            assert re.search(rf"^(class |struct )?(\w+, )*{name}\b", text, re.MULTILINE), name
+
+
 def test_every_public_name_of_detection_has_its_term():
     assert glossary() == set(detectors.__all__)
 

@@ -155,16 +155,18 @@ def _row(name: str, levels: Sequence[FreeScores], asked: float, plan: Plan, seed
 def trained(names: Sequence[str], arm: Mismatch, seed: int, *, quick: bool) -> list[FittedDetector]:
     """Detectors by name, fitted on simulated motion of ``arm`` with and without collisions."""
     from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
-    from tauguard.detectors import make_detector
-    from tauguard.detectors.calibration.nominal import nominal_design
+    from tauguard.detectors import ArmModel, RobotNumbers, make_detector
     from tauguard.envs import simulate
+    from tauguard.models import cura6, cura6_drive, pin_model
 
     speeds = (10.0, 30.0, 60.0, 20.0, 45.0)
     struck, free, seconds = (4, 8, 20.0) if quick else (15, 20, 40.0)
     planned = struck_episodes(seed, struck, 5, speeds, TRAINING_PAYLOADS[:: 15 // struck], arm)
     planned += free_episodes(seed, free, seconds, speeds, TRAINING_PAYLOADS[::2], arm)
     traces = [simulate(episode) for episode in planned]
-    return [make_detector(name).fit(traces, nominal_design()) for name in names]
+    nominal = RobotNumbers.from_pin(pin_model(cura6.arm_xml()))
+    believed = ArmModel(nominal, np.array(cura6_drive().gain))
+    return [make_detector(name).fit(traces, believed) for name in names]
 
 
 def run(quick: bool, seed: int) -> list[Row]:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.consistent import solve_consistent
 from tauguard.detectors.calibration.recording import Recording, is_known, known_load, moving_span
-from tauguard.detectors.calibration.regression import Filtered, System, filtered
+from tauguard.detectors.calibration.regression import Filtered, System, body_deviations, filtered
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import (
     INERTIAL,
@@ -96,11 +96,7 @@ def _deviations(
 ) -> tuple[Array, Array]:
     """Standard deviations and means of all unknowns."""
     spread = 4.0 if free_masses else 1.0
-    body = []
-    for numbers in robot.inertial:
-        mass, inertia = max(float(numbers[0]), 1e-3), float(np.abs(numbers[4:]).max()) + 1e-3
-        body += [spread * beliefs.mass * mass, *[spread * beliefs.centre * mass] * 3]
-        body += [spread * beliefs.inertia * inertia] * 6
+    body = spread * body_deviations(robot, beliefs.mass, beliefs.centre, beliefs.inertia)
     poses = np.concatenate([r.trace.q[:: max(1, len(r.trace.q) // 20)] for r in recordings])
     heaviest = np.diagonal(mass_matrix(robot, poses), axis1=1, axis2=2).max(axis=0)
     loads, means = [], []

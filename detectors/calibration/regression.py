@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array
-from tauguard.detectors.calibration.calibrate import free_rows
+from tauguard.arrays import Array, Bools
 from tauguard.detectors.calibration.recording import MOVING, Recording, known_load, moving_span
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import (
@@ -18,6 +17,7 @@ from tauguard.detectors.dynamics.robot import (
     momentum_terms,
 )
 from tauguard.detectors.estimation.observer import intervals, low_pass
+from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.thresholds.confirmation import confirmed
 from tauguard.traces.trace import Trace
 
@@ -48,44 +48,92 @@ def filtered(
     ``load`` is what it carries, shape (10,), for friction that depends on it (default: as told).
     """
     trace = recording.trace
+    held = None
+    if model.modelled:
+        held = _carried(trace, robot, known_load(recording) if load is None else load)
+    used = moving_span(trace) & free_rows(trace)
+    return filtered_columns(trace, robot, gain, model, rate, used, rest, held)
+
+
+def filtered_columns(
+    trace: Trace,
+    robot: RobotNumbers,
+    gain: Array,
+    model: FrictionModel,
+    rate: float,
+    used: Bools,
+    rest: float | None = None,
+    held: Array | None = None,
+) -> Filtered:
+    """The same of any rows of a trace, thinned to 0.02 s.
+
+    Args:
+        trace: of the arm.
+        robot: what is believed of it.
+        gain: N m per ampere, shape (n,).
+        model: the columns of friction.
+        rate: of the filter [1/s].
+        used: which rows, shape (T,).
+        rest: a joint that has stood still for longer counts no more [s]; ``None``: it counts.
+        held: what load-dependent friction grows with [N m], shape (T, n).
+    """
     stride = max(1, round(4e-3 / trace.dt))
     count = len(trace.t) // stride
     rows = count * stride
 
     def mean(x: Array) -> Array:
+        """Over the samples that a thinned interval holds: the drive torque acts throughout."""
         out: Array = x[:rows].reshape(count, stride, *x.shape[1:]).mean(axis=1)
         return out
 
     tau = trace.current * gain
-    if model.modelled:
-        held = _carried(trace, robot, known_load(recording) if load is None else load)
-        columns = mean(model.evaluate(trace.q, trace.qd, tau, held))
-    else:
-        columns = mean(model.evaluate(trace.q, trace.qd, tau))
+    columns = mean(model.evaluate(trace.q, trace.qd, tau, held))
     drive = mean(tau)
     q, qd, t = (x[:rows:stride] for x in (trace.q, trace.qd, trace.t))
     dt = intervals(t, count)
 
-    def through(p: Array, beta: Array, held: Array | None = None) -> Array:
+    def through(p: Array, beta: Array, driven: Array | None = None) -> Array:
         flat, other = p.reshape(count, -1), beta.reshape(count, -1)
-        driven = None if held is None else held.reshape(count, -1)
+        driven = None if driven is None else driven.reshape(count, -1)
         rates = np.full(flat.shape[1], rate)
         return low_pass(rates, dt, flat, other, driven).reshape(p.shape)
 
     nothing, no_columns = np.zeros_like(q), np.zeros_like(columns)
-    used = moving_span(trace) & free_rows(trace)
     keep = np.flatnonzero(used[:rows:stride])[:: max(1, round(0.02 / (stride * trace.dt)))]
-    slow = np.abs(trace.qd) < MOVING
-    needed = max(1, round(rest / trace.dt))
-    still = np.column_stack([confirmed(column, needed) for column in slow.T])[:rows:stride]
     return Filtered(
         through(*momentum_terms(robot, q, qd))[keep],
         -through(nothing, nothing, drive)[keep],
         through(*momentum_regressor(robot, q, qd))[keep],
         through(np.ascontiguousarray(qd), nothing)[keep],
         -through(no_columns, no_columns, columns)[keep],
-        np.where(still, 0.0, 1.0)[keep],
+        _weights(trace, rest)[:rows:stride][keep],
     )
+
+
+def _weights(trace: Trace, rest: float | None) -> Array:
+    """0 where a joint has stood still for ``rest`` seconds, else 1, shape (T, n)."""
+    if rest is None:
+        return np.ones_like(trace.q)
+    needed = max(1, round(rest / trace.dt))
+    slow = np.abs(trace.qd) < MOVING
+    still = np.column_stack([confirmed(column, needed) for column in slow.T])
+    return np.where(still, 0.0, 1.0)
+
+
+def body_deviations(robot: RobotNumbers, mass: float, centre: float, inertia: float) -> Array:
+    """Standard deviations of all inertial numbers, shape (10 n,).
+
+    Args:
+        robot: what is believed.
+        mass: of each link's, relative.
+        centre: of each centre of mass [m].
+        inertia: relative to the link's largest entry.
+    """
+    body = []
+    for numbers in robot.inertial:
+        heavy, wide = max(float(numbers[0]), 1e-3), float(np.abs(numbers[4:]).max()) + 1e-3
+        body += [mass * heavy, *[centre * heavy] * 3, *[inertia * wide] * 6]
+    return np.array(body)
 
 
 def _carried(trace: Trace, robot: RobotNumbers, load: Array) -> Array:
@@ -99,11 +147,19 @@ class System:
     """Normal equations over errors of inertia and armature, friction, gains and payloads.
 
     ``current = torque (1 + s) - inertial dphi - armature da + friction w + load``, and the gain of
-    a joint is that of the round divided by 1 + s.
+    a joint is that of the round divided by 1 + s. Gains that priors hold within percents may as
+    well scale what is measured, ``current (1 + s) = torque - ...``, and are then multiplied by
+    1 + s; free ones may not: all of them small would look like a good fit.
     """
 
-    def __init__(self, robot: RobotNumbers, columns: int, recordings: int) -> None:
-        """All zero, for a number of friction columns and of recordings."""
+    def __init__(
+        self, robot: RobotNumbers, columns: int, recordings: int, measured: bool = False
+    ) -> None:
+        """All zero, for a number of friction columns and of recordings.
+
+        ``measured``: the error of a gain scales the measured torque.
+        """
+        self.measured = measured
         self.n, self.c, self.count = robot.joints, columns, recordings
         self.friction = (INERTIAL + 1) * self.n
         self.gain = self.friction + self.n * columns
@@ -128,7 +184,7 @@ class System:
                 -data.inertial[:, joint],
                 -data.armature[:, joint],
                 data.friction[:, joint],
-                data.torque[:, joint] + load @ known,
+                -data.current[:, joint] if self.measured else data.torque[:, joint] + load @ known,
                 load,
             ]
         )
@@ -145,6 +201,13 @@ class System:
             w = (weight[joint] * data.weight[:, joint])[:, None] ** 2
             self.matrix[np.ix_(at, at)] += x.T @ (w * x)
             self.vector[at] += x.T @ (w[:, 0] * self.target(data, joint))
+
+    def solve(self, deviations: Array) -> Array:
+        """The unknowns around 0, shape (size,); those with a deviation of 0 are held there."""
+        out, free = np.zeros(self.size), np.flatnonzero(deviations > 0)
+        matrix = self.matrix[np.ix_(free, free)] + np.diag(deviations[free] ** -2.0)
+        out[free] = np.linalg.solve(matrix, self.vector[free])
+        return out
 
     def residual(self, data: Filtered, recording: int, solution: Array, known: Array) -> Array:
         """What the solution does not explain [N m], shape (R, n)."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tauguard.arrays import Bools
 from tauguard.traces.trace import Alarm, Collision, Detection, Trace
 
 if TYPE_CHECKING:
@@ -64,6 +65,21 @@ def detection_window(collision: Collision) -> Interval:
 def occupied(collision: Collision) -> Interval:
     """The time that is not collision-free: contact and detection window [s], [s]."""
     return collision.onset, max(collision.end, detection_window(collision)[1])
+
+
+def free_rows(trace: Trace, settle: float = 1.0, recover: float = 0.5) -> Bools:
+    """Rows outside all known collisions.
+
+    Args:
+        trace: without truth all of it counts as free.
+        settle: seconds to leave out at the beginning.
+        recover: seconds to leave out after each collision.
+    """
+    free = trace.t >= trace.t[0] + settle
+    for collision in trace.truth.collisions if trace.truth else ():
+        low, high = occupied(collision)
+        free &= ~((trace.t >= low - 0.05) & (trace.t <= high + recover))
+    return np.asarray(free)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.calibrate import calibrate, free_rows
+from tauguard.detectors.calibration.calibrate import calibrate
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.estimation.gains import DETECTION_GAIN, PLAIN_GAIN
+from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.frozen import Frozen

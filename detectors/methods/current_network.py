@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.features.low_pass import LowPass, smoothed
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.methods.network import Network

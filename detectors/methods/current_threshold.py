@@ -10,9 +10,9 @@ import numpy as np
 from scipy.optimize import nnls
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.features.low_pass import LowPass, smoothed
 from tauguard.traces.trace import Trace
 

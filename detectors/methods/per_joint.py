@@ -10,8 +10,8 @@ from typing import ClassVar, Generic, TypeVar
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.traces.trace import Trace

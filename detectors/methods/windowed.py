@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.calibrate import free_rows
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.features.training import Prepared, draw_windows, peaks, severity_target

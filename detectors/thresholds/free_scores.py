@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.calibrate import free_rows
-from tauguard.detectors.evaluation.events import CASE_SECONDS, MERGE_GAP, find_alarms
+from tauguard.detectors.evaluation.events import CASE_SECONDS, MERGE_GAP, find_alarms, free_rows
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.detectors.thresholds.rates import block_maxima
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels, recent_speed

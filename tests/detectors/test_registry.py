@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.detectors import CollisionAlarm, calibrate, held_out, model_file
-from tauguard.detectors.calibration.calibrate import free_rows
+from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.features import front_end
 from tauguard.detectors.registry import DETECTORS, make_detector
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels

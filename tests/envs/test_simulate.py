@@ -85,7 +85,7 @@ def test_contact_truth_equals_mujocos_constraint_torque():
     run.striking._attempt = spy
     trace = run.run()
     window = run._windows[0]
-    rows = slice(window.begin, window.begin + len(window.recording.q))
+    rows = slice(window.begin, window.begin + len(window.rollout.q))
     constraint = np.array(steps)
     assert np.abs(constraint).max() > 1.0
     np.testing.assert_allclose(trace.truth.tau_ext[rows], constraint, atol=1e-9)
@@ -99,7 +99,7 @@ def test_pulse_truth_is_the_applied_generalised_force():
     model, data = run.scene.model, mujoco.MjData(run.scene.model)
     body = int(run.scene.link_bodies[4])
     k = int(np.argmax(np.linalg.norm(window.wrenches.force[:, 4], axis=1)))
-    data.qpos[run.scene.qpos_adr] = window.recording.q[k]
+    data.qpos[run.scene.qpos_adr] = window.rollout.q[k]
     mujoco.mj_forward(model, data)
     force, torque = window.wrenches.force[k, 4], window.wrenches.torque[k, 4]
     expected = np.zeros(model.nv)

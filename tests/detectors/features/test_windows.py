@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors.calibration.calibrate import free_rows
+from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.features.windows import WindowShape, median_distance
