@@ -10,7 +10,6 @@ from pathlib import Path
 from tauguard.strangers import read_json, reading
 
 Column = str | int
-Unit = str
 
 #: Fields of a map that name a column a joint.
 SIGNALS = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")

@@ -115,8 +115,7 @@ def _collisions(
     )
 
 
-#: Classes whose balance is stated beforehand: episodes by three, collisions by the other three.
-CLASSES = ("arm", "speed", "payload_g", "kind", "link", "severity")
+#: Counts by class (arm, speed, payload; kind, link and severity of collisions) and its value.
 Balance = dict[str, dict[str, int]]
 
 

@@ -49,11 +49,6 @@ class Diagnosis:
         return self.kind != "payload"
 
     @property
-    def intended(self) -> bool:
-        """Whether somebody meant to push."""
-        return self.kind == "push"
-
-    @property
     def summary(self) -> str:
         """The diagnosis in a few words, with intervals that hold 90 %."""
         if not self.collision:

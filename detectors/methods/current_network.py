@@ -26,8 +26,6 @@ from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.methods.network import Network
 from tauguard.traces.trace import Trace
 
-#: The original's thresholds on the residual current [A].
-THRESHOLDS = (1.6, 2.0)
 #: Rate of the filter that differentiates the velocity [1/s].
 DERIVATIVE = 100.0
 #: Friction changes its sign within about this velocity [rad/s].

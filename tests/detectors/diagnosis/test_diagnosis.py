@@ -110,7 +110,6 @@ def test_simulated_contacts_and_payload(trace):
     for diagnosis, collision in zip(found, trace.truth.collisions, strict=False):
         assert diagnosis.kind == "impact"
         assert diagnosis.collision
-        assert not diagnosis.intended
         assert diagnosis.link == collision.link
         assert diagnosis.links.sum() == pytest.approx(1.0)
         assert abs(diagnosis.time - (collision.onset + 0.05)) < 0.03
