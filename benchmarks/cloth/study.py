@@ -198,7 +198,9 @@ def _peers(axes: Any, rows: list[Row]) -> None:
         axes.bar_label(bars, fmt="%.3g", fontsize="xx-small")
     _name_scenes(axes, scenes)
     axes.set(title="The same frame by ipctk", ylabel="time over ab2pf's", yscale="log")
-    axes.set_ylim(1, 5 * max((row["speedup"] for row in rows), default=1))
+    found = [row["speedup"] for row in rows] or [1.0]
+    axes.set_ylim(min(1.0, 0.7 * min(found)), 5 * max(found))
+    axes.axhline(1, color="black", linewidth=1)
     _plain(axes.yaxis)
     axes.legend(fontsize="x-small", loc="upper left")
 

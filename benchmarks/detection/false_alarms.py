@@ -112,6 +112,9 @@ def draw(rows: list[Row], figure: Figure) -> None:
     asked = sorted({r["asked"] for r in rows})
     axes.plot(asked, asked, "k--", label="as asked")
     axes.set(xscale="log", yscale="symlog", xlabel="false alarms per hour, asked for")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_ticks([], minor=True)
+        axis.set_ticks(asked, [f"{rate:g}" for rate in asked])
     axes.set(ylabel="counted on fresh motion", title="False alarms of arms nothing was set on")
     axes.legend()
     axes.grid(alpha=0.3)
