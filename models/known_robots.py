@@ -130,6 +130,7 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
             ),
             _row("z1", "z1_description/urdf/z1.urdf", "unitree_z1", {}),
             _row("j2s6s200", "kinova_description/robots/kinova.urdf", None, {}),
+            _row("so100", "so_arm_description/urdf/so100.urdf", None, {}),
         ]
     )
 )

@@ -14,6 +14,7 @@ from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.benchmarks.simulation.tool_error import tool_error
 from tauguard.envs import CollisionPlan, Episode, Simulation
 from tauguard.envs.sensing import listening
 from tauguard.envs.settings import CONTROLS, Settings
@@ -26,13 +27,15 @@ if TYPE_CHECKING:
 
 
 #: Arms that are asked for without `--robot`; a file of the data folder stands for the UR10e.
-ARMS = ("cura6", "ur3", "ur5", "ur10", "ur10e", "panda", "xarm7", "z1", "j2s6s200", "iiwa14")
+ARMS = ("cura6", "ur3", "ur5", "ur10", "ur10e", "panda", "xarm7", "z1", "j2s6s200", "so100")
 #: Percent of the largest joint speed that the servo is tried at.
 SPEEDS = (20.0, 50.0, 100.0)
 #: A joint moves above this speed [rad/s]: below it static friction hides what it may.
 MOVING = 0.1
 #: A blow's peak torque [N m], at most these shares of the strongest joint's limit; links to try.
 BLOW, BLOW_SHARE, LINKS = (15.0, 60.0), (0.1, 0.4), (4, 3, 5, 2)
+#: Operational space control: integral [1/s^3] and seconds, without and with friction.
+IDEAL_HOLD, HOLD = (0.0, 3.0), (1500.0, 5.0)
 #: Actions an episode of random actions.
 ACTIONS = 100
 #: Where a user keeps robot files of the list, as NAME/NAME.urdf.
@@ -45,7 +48,8 @@ NOTES = {
     "residual: the plain observer's largest, of any joint, as a share of its torque limit, without "
     "contact: while the joint moves, and at all (static friction of the file is in it). diverged: "
     "of random episodes in all five control modes. alarms: without contact, in the seconds named. "
-    "strike: delay of the alarm of the plain observer [s].",
+    "tool: how far operational space control leaves the tool from its goal, on ideal drives and on "
+    "those of the arm (six joints or more). strike: delay of the alarm of the plain observer [s].",
 }
 
 
@@ -96,6 +100,7 @@ def _row(name: str, quick: bool, seed: int) -> Row:
         row
         | _free(world, source, seconds, seed)
         | _random(source, quick, seed)
+        | _tool(world, source)
         | _strike(world, source, seed)
     )
 
@@ -160,6 +165,15 @@ def _random(source: str, quick: bool, seed: int) -> Row:
         "check_env": "passes",
         "diverged": f"{diverged} of {episodes}",
         "alarms": f"{alarms} in {episodes * ACTIONS / 100:g} s",
+    }
+
+
+def _tool(world: World, source: str) -> Row:
+    if len(world.scene.joint_names) < 6:
+        return {"tool, ideal [mm]": None, "tool [mm]": None}
+    return {
+        "tool, ideal [mm]": tool_error(source, True, *IDEAL_HOLD),
+        "tool [mm]": tool_error(source, False, *HOLD),
     }
 
 

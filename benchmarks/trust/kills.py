@@ -23,6 +23,7 @@ import numpy as np
 from tqdm import tqdm
 
 from tauguard.benchmarks.trust.generated import kill_rows
+from tauguard.benchmarks.trust.lost_nodes import node_rows
 from tauguard.benchmarks.trust.tasks import FILES, command
 from tauguard.report import Row
 
@@ -50,6 +51,8 @@ NOTES = {
     "finished: had ended before. ended: largest seconds from the event to the end.",
     "generate": "tauguard generate killed (SIGKILL, the whole process group) at moments drawn at "
     "random, then gone on with by one process; bytes beside those of a run that nobody killed.",
+    "cluster": "tauguard generate --ray on a new Ray cluster of two nodes on this machine; the "
+    "second is lost at a random moment after the first shard; bytes beside those of one process.",
 }
 
 
@@ -279,7 +282,7 @@ def run(quick: bool, seed: int) -> list[Row]:
                 if kind != "full disk" or disks:
                     trial(kind, workers, base, rng, count)
             rows.append(row(kind, workers, count))
-    return rows + kill_rows(quick, seed)
+    return rows + kill_rows(quick, seed) + node_rows(quick, seed)
 
 
 def row(kind: str, workers: int, count: Count) -> Row:

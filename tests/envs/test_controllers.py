@@ -1,11 +1,10 @@
 """Controllers in MuJoCo, whose dynamics they do not share."""
 
-import gymnasium as gym
 import mujoco
 import numpy as np
-import pinocchio as pin
 import pytest
 
+from tauguard.benchmarks.simulation.tool_error import tool_error
 from tauguard.envs import random_motion
 from tauguard.envs.controllers import Admittance, ComputedTorque, GravityPD, OperationalSpace
 from tauguard.envs.simulate import workspace
@@ -106,40 +105,9 @@ def test_bad_gains_are_named(make, message):
         make()
 
 
-def held(robot, ideal, integral, seconds=3.0):
-    """Distance of the tool from where it should be held, at the end [mm]."""
-    env = gym.make(
-        "tauguard/Reach-v0",
-        control="current",
-        control_rate=500,
-        robot=robot,
-        ideal_drive=ideal,
-        obstacles=(),
-        max_episode_steps=10_000,
-    )
-    env.reset(seed=0)
-    inner = env.unwrapped
-    scene, n = inner.scene, len(inner.scene.joint_names)
-    model = pin_model(scene.arm_model)
-    frame = scene.facts.tool or "tip"
-    if scene.facts.tool is None:
-        last = pin.Frame("tip", model.njoints - 1, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
-        model.addFrame(last)
-    control = OperationalSpace(model, frame, rest=scene.home + 0.3, integral=integral, dt=2e-3)
-    goal = control.pose(scene.home).copy()
-    goal[:3, 3] += [-0.03, 0.02, 0.02]
-    largest = np.array([entry.high for entry in inner.cell.actions])
-    for _ in range(round(seconds * 500)):
-        q, qd = inner.data.qpos[scene.qpos_adr], inner.data.qvel[scene.dof_adr]
-        current = control.torque(q, qd, goal) / inner.world.nominal.gain
-        env.step(np.clip(current / largest, -1, 1)[:n])
-    where = control.pose(inner.data.qpos[scene.qpos_adr])
-    return 1e3 * float(np.linalg.norm(where[:3, 3] - goal[:3, 3]))
-
-
 @pytest.mark.parametrize("seed", [33, 36])  # six and seven joints
 def test_operational_space_has_no_static_error_on_arms_never_seen(seed, tmp_path):
     path = tmp_path / "arm.xml"
     path.write_text(random_arm(seed))
-    assert held(str(path), True, 0.0) < 0.1
-    assert held(str(path), False, 1500.0, 5.0) < 2.0
+    assert tool_error(str(path), True, 0.0, 3.0) < 0.1
+    assert tool_error(str(path), False, 1500.0, 5.0) < 2.0
