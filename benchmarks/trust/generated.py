@@ -66,7 +66,7 @@ def killed(workers: int, count: int, seed: int) -> Row:
         assert contents(Path(place) / "timed") == contents(wanted), "differs without a kill"
         for number in range(count):
             folder = Path(place) / f"killed-{number}"
-            command = _start(config, folder, workers)
+            command = start(config, folder, "--workers", str(workers))
             _wait(folder, command)
             time.sleep(rng.uniform(0, 1.1 * (ended - begun)))
             os.killpg(command.pid, signal.SIGKILL)
@@ -91,11 +91,11 @@ def contents(folder: Path) -> dict[str, str]:
     }
 
 
-def _start(config: Path, folder: Path, workers: int) -> subprocess.Popen[bytes]:
+def start(config: Path, folder: Path, *flags: str) -> subprocess.Popen[bytes]:
+    """``tauguard generate`` with these flags, as a process group of its own."""
     program = "from tauguard.cli import main; main()"
-    flags = ["--out", str(folder), "--workers", str(workers)]
     return subprocess.Popen(
-        [sys.executable, "-c", program, "generate", str(config), *flags],
+        [sys.executable, "-c", program, "generate", str(config), "--out", str(folder), *flags],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
@@ -110,7 +110,7 @@ def _wait(folder: Path, command: subprocess.Popen[bytes]) -> None:
 
 def _timed(config: Path, folder: Path, workers: int) -> tuple[float, float]:
     """When the dataset is begun and when the command ends, of a run that is left alone."""
-    command = _start(config, folder, workers)
+    command = start(config, folder, "--workers", str(workers))
     _wait(folder, command)
     begun = time.monotonic()
     if command.wait() != 0:
