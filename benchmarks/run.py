@@ -9,7 +9,7 @@ from typing import Any
 
 from tauguard.benchmarks import STUDIES
 from tauguard.benchmarks.harness import Incomplete
-from tauguard.report import Row, machine, table, versions, write_json
+from tauguard.report import Row, measured, table, write_json
 from tauguard.whole_file import whole_file
 
 
@@ -51,18 +51,8 @@ def run_study(
     plt.close(figure)
     print(f"figure: {figure_path}")
     if json_path is not None:
-        write_json(
-            json_path,
-            {
-                "name": name,
-                "quick": quick,
-                "machine": machine(),
-                "versions": versions(),
-                "seed": seed,
-                **({"incomplete": str(broken)} if broken else {}),
-                "rows": rows,
-            },
-        )
+        incomplete = {"incomplete": str(broken)} if broken else {}
+        write_json(json_path, measured(name, rows, quick, seed) | incomplete)
         print(f"json: {json_path}")
     if broken is not None:
         raise broken

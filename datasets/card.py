@@ -20,6 +20,62 @@ from tauguard.whole_file import write_whole
 CARD, CROISSANT = "README.md", "croissant.json"
 LICENSE, LICENSE_URL = "apache-2.0", "https://www.apache.org/licenses/LICENSE-2.0"
 
+#: The card; the header is what the Hugging Face hub reads.
+CARD_TEXT = """---
+license: {license}
+pretty_name: {name}
+tags:
+- robotics
+- collision-detection
+- time-series
+- simulation
+- tauguard
+size_categories:
+- {size}
+configs:
+- config_name: default
+  data_files:
+{files}---
+
+# {name}
+
+{sentence}. The arms, their drives, sensors and collisions are simulated; no real arm
+was recorded.
+
+| split | episodes | hours | rows | MB | collisions |
+|---|---|---|---|---|---|
+{splits}
+
+An episode is a run of one arm. Splits share no motion; `unseen` in `dataset.json` says what else a
+split does not share with the first one.
+
+## Files
+
+* `data/SPLIT-NNNNNN.parquet`: a row a sample, an episode a row group.
+* `manifest/SPLIT-NNNNNN.jsonl`: a line an episode (arm, speed, payload, seed, collisions, outcome,
+  everything needed to simulate it again); the last line is a checksum of the others.
+* `arms/NAME.xml`: the nominal arm, what an observer may believe; the simulated ones differ from it.
+* `dataset.json`: the whole configuration, versions, what was planned.
+
+## Columns
+
+{columns}
+
+Joint signals have one column a joint, `q_1` to `q_{joints}`.
+
+## Labels
+
+A collision begins at the first sample (of the physics, at 1 kHz) with a contact force above 0 N and
+ends at the last one; contacts less than 0.5 s apart are one. Its kind, link, point, force and peak
+torque are in the manifest, and `collision` says which rows belong to which. Episodes in which other
+collisions happened than were planned are kept; their `outcome` says so.
+
+## How it was made
+
+By tauguard {tauguard} on MuJoCo {mujoco}, from the configuration with the SHA-256
+`{sha256}`. The same configuration and versions give the same bytes.
+"""
+
 
 def write_cards(folder: Path) -> None:
     """Write both into the dataset's folder, where their content is not there already."""
@@ -47,67 +103,25 @@ def describe(configuration: Configuration) -> str:
 def card(
     configuration: Configuration, head: dict[str, Any], summary: dict[str, SplitSummary]
 ) -> str:
-    """The text of ``README.md``, with the header that the Hugging Face hub reads."""
+    """The text of ``README.md``."""
     files = "".join(
         f"  - split: {name.replace('-', '_')}\n    path: data/{name}-*.parquet\n"
         for name in summary
     )
     rows = sum(one.rows for one in summary.values())
-    code = head["code"]
-    return f"""---
-license: {LICENSE}
-pretty_name: {configuration.name}
-tags:
-- robotics
-- collision-detection
-- time-series
-- simulation
-- tauguard
-size_categories:
-- {_size(rows)}
-configs:
-- config_name: default
-  data_files:
-{files}---
-
-# {configuration.name}
-
-{describe(configuration)}. The arms, their drives, sensors and collisions are simulated; no real arm
-was recorded.
-
-| split | episodes | hours | rows | MB | collisions |
-|---|---|---|---|---|---|
-{_split_rows(summary)}
-
-An episode is a run of one arm. Splits share no motion; `unseen` in `dataset.json` says what else a
-split does not share with the first one.
-
-## Files
-
-* `data/SPLIT-NNNNNN.parquet`: a row a sample, an episode a row group.
-* `manifest/SPLIT-NNNNNN.jsonl`: a line an episode (arm, speed, payload, seed, collisions, outcome,
-  everything needed to simulate it again); the last line is a checksum of the others.
-* `arms/NAME.xml`: the nominal arm, what an observer may believe; the simulated ones differ from it.
-* `dataset.json`: the whole configuration, versions, what was planned.
-
-## Columns
-
-{_column_rows(configuration)}
-
-Joint signals have one column a joint, `q_1` to `q_{len(cura6.JOINTS)}`.
-
-## Labels
-
-A collision begins at the first sample (of the physics, at 1 kHz) with a contact force above 0 N and
-ends at the last one; contacts less than 0.5 s apart are one. Its kind, link, point, force and peak
-torque are in the manifest, and `collision` says which rows belong to which. Episodes in which other
-collisions happened than were planned are kept; their `outcome` says so.
-
-## How it was made
-
-By tauguard {code["tauguard"]} on MuJoCo {code["mujoco"]}, from the configuration with the SHA-256
-`{head["configuration_sha256"]}`. The same configuration and versions give the same bytes.
-"""
+    return CARD_TEXT.format(
+        license=LICENSE,
+        name=configuration.name,
+        size=_size(rows),
+        files=files,
+        sentence=describe(configuration),
+        splits=_split_rows(summary),
+        columns=_column_rows(configuration),
+        joints=len(cura6.JOINTS),
+        sha256=head["configuration_sha256"],
+        tauguard=head["code"]["tauguard"],
+        mujoco=head["code"]["mujoco"],
+    )
 
 
 def _split_rows(summary: dict[str, SplitSummary]) -> str:

@@ -2,7 +2,7 @@
 
 from tauguard.report.digits import two_digits
 from tauguard.report.json_file import write_json
-from tauguard.report.machine import machine, versions
+from tauguard.report.machine import machine, measured, versions
 from tauguard.report.rates import rate
 from tauguard.report.table import WIDTH, Row, cell, table
 
@@ -11,6 +11,7 @@ __all__ = [
     "Row",
     "cell",
     "machine",
+    "measured",
     "rate",
     "table",
     "two_digits",

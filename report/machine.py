@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import platform
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,20 @@ _PACKAGES = (
     "gymnasium",
     "ipctk",
 )
+
+
+def measured(
+    name: str, rows: Sequence[Mapping[str, Any]], quick: bool = False, seed: int | None = None
+) -> dict[str, Any]:
+    """Rows as they go into a file: with what they were measured on."""
+    return {
+        "name": name,
+        "quick": quick,
+        "machine": machine(),
+        "versions": versions(),
+        "seed": seed,
+        "rows": rows,
+    }
 
 
 def machine() -> dict[str, Any]:

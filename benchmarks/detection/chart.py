@@ -9,6 +9,7 @@ import numpy as np
 
 from tauguard.benchmarks.detection.thresholds import HOURLY
 from tauguard.report import Row
+from tauguard.report.charts import errorbars
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -127,12 +128,7 @@ def _draw_sigma(rows: list[Row], axis: Any) -> None:
     own = [r for r in rows if r["study"] == "sigma" and r["detector"] == "srq-svr"]
     sigma = [r["sigma"] for r in own]
     for key, label in (("sensitivity", "from 16 N m up"), ("sensitivity_all", "from 4 N m up")):
-        rates = [r[key] for r in own]
-        low = [r["value"] - r["low"] for r in rates]
-        high = [r["high"] - r["value"] for r in rates]
-        axis.errorbar(
-            sigma, [r["value"] for r in rates], yerr=[low, high], fmt="o-", ms=3, label=label
-        )
+        errorbars(axis, sigma, (r[key] for r in own), fmt="o-", ms=3, label=label)
     if own:
         axis.set_xscale("log")
     _finish(

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tauguard.report import Row
+from tauguard.report.charts import errorbars
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -188,10 +189,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
     for k, name in enumerate(names):
         own = [row for row in rows if row["detector"] == name]
         at = [asked.index(row["asked_per_hour"]) + 0.15 * (k - (len(names) - 1) / 2) for row in own]
-        value = np.array([row["false_alarms_per_hour"]["value"] for row in own])
-        low = np.array([row["false_alarms_per_hour"]["low"] for row in own])
-        high = np.array([row["false_alarms_per_hour"]["high"] for row in own])
-        axes.errorbar(at, value, [value - low, high - value], fmt="o", capsize=3, label=name)
+        counted = (row["false_alarms_per_hour"] for row in own)
+        errorbars(axes, at, counted, fmt="o", capsize=3, label=name)
     for k, rate in enumerate(asked):
         axes.hlines(rate, k - 0.4, k + 0.4, colors="black", linestyles="dashed")
     axes.set_xticks(range(len(asked)), [f"{rate:g} asked" for rate in asked])

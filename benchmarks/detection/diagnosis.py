@@ -40,6 +40,7 @@ from tauguard.detectors.diagnosis.diagnosis_metrics import (
 from tauguard.envs import simulate
 from tauguard.models import LinkSurface, cura6, link_surface
 from tauguard.report import Row, rate
+from tauguard.report.charts import errorbars
 from tauguard.traces import STRATA, Collision, stratum
 
 if TYPE_CHECKING:
@@ -332,12 +333,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
             r["group"]: r for r in rows if r["study"] == "contact" and r["method"] == method
         }
         at = [i for i, name in enumerate(names) if name in own]
-        rates = [own[names[i]]["link_right"] for i in at]
-        bars = [
-            [r["value"] - r["low"] for r in rates],
-            [r["high"] - r["value"] for r in rates],
-        ]
-        axes[0, 0].errorbar(at, [r["value"] for r in rates], bars, fmt="o-", label=method)
+        rates = (own[names[i]]["link_right"] for i in at)
+        errorbars(axes[0, 0], at, rates, fmt="o-", label=method)
         axes[0, 1].plot(at, [own_errors[names[i]]["point_cm"] for i in at], "o-", label=method)
     for axis, label in ((axes[0, 0], "link right"), (axes[0, 1], "point error, median [cm]")):
         axis.set_xticks(range(len(names)), names)

@@ -13,8 +13,6 @@ import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from tauguard.benchmarks.detection import known_tails
 from tauguard.benchmarks.detection.arm_scores import Arm, Extent, arm_scores
 from tauguard.benchmarks.detection.fleet import Training
@@ -22,6 +20,7 @@ from tauguard.benchmarks.detection.threshold_laws import LAWS, judged, price_row
 from tauguard.benchmarks.kept import Kept
 from tauguard.benchmarks.workers import Workers
 from tauguard.report import Row
+from tauguard.report.charts import errorbars
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -105,10 +104,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
     for k, (name, law) in enumerate(dict.fromkeys((r["detector"], r["law"]) for r in rows)):
         own = [r for r in rows if (r["detector"], r["law"]) == (name, law)]
         at = [r["asked"] * 1.05 ** (k - 2.5) for r in own]
-        value = np.array([r["found_per_hour"]["value"] for r in own])
-        low = value - [r["found_per_hour"]["low"] for r in own]
-        high = np.array([r["found_per_hour"]["high"] for r in own]) - value
-        axes.errorbar(at, value, [low, high], fmt="o", capsize=3, label=f"{name}, {law}")
+        found = (r["found_per_hour"] for r in own)
+        errorbars(axes, at, found, fmt="o", capsize=3, label=f"{name}, {law}")
     asked = sorted({r["asked"] for r in rows})
     axes.plot(asked, asked, "k--", label="as asked")
     axes.set(xscale="log", yscale="symlog", xlabel="false alarms per hour, asked for")

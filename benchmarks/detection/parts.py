@@ -27,6 +27,7 @@ from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
 from tauguard.envs import simulate
 from tauguard.report import Row
+from tauguard.report.charts import errorbars
 from tauguard.traces import Trace
 
 if TYPE_CHECKING:
@@ -186,19 +187,12 @@ def draw(rows: list[Row], figure: Figure) -> None:
     left, right = figure.subplots(1, 2, sharey=True)
     names = [row["without"] for row in rows]
     at = np.arange(len(rows))[::-1]
-    rates = [row["found_per_hour"] for row in rows]
-    value = np.array([rate["value"] for rate in rates])
-    errors = [value - [r["low"] for r in rates], np.array([r["high"] for r in rates]) - value]
-    left.errorbar(value, at, xerr=errors, fmt="o", capsize=3)
+    errorbars(left, at, (row["found_per_hour"] for row in rows), across=True, fmt="o", capsize=3)
     left.axvline(rows[0]["asked"], color="k", linestyle="--")
     left.set_yticks(at, names)
     left.set(xlabel="false alarms per hour (dashed: asked for)", title="Without ...")
     timed = [(y, row["time"]) for y, row in zip(at, rows, strict=True) if row["time"]]
-    middle = np.array([ratio["median"] for _, ratio in timed])
-    spread = [
-        middle - [ratio["low"] for _, ratio in timed],
-        np.array([ratio["high"] for _, ratio in timed]) - middle,
-    ]
-    right.errorbar(middle, [y for y, _ in timed], xerr=spread, fmt="o", capsize=3)
+    places, ratios = zip(*timed, strict=True)
+    errorbars(right, places, ratios, across=True, fmt="o", capsize=3)
     right.axvline(1.0, color="k", linestyle="--")
     right.set(xlabel="time of a sample over the whole detector's")

@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from tauguard.benchmarks.harness import measure
 from tauguard.benchmarks.workers import Workers
 from tauguard.datasets.demo import SPEEDS, TRAINING_SPEEDS
@@ -24,6 +26,7 @@ from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch
 from tauguard.models.drive import PARTS
 from tauguard.report import Row
+from tauguard.report.charts import errorbars
 from tauguard.traces import Trace
 
 if TYPE_CHECKING:
@@ -170,17 +173,10 @@ def draw(rows: list[Row], figure: Figure) -> None:
             keys, "os", ("in the whole simulation", "in the poorer one"), strict=True
         ):
             shift = 0.12 if marker == "s" else -0.12
-            for k, row in enumerate(rows):
-                value = row[key]
-                axes.errorbar(
-                    value["value"],
-                    k + shift,
-                    xerr=[[value["value"] - value["low"]], [value["high"] - value["value"]]],
-                    fmt=marker,
-                    color="#2a788e" if marker == "o" else "#d95f02",
-                    label=label if k == 0 else None,
-                    capsize=3,
-                )
+            colour = "#2a788e" if marker == "o" else "#d95f02"
+            style = {"fmt": marker, "color": colour, "label": label, "capsize": 3}
+            at = np.arange(len(rows)) + shift
+            errorbars(axes, at, (row[key] for row in rows), across=True, **style)
         axes.set(xlabel=title)
         axes.grid(alpha=0.3)
     left.set_xscale("symlog", linthresh=10)

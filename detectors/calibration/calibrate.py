@@ -9,13 +9,18 @@ fit of the gains collapses to zero, so the priors count as strong as thousands o
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.regression import System, body_deviations, filtered_columns
+from tauguard.detectors.calibration.regression import (
+    Filtered,
+    System,
+    body_deviations,
+    filtered_columns,
+)
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import INERTIAL, RobotNumbers
 from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel
@@ -99,18 +104,7 @@ def calibrate(
     ]
     if sum(len(one.current) for one in data) < 200:
         raise ValueError("calibrate: fewer than 200 collision-free rows; give 20 s of motion")
-    deviations = _deviations(robot, priors, model.columns, len(data))
-    squares = [((one.torque - one.current) ** 2).mean(axis=0) for one in data]
-    level: Array = np.maximum(np.sqrt(np.mean(squares, axis=0)), 1e-6)
-    level = level / level.max()
-    nothing = np.zeros(INERTIAL)
-    for _ in range(rounds):
-        system = System(robot, model.columns, len(data), measured=True)
-        for k, one in enumerate(data):
-            system.add(one, k, 1 / (priors.softness * level), nothing)
-        solution = system.solve(deviations)
-        parts = [system.residual(one, k, solution, nothing) for k, one in enumerate(data)]
-        level = np.maximum(np.sqrt((np.concatenate(parts) ** 2).mean(axis=0)), 1e-6)
+    system, solution, level = _solved(data, robot, model, priors, rounds)
     inertial = solution[: INERTIAL * robot.joints].reshape(-1, INERTIAL)
     weights: Array = solution[system.friction : system.gain].reshape(robot.joints, -1)
     fast = bool(data) and max(trace.dt for trace in kept) <= SLOWEST
@@ -123,3 +117,22 @@ def calibrate(
     )
     payloads: Array = solution[system.load :].reshape(-1, INERTIAL)[:, :PAYLOAD]
     return Calibration(found, payloads, level)
+
+
+def _solved(
+    data: Sequence[Filtered], robot: RobotNumbers, model: FrictionModel, priors: Priors, rounds: int
+) -> tuple[System, Array, Array]:
+    """The last round's equations, their solution, and what each joint's rms is then [N m]."""
+    deviations = _deviations(robot, priors, model.columns, len(data))
+    squares = [((one.torque - one.current) ** 2).mean(axis=0) for one in data]
+    level: Array = np.maximum(np.sqrt(np.mean(squares, axis=0)), 1e-6)
+    level = level / level.max()
+    nothing = np.zeros(INERTIAL)
+    for _ in range(rounds):
+        system = System(robot, model.columns, len(data), measured=True)
+        for k, one in enumerate(data):
+            system.add(one, k, 1 / (priors.softness * level), nothing)
+        solution = system.solve(deviations)
+        parts = [system.residual(one, k, solution, nothing) for k, one in enumerate(data)]
+        level = np.maximum(np.sqrt((np.concatenate(parts) ** 2).mean(axis=0)), 1e-6)
+    return system, solution, level

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tauguard.detectors import CollisionAlarm
+    from tauguard.detectors import CollisionAlarm, Matching
     from tauguard.envs import Episode
     from tauguard.traces import Trace
 
@@ -38,9 +38,9 @@ def command(
     started = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
 
-    from tauguard.cli.summary import draw, text
+    from tauguard.cli.summary import draw
     from tauguard.datasets import demo_plan, simulate_all
-    from tauguard.detectors import SrqSvr, figures, match_detection, train
+    from tauguard.detectors import SrqSvr, match_detection, train
     from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.envs import simulate
     from tauguard.models import load_arm
@@ -60,12 +60,7 @@ def command(
     summary: dict[str, Any] = {
         "seed": seed,
         "simulated_seconds": plan.seconds,
-        "judged_seconds": sum(m.free_seconds for m in matchings),
-        "not_judged_seconds": detector.settle * len(judged),
-        "collisions_by_kind": count(judged, lambda c: c.kind),
-        "collisions_by_link": count(judged, lambda c: str(c.link)),
-        "threshold": detector.threshold,
-        **figures(matchings),
+        **judged_figures(detector, judged, matchings),
         "timing": {
             "simulate_s": simulated - started,
             "train_s": fitted - simulated,
@@ -80,12 +75,30 @@ def command(
     summary["timing"]["total_s"] = time.perf_counter() - started
     for path in filter(None, (out / "summary.json", json)):
         write_json(path, summary)
+    closing(out, summary)
+
+
+def judged_figures(
+    detector: CollisionAlarm, judged: list[Trace], matchings: list[Matching]
+) -> dict[str, Any]:
+    """What was judged, and how well the detector did on it."""
+    from tauguard.detectors import figures
+
+    return {
+        "judged_seconds": sum(m.free_seconds for m in matchings),
+        "not_judged_seconds": detector.settle * len(judged),
+        "collisions_by_kind": count(judged, lambda c: c.kind),
+        "collisions_by_link": count(judged, lambda c: str(c.link)),
+        "threshold": detector.threshold,
+        **figures(matchings),
+    }
+
+
+def closing(out: Path, summary: dict[str, Any]) -> None:
+    """How well it did, and what lies where."""
+    from tauguard.cli.summary import text
+
     print(text(summary))
-    closing(out)
-
-
-def closing(out: Path) -> None:
-    """Say what lies where."""
     print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
     print(f"look at the recording with: .uv/bin/uv run rerun {out / 'demo.rrd'}")
 

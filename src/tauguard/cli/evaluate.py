@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from tauguard.cli.events import EventFolder
     from tauguard.detectors import CollisionAlarm, Matching
-    from tauguard.models import LinkSurface
-    from tauguard.traces import Detection, Trace
+    from tauguard.traces import Trace
 
 
 def command(
@@ -44,9 +43,9 @@ def command(
     from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.datasets.arm_splits import episodes_of_splits
     from tauguard.datasets.labelled import labelled
-    from tauguard.detectors import figures, load_model
+    from tauguard.detectors import load_model
     from tauguard.detectors.registry import make_detector
-    from tauguard.report import machine, versions, write_json
+    from tauguard.report import measured, write_json
 
     if (traces is None) == (data is None):
         raise ValueError("give --traces (a folder of recordings) or --data (a dataset)")
@@ -60,13 +59,11 @@ def command(
     )
     rows, wrong = [], None if events is None else EventFolder(events, late)
     for name, recordings in parts:
-        matchings, diagnosis = judged_one_by_one(alarm, recordings, name, wrong)
-        summary = figures(matchings)
-        summary["diagnosis"] = diagnosis
+        matchings, summary = evaluated(alarm, recordings, name, wrong)
         rows.append({"split": name, **summary} if data is not None else summary)
         print(f"{len(matchings)} recordings in {name}")
         print(text(summary))
-        print(diagnosis_text(diagnosis))
+        print(diagnosis_text(summary["diagnosis"]))
         if figure is not None:
             drawn = figure if data is None else figure.with_stem(f"{figure.stem}-{name}")
             draw(drawn, summary, matchings)
@@ -74,58 +71,20 @@ def command(
         page = wrong.finish()
         print(f"{page}: open it with `tauguard replay --web {page.parent}`")
     if json is not None:
-        write_json(
-            json,
-            {
-                "name": "evaluate",
-                "quick": False,
-                "machine": machine(),
-                "versions": versions(),
-                "seed": None,
-                "rows": rows,
-            },
-        )
+        write_json(json, measured("evaluate", rows))
 
 
-def judged_one_by_one(
-    alarm: CollisionAlarm,
-    recordings: Iterable[Trace],
-    split: str,
-    wrong: EventFolder | None = None,
+def evaluated(
+    alarm: CollisionAlarm, recordings: Iterable[Trace], split: str, wrong: EventFolder | None
 ) -> tuple[list[Matching], dict[str, Any]]:
-    """Every recording judged, and the figures of what is said after its alarms; one in memory."""
-    from tauguard.detectors import diagnosis_figures, match_detection
-    from tauguard.detectors.detector import check_interval
+    """Alarms matched with the truth, and all figures; what went wrong is kept by ``wrong``."""
+    from tauguard.detectors import diagnosis_figures, figures
+    from tauguard.detectors.evaluation.recordings import judged_recordings
 
     matchings, said = [], []
-    for number, trace in enumerate(recordings, start=1):
-        check_interval(f"recording {number}", trace, alarm.detector.dt)
-        if trace.joint_names != alarm.detector.arm.robot.joint_names:
-            raise ValueError(
-                f"recording {number} is of joints {', '.join(trace.joint_names)}, the model of "
-                f"{', '.join(alarm.detector.arm.robot.joint_names)}"
-            )
-        found = alarm.detect(trace)
-        matchings.append(match_detection(found, trace, alarm.settle))
+    for number, one in enumerate(judged_recordings(alarm, recordings), start=1):
+        matchings.append(one.matching)
+        said += one.diagnoses(alarm)
         if wrong is not None:
-            wrong.add(split, number, matchings[-1], (trace, found))
-        said += explained(alarm, found, trace)
-    return matchings, diagnosis_figures(said)
-
-
-def explained(alarm: CollisionAlarm, detection: Detection, trace: Trace) -> list[Any]:
-    """What is said after the alarms of a recording that carries its arm's file, judged."""
-    from tauguard.detectors import diagnose, match_diagnoses
-
-    arm = trace.attachments.get("arm.xml")
-    if arm is None:
-        return []
-    return list(match_diagnoses(diagnose(alarm, trace, detection, surface(arm)), trace))
-
-
-@functools.cache
-def surface(arm: str) -> LinkSurface:
-    """Points on the links of an arm, from its MJCF text."""
-    from tauguard.models import link_surface
-
-    return link_surface(arm)
+            wrong.add(split, number, one.matching, (one.trace, one.detection))
+    return matchings, {**figures(matchings), "diagnosis": diagnosis_figures(said)}

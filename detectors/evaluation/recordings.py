@@ -1,0 +1,59 @@
+"""Recordings with truth, judged one by one: one is in memory at a time."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+from tauguard.detectors.detector import check_interval
+from tauguard.detectors.diagnosis.diagnosis import diagnose
+from tauguard.detectors.diagnosis.diagnosis_metrics import MatchedDiagnosis, match_diagnoses
+from tauguard.detectors.evaluation.events import Matching, match_detection
+from tauguard.models import LinkSurface, link_surface
+from tauguard.traces.trace import Detection, Trace
+
+if TYPE_CHECKING:
+    from tauguard.detectors.thresholds.alarm import CollisionAlarm
+
+
+class JudgedRecording(NamedTuple):
+    """What a detector said of a recording, and what that was worth."""
+
+    trace: Trace
+    detection: Detection
+    matching: Matching
+
+    def diagnoses(self, alarm: CollisionAlarm) -> list[MatchedDiagnosis]:
+        """What is said after the alarms, against the truth; nothing without the arm's file."""
+        arm = self.trace.attachments.get("arm.xml")
+        if arm is None:
+            return []
+        said = diagnose(alarm, self.trace, self.detection, _surface(arm))
+        return match_diagnoses(said, self.trace)
+
+
+def judged_recordings(
+    alarm: CollisionAlarm, recordings: Iterable[Trace]
+) -> Iterator[JudgedRecording]:
+    """Detect in each recording and match with its truth.
+
+    Raises:
+        ValueError: no truth, another sample rate, or other joints; the recording's number is named.
+    """
+    own = alarm.detector.arm.robot.joint_names
+    for number, trace in enumerate(recordings, start=1):
+        check_interval(f"recording {number}", trace, alarm.detector.dt)
+        if trace.joint_names != own:
+            raise ValueError(
+                f"recording {number} is of joints {', '.join(trace.joint_names)}, the model of "
+                f"{', '.join(own)}"
+            )
+        found = alarm.detect(trace)
+        yield JudgedRecording(trace, found, match_detection(found, trace, alarm.settle))
+
+
+@functools.cache
+def _surface(arm: str) -> LinkSurface:
+    """Points on the links of an arm, from its MJCF text."""
+    return link_surface(arm)
