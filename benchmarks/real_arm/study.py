@@ -62,6 +62,8 @@ Alarms = Callable[[Trace], NDArray[np.bool_]]
 EARLY = 0.15
 #: Seconds from which the plain observer learns.
 QUIET = 4.0
+#: Confirmation of the fixed thresholds [s].
+FIXED_CONFIRMATION = 0.04
 NOTES = {
     "pushes": "found of pushes by an alarm from 0.15 s before the start to the peak of the force.",
     "false alarms": "per hour of collision-free logs that training has not seen; the plain "
@@ -131,7 +133,7 @@ def detectors(fitted: FittedFreeMotion, start: ArmModel, recording: Recording) -
             estimator = Estimator(ours.arm, 20.0, trace.dt, Unknowns.none())
             left = estimator.run(trace.t, trace.q, trace.qd, trace.current).residual
             above = (np.abs(left) > threshold).any(axis=1) & (trace.t > trace.t[0] + 0.5)
-            return confirmed(above, confirmation_samples(CONFIRMATION, trace.dt))
+            return confirmed(above, confirmation_samples(FIXED_CONFIRMATION, trace.dt))
 
         return alarms
 

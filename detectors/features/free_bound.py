@@ -28,7 +28,7 @@ from tauguard.detectors.estimation.estimator import ArmModel
 Array = NDArray[np.float64]
 
 #: Bound at rest: deviations of the noise, and multiples of the friction level.
-NOISE, REST = 8.0, 0.3
+NOISE, REST = 8.0, 0.12
 #: What motion of any joint adds to the bound at rest, and a start to that in motion.
 STOP, START = 1.2, 1.0
 #: The bound in motion over the 99 % quantile of left-out residuals, and its least value.

@@ -32,15 +32,14 @@ from tauguard.detectors.features.free_stream import SLOW, FreeStream, native
 from tauguard.detectors.features.quantile_regression import upper_quantile
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
-from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
 from tauguard.detectors.thresholds.quiet_start import SERIES
 from tauguard.detectors.thresholds.rates import sustained
 from tauguard.traces.trace import Trace
 
 Array = NDArray[np.float64]
 
-#: Confirmation of an alarm [s].
-CONFIRMATION = 0.04
+#: Confirmation of an alarm [s]: none, since scores pass 1 only once they are confirmed.
+CONFIRMATION = 0.0
 #: The quantile of the residual in motion that is learned.
 QUANTILE = 0.99
 #: Seconds of motion that the prior is worth, where speed and accelerations are these [rad/s, ...].
@@ -62,7 +61,7 @@ class Judged:
     t: Array  #: [s], shape (T,)
     qd: Array  #: [rad/s], shape (T, n)
     qdd: Array  #: [rad/s^2], shape (T, n)
-    ratio: Array  #: of each joint's signal to its bound, shape (T, n)
+    ratio: Array  #: of each joint's signal to its bound, at most 1 until confirmed, shape (T, n)
     bound: Array  #: [N m], shape (T, n)
     residual: Array  #: without slow errors [N m], shape (T, n)
     rest: Bools  #: which joints are at rest, shape (T, n)
@@ -253,6 +252,5 @@ def _noise(judged: Sequence[Judged], prior: Array) -> Array:
 def _alarms(detector: FittedFreeMotion, recording: Recording) -> int:
     """False alarms in a collision-free recording."""
     trace = recording.trace
-    samples = confirmation_samples(CONFIRMATION, trace.dt)
     above = (detector.scores(trace) > 1) & (trace.t - trace.t[0] > SETTLE)
-    return len(find_alarms(trace.t, confirmed(above, samples), SERIES))
+    return len(find_alarms(trace.t, above, SERIES))

@@ -4,12 +4,17 @@
 // At rest static friction may hold any torque, so only a change counts: the residual less a
 // baseline that follows it. Motion of any joint stirs the torques of all that stand: integral
 // action of the controllers, changing loads. That adds to the bound, fully from `full_speed` on,
-// and is forgotten within about a second. For a second after a joint's excess only its change away
-// from what was before counts, so that letting go is no new push; other joints go on as before.
+// and is forgotten within about a second. A contact stirs the joint that it turned, too: when its
+// excess ends, what that joint does next may be its controller. For a second after an excess only a
+// change away from what was before counts, so that letting go is no new push. Other joints go on as
+// before.
 //
 // In motion the residual without slow errors counts. The bound is linear in speed and
 // accelerations; while a joint starts, its friction is between static and sliding, and more is
 // allowed.
+//
+// A ratio above 1 counts as 1 until it has lasted: in motion ripple and jerks pass a bound for
+// longer than noise does at rest.
 #pragma once
 
 #include <algorithm>
@@ -32,9 +37,11 @@ class Regimes {
   static constexpr double wait = 0.1;        // ... for so long [s] is at rest
   static constexpr double full_speed = 0.1;  // motion from which `stop` counts fully [rad/s]
   static constexpr double settles = 1.0;     // time constant with which that is forgotten [s]
-  static constexpr double follow = 0.3;      // time constant of the baseline [s]
+  static constexpr double follow = 0.15;     // time constant of the baseline [s]
   static constexpr double after = 1.0;       // change away only, for so long after an excess [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
+  static constexpr double contact = 0.5;     // of `stop` that an excess leaves on its own joint
+  static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation [s]
 
   explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), n_(of_.rest.size()) { reset(); }
 
@@ -45,6 +52,8 @@ class Regimes {
     before_.assign(n_, 0.0);
     rest_.assign(n_, 0);
     since_.assign(n_, after);
+    own_.assign(n_, 0.0);
+    above_.assign(n_, 0.0);
     stirred_ = 1.0;
   }
 
@@ -53,19 +62,21 @@ class Regimes {
 
   // Speeds [rad/s], `dt` s after the last; goes before judge().
   void motion(const double* qd, double dt) {
-    fastest_ = 0.0;
+    double fastest = 0.0;
     for (std::size_t j = 0; j < n_; ++j) {
       const double speed = std::fabs(qd[j]);
-      fastest_ = std::max(fastest_, speed);
+      fastest = std::max(fastest, speed);
       slow_for_[j] = speed < slow ? slow_for_[j] + dt : 0.0;
       moved_[j] = speed < slow ? 0.0 : moved_[j] + dt;
     }
-    stirred_ *= std::exp(-dt / settles);
-    if (fastest_ >= slow) stirred_ = std::max(stirred_, std::min(1.0, fastest_ / full_speed));
+    const double keep = std::exp(-dt / settles);
+    stirred_ = std::max(keep * stirred_, std::min(1.0, fastest / full_speed));
+    for (double& x : own_) x *= keep;
   }
 
-  // Ratios of what counts to its bound, and the bounds [N m]. `residual` is the observer's, `left`
-  // it less slow errors, `spread` the deviation that they leave, all [N m], n.
+  // Ratios of what counts to its bound, at most 1 until confirmed, and the bounds [N m]. `residual`
+  // is the observer's, `left` it less slow errors, `spread` the deviation that they leave, all
+  // [N m], n.
   void judge(const double* residual, const double* left, const double* spread, const double* qd,
              const double* qdd, double dt, double* ratio, double* bound) {
     double hardest = 0.0;
@@ -77,7 +88,7 @@ class Regimes {
       double signal = left[j];
       if (rest_[j]) {
         signal = changed(j, residual[j], !was, dt);
-        bound[j] = of_.rest[j] + of_.stop[j] * stirred_;
+        bound[j] = of_.rest[j] + of_.stop[j] * std::max(stirred_, own_[j]);
       } else {
         const double* per = &of_.moving[4 * j];
         const double linear =
@@ -85,12 +96,23 @@ class Regimes {
         bound[j] = std::max(linear, of_.least[j]) + spread[j] +
                    of_.start[j] * std::exp(-moved_[j] / starts);
       }
-      ratio[j] = std::fabs(signal) / bound[j];
-      if (ratio[j] > 1.0) since_[j] = 0.0;
+      ratio[j] = confirmed(j, std::fabs(signal) / bound[j], dt);
     }
   }
 
  private:
+  double confirmed(std::size_t j, double ratio, double dt) {
+    if (ratio > 1.0) {
+      since_[j] = 0.0;
+      above_[j] += dt;
+    } else {
+      if (above_[j] > 0.0 && rest_[j]) own_[j] = contact;
+      above_[j] = 0.0;
+    }
+    const bool lasts = above_[j] > (rest_[j] ? lasts_at_rest : lasts_moving) - 0.5 * dt;
+    return lasts ? ratio : std::min(ratio, 1.0);
+  }
+
   double changed(std::size_t j, double residual, bool begins, double dt) {
     if (begins) base_[j] = before_[j] = residual;
     if (since_[j] >= after) before_[j] = base_[j];
@@ -102,9 +124,9 @@ class Regimes {
 
   RegimeBounds of_;
   std::size_t n_;
-  std::vector<double> slow_for_, moved_, base_, before_, since_;
+  std::vector<double> slow_for_, moved_, base_, before_, since_, own_, above_;
   std::vector<char> rest_;
-  double stirred_ = 1.0, fastest_ = 0.0;
+  double stirred_ = 1.0;
 };
 
 }  // namespace tauguard::detectors
