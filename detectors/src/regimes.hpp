@@ -13,8 +13,8 @@
 // accelerations; while a joint starts, its friction is between static and sliding, and more is
 // allowed.
 //
-// A ratio above 1 counts as 1 until it has lasted: in motion ripple and jerks pass a bound for
-// longer than noise does at rest.
+// A ratio above 1 counts as 1 until it has lasted: in motion and soon after it ripple and jerks pass
+// a bound for longer than noise does at rest. A gap between samples confirms no more than a sample.
 #pragma once
 
 #include <algorithm>
@@ -41,7 +41,9 @@ class Regimes {
   static constexpr double after = 1.0;       // change away only, for so long after an excess [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
   static constexpr double contact = 0.5;     // of `stop` that an excess leaves on its own joint
-  static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation [s]
+  static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation [s] ...
+  static constexpr double forget = 1.05;  // rate at which the shortest interval is forgotten
+  static constexpr int samples = 3;                                    // ... and in samples at least
 
   explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), n_(of_.rest.size()) { reset(); }
 
@@ -54,7 +56,8 @@ class Regimes {
     since_.assign(n_, after);
     own_.assign(n_, 0.0);
     above_.assign(n_, 0.0);
-    stirred_ = 1.0;
+    count_.assign(n_, 0);
+    stirred_ = usual_ = 1.0;
   }
 
   const double* moved() const { return moved_.data(); }  // how long in motion [s]
@@ -72,6 +75,7 @@ class Regimes {
     const double keep = std::exp(-dt / settles);
     stirred_ = std::max(keep * stirred_, std::min(1.0, fastest / full_speed));
     for (double& x : own_) x *= keep;
+    usual_ = std::min(dt, forget * usual_);
   }
 
   // Ratios of what counts to its bound, at most 1 until confirmed, and the bounds [N m]. `residual`
@@ -104,13 +108,17 @@ class Regimes {
   double confirmed(std::size_t j, double ratio, double dt) {
     if (ratio > 1.0) {
       since_[j] = 0.0;
-      above_[j] += dt;
+      above_[j] += std::min(dt, usual_);
+      ++count_[j];
     } else {
       if (above_[j] > 0.0 && rest_[j]) own_[j] = contact;
       above_[j] = 0.0;
+      count_[j] = 0;
     }
-    const bool lasts = above_[j] > (rest_[j] ? lasts_at_rest : lasts_moving) - 0.5 * dt;
-    return lasts ? ratio : std::min(ratio, 1.0);
+    const double stirred = rest_[j] ? stirred_ : 1.0;
+    const double needs = lasts_at_rest + stirred * (lasts_moving - lasts_at_rest);
+    const bool lasted = count_[j] >= samples && above_[j] > needs - 0.5 * usual_;
+    return lasted ? ratio : std::min(ratio, 1.0);
   }
 
   double changed(std::size_t j, double residual, bool begins, double dt) {
@@ -125,8 +133,9 @@ class Regimes {
   RegimeBounds of_;
   std::size_t n_;
   std::vector<double> slow_for_, moved_, base_, before_, since_, own_, above_;
+  std::vector<int> count_;
   std::vector<char> rest_;
-  double stirred_ = 1.0;
+  double stirred_ = 1.0, usual_ = 1.0;  // interval of samples, gaps aside [s]
 };
 
 }  // namespace tauguard::detectors

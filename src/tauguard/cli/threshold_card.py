@@ -57,8 +57,8 @@ def _lines(card: ThresholdCard) -> list[str]:
     lines = [
         f"at the tool: {half[0]:.0f} N standing and {half[1]:.0f} N moving, in half of all poses "
         f"and directions; {most[0]:.0f} N and {most[1]:.0f} N in 95 % of them",
-        "all of contacts that last 0.1 s and more: an alarm needs 40 ms above a bound, so a "
-        "shorter blow has to be harder",
+        "all of contacts that last 0.1 s and more: an alarm needs 24 ms above a bound at rest and "
+        "40 ms in motion, so a shorter blow has to be harder",
         f"false alarms: {card.alarms} in {card.seconds / 60:.1f} min, each part under "
         "calibration and bounds from the others"
         + rate_text(

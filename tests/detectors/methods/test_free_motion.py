@@ -91,6 +91,37 @@ def test_one_joint_s_alarm_hides_no_push_on_another(alarm):
     assert any(13.1 < start < 13.4 for start in starts)
 
 
+def test_a_joint_that_hunts_hides_no_push_on_another(alarm):
+    """A controller's integral ramps joint 2 until it slips, over and over."""
+    trace = record(7, dwell=(6.0, 30.0))
+    level = alarm.detector.bound.friction
+    phase = (trace.t - 12.0) / 1.5
+    swings = np.where(trace.t > 12.0, np.abs(2 * (phase % 1.0) - 1.0) - 1.0, 0.0)
+    hunting = np.outer(swings, [0.0, level[1], 0.0]) / GAIN
+    trace = replace(trace, current=trace.current + hunting)
+    pushed = add_contact(trace, GAIN, Added(20.3, 0.5, (0.6 * level[0], 0.0, 0.0), "push"))
+    starts = [
+        [one.start for one in find_alarms(t.t, alarm.detect(t).alarm, SERIES)]
+        for t in (trace, pushed)
+    ]
+    assert sum(start > 12.0 for start in starts[0]) < 10  # of 24 ramps
+    assert not any(20.3 < start < 20.6 for start in starts[0])
+    assert any(20.3 < start < 20.6 for start in starts[1])
+
+
+def test_a_blow_counts_once_it_lasts_and_a_gap_confirms_nothing(alarm):
+    """Long at rest: the third sample of 10 ms is confirmed, a second one after a gap is not."""
+    trace, level = record(7, dwell=(6.0, 24.0)), alarm.detector.bound.friction
+    blow = add_contact(trace, GAIN, Added(16.0, 0.1, tuple(1.5 * level), "push"))
+    score = alarm.detector.scores(blow)
+    first = np.flatnonzero((score >= 1.0) & (trace.t > 16.0))[0]
+    assert (score[first : first + 2] == 1.0).all()
+    assert score[first + 2] > 1.0
+    late = np.where(np.arange(len(trace.t)) > first, 0.05, 0.0)
+    stretched = alarm.detector.scores(replace(blow, t=blow.t + late))
+    assert (stretched[first : first + 2] == 1.0).all()
+
+
 def test_few_seconds_leave_the_friction_level_unsure(fitted):
     logs = [Recording(record(seed)) for seed in range(3)]
     short = [Recording(record(0, seconds=12.0))]
