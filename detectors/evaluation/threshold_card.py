@@ -16,6 +16,9 @@ from tauguard.traces.trace import Trace
 
 #: A regime that all logs together show for less is not known [s].
 SEEN = 3.0
+#: Of a sudden torque on a standing joint, what counts for long enough: the observer (30/s) lets it in
+#: while the baseline (0.15 s) takes it up.
+COUNTS = 0.63
 #: An upper threshold, from which on a robot is to stop, over the lower one of contact.
 UPPER = 1.5
 #: Joints of the arms that libfranka speaks to.
@@ -85,11 +88,11 @@ def threshold_card(detector: FittedFreeMotion, traces: Sequence[Trace]) -> Thres
     )
     poses = np.concatenate([t.q[:: max(1, len(t.q) // POSES)] for t in traces])
     poses = poses[:: max(1, len(poses) // POSES)]
-    standing = bound.rest
+    standing = bound.rest / COUNTS
     return ThresholdCard(
         robot.joint_names,
         standing,
-        standing + bound.stop,
+        (bound.rest + bound.stop) / COUNTS,
         usual,
         np.maximum(usual, sliding) + bound.start,
         {
