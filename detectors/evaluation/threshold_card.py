@@ -16,8 +16,8 @@ from tauguard.traces.trace import Trace
 
 #: A regime that all logs together show for less is not known [s].
 SEEN = 3.0
-#: Of a sudden torque on a standing joint, what counts for long enough: the observer (30/s) lets it in
-#: while the baseline (0.15 s) takes it up.
+#: Of a sudden torque on a standing joint, what counts for long enough: the observer (30/s) lets it
+#: in while the baseline (0.15 s) takes it up.
 COUNTS = 0.63
 #: An upper threshold, from which on a robot is to stop, over the lower one of contact.
 UPPER = 1.5
