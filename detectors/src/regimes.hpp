@@ -13,8 +13,9 @@
 // accelerations; while a joint starts, its friction is between static and sliding, and more is
 // allowed.
 //
-// A ratio above 1 counts as 1 until it has lasted: in motion and soon after it ripple and jerks pass
-// a bound for longer than noise does at rest. A gap between samples confirms no more than a sample.
+// A ratio above 1 counts as 1 until it has lasted: in motion and soon after it ripple and jerks
+// pass a bound for longer than noise does at rest. A gap between samples confirms no more than a
+// sample.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +44,7 @@ class Regimes {
   static constexpr double contact = 0.5;     // of `stop` that an excess leaves on its own joint
   static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation [s] ...
   static constexpr double forget = 1.05;  // rate at which the shortest interval is forgotten
-  static constexpr int samples = 3;                                    // ... and in samples at least
+  static constexpr int samples = 3;       // ... and in samples at least
 
   explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), n_(of_.rest.size()) { reset(); }
 
