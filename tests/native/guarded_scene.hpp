@@ -1,0 +1,199 @@
+// A random scene under a guarded stepper, wired as contacts/guard does it, but by MuJoCo's headers:
+// convex geoms that fly at a floor and one another, sometimes a cloth.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "hard_numbers.hpp"
+#include "mujoco_scene.hpp"
+#include "stepper.hpp"
+
+namespace guarded {
+
+using namespace tauguard::contacts;
+
+constexpr double levels[] = {0, 0.5, 0.75, 0.95};
+constexpr int geom_kinds[] = {mjGEOM_PLANE,     mjGEOM_SPHERE,   mjGEOM_CAPSULE,
+                              mjGEOM_ELLIPSOID, mjGEOM_CYLINDER, mjGEOM_BOX};
+
+inline double uniform(Random& random, double low, double high) {
+  return low + (high - low) * double(random() % 100001) / 100000;
+}
+
+inline std::string body(Random& random, int number) {
+  const char* kinds[] = {"sphere", "capsule", "ellipsoid", "cylinder", "box"};
+  char text[400];
+  const auto size = [&] { return uniform(random, 0.01, 0.1); };
+  std::snprintf(text, sizeof text,
+                "<body pos=\"%g %g %g\"><freejoint/><geom type=\"%s\" size=\"%g %g %g\"/></body>",
+                uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3), 0.2 + 0.25 * number,
+                kinds[random() % 5], size(), size(), size());
+  return text;
+}
+
+inline std::string mjcf(Random& random, bool cloth, bool reset) {
+  const char* integrators[] = {"Euler", "implicitfast", "discrete"};
+  const char* steps[] = {"0.001", "0.004", "0.01"};
+  std::string text = "<mujoco><option timestep=\"" + std::string(steps[random() % 3]) +
+                     "\" integrator=\"" + integrators[random() % 3] + "\"><flag autoreset=\"" +
+                     (reset ? "enable" : "disable") +
+                     "\"/></option><worldbody><geom type=\"plane\" size=\"5 5 1\"/>";
+  const int bodies = 2 + int(random() % 4);
+  for (int k = 0; k < bodies; ++k) text += body(random, k);
+  if (cloth)
+    text +=
+        "<flexcomp name=\"cloth\" type=\"grid\" dim=\"2\" count=\"3 3 1\" spacing=\".15 .15 .15\" "
+        "pos=\"0 0 1.5\" radius=\".005\" mass=\".2\"><contact selfcollide=\"none\"/>"
+        "<elasticity young=\"3e4\" poisson=\"0\" thickness=\"5e-3\" elastic2d=\"stretch\"/>"
+        "</flexcomp>";
+  return text + "</worldbody></mujoco>";
+}
+
+inline Engine engine_of(const Scene& scene, mjData* end) {
+  mjModel* m = scene.model;
+  mjData* d = scene.data;
+  Engine e{};
+  e.model = m, e.data = d, e.end = end;
+  const auto step = [](void (*f)(const mjModel*, mjData*)) {
+    return reinterpret_cast<Engine::Step>(f);
+  };
+  e.step = step(&mj_step), e.step1 = step(&mj_step1), e.step2 = step(&mj_step2);
+  e.kinematics = step(&mj_kinematics), e.com_pos = step(&mj_comPos), e.com_vel = step(&mj_comVel);
+  e.flex = step(&mj_flex), e.tendon = step(&mj_tendon), e.make_m = step(&mj_makeM);
+  e.energy_pos = step(&mj_energyPos);
+  e.get_state = reinterpret_cast<decltype(e.get_state)>(&mj_getState);
+  e.set_state = reinterpret_cast<decltype(e.set_state)>(&mj_setState);
+  e.copy_state = reinterpret_cast<decltype(e.copy_state)>(&mj_copyState);
+  e.mul_m = reinterpret_cast<decltype(e.mul_m)>(&mj_mulM);
+  e.jac_com = reinterpret_cast<decltype(e.jac_com)>(&mj_jacBodyCom);
+  e.integrate = reinterpret_cast<decltype(e.integrate)>(&mj_integratePos);
+  e.nq = m->nq, e.nv = m->nv, e.nbody = m->nbody, e.ngeom = m->ngeom, e.nflex = m->nflex;
+  e.nflexvert = m->nflexvert, e.ntendon = m->ntendon;
+  e.signature = {mjSTATE_INTEGRATION, mjSTATE_QPOS | mjSTATE_MOCAP_POS | mjSTATE_MOCAP_QUAT};
+  e.state_size = mj_stateSize(m, mjSTATE_INTEGRATION);
+  e.timestep = &m->opt.timestep, e.disableflags = &m->opt.disableflags;
+  e.integrator = &m->opt.integrator, e.cone = &m->opt.cone, e.solver = &m->opt.solver;
+  e.iterations = &m->opt.iterations;
+  double* margins[] = {m->pair_margin, m->geom_margin, m->flex_margin};
+  double* solrefs[] = {m->pair_solref, m->geom_solref, m->flex_solref};
+  double* solimps[] = {m->pair_solimp, m->geom_solimp, m->flex_solimp};
+  int* priorities[] = {nullptr, m->geom_priority, m->flex_priority};
+  for (int k = 0; k < 3; ++k)
+    e.margin[k] = margins[k], e.solref[k] = solrefs[k], e.solimp[k] = solimps[k],
+    e.priority[k] = priorities[k];
+  e.pair_geom1 = m->pair_geom1, e.pair_geom2 = m->pair_geom2;
+  e.flex_vertbodyid = m->flex_vertbodyid, e.flex_vert = m->flex_vert;
+  e.time = &d->time, e.qpos = d->qpos, e.qvel = d->qvel, e.energy = d->energy;
+  e.actuator = d->qfrc_actuator, e.applied = d->qfrc_applied, e.wrench = d->xfrc_applied;
+  e.xpos = d->xpos, e.xmat = d->xmat, e.flexvert = d->flexvert_xpos;
+  e.ncon = &d->ncon, e.nefc = &d->nefc;
+  e.contacts = reinterpret_cast<char* const*>(&d->contact), e.contact_size = sizeof(mjContact);
+  e.at_dist = offsetof(mjContact, dist), e.at_dim = offsetof(mjContact, dim);
+  e.at_geom = offsetof(mjContact, geom), e.at_flex = offsetof(mjContact, flex);
+  e.at_row = offsetof(mjContact, efc_address);
+  e.efc_aref = &d->efc_aref, e.efc_margin = &d->efc_margin;
+  e.efc_vel = &d->efc_vel, e.efc_pos = &d->efc_pos;
+  e.end_qvel = end->qvel, e.end_energy = end->energy, e.end_xpos = end->xpos;
+  e.end_xmat = end->xmat, e.end_flexvert = end->flexvert_xpos, e.end_cvel = end->cvel;
+  e.discrete = mjINT_DISCRETE, e.pyramidal = mjCONE_PYRAMIDAL;
+  e.refsafe = mjDSBL_REFSAFE, e.newton = mjSOL_NEWTON;
+  return e;
+}
+
+inline Core core_of(int type) {
+  int k = 0;
+  while (geom_kinds[k] != type) ++k;
+  return static_cast<Core>(k);
+}
+
+inline double thickness(const mjModel* m, int geom) {
+  const double* size = m->geom_size + 3 * geom;
+  switch (m->geom_type[geom]) {
+    case mjGEOM_PLANE:
+      return 0;
+    case mjGEOM_SPHERE:
+    case mjGEOM_CAPSULE:
+      return size[0];
+    case mjGEOM_CYLINDER:
+      return std::min(size[0], size[1]);
+    default:
+      return std::min({size[0], size[1], size[2]});
+  }
+}
+
+inline int add_shape(const mjModel* m, int geom, double layer, Verdict* verdict) {
+  Shape shape{core_of(m->geom_type[geom]), {}, 0, {}, {}, {}, {}, {}};
+  const bool round = m->geom_type[geom] == mjGEOM_SPHERE || m->geom_type[geom] == mjGEOM_CAPSULE;
+  for (int k = 0; k < 3; ++k)
+    shape.size[k] = std::max(m->geom_size[3 * geom + k] - (round ? 0 : layer), 0.0);
+  if (round) shape.radius = m->geom_size[3 * geom] - layer;
+  double mat[9];
+  mju_quat2Mat(mat, m->geom_quat + 4 * geom);
+  Frame frame;
+  for (int i = 0; i < 3; ++i)
+    frame.row[i] = {mat[3 * i], mat[3 * i + 1], mat[3 * i + 2]},
+    frame.at[i] = m->geom_pos[3 * geom + i];
+  return verdict->add(std::move(shape), m->geom_bodyid[geom], frame);
+}
+
+struct Guarded {
+  Guarded(std::uint64_t seed, bool cloth, bool reset) : random(seed), scene(text(cloth, reset)) {
+    mjModel* m = scene.model;
+    end = mj_makeData(m);
+    Verdict verdict;
+    std::vector<Partners> pairs;
+    std::vector<int> last, spins;
+    for (int a = 0; a < m->ngeom; ++a)
+      for (int b = a + 1; b < m->ngeom; ++b) {
+        verdict.add_pair(cores(a, &verdict), cores(b, &verdict));
+        pairs.push_back({{Place::geom, a}, {Place::geom, b}, {Place::geom, a}});
+        last.push_back(3);
+      }
+    for (int geom = 0; cloth && geom < m->ngeom; ++geom) add_cloth(geom, &verdict, &pairs, &last);
+    for (int j = 0; j < m->njnt; ++j)
+      if (m->jnt_type[j] == mjJNT_FREE)
+        for (int k = 3; k < 6; ++k) spins.push_back(m->jnt_dofadr[j] + k);
+    const Settings settings{true, 40, 1e-5, 1.25, 1.0 / 64, 0.2, 10, 16, 1.0 / 8, 0.5, 1.0};
+    stepper.reset(new Stepper(engine_of(scene, end), std::move(verdict), std::move(pairs),
+                              std::move(last), {}, std::move(spins), settings, 0.01));
+    stepper->set_callbacks(nullptr, [](const std::vector<PairHit>& hits, const double*, double) {
+      std::vector<int> out;  // nothing is stopped here: it is reported as passed
+      for (const PairHit& hit : hits) out.push_back(hit.pair);
+      return out;
+    });
+    mj_forward(m, scene.data);
+  }
+  ~Guarded() { mj_deleteData(end); }
+
+  std::string text(bool cloth, bool reset) { return mjcf(random, cloth, reset); }
+
+  std::vector<std::int32_t> cores(int geom, Verdict* verdict) const {
+    std::vector<std::int32_t> out;
+    for (const double level : levels)
+      out.push_back(add_shape(scene.model, geom, level * thickness(scene.model, geom), verdict));
+    return out;
+  }
+
+  void add_cloth(int geom, Verdict* verdict, std::vector<Partners>* pairs, std::vector<int>* last) {
+    const mjModel* m = scene.model;
+    const double radius = m->flex_radius[0], thick = thickness(m, geom);
+    const double layers[] = {0, 0.5 * std::min(thick, 4 * radius), 0.5 * thick, 0.75 * thick,
+                             0.95 * thick};
+    std::vector<std::int32_t> a;
+    for (const double layer : layers) a.push_back(add_shape(m, geom, layer, verdict));
+    std::vector<std::int32_t> elements(m->flex_elem, m->flex_elem + 3 * m->flex_elemnum[0]);
+    verdict->add_flex_pair(std::move(a), {radius, radius / 2, radius / 2, radius / 4, radius / 20},
+                           std::move(elements), 3,
+                           std::vector<std::uint8_t>(m->flex_elemnum[0], 0));
+    pairs->push_back({{Place::flex, 0}, {Place::geom, geom}, {Place::flex, 0}});
+    last->push_back(4);
+  }
+
+  Random random;
+  Scene scene;
+  mjData* end;
+  std::unique_ptr<Stepper> stepper;
+};
+
+}  // namespace guarded
