@@ -33,11 +33,11 @@ inline std::string body(Random& random, int number) {
 }
 
 inline std::string mjcf(Random& random, bool cloth, bool reset) {
-  const char* integrators[] = {"Euler", "implicitfast", "discrete"};
+  const char* integrators[] = {"Euler", "discrete", "implicitfast"};  // the last has no cloth
   const char* steps[] = {"0.001", "0.004", "0.01"};
   std::string text = "<mujoco><option timestep=\"" + std::string(steps[random() % 3]) +
-                     "\" integrator=\"" + integrators[random() % 3] + "\"><flag autoreset=\"" +
-                     (reset ? "enable" : "disable") +
+                     "\" integrator=\"" + integrators[random() % (cloth ? 2 : 3)] +
+                     "\"><flag autoreset=\"" + (reset ? "enable" : "disable") +
                      "\"/></option><worldbody><geom type=\"plane\" size=\"5 5 1\"/>";
   const int bodies = 2 + int(random() % 4);
   for (int k = 0; k < bodies; ++k) text += body(random, k);
