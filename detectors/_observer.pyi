@@ -1,3 +1,5 @@
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -128,3 +130,96 @@ class FreeMotion:
         rest: Array,
     ) -> None: ...
     def step(self, q: Array, qd: Array, current: Array, dt: float) -> float: ...
+
+class FaultCheck:
+    def __init__(
+        self,
+        dt: float,
+        longest: float,
+        odd: int,
+        speed: float,
+        repeats: int,
+        window: int,
+        share: float,
+        step_share: float,
+        current: Array,
+        step: Array,
+        drift: Array,
+        stuck: NDArray[np.int64],
+    ) -> None: ...
+    def step(self, t: float, q: Array, qd: Array, current: Array) -> tuple[int, int, float]: ...
+    def reset(self) -> None: ...
+
+class TorqueCheck:
+    def __init__(
+        self, gain: Array, noise: Array, rate: float, opposed: Array, least: Array, most: Array
+    ) -> None: ...
+    def step(self, residual: Array, current: Array, dt: float) -> tuple[int, int, float]: ...
+    def extremes(self) -> list[float]: ...
+
+class Scores:
+    @property
+    def joints(self) -> int: ...
+    def step(self, q: Array, qd: Array, current: Array, dt: float) -> float: ...
+
+def free_scores(stream: FreeMotion) -> Scores: ...
+def limit_scores(
+    estimator: Estimator,
+    joints: list[int],
+    weights: list[float],
+    units: float,
+    factor: float,
+    compress: bool,
+    limits: list[float],
+) -> Scores: ...
+def kernel_scores(
+    estimator: Estimator,
+    joints: list[int],
+    weights: list[float],
+    units: float,
+    factor: float,
+    compress: bool,
+    lag: int,
+    count: int,
+    vectors: Array,
+    coef: Array,
+    intercept: float,
+    sigma: float,
+) -> Scores: ...
+def python_scores(make: Callable[[], object], joints: int) -> Scores: ...
+
+class Alarm:
+    def __init__(
+        self,
+        scores: Scores,
+        dt: float,
+        settle: float,
+        threshold: float,
+        samples: int,
+        memory: int,
+        speed: list[float],
+        base: list[float],
+        unit: list[float],
+    ) -> None: ...
+    @property
+    def score(self) -> float: ...
+    def step(self, q: Array, qd: Array, current: Array, dt: float) -> bool: ...
+
+class Monitor:
+    def __init__(
+        self,
+        check: FaultCheck,
+        alarm: Alarm,
+        observer: Estimator,
+        torques: TorqueCheck,
+        dt: float,
+        settle: float,
+        span: float,
+        window: float,
+        bridged: float,
+    ) -> None: ...
+    @property
+    def settled(self) -> bool: ...
+    def step(
+        self, t: float, q: Array, qd: Array, current: Array
+    ) -> tuple[int, bool, float, int, int, float, bool]: ...

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer
 
 #: No sample for so long, or samples this much behind the least late of them, are a fault [s].
@@ -65,4 +63,4 @@ class Lateness:
 def late_answer(answer: Answer, late: float) -> Answer:
     """An answer that comes too late: no collision is not "free", as the robot is further on."""
     reason = f"late: the samples are {1e3 * late:.0f} ms behind the robot"
-    return replace(answer, state=COLLISION if answer.alarm else FAULT, reason=reason)
+    return answer._replace(state=COLLISION if answer.alarm else FAULT, reason=reason)

@@ -11,6 +11,9 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 PORT = 30004
 VERSION = 2
 HEADER = struct.Struct(">HB")
@@ -103,6 +106,11 @@ class Recipe:
     def pack(self, values: Sequence[float]) -> bytes:
         """A data packet of ``values``, one number an element, in order."""
         return packet(DATA_PACKAGE, self.layout.pack(self.number, *values))
+
+
+def read_doubles(payload: bytes) -> NDArray[np.float64]:
+    """The numbers of a data packet that holds doubles and vectors of them alone."""
+    return np.frombuffer(payload, ">f8", offset=1).astype(np.float64)
 
 
 def text_message(source: str, message: str, level: int) -> bytes:

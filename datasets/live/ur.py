@@ -202,7 +202,7 @@ class UrSource(Closing):
                 f"a data packet of {len(payload)} bytes, expected {self._layout.size} of recipe "
                 f"{self._recipe}"
             )
-        values = np.array(self._layout.unpack(payload)[1:])
+        values = rtde.read_doubles(payload)
         t = float(values[0])
         passed, self._last = t - self._last, t
         if np.isfinite(passed) and passed * self._rate > 1.5:

@@ -142,7 +142,7 @@ class Estimator:
         joints = arm.robot.joints
         friction = arm.friction or FrictionModel.coulomb_viscous(np.zeros(joints), 0.0)
         assert arm.noise is not None
-        self._native = _observer.Estimator(
+        self.native = _observer.Estimator(
             arm.robot.chain,
             friction.basis(joints),
             [float(g) for g in arm.drive_gain],
@@ -176,12 +176,12 @@ class Estimator:
         tracked = np.empty((len(q) if keep else 0, PAYLOAD + PER_JOINT * joints))
         dt = intervals(t, len(q))
         out = residual, unexplained, acceleration, plain
-        self._native.run(dt, q, qd, current, *out, tracked)
+        self.native.run(dt, q, qd, current, *out, tracked)
         return Estimate(*out, tracked if keep else None)
 
     def reset(self) -> None:
         """Forget: the next sample is the first."""
-        self._native.reset()
+        self.native.reset()
 
     def step(
         self,
@@ -198,7 +198,7 @@ class Estimator:
         """
         try:
             step = self.dt if dt is None else dt
-            self._native.step(q, qd, current, step, out[0], out[1], out[2])
+            self.native.step(q, qd, current, step, out[0], out[1], out[2])
         except TypeError:
             joints = self.arm.robot.joints
             raise ValueError(
@@ -208,5 +208,5 @@ class Estimator:
     def tracked(self) -> Array:
         """The unknowns now, shape (4 + 3 n,): payload mass and moment, then three a joint."""
         out = np.empty(PAYLOAD + PER_JOINT * self.arm.robot.joints)
-        self._native.theta(out)
+        self.native.theta(out)
         return out

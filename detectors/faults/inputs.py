@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.detectors._faults import Check
+from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.faults.torques import torque_ratios
 from tauguard.traces.trace import Trace
@@ -154,13 +154,21 @@ def _longest_run(mask: NDArray[np.bool_]) -> int:
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
+def input_fault(usual: UsualInput, number: int, joint: int, value: float) -> str:
+    """What the native check says of a sample, in words: ``"frozen: no signal has changed ..."``."""
+    name, text = FAULTS[number]
+    who = usual.joint_names[joint] if joint >= 0 else ""
+    ms, dt = 1e3 * value, 1e3 * usual.dt
+    return f"{name}: " + text.format(joint=who, value=value, ms=ms, dt=dt, back=-value)
+
+
 class FaultCheck:
     """Asks of one sample after another whether it can be believed."""
 
     def __init__(self, usual: UsualInput) -> None:
         """Begin before the first sample."""
         self.usual = usual
-        self._check = Check(
+        self.native = _observer.FaultCheck(
             usual.dt,
             usual.longest,
             usual.odd,
@@ -177,10 +185,10 @@ class FaultCheck:
 
     def reset(self) -> None:
         """Forget the samples so far."""
-        self._check.reset()
+        self.native.reset()
 
     def step(self, t: float, q: Array, qd: Array, current: Array) -> str | None:
-        """None, or what is wrong with this sample: ``"frozen: no signal has changed ..."``.
+        """None, or what is wrong with this sample, see :func:`input_fault`.
 
         Args:
             t: its time [s].
@@ -191,10 +199,5 @@ class FaultCheck:
         Raises:
             ValueError: another number of joints.
         """
-        number, joint, value = self._check.step(t, q, qd, current)
-        if not number:
-            return None
-        name, text = FAULTS[number]
-        who = self.usual.joint_names[joint] if joint >= 0 else ""
-        ms, dt = 1e3 * value, 1e3 * self.usual.dt
-        return f"{name}: " + text.format(joint=who, value=value, ms=ms, dt=dt, back=-value)
+        number, joint, value = self.native.step(t, q, qd, current)
+        return input_fault(self.usual, number, joint, value) if number else None

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors._faults import Torques
+from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
 from tauguard.traces.trace import Trace
 
@@ -26,6 +26,11 @@ TEXTS = {
     15: "torque: the current of {joint} gives {value:.2f} of the torque that the model needs: "
     "another load, gain or arm, or a saturated or biased current",
 }
+
+
+def torque_fault(names: Sequence[str], number: int, joint: int, value: float) -> str:
+    """What the native check says of torques, in words; ``names`` are the joints'."""
+    return TEXTS[number].format(joint=names[joint], value=value)
 
 
 class TorqueCheck:
@@ -52,9 +57,9 @@ class TorqueCheck:
         noise = np.asarray(arm.noise, dtype=np.float64)
         floor = np.maximum(noise, SHARE * noise.max())
         self._names, self._dt = arm.robot.joint_names, dt
-        self._observer = Estimator(arm, RATE, dt, Unknowns.none())
+        self.observer = Estimator(arm, RATE, dt, Unknowns.none())
         gain = np.ascontiguousarray(arm.drive_gain, dtype=np.float64)
-        self._check = Torques(gain, floor, RATE, *bounds)
+        self.native = _observer.TorqueCheck(gain, floor, RATE, *bounds)
         self._out = tuple(np.zeros((3, len(noise))))
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> str:
@@ -69,14 +74,14 @@ class TorqueCheck:
         Raises:
             ValueError: wrong shapes or numbers that are not finite.
         """
-        self._observer.step(q, qd, current, self._out, dt)
-        number, joint, value = self._check.step(self._out[0], current, dt or self._dt)
-        return TEXTS[number].format(joint=self._names[joint], value=value) if number else ""
+        self.observer.step(q, qd, current, self._out, dt)
+        number, joint, value = self.native.step(self._out[0], current, dt or self._dt)
+        return torque_fault(self._names, number, joint, value) if number else ""
 
     @property
     def extremes(self) -> Array:
         """Least fast, least slow and largest slow ratio so far, shape (3, n)."""
-        return np.array(self._check.extremes()).reshape(3, -1)
+        return np.array(self.native.extremes()).reshape(3, -1)
 
 
 def torque_ratios(traces: Sequence[Trace], arm: ArmModel) -> Array:

@@ -34,6 +34,12 @@ class Scaling(Frozen):
         if not self.joints or not (self.units > 0 and np.isfinite(self.factor)):
             raise ValueError(f"Scaling: {self}, expected some joints, units > 0, a finite factor")
 
+    @property
+    def numbers(self) -> tuple[list[int], list[float], float, float, bool]:
+        """Joints, the envelope's weights, units, factor and whether it compresses: native form."""
+        weights = [] if self.envelope is None else self.envelope.weights.ravel().tolist()
+        return list(self.joints), weights, self.units, self.factor, self.compress
+
     @cached_property
     def _native(self) -> _kernel.Scaling:
         weights = np.empty((0, 4)) if self.envelope is None else self.envelope.weights

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from tauguard.arrays import Bools
+from tauguard.detectors import _observer
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
 from tauguard.detectors.calibration.recording import Load, Recording, known_load, moves, pieces
 from tauguard.detectors.calibration.regression import filtered
@@ -28,7 +29,8 @@ from tauguard.detectors.estimation.observer import intervals
 from tauguard.detectors.estimation.slow_errors import UNKNOWN_LOAD, LoadDeviation
 from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.features.free_bound import PRIOR, Bound, friction_level
-from tauguard.detectors.features.free_stream import SLOW, FreeStream, native
+from tauguard.detectors.features.free_stream import SLOW, native
+from tauguard.detectors.features.native_stream import NativeStream
 from tauguard.detectors.features.quantile_regression import upper_quantile
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
@@ -95,9 +97,10 @@ class FittedFreeMotion(Frozen):
         scores: Array = self.judge(trace).ratio.max(axis=1)
         return scores
 
-    def stream(self) -> FreeStream:
+    def stream(self) -> NativeStream:
         """The same scores sample by sample."""
-        return FreeStream(self.arm, self.bound, self.load, self.dt)
+        scores = _observer.free_scores(native(self.arm, self.bound, self.load))
+        return NativeStream(scores, self.dt)
 
     def judge(self, trace: Trace) -> Judged:
         """Ratios, bounds and residuals of a trace.

@@ -8,8 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.detectors import _observer
 from tauguard.detectors.estimation.gains import PLAIN_GAIN
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
+from tauguard.detectors.features.native_stream import NativeStream
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.methods.per_joint import FittedPerJoint, PerJoint
 from tauguard.traces.trace import Trace
@@ -61,24 +63,12 @@ class FittedThresholds(FittedPerJoint):
 
     def scores(self, trace: Trace) -> Array:
         """The largest ratio over the joints, shape (T,)."""
-        return self._score(self.front.scaled(trace, self.scaling))
-
-    def _score(self, scaled: Array) -> Array:
+        scaled = self.front.scaled(trace, self.scaling)
         score: Array = (np.abs(scaled) / self.limits).max(axis=1)
         return score
 
-    def stream(self) -> ThresholdStream:
+    def stream(self) -> NativeStream:
         """The same, sample by sample."""
-        return ThresholdStream(self)
-
-
-class ThresholdStream:
-    """Sample by sample."""
-
-    def __init__(self, detector: FittedThresholds) -> None:
-        """Begin anew."""
-        self._score, self._residual = detector._score, detector.front.stream(detector.scaling)
-
-    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
-        """The score of this sample."""
-        return float(self._score(self._residual.step(q, qd, current, dt))[0])
+        estimator, scaling = self.front.estimator().native, self.scaling.numbers
+        scores = _observer.limit_scores(estimator, *scaling, self.limits.tolist())
+        return NativeStream(scores, self.dt)

@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.evaluation.events import free_rows
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
+from tauguard.detectors.features.native_stream import NativeStream
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.features.training import Prepared, draw_windows, peaks, severity_target
 from tauguard.detectors.features.windows import WindowShape
+from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
 from tauguard.traces.trace import Trace
 
@@ -145,9 +148,23 @@ class FittedWindowed(OnFrontEnd):
         signal = self.front.scaled(trace, self.scaling)
         return evaluated(self.regressor, signal, self.shape, np.arange(len(signal)))
 
-    def stream(self) -> WindowStream:
-        """The same, sample by sample."""
-        return WindowStream(self)
+    def stream(self) -> NativeStream | WindowStream:
+        """The same, sample by sample; of a kernel machine all of it is native."""
+        machine = self.regressor
+        if not isinstance(machine, KernelMachine):
+            return WindowStream(self)
+        vectors, weights = map(np.ascontiguousarray, (machine.vectors, machine.weights))
+        scores = _observer.kernel_scores(
+            self.front.estimator().native,
+            *self.scaling.numbers,
+            self.shape.lag,
+            self.shape.count,
+            vectors,
+            weights,
+            machine.intercept,
+            machine.sigma,
+        )
+        return NativeStream(scores, self.dt)
 
 
 class WindowStream:

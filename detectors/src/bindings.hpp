@@ -45,5 +45,7 @@ inline void check_sample(std::size_t n, const In1& q, const In1& qd, const In1& 
 
 void bind_estimator(nb::module_& m);
 void bind_free_motion(nb::module_& m);
+void bind_faults(nb::module_& m);
+void bind_monitor(nb::module_& m);
 
 }  // namespace tauguard::detectors

@@ -65,7 +65,7 @@ class Estimator {
         gathered_(m_),
         row_(m_) {
     for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_,
-                    &decay_, &plain_, &plain_tau_, &plain_tau_before_})
+                    &decay_, &plain_, &plain_tau_, &plain_tau_before_, &smooth_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
       v->resize(payload_numbers * n_);
@@ -112,7 +112,7 @@ class Estimator {
 
  private:
   void begin(const double* q, const double* qd) {
-    smooth_.assign(qd, qd + n_);
+    std::copy(qd, qd + n_, smooth_.begin());
     fusion_.reset(q, qd);
     for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
     for (auto* v : {&residual_, &plain_, &load_, &own_, &theta_, &covariance_})

@@ -65,6 +65,8 @@ class FaultCheck {
         bent_(n_),
         unchanged_(n_) {}
 
+  std::size_t joints() const { return n_; }
+
   void reset() {
     begun_ = false;
     repeats_ = filled_ = odd_ = 0;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -47,6 +48,7 @@ class FreeMotion {
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_, &design_})
       v->resize(SlowErrors::load * n_);
+    for (Sample& s : last_) s.values.resize(3 * n_);
     reset();
   }
 
@@ -63,7 +65,7 @@ class FreeMotion {
     count_ = 0;
     time_ = 0.0;
     std::fill(sum_.begin(), sum_.end(), 0.0);
-    last_.clear();
+    filled_ = false;
     for (auto* v : {&residual_, &own_, &qdd_, &load_, &ratio_, &left_})
       std::fill(v->begin(), v->end(), 0.0);
     std::fill(bound_.begin(), bound_.end(), 1.0);
@@ -81,11 +83,13 @@ class FreeMotion {
     ++count_;
     time_ += dt;
     if (!(time_ > interval - 0.5 * dt)) return;
-    Sample mean{sum_, time_};
+    std::rotate(last_.begin(), last_.begin() + 1, last_.end());
+    Sample& mean = last_.back();
+    std::copy(sum_.begin(), sum_.end(), mean.values.begin());
+    mean.dt = time_;
     for (double& x : mean.values) x /= count_;
-    if (last_.empty()) last_.assign(2, mean);
-    if (last_.size() == 3) last_.erase(last_.begin());
-    last_.push_back(std::move(mean));
+    if (!filled_) last_[0] = last_[1] = mean;  // of one size: nothing is allocated
+    filled_ = true;
     count_ = 0;
     time_ = 0.0;
     std::fill(sum_.begin(), sum_.end(), 0.0);
@@ -95,7 +99,7 @@ class FreeMotion {
  private:
   struct Sample {
     std::vector<double> values;  // q, qd, current
-    double dt;
+    double dt = 0.0;
   };
 
   void take() {
@@ -165,10 +169,10 @@ class FreeMotion {
   std::vector<double> p_, beta_, p_before_, beta_before_, tau_, tau_before_, friction_,
       friction_before_, residual_, own_, qd_before_, qdd_, left_, spread_, ratio_, bound_;
   std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_, design_;
-  std::vector<Sample> last_;
+  std::array<Sample, 3> last_;
   std::size_t count_ = 0;
   double time_ = 0.0;
-  bool started_ = false;
+  bool started_ = false, filled_ = false;
 };
 
 }  // namespace tauguard::detectors

@@ -1,6 +1,6 @@
-// tauguard.detectors._observer: chains of one-degree joints and the momentum observer on arrays.
-// Rows are samples and independent of each other in all batch functions; shapes are checked in
-// Python.
+// tauguard.detectors._observer: chains of one-degree joints and the momentum observer on arrays;
+// with it what stands on them, up to the monitor of a stream. Rows are samples and independent of
+// each other in all batch functions; shapes are checked in Python.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -230,4 +230,6 @@ NB_MODULE(_observer, m) {
         nb::arg().noconvert());
   bind_estimator(m);
   bind_free_motion(m);
+  bind_faults(m);
+  bind_monitor(m);
 }

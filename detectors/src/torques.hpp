@@ -32,7 +32,18 @@ class TorqueCheck {
       : gain_(std::move(gain)), noise_(std::move(noise)), set_(bounds), n_(gain_.size()) {
     for (auto* v : {&given_, &fast_square_, &fast_product_, &slow_square_, &slow_product_})
       v->resize(n_);
-    for (auto* v : {&fast_least_, &slow_least_, &slow_most_}) v->assign(n_, 1.0);
+    for (auto* v : {&fast_least_, &slow_least_, &slow_most_}) v->resize(n_);
+    reset();
+  }
+
+  std::size_t joints() const { return n_; }
+
+  // Forgets the samples so far.
+  void reset() {
+    time_ = 0;
+    for (auto* v : {&given_, &fast_square_, &fast_product_, &slow_square_, &slow_product_})
+      std::fill(v->begin(), v->end(), 0.0);
+    for (auto* v : {&fast_least_, &slow_least_, &slow_most_}) std::fill(v->begin(), v->end(), 1.0);
   }
 
   // The least fast, the least slow and the largest slow ratio so far, n each; 1 where none counted.

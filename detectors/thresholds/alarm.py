@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,19 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.detectors import _observer
 from tauguard.detectors.detector import FittedDetector, same_rate
 from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.features.front_end import plain_residual
+from tauguard.detectors.features.native_stream import NativeStream
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.thresholds.confirmation import (
     CONFIRMATION,
-    Confirmation,
     confirmation_samples,
     confirmed,
 )
 from tauguard.detectors.thresholds.rates import sustained
-from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels, recent_speed
+from tauguard.detectors.thresholds.speed_levels import (
+    SpeedLevels,
+    memory_samples,
+    recent_speed,
+)
 from tauguard.traces.trace import Detection, Trace
 
 #: A signal that is finite but absurd has left numbers in the detector that are not.
@@ -132,17 +136,28 @@ class AlarmStream:
     """An alarm as the samples of one recording come in.
 
     Attributes:
-        score: the normalised score at the last sample.
+        native: what does it.
     """
 
     def __init__(self, alarm: CollisionAlarm) -> None:
         """Begin anew."""
-        self._scores, self._levels = alarm.detector.stream(), alarm.levels
-        self._dt, self._settle = alarm.detector.dt, alarm.settle - alarm.detector.dt / 2
-        self._speed = RecentSpeed(self._dt)
-        self._confirmation, self._threshold = Confirmation(alarm.samples), alarm.threshold
-        self._time = -1.0
-        self.score = 0.0
+        detector, levels = alarm.detector, alarm.levels
+        self._dt, self._first = detector.dt, True
+        columns = (levels.speed, levels.base, levels.unit) if levels else ([], [], [])
+        self.native = _observer.Alarm(
+            native_scores(detector),
+            detector.dt,
+            alarm.settle - detector.dt / 2,
+            alarm.threshold,
+            alarm.samples,
+            memory_samples(detector.dt),
+            *([float(x) for x in column] for column in columns),
+        )
+
+    @property
+    def score(self) -> float:
+        """The normalised score at the last sample, 0 before the first."""
+        return self.native.score
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> bool:
         """Whether the alarm is up at this sample; equal to :meth:`CollisionAlarm.detect`.
@@ -158,17 +173,22 @@ class AlarmStream:
                 training's.
         """
         interval = self._dt if dt is None else dt
-        first = self._time < 0
-        if not first and not same_rate(interval, self._dt):
+        if not self._first and not same_rate(interval, self._dt):
             raise ValueError(
                 f"dt {1e3 * interval:g} ms: this detector works at {1e3 * self._dt:g} ms; feed it "
                 "every sample, or train one at this rate"
             )
-        score = self._scores.step(q, qd, current, dt)
-        if not math.isfinite(score):
-            raise ValueError(LOST)
-        self._time = 0.0 if first else self._time + interval
-        if self._levels is not None:
-            score = self._levels.one(score, self._speed.step(qd))
-        self.score = score
-        return self._confirmation.step(score > self._threshold and self._time > self._settle)
+        try:
+            up = self.native.step(q, qd, current, interval)
+        except TypeError:
+            raise ValueError("q, qd, current: expected float64 arrays, one entry a joint") from None
+        self._first = False
+        return up
+
+
+def native_scores(detector: FittedDetector) -> _observer.Scores:
+    """A new stream of the detector in native form; one that is Python's is called back."""
+    stream = detector.stream()
+    if isinstance(stream, NativeStream):
+        return stream.native
+    return _observer.python_scores(detector.stream, detector.arm.robot.joints)

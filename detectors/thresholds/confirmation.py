@@ -31,23 +31,3 @@ def confirmed(raw: ArrayLike, samples: int) -> Bools:
     index = np.arange(len(truth))
     last_false = np.maximum.accumulate(np.where(truth, -1, index))
     return np.asarray(index - last_false >= samples)
-
-
-class Confirmation:
-    """The same, sample by sample."""
-
-    def __init__(self, samples: int) -> None:
-        """Ask for ``samples`` successive True."""
-        if samples < 1:
-            raise ValueError(f"samples: {samples}, expected 1 or more")
-        self.samples = samples
-        self._run = 0
-
-    def reset(self) -> None:
-        """Forget."""
-        self._run = 0
-
-    def step(self, raw: bool) -> bool:
-        """Whether this and the samples before make an alarm."""
-        self._run = self._run + 1 if raw else 0
-        return self._run >= self.samples

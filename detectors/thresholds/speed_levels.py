@@ -8,7 +8,6 @@ exceed, in units of their mean excess beyond that.
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,38 +36,18 @@ def recent_speed(qd: ArrayLike, dt: float, memory: float = MEMORY) -> Array:
         memory: [s].
     """
     total = np.abs(np.asarray(qd, dtype=np.float64)).sum(axis=1)
-    samples = _samples(dt, memory)
+    samples = memory_samples(dt, memory)
     found: Array = maximum_filter1d(
         total, samples, mode="constant", cval=0.0, origin=(samples - 1) // 2
     )
     return found
 
 
-def _samples(dt: float, memory: float) -> int:
+def memory_samples(dt: float, memory: float = MEMORY) -> int:
+    """How many samples a motion counts for, 1 or more; times in s."""
     if not (dt > 0 and np.isfinite(memory) and memory >= 0):
         raise ValueError(f"dt {dt}, memory {memory} s: expected above 0, and 0 or more")
     return max(1, round(memory / dt))
-
-
-class RecentSpeed:
-    """:func:`recent_speed`, sample by sample."""
-
-    def __init__(self, dt: float, memory: float = MEMORY) -> None:
-        """Take the sample interval and the memory [s]."""
-        self._samples, self._at = _samples(dt, memory), 0
-        self._falling: deque[tuple[int, float]] = deque()  # candidates for the maximum
-
-    def step(self, qd: Array) -> float:
-        """The recent speed at this sample [rad/s]."""
-        total = float(np.abs(qd).sum())
-        kept = self._falling
-        while kept and kept[-1][1] <= total:
-            kept.pop()
-        kept.append((self._at, total))
-        if kept[0][0] <= self._at - self._samples:
-            kept.popleft()
-        self._at += 1
-        return kept[0][1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +106,6 @@ class SpeedLevels:
         unit = np.interp(at, self.speed, self.unit)
         normalised: Array = (np.asarray(score, dtype=np.float64) - base) / unit
         return normalised
-
-    def one(self, score: float, speed: float) -> float:
-        """:meth:`__call__` of one number."""
-        base = np.interp(speed, self.speed, self.base)
-        unit = np.interp(speed, self.speed, self.unit)
-        return float((score - base) / unit)
 
 
 def _bins(blocks: int) -> int:

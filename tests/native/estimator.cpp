@@ -1,14 +1,29 @@
-// The estimator and the free-motion detector without an interpreter, for the sanitizers: random
-// arms and friction models, samples of every size that Python lets pass. Prints what it tried.
+// The estimator, the free-motion detector and the monitor without an interpreter, for the
+// sanitizers: random arms and friction models, samples of every size that Python lets pass, and for
+// the monitor of every kind. Counts what a monitor allocates. Prints what it tried.
 #include "estimator.hpp"
 
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
+#include <new>
 
 #include "free_motion.hpp"
 #include "hard_numbers.hpp"
+#include "monitor.hpp"
+
+// They are a pair: malloc and free.
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
+static long allocations = 0;
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size ? size : 1)) return p;
+  throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 namespace {
 
@@ -151,19 +166,22 @@ int estimators(Random& random, int rounds) {
   return 10 * rounds * 600;
 }
 
+FreeSettings free_settings(Random& random, std::size_t n, std::size_t columns) {
+  return {uniforms(random, n, 1, 20),
+          uniforms(random, n * columns, 0, 1),
+          uniforms(random, n, 0.1, 5),
+          uniform(random, 0, 2),
+          uniform(random, 0, 0.2),
+          {uniforms(random, n, 0.1, 1), uniforms(random, n, 0, 1), uniforms(random, n, 0.1, 1),
+           uniforms(random, 4 * n, 0, 1), uniforms(random, n, 0, 1)}};
+}
+
 int free_motions(Random& random, int rounds) {
   constexpr std::size_t samples = 500;
   for (int round = 0; round < 10 * rounds; ++round) {
     const std::size_t n = 1 + random() % 7;
     const FrictionBasis basis = basis_of(random, n);
-    FreeSettings set{
-        uniforms(random, n, 1, 20),
-        uniforms(random, n * basis.columns(), 0, 1),
-        uniforms(random, n, 0.1, 5),
-        uniform(random, 0, 2),
-        uniform(random, 0, 0.2),
-        {uniforms(random, n, 0.1, 1), uniforms(random, n, 0, 1), uniforms(random, n, 0.1, 1),
-         uniforms(random, 4 * n, 0, 1), uniforms(random, n, 0, 1)}};
+    const FreeSettings set = free_settings(random, n, basis.columns());
     FreeMotion stream(chain_of(random, n), basis, set);
     const bool hard = round % 2;
     const Motion m(random, n, samples, hard);
@@ -185,13 +203,107 @@ int free_motions(Random& random, int rounds) {
   return 10 * rounds * 1000;
 }
 
+// The three kinds of streams that are native, of one arm.
+std::shared_ptr<Scores> scores_of(Random& random, int kind, const Chain& chain,
+                                  const FrictionBasis& basis) {
+  const std::size_t n = chain.joints.size();
+  if (kind == 0)
+    return std::make_shared<FreeScores>(
+        FreeMotion(chain, basis, free_settings(random, n, basis.columns())));
+  std::vector<std::int64_t> joints;
+  for (std::size_t j = 0; j < n; ++j) joints.push_back(static_cast<std::int64_t>(n - 1 - j));
+  const Numbers weights = random() % 2 ? Numbers{} : uniforms(random, 4 * n, 0.1, 1);
+  Estimator estimator(chain, basis, settings_of(random, n, basis.columns(), true));
+  ScaledResidual residual(std::move(estimator), Scaling(joints, weights, 1, 0.5, random() % 2));
+  if (kind == 1)
+    return std::make_shared<LimitScores>(std::move(residual), uniforms(random, n, 0.1, 2));
+  const std::size_t count = 1 + random() % 11, size = n * count, vectors = random() % 40;
+  const Numbers z = uniforms(random, vectors * size, -1, 1), c = uniforms(random, vectors, -1, 1);
+  return std::make_shared<KernelScores>(std::move(residual), Window(n, 1 + random() % 8, count),
+                                        KernelSum(z.data(), c.data(), vectors, size, 0.1, 3));
+}
+
+struct Watch {
+  Watch(std::uint64_t seed, int kind)
+      : random(seed), n(1 + random() % 7), chain(chain_of(random, n)) {
+    const FrictionBasis basis = basis_of(random, n);
+    const Numbers one(n, 1.0);
+    Usual usual{dt,
+                0.01,
+                8,
+                20.0,
+                6,
+                10,
+                Numbers(n, 10.0),
+                0.2,
+                0.5,
+                one,
+                one,
+                std::vector<std::int64_t>(n, 9)};
+    Levels levels{{0.5, 1.0, 1.0, 4.0}, {0, 0.1, 0.2, 0.3}, {1, 1, 2, 2}};
+    if (random() % 2) levels = {};
+    TorqueBounds bounds;
+    bounds.opposed = Numbers(n, -0.4), bounds.least = Numbers(n, 0.4);
+    bounds.most = Numbers(n, 1.7);
+    Alarm alarm(scores_of(random, kind, chain, basis), {dt, 0.1, 0.5, 2, 250, levels});
+    Estimator observer(chain, basis, settings_of(random, n, basis.columns(), false));
+    monitor.reset(new Monitor(FaultCheck(usual), std::move(alarm), std::move(observer),
+                              TorqueCheck(one, one, bounds), {dt, 0.1, 0.02, 0.1, 2}));
+  }
+  static constexpr double dt = 2e-3;
+  Random random;
+  std::size_t n;
+  Chain chain;
+  std::unique_ptr<Monitor> monitor;
+};
+
+// Motion with packets that are late, missing, repeated, of another clock, and numbers that are
+// none: such samples are faults, every answer is one, and nothing is allocated on the way.
+int monitors(Random& random, int rounds) {
+  constexpr int samples = 2000;
+  const double strange[] = {std::nan(""), std::numeric_limits<double>::infinity(), 1e300, -1e300,
+                            50};
+  for (int round = 0; round < 3 * rounds; ++round) {
+    const std::uint64_t seed = random();
+    Watch watch(seed, round % 3), twin(seed, round % 3);
+    Numbers q(watch.n), qd(watch.n), current(watch.n);
+    double t = 0;
+    for (int k = 0; k < samples; ++k) {
+      const auto kind = random() % 100;
+      t += kind < 4    ? Watch::dt * double(random() % 12)
+           : kind == 4 ? -hard_number(random)
+                       : Watch::dt;
+      if (!std::isfinite(t) || std::fabs(t) > 1e5) t = 0;
+      for (std::size_t j = 0; j < watch.n; ++j) {
+        const double phase = Watch::dt * k + double(j);
+        q[j] = std::sin(phase), qd[j] = std::cos(phase), current[j] = uniform(random, -3, 3);
+      }
+      Numbers* parts[] = {&qd, &current};
+      if (kind > 94) (*parts[random() % 2])[random() % watch.n] = strange[random() % 5];
+      const double at = kind == 94 ? strange[random() % 2] : t;
+      const long before = allocations;
+      const Thought said = watch.monitor->step(at, q.data(), qd.data(), current.data());
+      check(allocations == before, "a monitor allocates");
+      const Thought again = twin.monitor->step(at, q.data(), qd.data(), current.data());
+      check(said.state == again.state && !std::memcmp(&said.score, &again.score, 8),
+            "two monitors of one stream differ");
+      check(std::isfinite(said.score), "a score that is no number");
+      check(kind < 94 || (said.why.fault != Fault::none && said.state != State::free),
+            "a sample that is no number passes");
+      check(said.state != State::collision || said.alarm, "a collision without an alarm");
+    }
+  }
+  return 3 * rounds * samples;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const int effort = argc > 1 ? std::atoi(argv[1]) : 20;
   Random random(5);
-  const int estimated = estimators(random, effort), judged = free_motions(random, effort);
-  std::printf("estimator samples %d, free-motion samples %d: %d wrong\n", estimated, judged,
-              failures);
+  const int estimated = estimators(random, effort), judged = free_motions(random, effort),
+            watched = monitors(random, effort);
+  std::printf("estimator samples %d, free-motion samples %d, monitor samples %d: %d wrong\n",
+              estimated, judged, watched, failures);
   return failures != 0;
 }

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tauguard.detectors.evaluation.events import collision_free, find_alarms, match
-from tauguard.detectors.thresholds.confirmation import Confirmation, confirmation_samples, confirmed
+from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
 from tauguard.traces.trace import Alarm, Collision
 
 
@@ -18,8 +18,6 @@ def collision(onset, end, kind="strike", peak=20.0):
 def test_confirmed_means_the_last_n_are_all_true(raw, n):
     expected = [k + 1 >= n and all(raw[k + 1 - n : k + 1]) for k in range(len(raw))]
     assert confirmed(raw, n).tolist() == expected
-    online = Confirmation(n)
-    assert [online.step(x) for x in raw] == expected
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from tauguard.detectors.thresholds.expected_rate import ExpectedRate, Tails
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.law import threshold_for_rate, with_rate
 from tauguard.detectors.thresholds.rates import Tail, block_maxima, tail_level
-from tauguard.detectors.thresholds.speed_levels import RecentSpeed, SpeedLevels, recent_speed
+from tauguard.detectors.thresholds.speed_levels import SpeedLevels, recent_speed
 from tauguard.traces import Trace
 
 
@@ -26,8 +26,6 @@ def test_recent_speed_is_the_maximum_of_the_last_moments(speeds, memory):
     count = max(1, round(memory / dt))
     expected = [total[max(0, k - count + 1) : k + 1].max() for k in range(len(total))]
     np.testing.assert_array_equal(recent_speed(qd, dt, memory), expected)
-    stream = RecentSpeed(dt, memory)
-    assert [stream.step(row) for row in qd] == expected
 
 
 def test_one_level_is_passed_as_often_at_every_speed():

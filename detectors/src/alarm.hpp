@@ -1,0 +1,129 @@
+// From scores to an alarm: normalised over the speed, above the threshold for the confirmation
+// time, never before the detector has settled. The same as the batch form, to the bit.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include "scores.hpp"
+
+namespace tauguard::detectors {
+
+// The sum of |x| in the order of NumPy's sums over up to 128 numbers, so that the bits are its own.
+inline double sum_of_sizes(const double* x, std::size_t n) {
+  double sum = 0.0;
+  std::size_t k = 0;
+  if (n >= 8) {
+    double part[8];
+    for (; k < 8; ++k) part[k] = std::fabs(x[k]);
+    for (; k + 8 <= n; k += 8)
+      for (std::size_t i = 0; i < 8; ++i) part[i] += std::fabs(x[k + i]);
+    sum = ((part[0] + part[1]) + (part[2] + part[3])) + ((part[4] + part[5]) + (part[6] + part[7]));
+  }
+  for (; k < n; ++k) sum += std::fabs(x[k]);
+  return sum;
+}
+
+// The largest sum of |qd| within the last so many samples: a queue of falling candidates.
+class RecentSpeed {
+ public:
+  explicit RecentSpeed(std::int64_t samples)
+      : samples_(samples), kept_(static_cast<std::size_t>(samples)) {}
+
+  void reset() { first_ = count_ = 0, at_ = 0; }
+
+  double step(const double* qd, std::size_t n) {
+    const double total = sum_of_sizes(qd, n);
+    if (count_ > 0 && kept_[first_].at <= at_ - samples_) {
+      first_ = (first_ + 1) % kept_.size();
+      --count_;
+    }
+    while (count_ > 0 && kept_[place(count_ - 1)].total <= total) --count_;
+    kept_[place(count_++)] = {at_++, total};
+    return kept_[first_].total;
+  }
+
+ private:
+  struct Candidate {
+    std::int64_t at;
+    double total;
+  };
+  std::size_t place(std::size_t k) const { return (first_ + k) % kept_.size(); }
+
+  std::int64_t samples_, at_ = 0;
+  std::size_t first_ = 0, count_ = 0;
+  std::vector<Candidate> kept_;
+};
+
+// What the peaks of collision-free scores reach at K rising speeds; none: scores count as they are.
+struct Levels {
+  std::vector<double> speed, base, unit;
+
+  double normalised(double score, double now) const {
+    return (score - at(now, base)) / at(now, unit);
+  }
+
+ private:
+  // Linear between the speeds and constant beyond them, by the operations of NumPy's interp.
+  double at(double now, const std::vector<double>& y) const {
+    const std::size_t last = speed.size() - 1;
+    if (std::isnan(now)) return now;
+    if (now < speed[0]) return y[0];
+    if (now > speed[last]) return y[last];
+    const auto after = std::upper_bound(speed.begin(), speed.end(), now);
+    const std::size_t k = static_cast<std::size_t>(after - speed.begin()) - 1;
+    if (k == last || speed[k] == now) return y[k];
+    return (y[k + 1] - y[k]) / (speed[k + 1] - speed[k]) * (now - speed[k]) + y[k];
+  }
+};
+
+struct AlarmSettings {
+  double dt = 0;             // of a sample that does not say its own [s]
+  double settle = 0;         // an alarm comes only after so long [s]
+  double threshold = 0;      // of the normalised score
+  std::int64_t samples = 1;  // in a row above it
+  std::int64_t memory = 1;   // samples that a speed counts for
+  Levels levels;
+};
+
+class Alarm {
+ public:
+  Alarm(std::shared_ptr<Scores> scores, AlarmSettings settings)
+      : scores_(std::move(scores)), set_(std::move(settings)), speed_(set_.memory) {}
+
+  std::size_t joints() const { return scores_->joints(); }
+  double dt() const { return set_.dt; }
+  double score() const { return score_; }
+
+  void reset() {
+    scores_->reset();
+    speed_.reset();
+    run_ = 0, time_ = -1.0, score_ = 0.0;
+  }
+
+  // Whether the alarm is up at this sample, `dt` s after the last.
+  bool step(const double* q, const double* qd, const double* current, double dt) {
+    double score = scores_->step(q, qd, current, dt);
+    if (!std::isfinite(score))
+      throw std::invalid_argument(
+          "the score is not a number: a sample was out of any arm's range; begin anew without it");
+    time_ = time_ < 0 ? 0.0 : time_ + dt;
+    if (!set_.levels.speed.empty())
+      score = set_.levels.normalised(score, speed_.step(qd, joints()));
+    score_ = score;
+    run_ = score > set_.threshold && time_ > set_.settle ? run_ + 1 : 0;
+    return run_ >= set_.samples;
+  }
+
+ private:
+  std::shared_ptr<Scores> scores_;
+  AlarmSettings set_;
+  RecentSpeed speed_;
+  std::int64_t run_ = 0;
+  double time_ = -1.0, score_ = 0.0;
+};
+
+}  // namespace tauguard::detectors

@@ -1,0 +1,144 @@
+// The SRQ kernel 1 / (1 + |x - z|^2 / sigma^2)^2 and sums of it, the scaling of residuals and the
+// window over them: what turns residuals into the score of a kernel machine. Nothing here is of
+// Python, and nothing is allocated after construction.
+//
+// Lanes run over support vectors: every lane does the same arithmetic in the same order whatever
+// the vector width, so that all code paths give the same bits. A result depends on its row alone,
+// so that any number of threads and online evaluation give the same bits too.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include "tauguard/geometry/lanes.hpp"
+
+namespace tauguard::detectors {
+
+// Four lanes at once; the compiler makes one or two machine vectors of it.
+typedef double Four __attribute__((vector_size(32)));
+constexpr std::size_t fours = 4, lanes = 4 * fours;
+
+inline Four load_four(const double* p) {
+  Four v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
+
+// sum_i coef_i / (1 + |x - z_i|^2 inv)^2 over `blocks` blocks of lanes vectors of d numbers, lane
+// last.
+double weighted_sum(const double* x, const double* vectors, const double* coef, std::size_t blocks,
+                    std::size_t d, double inv);
+
+// A weighted sum of kernels: support vectors packed for weighted_sum, padded with zero
+// coefficients.
+class KernelSum {
+ public:
+  // `vectors` are rows of d numbers, one a coefficient; sigma > 0.
+  KernelSum(const double* vectors, const double* coef, std::size_t count, std::size_t d,
+            double intercept, double sigma)
+      : d_(d),
+        blocks_((count + lanes - 1) / lanes),
+        intercept_(intercept),
+        inv_(1.0 / (sigma * sigma)) {
+    vectors_.assign(blocks_ * d_ * lanes, 0.0);
+    coef_.assign(blocks_ * lanes, 0.0);
+    for (std::size_t i = 0; i < count; ++i) {
+      coef_[i] = coef[i];
+      for (std::size_t k = 0; k < d_; ++k)
+        vectors_[((i / lanes) * d_ + k) * lanes + i % lanes] = vectors[i * d_ + k];
+    }
+  }
+
+  std::size_t dimension() const { return d_; }
+  double at(const double* x) const {
+    return weighted_sum(x, vectors_.data(), coef_.data(), blocks_, d_, inv_) + intercept_;
+  }
+
+ private:
+  std::size_t d_, blocks_;
+  double intercept_, inv_;
+  std::vector<double> vectors_, coef_;
+};
+
+// Residuals of the chosen joints in units of their envelope, row by row.
+class Scaling {
+ public:
+  // weights: of the envelope, a row of four a joint; none: the residual in N m times `factor`.
+  Scaling(std::vector<std::int64_t> joints, std::vector<double> weights, double units,
+          double factor, bool compress)
+      : joints_(std::move(joints)),
+        weights_(std::move(weights)),
+        units_(units),
+        factor_(factor),
+        compress_(compress) {}
+
+  std::size_t columns() const { return joints_.size(); }
+  // Whether it is made for an arm of n joints.
+  bool fits(std::size_t n) const {
+    for (const auto j : joints_)
+      if (j < 0 || static_cast<std::size_t>(j) >= n) return false;
+    return weights_.empty() || weights_.size() == 4 * n;
+  }
+
+  void row(const double* left, const double* qd, const double* acceleration, std::size_t n,
+           double* out) const {
+    double speed = 0.0, shaken = 0.0;
+    for (std::size_t j = 0; j < n; ++j) {
+      speed += std::abs(qd[j]);
+      shaken += std::abs(acceleration[j]);
+    }
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+      const auto j = static_cast<std::size_t>(joints_[k]);
+      out[k] = scaled(left[j], j, std::abs(qd[j]), speed, shaken);
+    }
+  }
+
+ private:
+  double scaled(double left, std::size_t j, double own, double speed, double shaken) const {
+    if (weights_.empty()) return left * factor_;
+    const double* w = weights_.data() + 4 * j;
+    const double ratio = left / (units_ * (w[0] + w[1] * own + w[2] * speed + w[3] * shaken));
+    return factor_ * (compress_ ? std::asinh(ratio) : ratio);
+  }
+
+  std::vector<std::int64_t> joints_;
+  std::vector<double> weights_;
+  double units_, factor_;
+  bool compress_;
+};
+
+// The window that ends with the latest row of a signal: `count` rows `lag` apart, oldest first, one
+// column after the other; rows before the first are the first.
+class Window {
+ public:
+  Window(std::size_t columns, std::size_t lag, std::size_t count)
+      : columns_(columns), lag_(lag), count_(count), rows_((lag * (count - 1) + 1) * columns) {}
+
+  std::size_t columns() const { return columns_; }
+  std::size_t size() const { return columns_ * count_; }
+  void reset() { filled_ = false; }
+
+  void step(const double* row, double* out) {
+    const std::size_t length = rows_.size() / columns_;
+    at_ = filled_ ? (at_ + 1) % length : 0;
+    for (std::size_t r = at_; r < (filled_ ? at_ + 1 : length); ++r)
+      std::copy(row, row + columns_, rows_.data() + r * columns_);
+    filled_ = true;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double* past =
+          rows_.data() + ((at_ + length - (count_ - 1 - i) * lag_) % length) * columns_;
+      for (std::size_t k = 0; k < columns_; ++k) out[k * count_ + i] = past[k];
+    }
+  }
+
+ private:
+  std::size_t columns_, lag_, count_, at_ = 0;
+  bool filled_ = false;
+  std::vector<double> rows_;
+};
+
+}  // namespace tauguard::detectors

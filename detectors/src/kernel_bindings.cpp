@@ -1,0 +1,132 @@
+// tauguard.detectors._kernel: kernel machines, scalings and windows on arrays.
+#include "bindings.hpp"
+#include "kernel.hpp"
+#include "tauguard/geometry/thread_pool.hpp"
+
+namespace tauguard::detectors {
+
+using geometry::ThreadPool;
+
+namespace {
+
+void rows(const KernelSum& kernel, In2 x, Out1 out, int threads) {
+  require(x.shape(1) == kernel.dimension() && out.shape(0) == x.shape(0),
+          "rows: arrays differ in shape");
+  nb::gil_scoped_release release;
+  ThreadPool::shared().parallel_for(x.shape(0), threads, 256, [&](auto begin, auto end, auto) {
+    for (auto t = begin; t < end; ++t) out.data()[t] = kernel.at(x.data() + t * kernel.dimension());
+  });
+}
+
+// The window that ends with row t of a signal of m columns: `count` rows `lag` apart, oldest first,
+// one column after the other; rows before the first are the first.
+void window(const double* signal, std::size_t m, std::size_t t, std::size_t lag, std::size_t count,
+            double* out) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t back = (count - 1 - i) * lag;
+    const double* row = signal + m * (back > t ? 0 : t - back);
+    for (std::size_t j = 0; j < m; ++j) out[j * count + i] = row[j];
+  }
+}
+
+void windows(In2 signal, Ids ends, std::size_t lag, std::size_t count, Out2 out) {
+  const std::size_t m = signal.shape(1);
+  require(out.shape(0) == ends.shape(0) && out.shape(1) == m * count,
+          "windows: arrays differ in shape");
+  for (std::size_t i = 0; i < ends.shape(0); ++i) {
+    require(ends.data()[i] >= 0 && static_cast<std::size_t>(ends.data()[i]) < signal.shape(0),
+            "windows: an end lies outside the signal");
+    window(signal.data(), m, ends.data()[i], lag, count, out.data() + i * m * count);
+  }
+}
+
+void series(const KernelSum& kernel, In2 signal, std::size_t lag, std::size_t count, Out1 out,
+            int threads) {
+  const std::size_t m = signal.shape(1);
+  require(m * count == kernel.dimension() && out.shape(0) == signal.shape(0) && lag > 0,
+          "series: arrays differ in shape");
+  nb::gil_scoped_release release;
+  ThreadPool::shared().parallel_for(signal.shape(0), threads, 256, [&](auto begin, auto end, auto) {
+    std::vector<double> x(m * count);
+    for (auto t = begin; t < end; ++t) {
+      window(signal.data(), m, t, lag, count, x.data());
+      out.data()[t] = kernel.at(x.data());
+    }
+  });
+}
+
+KernelSum* make_kernel(In2 vectors, In1 coef, double intercept, double sigma) {
+  require(coef.shape(0) == vectors.shape(0), "KernelSum: one coefficient a vector");
+  require(sigma > 0, "KernelSum: sigma must be above 0");
+  return new KernelSum(vectors.data(), coef.data(), coef.shape(0), vectors.shape(1), intercept,
+                       sigma);
+}
+
+Scaling* make_scaling(Ids joints, In2 weights, double units, double factor, bool compress) {
+  require(weights.shape(0) == 0 || weights.shape(1) == 4, "Scaling: four weights a joint");
+  return new Scaling({joints.data(), joints.data() + joints.shape(0)},
+                     {weights.data(), weights.data() + weights.shape(0) * weights.shape(1)}, units,
+                     factor, compress);
+}
+
+void scale(const Scaling& scaling, In2 left, In2 qd, In2 acceleration, Out2 out) {
+  const std::size_t n = left.shape(1), m = scaling.columns();
+  require(qd.shape(0) == left.shape(0) && acceleration.shape(0) == left.shape(0) &&
+              out.shape(0) == left.shape(0) && out.shape(1) == m && qd.shape(1) == n &&
+              acceleration.shape(1) == n && scaling.fits(n),
+          "Scaling: expected one number a joint");
+  nb::gil_scoped_release release;
+  for (std::size_t t = 0; t < left.shape(0); ++t)
+    scaling.row(left.data() + t * n, qd.data() + t * n, acceleration.data() + t * n, n,
+                out.data() + t * m);
+}
+
+Window* make_window(std::size_t columns, std::size_t lag, std::size_t count) {
+  require(columns > 0 && lag > 0 && count > 0, "Window: sizes must be above 0");
+  return new Window(columns, lag, count);
+}
+
+void step(Window& window, In2 row, Out2 out) {
+  require(row.shape(0) == 1 && row.shape(1) == window.columns() && out.shape(0) == 1 &&
+              out.shape(1) == window.size(),
+          "Window: arrays differ in shape");
+  window.step(row.data(), out.data());
+}
+
+// K_ij between the rows of a and b.
+void gram(In2 a, In2 b, double sigma, Out2 out, int threads) {
+  const std::size_t d = a.shape(1), columns = b.shape(0);
+  require(b.shape(1) == d && out.shape(0) == a.shape(0) && out.shape(1) == columns && sigma > 0,
+          "gram: arrays differ in shape, or sigma is not above 0");
+  nb::gil_scoped_release release;
+  const double inv = 1.0 / (sigma * sigma);
+  ThreadPool::shared().parallel_for(a.shape(0), threads, 16, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i)
+      for (std::size_t j = 0; j < columns; ++j) {
+        const double *x = a.data() + i * d, *z = b.data() + j * d;
+        double square = 0.0;
+        for (std::size_t k = 0; k < d; ++k) square += (x[k] - z[k]) * (x[k] - z[k]);
+        const double one = 1.0 / (1.0 + square * inv);
+        out.data()[i * columns + j] = one * one;
+      }
+  });
+}
+
+}  // namespace
+}  // namespace tauguard::detectors
+
+NB_MODULE(_kernel, m) {
+  using namespace tauguard::detectors;
+  nb::class_<KernelSum>(m, "KernelSum")
+      .def(nb::new_(&make_kernel))
+      .def("rows", &rows, nb::arg(), nb::arg().noconvert(), nb::arg())
+      .def("series", &series, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
+  nb::class_<Scaling>(m, "Scaling")
+      .def(nb::new_(&make_scaling))
+      .def("rows", &scale, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+  nb::class_<Window>(m, "Window")
+      .def(nb::new_(&make_window))
+      .def("step", &step, nb::arg(), nb::arg().noconvert());
+  m.def("gram", &gram, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
+  m.def("windows", &windows, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+}

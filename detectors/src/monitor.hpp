@@ -1,0 +1,142 @@
+// Free, collision or fault: a detector on samples that cannot always be believed. From a sample to
+// the answer nothing is allocated, and the work is bounded: at most `span` seconds of samples are
+// interpolated.
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "alarm.hpp"
+#include "faults.hpp"
+#include "torques.hpp"
+
+namespace tauguard::detectors {
+
+enum class State : int { free, collision, fault };
+
+struct Thought {
+  State state = State::free;
+  bool alarm = false;  // during a fault: it was up when the fault began
+  double score = 0;    // the last one known
+  Verdict why;         // what is wrong, or was
+  bool settling = false;
+};
+
+struct MonitorSettings {
+  double dt = 0;       // of the samples [s]
+  double settle = 0;   // of the detector [s]
+  double span = 0;     // an alarm so soon before a fault is the fault's own [s]
+  double window = 0;   // after a bridged fault nothing is judged for so long [s]
+  double bridged = 0;  // samples in a row that are interpolated at most
+};
+
+class Monitor {
+ public:
+  // `observer` gives the residual that `torques` judges; all are of one arm.
+  Monitor(FaultCheck check, Alarm alarm, Estimator observer, TorqueCheck torques,
+          MonitorSettings settings)
+      : check_(std::move(check)),
+        alarm_(std::move(alarm)),
+        observer_(std::move(observer)),
+        torques_(std::move(torques)),
+        set_(settings),
+        n_(observer_.joints()),
+        last_(3 * n_),
+        between_(3 * n_),
+        out_(3 * n_) {}
+
+  std::size_t joints() const { return n_; }
+  bool settled() const { return time_ >= ready_; }
+
+  const Thought& step(double t, const double* q, const double* qd, const double* current) {
+    const Verdict verdict = check_.step(t, q, qd, current);
+    said_ = verdict.fault != Fault::none ? fault(verdict) : sound(t, q, qd, current);
+    return said_;
+  }
+
+ private:
+  Thought fault(const Verdict& verdict) {
+    bad_ = true;
+    reason_ = verdict;
+    const bool held = said_.alarm && time_ - raised_ > set_.span;
+    return {held ? State::collision : State::fault, held, said_.score, verdict, false};
+  }
+
+  Thought sound(double t, const double* q, const double* qd, const double* current) {
+    const double missing = bridge(t, q, qd, current), passed = t - time_;
+    const double ratio = passed / set_.dt;
+    const bool usual = missing == 0 && 0.8 < ratio && ratio < 1.25;
+    std::copy_n(q, n_, last_.data());
+    std::copy_n(qd, n_, last_.data() + n_);
+    std::copy_n(current, n_, last_.data() + 2 * n_);
+    known_ = true;
+    time_ = t;
+    const bool up = alarm_.step(q, qd, current, usual ? passed : alarm_.dt());
+    const Verdict torques = judge_torques(q, qd, current, usual ? passed : set_.dt);
+    if (t < ready_ && reason_.fault != Fault::none)
+      return {said_.alarm ? State::collision : State::fault, said_.alarm, alarm_.score(), reason_,
+              true};
+    reason_ = Verdict{};
+    raised_ = up ? std::min(raised_, t) : infinite;
+    const State state = up                             ? State::collision
+                        : torques.fault != Fault::none ? State::fault
+                                                       : State::free;
+    return {state, up, alarm_.score(), torques, false};
+  }
+
+  Verdict judge_torques(const double* q, const double* qd, const double* current, double dt) {
+    observer_.step(q, qd, current, dt, out_.data(), out_.data() + n_, out_.data() + 2 * n_);
+    return torques_.step(out_.data(), current, dt);
+  }
+
+  // Interpolates the samples that are missing before this one, or begins anew; their number.
+  double bridge(double t, const double* q, const double* qd, const double* current) {
+    if (!known_) {
+      ready_ = t + set_.settle;
+      bad_ = false;
+      return 0;
+    }
+    // To even where it lies between two, as the batch form rounds.
+    const double missing = std::max(0.0, std::nearbyint((t - time_) / set_.dt) - 1);
+    if (t < time_ || missing > std::max(set_.bridged, set_.span / set_.dt)) {
+      alarm_.reset();
+      observer_.reset();
+      torques_.reset();
+      ready_ = t + set_.settle;
+    } else {
+      for (double k = 1; k <= missing; ++k) interpolate(k / (missing + 1), q, qd, current);
+      if (bad_) ready_ = std::max(ready_, t + set_.window);
+    }
+    bad_ = false;
+    return missing;
+  }
+
+  void interpolate(double share, const double* q, const double* qd, const double* current) {
+    const double* now[3] = {q, qd, current};
+    for (std::size_t part = 0; part < 3; ++part)
+      for (std::size_t j = 0; j < n_; ++j) {
+        const double before = last_[part * n_ + j];
+        between_[part * n_ + j] = before + share * (now[part][j] - before);
+      }
+    const double *a = between_.data(), *b = a + n_, *c = b + n_;
+    alarm_.step(a, b, c, alarm_.dt());
+    judge_torques(a, b, c, set_.dt);
+  }
+
+  static constexpr double infinite = std::numeric_limits<double>::infinity();
+
+  FaultCheck check_;
+  Alarm alarm_;
+  Estimator observer_;
+  TorqueCheck torques_;
+  MonitorSettings set_;
+  std::size_t n_;
+  std::vector<double> last_, between_, out_;
+  bool known_ = false, bad_ = false;
+  double time_ = -infinite, ready_ = -infinite, raised_ = infinite;
+  Verdict reason_;
+  Thought said_;
+};
+
+}  // namespace tauguard::detectors

@@ -1,0 +1,129 @@
+// Streams of scores, the alarm on them, and the monitor: one call from a sample to the answer.
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+
+#include "bindings.hpp"
+#include "monitor.hpp"
+
+namespace tauguard::detectors {
+namespace {
+
+using Numbers = std::vector<double>;
+using Source = std::shared_ptr<Scores>;
+
+// A stream that is Python's: `make` gives a new one, whose step is asked. It allocates.
+class PythonScores final : public Scores {
+ public:
+  PythonScores(nb::object make, std::size_t joints) : make_(std::move(make)), n_(joints) {
+    PythonScores::reset();
+  }
+  std::size_t joints() const override { return n_; }
+  void reset() override { step_ = make_().attr("step"); }
+  double step(const double* q, const double* qd, const double* current, double dt) override {
+    return nb::cast<double>(step_(array(q), array(qd), array(current), dt));
+  }
+
+ private:
+  // A copy: the stream may keep it.
+  nb::object array(const double* from) const {
+    return nb::cast(nb::ndarray<nb::numpy, const double, nb::ndim<1>>(from, {n_}),
+                    nb::rv_policy::copy);
+  }
+  nb::object make_, step_;
+  std::size_t n_;
+};
+
+ScaledResidual residual_of(const Estimator& estimator, const std::vector<std::int64_t>& joints,
+                           const Numbers& weights, double units, double factor, bool compress) {
+  Scaling scaling(joints, weights, units, factor, compress);
+  require(!joints.empty() && scaling.fits(estimator.joints()),
+          "scaling: expected joints of the arm, and four weights a joint or none");
+  return {estimator, std::move(scaling)};
+}
+
+Source limit_scores(const Estimator& estimator, const std::vector<std::int64_t>& joints,
+                    const Numbers& weights, double units, double factor, bool compress,
+                    const Numbers& limits) {
+  require(limits.size() == joints.size(), "limits: expected one a joint that is used");
+  return std::make_shared<LimitScores>(
+      residual_of(estimator, joints, weights, units, factor, compress), limits);
+}
+
+Source kernel_scores(const Estimator& estimator, const std::vector<std::int64_t>& joints,
+                     const Numbers& weights, double units, double factor, bool compress,
+                     std::size_t lag, std::size_t count, In2 vectors, In1 coef, double intercept,
+                     double sigma) {
+  require(lag > 0 && count > 0 && vectors.shape(1) == joints.size() * count &&
+              coef.shape(0) == vectors.shape(0) && sigma > 0,
+          "kernel_scores: vectors of another size than the window, or sigma not above 0");
+  return std::make_shared<KernelScores>(
+      residual_of(estimator, joints, weights, units, factor, compress),
+      Window(joints.size(), lag, count),
+      KernelSum(vectors.data(), coef.data(), coef.shape(0), vectors.shape(1), intercept, sigma));
+}
+
+Alarm* make_alarm(Source scores, double dt, double settle, double threshold, std::int64_t samples,
+                  std::int64_t memory, const Numbers& speed, const Numbers& base,
+                  const Numbers& unit) {
+  require(scores && dt > 0 && samples > 0 && memory > 0, "dt, samples, memory: expected above 0");
+  require(base.size() == speed.size() && unit.size() == speed.size(),
+          "speed, base, unit: expected as many of each");
+  return new Alarm(std::move(scores),
+                   {dt, settle, threshold, samples, memory, {speed, base, unit}});
+}
+
+Monitor* make_monitor(const FaultCheck& check, const Alarm& alarm, const Estimator& observer,
+                      const TorqueCheck& torques, double dt, double settle, double span,
+                      double window, double bridged) {
+  const std::size_t n = observer.joints();
+  require(check.joints() == n && alarm.joints() == n && torques.joints() == n,
+          "Monitor: its parts are of arms with other numbers of joints");
+  require(dt > 0 && settle >= 0 && span >= 0 && window >= 0 && bridged >= 0,
+          "dt: expected above 0; settle, span, window, bridged: 0 or more");
+  return new Monitor(check, alarm, observer, torques, {dt, settle, span, window, bridged});
+}
+
+nb::tuple step(Monitor& monitor, double t, In1 q, In1 qd, In1 current) {
+  const std::size_t n = monitor.joints();
+  require(q.shape(0) == n && qd.shape(0) == n && current.shape(0) == n,
+          "q, qd, current: expected one entry a joint");
+  const Thought& said = monitor.step(t, q.data(), qd.data(), current.data());
+  return nb::make_tuple(static_cast<int>(said.state), said.alarm, said.score,
+                        static_cast<int>(said.why.fault), said.why.joint, said.why.value,
+                        said.settling);
+}
+
+}  // namespace
+
+void bind_monitor(nb::module_& m) {
+  nb::class_<Scores>(m, "Scores")
+      .def_prop_ro("joints", &Scores::joints)
+      .def("step", [](Scores& scores, In1 q, In1 qd, In1 current, double dt) {
+        check_sample(scores.joints(), q, qd, current, "current");
+        require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
+        return scores.step(q.data(), qd.data(), current.data(), dt);
+      });
+  m.def("free_scores",
+        [](const FreeMotion& stream) -> Source { return std::make_shared<FreeScores>(stream); });
+  m.def("limit_scores", &limit_scores);
+  m.def("kernel_scores", &kernel_scores);
+  m.def("python_scores", [](nb::object make, std::size_t joints) -> Source {
+    return std::make_shared<PythonScores>(std::move(make), joints);
+  });
+  nb::class_<Alarm>(m, "Alarm")
+      .def(nb::new_(&make_alarm))
+      .def_prop_ro("score", &Alarm::score)
+      .def("step", [](Alarm& alarm, In1 q, In1 qd, In1 current, double dt) {
+        check_sample(alarm.joints(), q, qd, current, "current");
+        require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
+        return alarm.step(q.data(), qd.data(), current.data(), dt);
+      });
+  nb::class_<Monitor>(m, "Monitor")
+      .def(nb::new_(&make_monitor))
+      .def_prop_ro("settled", &Monitor::settled)
+      .def("step", &step);
+}
+
+}  // namespace tauguard::detectors
