@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from tauguard.detectors.model_file import load_model, save_model
     from tauguard.detectors.registry import DETECTORS, make_detector
     from tauguard.detectors.thresholds.alarm import AlarmStream, CollisionAlarm
-    from tauguard.detectors.thresholds.confirmation import Confirmation, confirmed
+    from tauguard.detectors.thresholds.confirmation import confirmed
     from tauguard.detectors.thresholds.free_scores import FreeScores
     from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
     from tauguard.detectors.thresholds.law import held_out, train, with_guarantee, with_rate
@@ -46,7 +46,6 @@ __all__ = [
     "ArmModel",
     "Calibration",
     "CollisionAlarm",
-    "Confirmation",
     "Detector",
     "Diagnoser",
     "Diagnosis",

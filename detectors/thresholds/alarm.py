@@ -143,7 +143,6 @@ class AlarmStream:
         """Begin anew."""
         detector, levels = alarm.detector, alarm.levels
         self._dt, self._first = detector.dt, True
-        columns = (levels.speed, levels.base, levels.unit) if levels else ([], [], [])
         self.native = _observer.Alarm(
             native_scores(detector),
             detector.dt,
@@ -151,7 +150,9 @@ class AlarmStream:
             alarm.threshold,
             alarm.samples,
             memory_samples(detector.dt),
-            *([float(x) for x in column] for column in columns),
+            [] if levels is None else np.asarray(levels.speed).tolist(),
+            [] if levels is None else np.asarray(levels.base).tolist(),
+            [] if levels is None else np.asarray(levels.unit).tolist(),
         )
 
     @property

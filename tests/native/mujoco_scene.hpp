@@ -7,10 +7,12 @@
 #include <stdexcept>
 #include <string>
 
+// A diverging run is what is tried. Set before there are threads.
+inline const bool silent = (mju_user_warning = [](const char*) {}, true);
+
 class Scene {
  public:
   explicit Scene(const std::string& xml) {
-    mju_user_warning = [](const char*) {};  // a diverging run is what is tried
     char error[512] = "";
     mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error);
     if (spec) model = mj_compile(spec, nullptr);
