@@ -37,8 +37,11 @@ def made_once(tmp_path_factory):
         path = folder / f"{name}.pickle"
         with open(folder / f"{name}.lock", "w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            if not path.exists():
-                path.write_bytes(pickle.dumps(make()))
+            try:
+                if not path.exists():
+                    path.write_bytes(pickle.dumps(make()))
+            finally:  # a process that was forked meanwhile holds the file open
+                fcntl.flock(lock, fcntl.LOCK_UN)
         return pickle.loads(path.read_bytes())
 
     return found
