@@ -90,7 +90,7 @@ def test_mesh_rows_on_a_generated_mesh(monkeypatch):
     monkeypatch.delenv("TAUGUARD_DATA", raising=False)
     monkeypatch.delenv("TAUGUARD_MESH", raising=False)
     mesh = rigid_mesh.load(quick=True)
-    assert (mesh.name, len(mesh.faces)) == ("generated", 7200)
+    assert (mesh.name, len(mesh.faces)) == ("generated", 7080)
     poses = rigid_mesh.poses_near(mesh, np.random.default_rng(0), 60)
     peer = rigid_mesh.Peer(mesh, poses)
     static = rigid_mesh.static_rows(mesh, poses, peer, 1)
@@ -117,7 +117,7 @@ def test_volumes_hold_their_bodies_and_miss_no_pair_of_hulls(monkeypatch):
     monkeypatch.delenv("TAUGUARD_MESH", raising=False)
     rng = np.random.default_rng(0)
     bodies = rigid_volumes.pieces(rigid_mesh.load(quick=True), 64)
-    assert len(bodies.corners) == 7200
+    assert len(bodies.corners) == 7080
     poses = rigid_volumes.near(bodies, rng)
     pairs = rng.integers(0, len(bodies), (400, 2))
     hulls = rigid_volumes.Hull(bodies)

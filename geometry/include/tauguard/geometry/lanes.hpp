@@ -14,8 +14,10 @@
 #define TAUGUARD_AVX512 __attribute__((target("avx512f")))
 #endif
 
-// Compiles a function for the baseline and for AVX2; the loader picks.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__)
+// Compiles a function for the baseline and for AVX2; the loader picks. Not under ThreadSanitizer:
+// the loader asks before that has begun.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__) && \
+    !defined(__SANITIZE_THREAD__)
 #define TAUGUARD_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define TAUGUARD_CLONES
