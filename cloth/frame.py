@@ -20,8 +20,8 @@ class FrameStats:
             as ``adjacent`` or ``kept_apart`` (by groups); ``candidates``; how many of them were
             apart on an axis (``axes``: asked where the volumes sweep the step), how many the
             cubic cleared (``cubic_sign``: no root) and its roots (``roots``: no contact at any);
-            how many touch ``at_start``; how many were told while ``sliding`` on a plane across an
-            axis; how many were ``resolved`` one by one, cut into how many ``intervals`` of time;
+            how many touch ``at_start``; how many were decided while ``sliding`` on a plane across
+            an axis; how many were ``resolved`` one by one, cut into how many ``intervals`` of time;
             how many ``exact`` arithmetic decided, and of these with integers of any length
             (``long_exact``), the others with integers of fixed width; ``hits``.
         ee: The same of the edge-edge side.

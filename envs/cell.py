@@ -212,7 +212,7 @@ class Cell:
     def step(self, i: int, action: Array, rng: np.random.Generator) -> None:
         """One action of copy ``i``, shape (m,)."""
         if self.checks:
-            self._watched(i, action)
+            self._checked_step(i, action)
         else:
             self.plants[i].step(action)
         self.cost_sum[i] += self.figure[i, COST]
@@ -225,7 +225,7 @@ class Cell:
         """One action of every copy that ``mask`` chooses, shape (rows, m), on a thread pool."""
         if self.checks:
             for i in np.flatnonzero(mask):
-                self._watched(int(i), actions[i])
+                self._checked_step(int(i), actions[i])
         else:
             _plant.step_all(self.plants, actions, mask, threads)
         self.cost_sum[mask] += self.figure[mask, COST]
@@ -263,7 +263,7 @@ class Cell:
         if found.size and delays[found[0]] <= LATEST:
             self.alarm_delay[i] = max(0.0, float(delays[found[0]]))
 
-    def _watched(self, i: int, action: Array) -> None:
+    def _checked_step(self, i: int, action: Array) -> None:
         """A step with contact checkers: each sees every physics step."""
         plant, data, checks = self.plants[i], self.datas[i], self.checks[i]
         plant.begin(action)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
 import tempfile
 import textwrap
 import time
@@ -19,6 +22,8 @@ from tauguard.report import Row
 RUNS = (20, 1)
 #: A node is lost up to so long after the first shard [s]: a run takes a few seconds.
 LATEST = 3.0
+#: A run that goes on so long after the loss hangs [s].
+HANGS = 120.0
 
 
 def node_rows(quick: bool, seed: int) -> list[Row]:
@@ -45,6 +50,7 @@ def _run(cluster_type: Any, config: Path, folder: Path, after: float) -> bool:
     """Whether the second node was lost before the end, ``after`` [s] the first shard."""
     head = {"num_cpus": 1, "include_dashboard": False}
     cluster = cluster_type(initialize_head=True, head_node_args=head)
+    command = None
     try:
         node = cluster.add_node(num_cpus=1)
         cluster.wait_for_nodes()
@@ -54,7 +60,11 @@ def _run(cluster_type: Any, config: Path, folder: Path, after: float) -> bool:
         time.sleep(after)
         midway = command.poll() is None
         cluster.remove_node(node, allow_graceful=False)
-        command.wait()
+        command.wait(HANGS)
         return midway
+    except subprocess.TimeoutExpired:
+        raise RuntimeError(f"tauguard generate --ray hangs for {HANGS:g} s: a node lost") from None
     finally:
+        if command is not None and command.poll() is None:
+            os.killpg(command.pid, signal.SIGKILL)
         cluster.shutdown()

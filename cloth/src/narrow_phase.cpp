@@ -203,7 +203,7 @@ bool may_touch_at_start(const Batch& b, std::int32_t query) {
 }
 
 // Of a query that is apart at the start. A cubic that is zero there may be zero throughout: what
-// slides on a plane across an axis is then told in two dimensions.
+// slides on a plane across an axis is then decided in two dimensions.
 template <bool vf>
 double later(const Batch& b, std::int32_t query, const Ends& x, const std::int32_t* row,
              Stats& stats) {

@@ -21,9 +21,9 @@ struct ImpactArrays {
 };
 
 // How many queries each filter removed (apart on an axis; no root of the cubic; no contact at its
-// roots); how many touch at the start of the step; how many were told while sliding on a plane; how
-// many were resolved one by one and cut into how many intervals of time; how many exact arithmetic
-// decided, and of these with numbers of any length.
+// roots); how many touch at the start of the step; how many were decided while sliding on a plane;
+// how many were resolved one by one and cut into how many intervals of time; how many exact
+// arithmetic decided, and of these with numbers of any length.
 struct Stats {
   std::uint64_t axes = 0, cubic_sign = 0, roots = 0, at_start = 0, sliding = 0, resolved = 0,
                 intervals = 0, exact = 0, long_exact = 0;

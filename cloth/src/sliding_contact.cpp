@@ -15,7 +15,7 @@ constexpr double none = std::numeric_limits<double>::infinity(),
 constexpr int reaches_of_vf[][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
 constexpr int reaches_of_ee[][3] = {{0, 2, 3}, {1, 2, 3}, {2, 0, 1}, {3, 0, 1}};
 
-// Half of the time that holds the root.
+// The root lies within this of its estimate, or is not accepted.
 constexpr double around = 0x1p-40;
 
 struct Flat {
@@ -27,9 +27,9 @@ Flat mix(Flat a, Flat b, double t) { return {(1 - t) * a.x + t * b.x, (1 - t) * 
 double largest(Flat a) { return std::max(std::fabs(a.x), std::fabs(a.y)); }
 
 // u and v are the edge's ends as seen from the point, M the product of their largest coordinates.
-// A difference carries u_ (2^-53), so a cross or dot product of two at most 8 u_ M, the middle
-// coefficient 12 u_ M, a value between, by three products of positive weights, 32 u_ M: `error` is
-// 2^-45 M, eight times that.
+// A difference carries a relative error of eps (2^-53), so a cross or dot product of two at most
+// 8 eps M, the middle coefficient 12 eps M, a value between, by three products of positive weights,
+// 32 eps M: `error` is 2^-45 M, eight times that.
 double reach(const Flat (&u)[2], const Flat (&v)[2]) {
   const auto apart = [](double a, double b, double c, double d) {
     return (a > 0 && b > 0 && c > 0 && d > 0) || (a < 0 && b < 0 && c < 0 && d < 0);

@@ -36,7 +36,7 @@ class FreeScores final : public Scores {
   void reset() override { stream_.reset(); }
   double step(const double* q, const double* qd, const double* current, double dt) override {
     stream_.step(q, qd, current, dt);
-    return *std::max_element(stream_.ratio().begin(), stream_.ratio().end());
+    return largest(stream_.ratio().data(), stream_.ratio().size());
   }
 
  private:

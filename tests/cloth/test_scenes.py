@@ -139,3 +139,18 @@ def test_faces_that_slide_on_each_other_are_all_found():
     assert found["ab2pf"].ee.tobytes() == found["exact"].ee.tobytes()
     assert (found["ab2pf"].vf_impacts.toi == 0).all()
     assert len(found["iccd"].ee) < len(found["ab2pf"].ee)
+
+
+def test_faces_that_slide_into_contact_are_decided_in_their_plane():
+    scene = SCENES["packed_cubes"](3_000, 1)
+    step = scene.positions(0.7), scene.positions(0.9)
+    ours, exact = (
+        MeshCCD(scene.faces, method, groups=scene.groups).find(*step) for method in ("ab2pf", "exact")
+    )
+    assert ours.stats.vf["sliding"] + ours.stats.ee["sliding"] > 100
+    for a, b in ((ours.vf_impacts, exact.vf_impacts), (ours.ee_impacts, exact.ee_impacts)):
+        assert ((a.toi > 0) == (b.toi > 0)).all()
+        assert (a.toi <= b.toi).all()
+        assert (a.toi >= b.toi - 1e-9).all()
+    assert ours.vf.tobytes() == exact.vf.tobytes()
+    assert ours.ee.tobytes() == exact.ee.tobytes()
