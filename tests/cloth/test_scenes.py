@@ -145,7 +145,8 @@ def test_faces_that_slide_into_contact_are_decided_in_their_plane():
     scene = SCENES["packed_cubes"](3_000, 1)
     step = scene.positions(0.7), scene.positions(0.9)
     ours, exact = (
-        MeshCCD(scene.faces, method, groups=scene.groups).find(*step) for method in ("ab2pf", "exact")
+        MeshCCD(scene.faces, method, groups=scene.groups).find(*step)
+        for method in ("ab2pf", "exact")
     )
     assert ours.stats.vf["sliding"] + ours.stats.ee["sliding"] > 100
     for a, b in ((ours.vf_impacts, exact.vf_impacts), (ours.ee_impacts, exact.ee_impacts)):
