@@ -265,7 +265,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
         # None: more than are told apart.
         values = [float(row[f"{name} [us]"] or np.nan) / 1e3 for name in LEVELS]
         label = f"{row['rate [Hz]']:g} Hz, {row['heard']:,} samples"
-        axes.semilogy(LEVELS, values, "o-", color=f"C{k}", label=label)
+        names = [name.replace("_", ".") for name in LEVELS]
+        axes.semilogy(names, values, "o-", color=f"C{k}", label=label)
         period = 1e3 / float(row["rate [Hz]"])
         axes.axhline(period, color=f"C{k}", linestyle=":", label=f"its period, {period:g} ms")
     axes.set_ylabel("from packet to answer [ms]")
