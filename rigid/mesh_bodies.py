@@ -41,7 +41,9 @@ def mesh_beside(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[MeshTree, Sol
         ValueError: both are.
     """
     if isinstance(a, MeshTree) and isinstance(b, MeshTree):
-        raise ValueError("b: a mesh, as a is; give convex bodies, or MeshTree.overlap two meshes")
+        raise ValueError(
+            "b: a mesh, as a is; MeshTree.overlap is for two meshes, give convex bodies"
+        )
     if isinstance(a, MeshTree):
         return a, cast(Solid, b), False
     return (b, a, True) if isinstance(b, MeshTree) else None
