@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import signal
@@ -10,6 +11,7 @@ import sys
 import tempfile
 import textwrap
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -57,22 +59,19 @@ def killed(workers: int, count: int, seed: int) -> Row:
     """
     rng = np.random.default_rng([seed, 81])
     same, midway = 0, 0
-    with tempfile.TemporaryDirectory() as place:
-        config = Path(place) / "small.toml"
-        config.write_text(textwrap.dedent(SMALL.format(seed=seed)))
-        wanted = Path(place) / "wanted"
-        generate_dataset(load(config), wanted, workers=1)
-        begun, ended = _timed(config, Path(place) / "timed", workers)
-        assert contents(Path(place) / "timed") == contents(wanted), "differs without a kill"
+    with small_dataset(seed) as (config, wanted):
+        timed = config.parent / "timed"
+        begun, ended = _timed(config, timed, workers)
+        assert contents(timed) == wanted, "differs without a kill"
         for number in range(count):
-            folder = Path(place) / f"killed-{number}"
+            folder = config.parent / f"killed-{number}"
             command = start(config, folder, "--workers", str(workers))
             _wait(folder, command)
             time.sleep(rng.uniform(0, 1.1 * (ended - begun)))
             os.killpg(command.pid, signal.SIGKILL)
             midway += command.wait() != 0
             generate_dataset(load(config), folder, workers=1)
-            same += contents(folder) == contents(wanted)
+            same += contents(folder) == wanted
     return {
         "study": "generate",
         "workers": workers,
@@ -80,6 +79,17 @@ def killed(workers: int, count: int, seed: int) -> Row:
         "before it ended": midway,
         "same bytes": same,
     }
+
+
+@contextlib.contextmanager
+def small_dataset(seed: int) -> Iterator[tuple[Path, dict[str, str]]]:
+    """Its configuration, in a folder for more, and the :func:`contents` that one process writes."""
+    with tempfile.TemporaryDirectory() as place:
+        config = Path(place) / "small.toml"
+        config.write_text(textwrap.dedent(SMALL.format(seed=seed)))
+        wanted = Path(place) / "wanted"
+        generate_dataset(load(config), wanted, workers=1)
+        yield config, contents(wanted)
 
 
 def contents(folder: Path) -> dict[str, str]:

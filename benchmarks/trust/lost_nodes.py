@@ -5,17 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import tempfile
-import textwrap
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tauguard.benchmarks.trust.generated import SMALL, contents, start
-from tauguard.datasets.configuration import load
-from tauguard.datasets.generation import generate_dataset
+from tauguard.benchmarks.trust.generated import contents, small_dataset, start
 from tauguard.report import Row
 
 #: Runs, each on a cluster of its own, in a full and in a quick run.
@@ -34,15 +30,11 @@ def node_rows(quick: bool, seed: int) -> list[Row]:
         return [{"study": "cluster", "note": "Ray is not installed (extra `distributed`)"}]
     rng = np.random.default_rng([seed, 82])
     lost, same, count = 0, 0, RUNS[quick]
-    with tempfile.TemporaryDirectory() as place:
-        config = Path(place) / "small.toml"
-        config.write_text(textwrap.dedent(SMALL.format(seed=seed)))
-        wanted = Path(place) / "wanted"
-        generate_dataset(load(config), wanted, workers=1)
+    with small_dataset(seed) as (config, wanted):
         for number in range(count):
-            folder = Path(place) / f"lost-{number}"
+            folder = config.parent / f"lost-{number}"
             lost += _run(Cluster, config, folder, rng.uniform(0, LATEST))
-            same += contents(folder) == contents(wanted)
+            same += contents(folder) == wanted
     return [{"study": "cluster", "runs": count, "nodes lost": lost, "same bytes": same}]
 
 
