@@ -45,6 +45,10 @@ STUDIES: dict[str, Study] = {
         "detection.parts",
         "what each part of the detector brings: left out, everything else stays",
     ),
+    "detection_ladder": Study(
+        "detection.ladder",
+        "from the dissertation's setting to ours: one change at a time",
+    ),
     "detection_online": Study(
         "detection.online", "observer and SVR a sample: microseconds, and fewer support vectors"
     ),

@@ -49,7 +49,7 @@ class Training:
         free = free_episodes(
             own, self.free, self.free_seconds, TRAINING_SPEEDS, payloads[::2], mismatch
         )
-        return [simulate(under.applied(episode)) for episode in [*struck, *free]]
+        return [under.simulated(episode) for episode in [*struck, *free]]
 
 
 def training_groups(names: Sequence[str]) -> list[tuple[str, ...]]:

@@ -48,6 +48,7 @@ class Conditions:
     temperature: float | None = None  #: of the gears [degC]; None: drawn between 25 and 45
     scale: float = 1.0  #: of the mismatch between the arm and what is believed of it
     timestep: float = 1e-3  #: [s]
+    without: tuple[str, ...] = ()  #: parts of the drives that are left out
 
     def arm(self, seed: int) -> Mismatch:
         """The arm ``seed`` under these conditions."""
@@ -60,6 +61,10 @@ class Conditions:
         if self.temperature is not None:
             episode = replace(episode, temperature=self.temperature)
         return replace(episode, timestep=self.timestep)
+
+    def simulated(self, episode: Episode) -> Trace:
+        """``episode`` under these conditions."""
+        return simulate(self.applied(episode), without=self.without)
 
 
 @dataclass(frozen=True)
@@ -122,7 +127,7 @@ def struck_pool(
                 mismatch=under.arm(arm),
                 temperature=float(rng.uniform(25, 45)),
             )
-            trace = simulate(under.applied(episode))
+            trace = under.simulated(episode)
             assert trace.truth is not None
             kept = []
             for collision in trace.truth.collisions:

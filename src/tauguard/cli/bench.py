@@ -8,7 +8,14 @@ from typing import Annotated
 import tyro
 
 #: Studies that keep what they have done in a folder.
-KEEPING = ("guard", "entries", "detection", "detection_parts", "false_alarms")
+KEEPING = (
+    "guard",
+    "entries",
+    "detection",
+    "detection_parts",
+    "detection_ladder",
+    "false_alarms",
+)
 
 
 def command(
@@ -34,9 +41,10 @@ def command(
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
         robot: arms of the study `arms`, by name or file, parted by commas.
-        keep: folder for what `guard`, `entries`, `detection`, `detection_parts` and `false_alarms`
-            have done; what it holds is not done again. The last three leave results of other
-            versions, or of other sources of simulation and detectors, alone and do not use them.
+        keep: folder for what `guard`, `entries`, `detection`, `detection_parts`,
+            `detection_ladder` and `false_alarms` have done; what it holds is not done again. The
+            last four leave results of other versions, or of other sources of simulation and
+            detectors, alone and do not use them.
         json: write the figures here as JSON.
         figure: write the chart here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
