@@ -90,18 +90,15 @@ class Form(SrqSvr):
         return self.prepared(trace, front, scaling, target, target > 0)
 
 
-def _form(
-    graded: bool, calibrate: bool, adapt: bool, envelope: bool, mined: int, windows: int
-) -> Form:
-    """With the settings that the dissertation's form and ours have without and with each part."""
-    front = FrontEndSettings(adapt=adapt, settle=3.0 if adapt else 0.5, calibrate=calibrate)
-    distance = SrqSvr.distance if envelope else SrqSvr.sigma
+def _form(parts: int, mined: int, windows: int) -> Form:
+    """The form that has the first ``parts`` of ours, each with the settings that go with it."""
+    graded, calibrate, adapt, envelope, mining = (parts > k for k in range(5))
     return Form(
         windows=windows,
-        mined=mined,
-        distance=distance,
-        vectors=SrqSvr.vectors if mined else 0,
-        front=front,
+        mined=mined if mining else 0,
+        distance=SrqSvr.distance if envelope else SrqSvr.sigma,
+        vectors=SrqSvr.vectors if mining else 0,
+        front=FrontEndSettings(adapt=adapt, settle=3.0 if adapt else 0.5, calibrate=calibrate),
         graded=graded,
         envelope=envelope,
     )
@@ -155,8 +152,7 @@ class Size:
 
     def form(self, parts: int) -> Detector:
         """The form that has the first ``parts`` of ours."""
-        has = [parts > k for k in range(5)]
-        return _form(*has[:4], self.mined if has[4] else 0, self.windows)
+        return _form(parts, self.mined, self.windows)
 
 
 FULL = Size(3, SPEEDS[::2], 4, 0.1)
