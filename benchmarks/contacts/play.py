@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -113,6 +114,18 @@ def fine_runs(scene: Thrown, fixed: Sequence[float]) -> dict[float, Played]:
     return out
 
 
+@contextmanager
+def unwarned() -> Iterator[None]:
+    """MuJoCo prints and logs nothing: that plain steps diverge is what is studied here."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+@unwarned()
 def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> Played:
     """Play ``scene`` to its end: ``method`` is ``guarded`` or one of MuJoCo's modes."""
     model, data = scene.start(timestep, MODES.get(method, 0), stiff)

@@ -1,5 +1,7 @@
 """The guard's study: scenes come from the seed alone; the referee, where the truth is clear."""
 
+from contextlib import nullcontext
+
 import mujoco
 import numpy as np
 import pytest
@@ -127,3 +129,18 @@ def test_the_study_draws_what_it_has():
     figure = Figure()
     guard.draw(rows, figure)
     assert len(figure.axes) == 2
+
+
+def test_plain_steps_that_diverge_print_and_log_nothing(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>"
+    )
+    for quiet in (True, False):
+        data = mujoco.MjData(model)
+        data.qvel[:] = np.inf
+        with play.unwarned() if quiet else nullcontext():
+            mujoco.mj_step(model, data)
+        assert data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number > 0
+        assert bool(list(tmp_path.iterdir())) != quiet
+        assert bool("".join(capfd.readouterr())) != quiet
