@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from tauguard.benchmarks import STUDIES
 from tauguard.benchmarks.harness import Incomplete
 from tauguard.report import Row, measured, table, write_json
+from tauguard.report.charts import STYLE
 from tauguard.whole_file import whole_file
 
 
@@ -38,17 +40,9 @@ def run_study(
     shown: Callable[[list[Row]], list[Row]] | None = getattr(study, "shown", None)
     print(table(shown(rows) if shown else rows, notes=getattr(study, "NOTES", {})))
 
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     figure_path = figure_path or Path(f"bench-{name}.png")
-    figure = plt.figure(figsize=(11, 7), layout="constrained")
-    study.draw(rows, figure)
     with whole_file(figure_path) as stream:
-        figure.savefig(stream, dpi=120, format=figure_path.suffix[1:] or "png")
-    plt.close(figure)
+        stream.write(chart(study, rows, figure_path.suffix[1:] or "png"))
     print(f"figure: {figure_path}")
     if json_path is not None:
         incomplete = {"incomplete": str(broken)} if broken else {}
@@ -57,6 +51,22 @@ def run_study(
     if broken is not None:
         raise broken
     return rows
+
+
+def chart(study: Any, rows: list[Row], kind: str = "png") -> bytes:
+    """The chart of a study's rows as a file of ``kind``, in the style of all charts."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    out = io.BytesIO()
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=getattr(study, "SIZE", None), layout="constrained")
+        study.draw(rows, figure)
+        figure.savefig(out, format=kind)
+        plt.close(figure)
+    return out.getvalue()
 
 
 def _rows(

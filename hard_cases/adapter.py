@@ -19,6 +19,8 @@ BUILT_IN = {
 class Adapter(Protocol):
     """A library to be asked. Only ``name`` is needed; a method that is absent is not asked.
 
+    Nor is one that raises ``NotImplementedError`` for a case of its kind.
+
     The methods and what they answer::
 
         vertex_face(x_t0, x_t1) -> time of impact or None     rows v, f0, f1, f2; shape (4, 3)

@@ -27,6 +27,7 @@ class Case:
         origin: where it was met first; ``of this project`` where it was made here.
         why: what makes it hard.
         given: the method's arguments by name.
+        explained: why tauguard's own answer is wrong, where it is.
         expected: ``{"toi": "1/2"}`` (a fraction of the step; ``None``: no contact),
             ``{"overlap": true}``, or ``{"low": 0, "high": 1}``, bounds of a number.
     """
@@ -37,6 +38,7 @@ class Case:
     why: str
     given: dict[str, Any]
     expected: dict[str, Any]
+    explained: str = ""
 
     def right(self, answer: Answer) -> bool:
         """Whether ``answer`` is right; a time is never late, and early by 1e-5 at most."""

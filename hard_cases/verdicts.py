@@ -12,16 +12,20 @@ from tauguard.hard_cases.case import Case, answer_text
 def run(cases: Iterable[Case], libraries: Iterable[Adapter]) -> list[dict[str, Any]]:
     """Rows with ``case``, ``library``, ``expected``, ``answer``, ``right`` and what the case is.
 
-    A library is not asked what it has no method for. What it raises is its answer, and wrong.
+    A library is not asked what it has no method for, or what raises ``NotImplementedError``. What
+    else it raises is its answer, and wrong.
     """
     libraries = list(libraries)
-    return [_row(case, one) for case in cases for one in libraries if hasattr(one, case.kind)]
+    asked = [_row(case, one) for case in cases for one in libraries if hasattr(one, case.kind)]
+    return [row for row in asked if row is not None]
 
 
-def _row(case: Case, library: Adapter) -> dict[str, Any]:
+def _row(case: Case, library: Adapter) -> dict[str, Any] | None:
     try:
         answer = getattr(library, case.kind)(**case.given)
         text, right = answer_text(answer), case.right(answer)
+    except NotImplementedError:
+        return None
     except Exception as error:
         text, right = f"{type(error).__name__}: {str(error).splitlines()[0]}", False
     return {
@@ -33,6 +37,7 @@ def _row(case: Case, library: Adapter) -> dict[str, Any]:
         "kind": case.kind,
         "why": case.why,
         "origin": case.origin,
+        "explained": case.explained,
     }
 
 
@@ -45,3 +50,12 @@ def verdicts(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
         {"kind": kind, "library": library, "cases": len(all_), "right": sum(all_)}
         for (kind, library), all_ in counts.items()
     ]
+
+
+def by_library(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The same as one row a kind and a column a library: ``11 of 13``, or None if not asked."""
+    found = verdicts(rows)
+    libraries = dict.fromkeys(one["library"] for one in found)
+    kinds = dict.fromkeys(one["kind"] for one in found)
+    right = {(f["kind"], f["library"]): f"{f['right']} of {f['cases']}" for f in found}
+    return [{"kind": k} | {name: right.get((k, name)) for name in libraries} for k in kinds]

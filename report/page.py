@@ -20,11 +20,19 @@ table { border-collapse: collapse; font-size: 0.8rem; font-variant-numeric: tabu
 th, td { border-bottom: 1px solid #ddd; padding: 0.2rem 0.6rem; text-align: left;
          vertical-align: top; }
 th { background: #f4f4f4; }
-.figures { display: flex; flex-wrap: wrap; gap: 1rem; } .figures img { flex: 1 1 24rem; }
+.figures { display: flex; flex-wrap: wrap; gap: 1rem; }
+.figures img { flex: 1 1 24rem; max-width: 35rem; }
 img { max-width: 100%; height: auto; min-width: 0; } figure { margin: 1rem 0; }
+figure img { width: 56rem; }
 .no { background: #fde3d3; } .yes { background: #e1f0fa; } .note { color: #444; }
 summary { cursor: pointer; padding: 0.3rem 0; } code { background: #f4f4f4; }
-@media print { nav { display: none; } .wide { overflow: visible; } }
+@media (max-width: 40rem) { nav a { white-space: normal; } th, td { padding: 0.2rem 0.3rem; } }
+@media print {
+  body { font-size: 10pt; max-width: none; padding: 0; } table { font-size: 7.5pt; }
+  nav, details { display: none; } .wide { overflow: visible; }
+  h2, h4 { break-after: avoid; } tr, img { break-inside: avoid; }
+  figure img { width: auto; max-height: 9cm; } .figures img { flex: 1 1 8cm; max-width: 9cm; }
+}
 """
 
 
@@ -36,8 +44,15 @@ class Link:
     text: str
 
 
-def page(title: str, sections: Mapping[str, str]) -> str:
-    """A whole page: a heading and a link for each section, whose bodies are HTML."""
+def page(title: str, sections: Mapping[str, str], lead: str = "") -> str:
+    """A whole page: a heading and a link for each section, whose bodies are HTML.
+
+    Args:
+        title: of the page.
+        sections: heading and body of each; one without a body is left out.
+        lead: HTML between the title and the links.
+    """
+    sections = {name: body for name, body in sections.items() if body}
     names = {name: f"s{i}" for i, name in enumerate(sections)}
     links = " ".join(f'<a href="#{at}">{escape(name)}</a>' for name, at in names.items())
     bodies = "\n".join(
@@ -48,7 +63,7 @@ def page(title: str, sections: Mapping[str, str]) -> str:
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(title)}</title><style>{STYLE}</style></head>\n"
-        f"<body><h1>{escape(title)}</h1>\n<nav>{links}</nav>\n{bodies}\n</body></html>\n"
+        f"<body><h1>{escape(title)}</h1>\n{lead}\n<nav>{links}</nav>\n{bodies}\n</body></html>\n"
     )
 
 

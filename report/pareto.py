@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-#: Okabe and Ito's colours, which colour-blind readers tell apart: ours, peers.
-OURS, PEER = "#0072B2", "#D55E00"
+from tauguard.report.charts import COLOURS
+
+#: Colours of our points and of the peers'.
+OURS, PEER = COLOURS[:2]
 
 
 @dataclass(frozen=True)
@@ -91,3 +93,5 @@ def _scale(panel: Panel, axes: Any) -> None:
     if above and max(above) > 20 * min(above):
         axes.set_yscale("symlog", linthresh=min(above))
     axes.margins(x=0.1, y=0.12)
+    if not above:
+        axes.set(ylim=(-0.1, 1.0), yticks=[0])

@@ -61,10 +61,10 @@ def cell(value: object, brief: bool = False) -> str:
     if value is None:
         return "-"
     if isinstance(value, Mapping):
-        form = ".3f" if "value" in value else ".3g"
         middle = value["value"] if "value" in value else value["median"]
         if middle is None:
             return "-"
+        form = ".3g" if "median" in value else ".3f" if middle < 10 else ".0f"
         if brief:
             return f"{middle:.1e}" if 0 < middle < 5e-4 else f"{middle:{form}}"
         if "median" in value and value["low"] == value["high"]:

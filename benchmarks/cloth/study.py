@@ -27,6 +27,9 @@ UNSET = (
     "(docs/cloth.md says where they come from)"
 )
 
+#: The chart's size [in].
+SIZE = (11.0, 8.0)
+
 #: What the columns of each table mean.
 NOTES = {
     "cloth": "what is run. Times in all tables are medians of so many repeats [least, most] (of "

@@ -188,13 +188,20 @@ def _summary(rows: list[Row]) -> list[Row]:
             answer(f"{method}: held", "all" if guarded else "figure", f"{held} of {runs}", met)
         )
     mine = [r for r in whole if r["method"] == "guarded"]
-    for key, asked in (("silent", 0), ("exhausted", 0)):
+    for key, name in (("silent", "lost without a word"), ("exhausted", "gave up, and said so")):
         count = sum(r[key] for r in mine)
-        out.append(answer(f"guarded: {key}", "0", str(count), count == asked))
-    for key, bar in (("energy_above", None), ("over_plain", 3.0), ("over_fixed", 1.0)):
+        out.append(answer(f"guarded: {name}", "0", str(count), count == 0))
+    figures = (
+        ("energy_above", "scenes with added energy", None),
+        ("over_plain", "time over plain steps", 3.0),
+        ("over_fixed", "time over the largest fixed step that holds", 1.0),
+    )
+    for key, name, bar in figures:
         text = ", ".join(f"{r['family']} {r[key]:.3g}" for r in mine if r[key] is not None)
         met = None if bar is None else all(r[key] is None or r[key] <= bar for r in mine)
-        out.append(answer(f"guarded: {key}", "figure" if bar is None else f"<= {bar:g}", text, met))
+        out.append(
+            answer(f"guarded: {name}", "figure" if bar is None else f"<= {bar:g}", text, met)
+        )
     return out
 
 
@@ -211,7 +218,7 @@ def draw(rows: list[Row], figure: Any) -> None:
     """Share that is held, and time over the first fixed step that holds, a group a family."""
     whole = [r for r in rows if r["study"] == "thrown" and r["timestep_ms"] == "all"]
     families = [f for f in FAMILIES if any(r["family"] == f for r in whole)]
-    looks = {"plain": "0.6", "speculative": "tab:orange", "ipc": "tab:green", "guarded": "tab:blue"}
+    looks = {"plain": "0.6", "speculative": "C1", "ipc": "C2", "guarded": "C0"}
     top, bottom = figure.subplots(2, 1, sharex=True)
     for k, (method, color) in enumerate(looks.items()):
         mine = [r for r in whole if r["method"] == method]
@@ -220,7 +227,7 @@ def draw(rows: list[Row], figure: Any) -> None:
         known = [(a, r["over_fixed"]) for a, r in zip(x, mine, strict=True) if r["over_fixed"]]
         bottom.bar([a for a, _ in known], [b for _, b in known], 0.18, color=color)
     top.set(ylabel="held [%]", ylim=(0, 105))
-    bottom.set(ylabel="time over the first fixed step that holds", yscale="log")
+    bottom.set(ylabel="time over the first\nfixed step that holds", yscale="log")
     bottom.axhline(1.0, color="0.3", lw=0.8)
     bottom.set_xticks(range(len(families)), families)
     top.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.18), frameon=False)

@@ -239,7 +239,7 @@ def draw(rows: list[Row], figure: Any) -> None:
     """Error against cost in every scene, and the ball's contacts against its speed."""
     axes = figure.subplot_mosaic([["cost", "generates"], ["cost", "holds"]])
     left = axes["cost"]
-    colours = dict(zip(CHECKERS, ("tab:grey", "tab:blue", "tab:orange"), strict=True))
+    colours = dict(zip(CHECKERS, ("C7", "C0", "C1"), strict=True))
     scenes = [r for r in rows if r["study"] == "scenes" and r["recall"]["n"]]
     for row in scenes:
         late = abs(row["delay_ms"]) if row["delay_ms"] is not None else np.inf
@@ -267,7 +267,7 @@ def _draw_shares(rows: list[Row], axis: Any, kind: str) -> None:
     styles = {"plain": "-", "speculative": "--", "ipc": ":"}
     widths = {"plain": 4, "speculative": 2.5, "ipc": 1.2}  # equal curves stay visible
     timesteps = sorted({r["timestep_ms"] for r in rows})
-    shades = dict(zip(timesteps, ("tab:green", "tab:orange", "tab:red"), strict=False))
+    shades = dict(zip(timesteps, ("C2", "C4", "C1"), strict=False))
     for mode, timestep in itertools.product(dict.fromkeys(r["mode"] for r in rows), timesteps):
         mine = [r for r in rows if (r["mode"], r["timestep_ms"]) == (mode, timestep)]
         axis.plot(
@@ -284,6 +284,6 @@ def _draw_shares(rows: list[Row], axis: Any, kind: str) -> None:
     if kind == "generates":
         speeds = sorted({r["speed"] for r in rows})
         cloth = [min(r["cloth_recall"]["value"] for r in rows if r["speed"] == v) for v in speeds]
-        axis.plot(speeds, cloth, "o", color="tab:blue", label="cloth, every timestep")
+        axis.plot(speeds, cloth, "o", color="C0", label="cloth, every timestep")
     axis.set(xscale="log", ylabel=f"share that MuJoCo {kind}", ylim=(-0.05, 1.05))
     axis.grid(alpha=0.3)

@@ -46,8 +46,9 @@ def draw(rows: list[Row], figure: Figure) -> None:
     for k, row in enumerate(timed):
         left.hlines(float(str(row["rollout [us]"])), k - 0.4, k + 0.4, "black", "dashed")
     left.axhline(1000 / 60, color="grey", linewidth=1)
-    left.set(ylabel="us a sample (grey: 60 x real time; dashed: mujoco.rollout)")
-    left.legend()
+    left.set(ylabel="us a sample", title="grey: 60 x real time; dashed: rollout")
+    left.set_xlim(-0.6, 2.2 * len(timed) - 1)
+    left.legend(loc="upper right")
     sizes = [row for row in rows if row["study"] == "size"]
     labels = [str(row["rows a second"]) for row in sizes]
     right.barh(labels, [float(str(row["MB an hour"])) for row in sizes])

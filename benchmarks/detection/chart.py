@@ -49,7 +49,7 @@ def _draw_strata(rows: list[Row], axis: Any, colours: Mapping[str, str]) -> None
         xlabel="achieved peak |tau_ext| over joints 1-4 [N m]",
         ylabel="sensitivity, all speeds",
         title="At the hourly threshold",
-        legend={"fontsize": 6, "framealpha": 0.5},
+        legend={"fontsize": 7, "framealpha": 0.5},
     )
 
 

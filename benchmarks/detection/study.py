@@ -50,6 +50,9 @@ _JUDGED = (
     "sensitivity: of the collisions from 16 N m up (achieved peak of the external torque, joints 1 "
     "to 4), "
 )
+#: The chart's size [in].
+SIZE = (13.0, 8.5)
+
 #: What the columns of each table mean.
 NOTES = {
     "speed": _JUDGED + "and specificity, of collision-free cases of 2 s; by percent of the largest "

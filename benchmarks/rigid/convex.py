@@ -350,7 +350,7 @@ def draw(rows: list[Row], axes: Any) -> None:
         [x for x, _ in known], [y for _, y in known], "k_", ms=18, mew=2, label="published ABFME"
     )
     axes.axhline(1.0, color="grey", lw=0.8)
-    axes.set_xticks(at, labels, fontsize=6)
+    axes.set_xticks(at, labels, fontsize=8, rotation=30, ha="right")
     axes.set(ylabel="times faster than textbook SAT", yscale="log", ylim=(0.8, 60))
     axes.set_yticks([1, 2, 5, 10, 20, 50], ["1", "2", "5", "10", "20", "50"])
     axes.minorticks_off()

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 PARTS = (rigid_convex, rigid_mesh, rigid_volumes, rigid_impact)
 
+#: The chart's size [in].
+SIZE = (11.0, 8.5)
+
 #: What the columns of each table mean; a table without a line has its file's docstring.
 NOTES = {
     "table 2.1 static": "ns a pair in one pose, one thread. coal_net: without the loop and the "

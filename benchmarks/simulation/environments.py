@@ -39,7 +39,8 @@ NOTES = {
     "added_us: over the environment. q_difference_rad: largest, of rollout's joints. "
     "Rows below the environment change one thing of it; a checker's price grows with the scene.",
     "vector": "wall time of 16 copies; ratio_to_sync: over Gymnasium's SyncVectorEnv; mujoco.batch "
-    "alone: physics without drives, observations or rewards. Means little on a loaded machine.",
+    "alone: physics without drives, observations or rewards; q_difference_rad: of its copies from "
+    "mj_step of one. Means little on a loaded machine.",
     "reaction": "swings into the chest, median [least, most] over them; false_alarms: swings with "
     "an alarm before the touch, left out of the rest. delay_s: from the touch to the reaction; "
     "farthest_m, end_m: of the tool from where it touched; force_over_limit: of the standard's for "
@@ -223,8 +224,10 @@ def vectors(count: int, repeats: int, seed: int) -> list[Row]:
     calls: dict[str, Callable[[], object]] = {"SyncVectorEnv": vector(sync)}
     for threads, env in native.items():
         calls[f"make_vec, {threads} threads"] = vector(env)
+    strayed = {}
     for threads in (1, 2):
-        calls[f"mujoco.batch alone, {threads} threads"] = batched(seed, count, threads)
+        name = f"mujoco.batch alone, {threads} threads"
+        calls[name], strayed[name] = batched(seed, count, threads)
     forms = {"SyncVectorEnv": sync} | {f"make_vec, {t} threads": e for t, e in native.items()}
     last = {}
     for name, env in forms.items():
@@ -242,13 +245,18 @@ def vectors(count: int, repeats: int, seed: int) -> list[Row]:
             "same_bits_as_sync": bool(np.array_equal(last[name], last["SyncVectorEnv"]))
             if name in last
             else None,
+            "q_difference_rad": strayed.get(name),
         }
         for name, figure in taken.items()
     ]
 
 
-def batched(seed: int, count: int, threads: int) -> Callable[[], object]:
-    """Physics alone: every copy of the scene holds the arm with constant forces."""
+def batched(seed: int, count: int, threads: int) -> tuple[Callable[[], object], float]:
+    """Physics alone: every copy of the scene holds the arm with constant forces.
+
+    Returns:
+        The call, and its copies' largest joint difference from ``mj_step`` of one of them [rad].
+    """
     env = made(seed)
     model, data = env.world.scene.model, env.cell.datas[0]
     env.step(np.zeros(6))
@@ -261,7 +269,12 @@ def batched(seed: int, count: int, threads: int) -> Callable[[], object]:
         for _ in range(count):
             batch.step(nstep=substeps)
 
-    return call
+    single = mujoco.MjData(model)
+    single.qpos[:], single.qfrc_applied[:] = start, force
+    for _ in range(count * substeps):
+        mujoco.mj_step(model, single)
+    call()
+    return call, float(np.abs(batch.qpos - single.qpos).max())
 
 
 # -- the figure ------------------------------------------------------------------------------------
@@ -276,7 +289,7 @@ def draw(rows: list[Row], figure: Figure) -> None:
     ):
         chosen = [row for row in rows if row["study"] == study]
         values = [row[key]["median"] if isinstance(row[key], dict) else row[key] for row in chosen]
-        axes.barh([row["what"] for row in chosen], values, color="#2a788e")
+        axes.barh([row["what"] for row in chosen], values, color="C0")
         axes.invert_yaxis()
         axes.set(xlabel=label)
     limit = body_region("chest").transient_force

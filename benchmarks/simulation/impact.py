@@ -305,7 +305,7 @@ def draw(rows: list[Row], figure: Figure) -> None:
         plain = row["integrator"] == "implicitfast" and row["contact"] == "direct"
         other = row["contact"] if row["contact"] != "direct" else row["integrator"]
         at = (row["us_per_simulated_ms"], 100 * row["peak_force_error"])
-        left.loglog(*at, "o" if plain else "s", color="#2a788e" if plain else "#d95f02")
+        left.loglog(*at, "o" if plain else "s", color="C0" if plain else "C1")
         if other in ("euler", "implicit"):
             continue  # on top of the default
         label = f"{row['timestep_ms']:g} ms" if plain else f"{other}, 1 ms"
@@ -323,10 +323,10 @@ def draw(rows: list[Row], figure: Figure) -> None:
     height = np.arange(len(found))
     for k, (key, label, color) in enumerate(
         (
-            ("inertial_peak_n", "limp arm", "#2a788e"),
+            ("inertial_peak_n", "limp arm", "C0"),
             ("predicted_n", "by the reflected mass", "#7ad151"),
             ("standard_n", "by M/2 + m_L", "#b5b5b5"),
-            ("driven_peak_n", "position-controlled", "#d95f02"),
+            ("driven_peak_n", "position-controlled", "C1"),
         )
     ):
         right.barh(

@@ -173,7 +173,7 @@ def draw(rows: list[Row], figure: Figure) -> None:
             keys, "os", ("in the whole simulation", "in the poorer one"), strict=True
         ):
             shift = 0.12 if marker == "s" else -0.12
-            colour = "#2a788e" if marker == "o" else "#d95f02"
+            colour = "C0" if marker == "o" else "C1"
             style = {"fmt": marker, "color": colour, "label": label, "capsize": 3}
             at = np.arange(len(rows)) + shift
             errorbars(axes, at, (row[key] for row in rows), across=True, **style)

@@ -161,13 +161,13 @@ def draw(rows: list[Row], figure: Figure) -> None:
     left, right = figure.subplots(1, 2)
     cost = [row for row in rows if row["study"] == "cost"]
     names = [row["scene"] for row in cost]
-    left.barh(names, [row["us_per_step"]["median"] for row in cost], color="#2a788e")
+    left.barh(names, [row["us_per_step"]["median"] for row in cost], color="C0")
     left.invert_yaxis()
     left.set(xlabel="microseconds a step", title="What a scene's parts cost")
     steps = [row for row in rows if row["study"] == "timestep"]
     x = [row["us_per_simulated_ms"]["median"] for row in steps]
     y = [row["q_error_rad"] for row in steps]
-    right.loglog(x, y, "o", color="#d95f02")
+    right.loglog(x, y, "o", color="C1")
     right.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     right.xaxis.set_major_formatter("{x:g}")
     right.xaxis.set_minor_formatter(NullFormatter())

@@ -16,6 +16,8 @@ class ExplicitObserver:
     def observer(self, mjcf: str, t: Any, q: Any, qd: Any, tau: Any, gain: float) -> float:
         """The residual of the last sample."""
         model = mujoco.MjModel.from_xml_string(mjcf)
+        if model.nv != 1:
+            raise NotImplementedError("one joint only")
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         inertia = float(data.M[0])

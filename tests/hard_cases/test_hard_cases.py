@@ -13,6 +13,7 @@ from tauguard.benchmarks.rigid.truth import cross, dot
 from tauguard.cli import main
 from tauguard.hard_cases import adapters, load_cases, run
 from tauguard.hard_cases.case import Case
+from tauguard.hard_cases.verdicts import by_library
 
 CASES = load_cases()
 #: Where a scene's answer is MuJoCo's, whose contacts and dry friction yield: docs/hard_cases.md.
@@ -129,6 +130,29 @@ def test_wrong_answers_are_found():
     assert [n for n, r in rows.items() if r["right"]] == ["touches_at_the_start"]
     assert rows["box_in_a_box"]["answer"] == "RuntimeError: no hull"
     assert "impact_20_m_per_s" not in rows
+
+
+def test_what_a_library_has_no_form_of_is_not_asked():
+    class Few:
+        name = "few"
+
+        def convex_overlap(self, a, b):
+            raise NotImplementedError
+
+    assert run(CASES, [Few()]) == []
+
+
+def test_verdicts_by_library():
+    found = [("scene", "a", True), ("scene", "a", False), ("observer", "b", True)]
+    rows = [{"kind": k, "library": name, "right": right} for k, name, right in found]
+    assert by_library(rows) == [
+        {"kind": "scene", "a": "1 of 2", "b": None},
+        {"kind": "observer", "a": None, "b": "1 of 1"},
+    ]
+
+
+def test_what_is_wrong_of_ours_is_explained():
+    assert {case.name for case in CASES if case.explained} == SOFT
 
 
 def test_early_is_right_within_a_share_of_the_step_and_late_never():

@@ -67,6 +67,16 @@ class EventFolder:
         self._rows: list[dict[str, Any]] = []
         self._found = dict.fromkeys(KINDS, 0)
 
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for every recording: what happened, and ``file``, its name."""
+        return self._rows
+
+    @property
+    def counts(self) -> str:
+        """How many of each kind there were, as text."""
+        return ", ".join(f"{count} {kind}" for kind, count in self._found.items())
+
     def add(self, split: str, number: int, matching: Matching, of: tuple[Trace, Detection]) -> None:
         """The events of one recording: the ``number``-th of ``split``."""
         for event in events_of(matching, self._late):
@@ -89,9 +99,8 @@ class EventFolder:
         from tauguard.report.page import Link, page, tables
         from tauguard.whole_file import write_whole
 
-        counts = ", ".join(f"{count} {kind}" for kind, count in self._found.items())
         how = (
-            f"<p>{counts}. Late is later than {1e3 * self._late:.0f} ms. A recording begins "
+            f"<p>{self.counts}. Late is later than {1e3 * self._late:.0f} ms. A recording begins "
             f"{BEFORE} s before its event and lasts {LENGTH:.0f} s; at most {MOST} of a kind are "
             f"kept. The links work while <code>tauguard replay --web {self._folder}</code> runs; "
             "<code>rerun FILE</code> opens a file without it.</p>"

@@ -10,29 +10,36 @@ def command(
     quick: bool = False,
     seed: int = 0,
     study: tuple[str, ...] = (),
+    bound: bool = False,
 ) -> None:
     """Run the studies that the folder does not hold yet, and bind them into `index.html`.
 
-    A run that was broken off goes on where it stopped. The page opens offline.
+    A run that was broken off goes on where it stopped. The page opens offline. It also links to
+    recordings of what the detector of `tauguard demo` gets wrong: `tauguard replay --web OUT`
+    opens them.
 
     Args:
         out: the folder of the page and of each study's figures (JSON) and chart.
         quick: shorter runs, each 60 s or less on 2 cores (full ones take up to 30 minutes each).
         seed: of every random input.
         study: these studies only (default: all that `tauguard bench list` names).
+        bound: run no study, bind those that the folder holds.
     """
     from tauguard.benchmarks import STUDIES
     from tauguard.benchmarks.bound import bind
     from tauguard.benchmarks.collect import collect
+    from tauguard.cli.mistakes import mistakes
     from tauguard.hard_cases import adapters, load_cases, run
     from tauguard.report import write_json
 
     unknown = set(study) - STUDIES.keys()
     if unknown:
         raise ValueError(f"no study {min(unknown)!r}: there are {', '.join(STUDIES)}")
-    failed = collect(out, study or tuple(STUDIES), quick=quick, seed=seed)
+    failed = {}
+    if not bound:
+        failed = collect(out, study or tuple(STUDIES), quick=quick, seed=seed)
     cases = run(load_cases(), adapters())
     write_json(out / "hard-cases.json", {"name": "hard-cases", "rows": cases})
-    print(f"report: {bind(out, cases, failed)}")
+    print(f"report: {bind(out, cases, failed, mistakes(out, seed))}")
     if failed:
         raise SystemExit(1)
