@@ -131,8 +131,8 @@ def _cases(rows: Sequence[Row]) -> str:
     shown = ("case", "library", "expected", "answer", "right", "why", "origin")
     full = [{key: row[key] for key in shown} for row in rows]
     wrong = [row for row in rows if not row["right"] and row["library"] == "tauguard"]
-    shown = ("case", "expected", "answer", "why", "explained")
-    ours = [{key: row[key] for key in shown} for row in wrong]
+    columns = ("case", "expected", "answer", "why", "explained")
+    ours = [{key: row[key] for key in columns} for row in wrong]
     return (
         "<p>Named cases with exact answers, put to every library that is installed; "
         "<code>tauguard hard-cases</code> runs them, on other libraries too. "

@@ -176,7 +176,7 @@ def _convex(studies: Studies) -> Panel:
 
 def _meshes(studies: Studies) -> Panel:
     """Each volume's mean over the poses of the generated mesh, and coal's."""
-    points = []
+    points: list[Point] = []
     rows = rows_of(studies, "rigid", "table 2.2 static")
     for label, own in _grouped(rows, lambda row: str(row["volume"])).items():
         poses = sum(row["poses"] for row in own)
