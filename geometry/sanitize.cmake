@@ -1,14 +1,17 @@
-# -DTAUGUARD_SANITIZE=address (with undefined) or thread: what native targets are built with.
-set(TAUGUARD_SANITIZE "" CACHE STRING "address (and undefined behaviour) or thread; empty: none")
+# -DTAUGUARD_SANITIZE=address (with undefined), thread, or fuzzer (of Clang, with both of the first):
+# what native targets are built with.
+set(TAUGUARD_SANITIZE "" CACHE STRING "address (and undefined behaviour), thread or fuzzer; empty: none")
 
 function(tauguard_sanitize target)
   if(TAUGUARD_SANITIZE STREQUAL "address")
     set(flags -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
         -fno-omit-frame-pointer)
+  elseif(TAUGUARD_SANITIZE STREQUAL "fuzzer")
+    set(flags -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined)
   elseif(TAUGUARD_SANITIZE STREQUAL "thread")
     set(flags -fsanitize=thread)
   elseif(TAUGUARD_SANITIZE)
-    message(FATAL_ERROR "TAUGUARD_SANITIZE: ${TAUGUARD_SANITIZE}, expected address or thread")
+    message(FATAL_ERROR "TAUGUARD_SANITIZE: ${TAUGUARD_SANITIZE}, expected address, thread or fuzzer")
   else()
     return()
   endif()
