@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tauguard.traces.mcap import read_mcap
-from tauguard.traces.mcap_container import CHUNK, check_chunks, walk
+from tauguard.traces.mcap_container import CHUNK, Contents, check_chunks, walk
 from tauguard.traces.trace import Trace
 
 if TYPE_CHECKING:
@@ -26,35 +27,55 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
         ValueError: no such topic, messages without velocity or effort, other joints on the way.
     """
     from mcap.exceptions import McapError
-    from mcap.reader import make_reader
 
     from tauguard.datasets.log_checks import checked
     from tauguard.datasets.logs import Log
 
-    with open(path, "rb") as stream:
-        try:
-            content = stream.read()
-            chunks = [(at, body) for at, code, body in walk(content) if code == CHUNK]
-            check_chunks(chunks, len(content))
-            stream.seek(0)
-            reader = make_reader(stream, validate_crcs=True)
-            if any(record.name == "tauguard.trace" for record in reader.iter_metadata()):
-                own = read_mcap(path)[0]
-                return Log(own, checked(own, lambda row: f"sample {row}"))
-            summary = reader.get_summary()
-            channels = summary.channels.values() if summary is not None else ()
-            schemas = summary.schemas if summary is not None else {}
-            types = {c.topic: getattr(schemas.get(c.schema_id), "name", "?") for c in channels}
-            topic = next((name for name, kind in types.items() if kind == TYPE), None)
-            if topic is None:
-                have = ", ".join(f"{name} ({kind})" for name, kind in types.items())
-                raise ValueError(f"no topic of type {TYPE}; topics: {have or 'none'}")
-            messages = [(m.log_time, m.data) for _, _, m in reader.iter_messages(topics=[topic])]
-        except (McapError, struct.error, RecursionError) as error:
-            raise ValueError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
+    try:
+        content = path.read_bytes()
+        contents = Contents(content)
+        check_chunks(
+            [(at, body) for at, code, body in walk(content) if code == CHUNK], len(content)
+        )
+        contents.check_sum()
+        if "tauguard.trace" in contents.metadata:
+            own = read_mcap(path)[0]
+            return Log(own, checked(own, lambda row: f"sample {row}"))
+        topic, messages = _messages(content)
+    except (McapError, struct.error, RecursionError) as error:
+        raise ValueError(f"not a whole MCAP file: {error or 'it is cut off'}") from error
     trace = assemble(topic, messages, joint_names)
     notes = checked(trace, lambda row: f"{topic}, message {row}")
     return Log(trace, (f"{topic}: effort is taken as current [A]", *notes))
+
+
+def _messages(content: bytes) -> tuple[str, list[tuple[int, bytes]]]:
+    """The first topic of the type, and its log times and messages.
+
+    They are read from the data and not by the index at the file's end: what a damaged index leaves
+    out would be missing without a word.
+    """
+    from mcap.reader import NonSeekingReader, make_reader
+
+    summary = make_reader(io.BytesIO(content), validate_crcs=True).get_summary()
+    channels = list(summary.channels.values()) if summary is not None else []
+    schemas = summary.schemas if summary is not None else {}
+    types = {c.topic: getattr(schemas.get(c.schema_id), "name", "?") for c in channels}
+    topic = next((name for name, kind in types.items() if kind == TYPE), None)
+    if topic is None:
+        have = ", ".join(f"{name} ({kind})" for name, kind in types.items())
+        raise ValueError(f"no topic of type {TYPE}; topics: {have or 'none'}")
+    reader = NonSeekingReader(io.BytesIO(content), validate_crcs=True)
+    messages = [(m.log_time, m.data) for _, _, m in reader.iter_messages(topics=[topic])]
+    if summary is not None and summary.statistics is not None:
+        counts = summary.statistics.channel_message_counts
+        counted = sum(counts.get(c.id, 0) for c in channels if c.topic == topic)
+        if counts and counted != len(messages):
+            raise ValueError(
+                f"{topic}: {len(messages)} messages, but the file's summary counts {counted}: "
+                "damaged, or cut"
+            )
+    return topic, messages
 
 
 def assemble(

@@ -93,7 +93,7 @@ def as_xml(path: Path, found: Any, intact: Any) -> str:
         moving = [j for j in root.iter("joint") if j.get("type") != "fixed"]
         below = [j.find("child").get("link") for j in moving]  # type: ignore[union-attr]
         masses = [
-            float(mass.get("value", "nan"))
+            float(mass.get("value") or "nan")
             for link in root.iter("link")
             if link.get("name") in below
             for mass in link.iter("mass")
@@ -109,7 +109,7 @@ def as_xml(path: Path, found: Any, intact: Any) -> str:
         geoms = [
             g for body in root.iter("body") if id(body) in carried for g in body.findall("geom")
         ]
-        masses = [float(g.get("mass", "nan")) for g in geoms]
+        masses = [float(g.get("mass") or "nan") for g in geoms]
     joints, mass = found
     if joints != len(moving):
         return f"{joints} joints, the text has {len(moving)}"

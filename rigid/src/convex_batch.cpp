@@ -40,7 +40,7 @@ TAUGUARD_INLINE std::size_t run_blocks(const Batch& batch, std::size_t begin, st
     using Byte8 = std::int8_t __attribute__((vector_size(8)));
     const Byte8 hits = __builtin_convertvector(together & 1, Byte8);
     std::memcpy(batch.hit + first, &hits, lanes);
-    if (all(apart | together)) continue;
+    if (all_eight(apart | together)) continue;
     for (std::size_t lane = 0; lane < lanes; ++lane)
       if (!apart[lane] && !together[lane]) left += decide_row(batch, first + lane);
   }

@@ -53,7 +53,8 @@ TAUGUARD_INLINE bool all(Mask4 m) {
 TAUGUARD_INLINE bool any(Mask4 m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
 TAUGUARD_INLINE bool all(Mask4 m) { return (m[0] & m[1] & m[2] & m[3]) == -1; }
 #endif
-TAUGUARD_INLINE bool all(Mask8 m) { return all((Mask4)m & ((Mask4)m << 32)); }
+// Another name: to Clang, vectors of one size are each other.
+TAUGUARD_INLINE bool all_eight(Mask8 m) { return all((Mask4)m & ((Mask4)m << 32)); }
 TAUGUARD_INLINE double largest(Double4 x) {
   return std::max(std::max(x[0], x[1]), std::max(x[2], x[3]));
 }

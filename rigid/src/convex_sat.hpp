@@ -66,7 +66,7 @@ TAUGUARD_INLINE double edge_error(double a, double b, double reach) {
 TAUGUARD_INLINE Verdict sat_tetrahedra(const double* a, const double* b) {
   const TetrahedronFacets fa(a), fb(b);
   double p[4][3], own[4][3], reach = 0.0, far = 0.0;
-  Double4 top_a, top_b;
+  Double4 top_a{}, top_b{};
   for (int j = 0; j < 4; ++j) {
     double q[3];
     for (int k = 0; k < 3; ++k) {

@@ -23,7 +23,7 @@ TAUGUARD_INLINE Verdict swept_tetrahedra(const double* a, const double* b, const
   moved(p, d, p + 4), moved(q, back, q + 4);
   if (!in_range(fa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(length))
     return undecided;
-  Double4 row[8], top_a, top_b;
+  Double4 row[8], top_a{}, top_b{};
   for (int j = 0; j < 8; ++j) {
     row[j] = fa.at(p[j]);
     top_a = j == 0 ? row[0] : max(top_a, row[j]);
@@ -39,7 +39,7 @@ TAUGUARD_INLINE Verdict swept_tetrahedra(const double* a, const double* b, const
   const double ed = edge_error(length, 2 * fb.size, reach + fa.size);
   for (int group = 0; group < 2; ++group) {
     f.range(group, c, low, high);
-    Double4 own_low, own_high;
+    Double4 own_low{}, own_high{};
     for (int i = 0; i < 4; ++i) {
       double x[3], xd[3];
       for (int k = 0; k < 3; ++k) x[k] = a[3 * i + k] - a[k];
@@ -89,7 +89,7 @@ TAUGUARD_INLINE Verdict swept_zonotope_tetrahedron(const Zonotope& a, const doub
   if (!in_range(sa.size) || !in_range(fb.size) || !in_range(reach) || !in_range(length))
     return undecided;
   const double ea = 32 * unit * sa.size * sa.size * reach, wall = sa.determinant;
-  Double4 row[8], top, bottom;
+  Double4 row[8], top{}, bottom{};
   for (int j = 0; j < 8; ++j) {
     row[j] = sa.at(p[j]);
     top = j == 0 ? row[0] : max(top, row[j]);

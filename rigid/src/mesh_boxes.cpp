@@ -4,7 +4,7 @@
 
 namespace tauguard::rigid {
 
-TAUGUARD_WIDE unsigned overlap_mask(const Node& node, const Box& box, const Relative& rel,
+TAUGUARD_CLONES unsigned overlap_mask(const Node& node, const Box& box, const Relative& rel,
                                     float* distance2) {
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
   const Wide* e = reinterpret_cast<const Wide*>(node.extent);

@@ -34,7 +34,7 @@ FloatObb placed(const FloatObb& box, const Relative& at) {
   return out;
 }
 
-TAUGUARD_WIDE unsigned overlap_mask(const ObbNode& node, const FloatObb& box, float pad,
+TAUGUARD_CLONES unsigned overlap_mask(const ObbNode& node, const FloatObb& box, float pad,
                                     float* distance2) {
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
   const Wide* e = reinterpret_cast<const Wide*>(node.extent);

@@ -42,7 +42,7 @@ struct Span {
 };
 
 // Bounds of corners [begin, end) along three axes; at least eight corners.
-TAUGUARD_WIDE Span span_wide(const float* x, const float* y, const float* z, std::size_t count,
+TAUGUARD_CLONES Span span_wide(const float* x, const float* y, const float* z, std::size_t count,
                              const float axis[3][3]) {
   Wide lo[3], hi[3];
   for (int i = 0; i < 3; ++i) lo[i] = (Wide){} + INFINITY, hi[i] = (Wide){} - INFINITY;

@@ -39,7 +39,7 @@ MovingObb moving(const FloatObb& box, const Chord& chord) {
 // As overlap_mask in mesh_obb.cpp, with the time at which each axis stops separating. A motion of
 // less than the pad along an axis is taken as the pad, so that no quotient is without bound; the
 // second pad pays for it.
-TAUGUARD_WIDE unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave,
+TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave,
                                   float* enter) {
   const FloatObb& box = m.box;
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);

@@ -1,15 +1,11 @@
-// Eight floats at once. One source, compiled for AVX2 as well where that exists and picked at load
-// time; no contraction, so the bits are the portable ones.
+// Eight floats at once. One source, compiled by TAUGUARD_CLONES for AVX2 as well; no contraction,
+// so the bits are the portable ones.
 #pragma once
 
 #include <cstdint>
 #include <cstring>
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__linux__)
-#define TAUGUARD_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define TAUGUARD_WIDE
-#endif
+#include "tauguard/geometry/lanes.hpp"
 
 namespace tauguard::rigid {
 

@@ -4,11 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 from mcap_ros2.writer import Writer
 
 from tauguard.datasets import PRESETS, ColumnMap, read_log
 from tauguard.datasets.columns import UR_JOINTS
 from tauguard.traces import Trace, write_mcap
+from tauguard.traces.mcap_container import walk
 
 JOINT_STATE = """\
 std_msgs/Header header
@@ -150,10 +152,10 @@ def test_every_real_file_reads(data_dir):
         assert 0.009 < trace.dt < 0.011
 
 
-def rosbag(path, rows, effort=True, names=("b", "a"), stamped=True):
+def rosbag(path, rows, effort=True, names=("b", "a"), stamped=True, **options):
     """A bag as another program writes it: mcap-ros2-support's own encoder."""
     with open(path, "wb") as stream:
-        writer = Writer(stream)
+        writer = Writer(stream, **options)
         schema = writer.register_msgdef("sensor_msgs/msg/JointState", JOINT_STATE)
         for k in range(rows):
             ns = (10**9 + 8 * 10**6 * k) if stamped else 0
@@ -190,12 +192,31 @@ def test_bags_with_faults(tmp_path):
     data = (tmp_path / "b.mcap").read_bytes()
     for cut in (3, 100, len(data) - 5):
         (tmp_path / "c.mcap").write_bytes(data[:cut])
-        with pytest.raises(ValueError, match=r"c\.mcap: .*cut off"):
+        with pytest.raises(ValueError, match=r"c\.mcap: .*(cut off|not an MCAP file)"):
             read_log(tmp_path / "c.mcap")
     with open(tmp_path / "d.mcap", "wb") as stream:
         Writer(stream).finish()
     with pytest.raises(ValueError, match="no topic of type"):
         read_log(tmp_path / "d.mcap")
+
+
+def without(data, opcode):
+    """The bytes of an MCAP file less its first record of a kind."""
+    at, body = next((at, body) for at, code, body in walk(data) if code == opcode)
+    return data[:at] + data[at + 9 + len(body) :]
+
+
+def test_a_bag_is_read_by_its_data_not_by_its_index(tmp_path):
+    """A chunk that the index at the end leaves out was missing without a word."""
+    rosbag(tmp_path / "whole.mcap", 12, chunk_size=512)
+    data = (tmp_path / "whole.mcap").read_bytes()
+    (tmp_path / "index.mcap").write_bytes(without(data, Opcode.CHUNK_INDEX))
+    whole, found = (read_log(tmp_path / f"{name}.mcap").trace for name in ("whole", "index"))
+    assert np.array_equal(found.t, whole.t)
+    assert np.array_equal(found.current, whole.current)
+    (tmp_path / "chunk.mcap").write_bytes(without(data, Opcode.CHUNK))
+    with pytest.raises(ValueError, match=r"chunk\.mcap: not a whole"):
+        read_log(tmp_path / "chunk.mcap")
 
 
 def test_a_recording_of_our_own(tmp_path):

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <thread>
 
 #include "guarded_scene.hpp"
@@ -89,11 +90,16 @@ Tally scenes(Random& random, int rounds) {
     const bool cloth = round % 3 == 2, hard = round % 2, reset = round % 4 < 2;
     std::vector<std::vector<double>> ends(3);
     std::vector<Tally> tallies(3);
+    // Scenes are compiled before there are threads: ThreadSanitizer does not see what orders those
+    // inside MuJoCo's library.
+    std::vector<std::unique_ptr<Guarded>> scenes;
+    for (std::size_t k = 0; k < ends.size(); ++k)
+      scenes.emplace_back(new Guarded(seed, cloth, reset));
     std::vector<std::thread> threads;
     for (std::size_t k = 0; k < ends.size(); ++k)
       threads.emplace_back([&, k] {
         const tauguard::geometry::RoundToNearest guard;
-        Guarded g(seed, cloth, reset);
+        Guarded& g = *scenes[k];
         tallies[k] = play(g, hard, cloth ? 20 : 60);
         ends[k] = state_of(g.scene.model, g.scene.data);
       });

@@ -26,6 +26,11 @@ def hull(points):
     return bytes([HULL, len(points) - 1]) + numbers(points)
 
 
+def fits(case):
+    """Whether both hulls have so few points as a target reads."""
+    return max(len(case.given["a"]), len(case.given["b"])) <= 9
+
+
 def convex(case):
     """The bytes of a pair of convex bodies, resting, on a straight way, or each on its own."""
     bodies = bytes([IN_SPACE]) + hull(case.given["a"]) + hull(case.given["b"])
@@ -51,9 +56,8 @@ def corpus():
             yield "cloth", bytes([case.kind == "edge_edge"]) + ends
             faces = b"\x02\x02\x01\x01\x00\x01\x02\x01\x02\x03"  # a mesh of the four points
             yield "cloth", faces + numbers(case.given["x_t0"]) + numbers(case.given["x_t1"])
-        elif case.kind in ("convex_overlap", "convex_sweep"):
-            if max(len(case.given["a"]), len(case.given["b"])) <= 9:
-                yield from (("rigid", data) for data in convex(case))
+        elif case.kind in ("convex_overlap", "convex_sweep") and fits(case):
+            yield from (("rigid", data) for data in convex(case))
     yield from (("streams", data) for data in streams(np.random.default_rng(0)))
     for core in range(6):
         for absurd in ABSURD:

@@ -1,7 +1,6 @@
 // libFuzzer: pairs of convex bodies at rest, on straight ways and turning, and meshes of triangles.
 #include <algorithm>
 
-#include "convex_boxes.hpp"
 #include "convex_overlap.hpp"
 #include "input.hpp"
 #include "mesh_body.hpp"
@@ -41,14 +40,14 @@ bool hit_of(const Body& a, const Body& b, Method method) {
 // The way of whole batches: nine copies, of which the last stands alone in its block.
 bool hit_in_batch(const Body& a, const Body& b) {
   constexpr std::size_t n = 9;
-  std::vector<double> rows[2];
-  std::vector<BoxBlock> blocks[2] = {std::vector<BoxBlock>(2), std::vector<BoxBlock>(2)};
+  std::vector<double> rows[2], blocks[2];
   double skew = 0;
   const Body* bodies[] = {&a, &b};
   for (int s = 0; s < 2; ++s) {
     for (std::size_t i = 0; i < n; ++i)
       rows[s].insert(rows[s].end(), bodies[s]->data.begin(), bodies[s]->data.end());
-    pack_boxes(rows[s].data(), n, reinterpret_cast<double*>(blocks[s].data()));
+    blocks[s].resize(2 * 72);
+    pack_boxes(rows[s].data(), n, blocks[s].data());
     const Skew found = box_skew(&bodies[s]->data[6], 1, 1e-6);
     require(found.first_beyond == 1, "a rotation is none");
     skew = std::max(skew, found.largest);
