@@ -5,7 +5,7 @@
 namespace tauguard::rigid {
 
 TAUGUARD_CLONES unsigned overlap_mask(const Node& node, const Box& box, const Relative& rel,
-                                    float* distance2) {
+                                      float* distance2) {
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
   const Wide* e = reinterpret_cast<const Wide*>(node.extent);
   Wide d[3];

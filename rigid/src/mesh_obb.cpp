@@ -35,7 +35,7 @@ FloatObb placed(const FloatObb& box, const Relative& at) {
 }
 
 TAUGUARD_CLONES unsigned overlap_mask(const ObbNode& node, const FloatObb& box, float pad,
-                                    float* distance2) {
+                                      float* distance2) {
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
   const Wide* e = reinterpret_cast<const Wide*>(node.extent);
   const Wide d0 = box.centre[0] - centre[0], d1 = box.centre[1] - centre[1],

@@ -43,7 +43,7 @@ struct Span {
 
 // Bounds of corners [begin, end) along three axes; at least eight corners.
 TAUGUARD_CLONES Span span_wide(const float* x, const float* y, const float* z, std::size_t count,
-                             const float axis[3][3]) {
+                               const float axis[3][3]) {
   Wide lo[3], hi[3];
   for (int i = 0; i < 3; ++i) lo[i] = (Wide){} + INFINITY, hi[i] = (Wide){} - INFINITY;
   for (std::size_t at = 0; at < count; at += 8) {

@@ -40,7 +40,7 @@ MovingObb moving(const FloatObb& box, const Chord& chord) {
 // less than the pad along an axis is taken as the pad, so that no quotient is without bound; the
 // second pad pays for it.
 TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave,
-                                  float* enter) {
+                                    float* enter) {
   const FloatObb& box = m.box;
   const Wide* centre = reinterpret_cast<const Wide*>(node.centre);
   const Wide* e = reinterpret_cast<const Wide*>(node.extent);
