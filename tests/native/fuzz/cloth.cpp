@@ -26,7 +26,9 @@ Answer ask(bool vf, const Ends& x, const std::int32_t* row, Method method, doubl
 // With a minimum distance there is a contact wherever there is one without.
 void query(Input& in, bool vf) {
   const std::int32_t row[4] = {0, 1, 2, 3};
-  const auto x0 = in.numbers(12), x1 = in.numbers(12);
+  const bool wide = in.choice(8) == 7;  // exact arithmetic on numbers of any size is slow
+  const double most = wide ? 1.7976931348623157e308 : 0x1p60, least = wide ? 0 : 0x1p-60;
+  const auto x0 = in.numbers(12, most, least), x1 = in.numbers(12, most, least);
   const Ends x = Ends::of(x0.data(), x1.data());
   const Answer ours = ask(vf, x, row, Method::ab2pf, 0), exact = ask(vf, x, row, Method::exact, 0);
   require(ours.hit == exact.hit, "ab2pf differs from exact");
@@ -71,7 +73,7 @@ void mesh(Input& in) {
   const VolumeKind volume{ks[in.choice(5)], in.choice(2) == 1};
   auto faces = faces_of(in);
   MeshCcd ccd(faces, {}, volume, 3), plain(faces, {}, {6, false}, 1);
-  auto x0 = in.numbers(3 * vertices);
+  auto x0 = in.numbers(3 * vertices, 0x1p60, 0x1p-60);
   for (int step = in.between(1, 4); step > 0; --step) {
     if (in.choice(4) == 3) {
       faces = faces_of(in);
@@ -80,7 +82,7 @@ void mesh(Input& in) {
     }
     auto x1 = x0;
     for (int moved = in.choice(3 * vertices + 1); moved > 0; --moved)
-      x1[in.choice(3 * vertices)] = in.number();
+      x1[in.choice(3 * vertices)] = in.number(0x1p60, 0x1p-60);
     ccd.prepare(x0.data(), x1.data(), vertices, 0, in.choice(4) == 3, limit);
     plain.prepare(x0.data(), x1.data(), vertices, 0, true, limit);
     for (const auto kind : {MeshCcd::Kind::vf, MeshCcd::Kind::ee}) {

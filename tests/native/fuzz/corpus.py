@@ -53,7 +53,7 @@ def corpus():
     for case in load_cases():
         if case.kind in ("vertex_face", "edge_edge"):
             ends = numbers(case.given["x_t0"]) + numbers(case.given["x_t1"])
-            yield "cloth", bytes([case.kind == "edge_edge"]) + ends
+            yield "cloth", bytes([case.kind == "edge_edge", 7]) + ends
             faces = b"\x02\x02\x01\x01\x00\x01\x02\x01\x02\x03"  # a mesh of the four points
             yield "cloth", faces + numbers(case.given["x_t0"]) + numbers(case.given["x_t1"])
         elif case.kind in ("convex_overlap", "convex_sweep") and fits(case):

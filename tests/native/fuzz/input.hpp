@@ -51,17 +51,19 @@ class Input {
       }
     }
   }
-  // The same, finite and at most so large: of a larger one its fraction.
-  double number(double most = 1.7976931348623157e308) {
+  // The same, finite; of one larger than `most` its fraction, of one smaller than `least` nothing.
+  double number(double most = 1.7976931348623157e308, double least = 0) {
     any();
     if (!std::isfinite(last_)) last_ = 0;
     int exponent = 0;
     if (std::fabs(last_) > most) last_ = std::frexp(last_, &exponent);
+    if (std::fabs(last_) < least) last_ = 0;
     return last_;
   }
-  std::vector<double> numbers(std::size_t n, double most = 1.7976931348623157e308) {
+  std::vector<double> numbers(std::size_t n, double most = 1.7976931348623157e308,
+                              double least = 0) {
     std::vector<double> out(n);
-    for (double& x : out) x = number(most);
+    for (double& x : out) x = number(most, least);
     return out;
   }
 
