@@ -14,7 +14,6 @@ from tauguard.datasets.columns_of_shards import JOINT_SIGNALS, MEANING, RESIDUAL
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import configuration_in, lines, read_head
 from tauguard.datasets.inspection import SplitSummary, summarised
-from tauguard.models import cura6
 from tauguard.whole_file import write_whole
 
 CARD, CROISSANT = "README.md", "croissant.json"
@@ -117,7 +116,7 @@ def card(
         sentence=describe(configuration),
         splits=_split_rows(summary),
         columns=_column_rows(configuration),
-        joints=len(cura6.JOINTS),
+        joints=configuration.most_joints,
         sha256=head["configuration_sha256"],
         tauguard=head["code"]["tauguard"],
         mujoco=head["code"]["mujoco"],
@@ -192,7 +191,7 @@ def _records(split: str, configuration: Configuration) -> tuple[dict[str, Any], 
         "includes": f"data/{split}-*.parquet",
     }
     fields = []
-    for field in schema(len(cura6.JOINTS), configuration.residual):
+    for field in schema(configuration.most_joints, configuration.residual):
         signal = field.name.rpartition("_")[0]
         meaning = MEANING.get(field.name)
         if meaning is None and signal in (*JOINT_SIGNALS, RESIDUAL):

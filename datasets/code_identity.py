@@ -18,6 +18,7 @@ _FILES = {
         "configuration.py",
         "configuration_checks.py",
         "plans.py",
+        "robots.py",
         "schedule.py",
         "shard.py",
         "columns_of_shards.py",

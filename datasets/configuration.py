@@ -19,6 +19,8 @@ from tauguard.datasets.configuration_checks import (
     closest,
     refuse,
 )
+from tauguard.datasets.robots import RobotSource, find_robot
+from tauguard.models import ROBOTS, cura6
 
 #: The configurations that ship, by name.
 NAMED = ("tauguard-collisions-v1", "cura6-twin")
@@ -57,23 +59,44 @@ class Configuration:
     residual: bool  #: whether the momentum observer's estimate of tau_ext is stored
     mismatch: tuple[tuple[str, float], ...]  #: half-widths, see :class:`tauguard.models.Mismatch`
     splits: tuple[Split, ...]
+    robots: tuple[RobotSource, ...] = ()  #: arms that are not the package's own
 
     def to_json(self) -> str:
         """As JSON text with sorted keys: equal configurations give equal text."""
-        return json.dumps(asdict(self), sort_keys=True)
+        values = asdict(self)
+        if not self.robots:
+            del values["robots"]
+        return json.dumps(values, sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Configuration:
         """What :meth:`to_json` wrote."""
         values = json.loads(text)
         splits = tuple(Split(**{k: _frozen(v) for k, v in s.items()}) for s in values["splits"])
-        rest = {k: _frozen(v) for k, v in values.items() if k != "splits"}
-        return cls(**rest, splits=splits)
+        robots = tuple(
+            RobotSource(**{k: _frozen(v) for k, v in r.items()}) for r in values.get("robots", ())
+        )
+        rest = {k: _frozen(v) for k, v in values.items() if k not in ("splits", "robots")}
+        return cls(**rest, splits=splits, robots=robots)
 
     @property
     def sha256(self) -> str:
-        """Of the JSON text."""
-        return hashlib.sha256(self.to_json().encode()).hexdigest()
+        """Of the JSON text; where on this machine an arm's file lies does not count."""
+        anywhere = replace(self, robots=tuple(replace(r, source="") for r in self.robots))
+        return hashlib.sha256(anywhere.to_json().encode()).hexdigest()
+
+    def joints_of(self, arm: str) -> tuple[str, ...]:
+        """The joints' names of an arm, base to tip."""
+        return next((r.joints for r in self.robots if r.name == arm), cura6.JOINTS)
+
+    def source_of(self, arm: str) -> str:
+        """What :func:`tauguard.models.load_arm` makes the arm from."""
+        return next((r.source for r in self.robots if r.name == arm), arm)
+
+    @property
+    def most_joints(self) -> int:
+        """Of any of the arms."""
+        return max(len(self.joints_of(arm)) for split in self.splits for arm in split.arms)
 
     def quick(self) -> Configuration:
         """The first episodes of every split, with the same bytes as in the whole dataset."""
@@ -114,7 +137,7 @@ def load(source: str | Path) -> Configuration:
             f"ship: {', '.join(NAMED)}"
         )
     try:
-        return parse(tomllib.loads(text))
+        return parse(tomllib.loads(text), path.parent)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{where}not TOML ({error})") from None
     except RecursionError:
@@ -123,8 +146,13 @@ def load(source: str | Path) -> Configuration:
         raise ValueError(f"{where}{error}") from None
 
 
-def parse(values: Mapping[str, Any]) -> Configuration:
-    """The configuration of parsed TOML; errors as for :func:`load`."""
+def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
+    """The configuration of parsed TOML; errors as for :func:`load`.
+
+    Args:
+        values: the tables.
+        folder: that files of arms are looked for in.
+    """
     top = checked_table("", {k: v for k, v in values.items() if k not in TABLES}, KEYS["top"])
     if not re.fullmatch(r"[a-z0-9][a-z0-9._-]{0,63}", top["name"]):
         refuse("name", top["name"], "small letters, digits, dots and dashes, at most 64")
@@ -134,13 +162,22 @@ def parse(values: Mapping[str, Any]) -> Configuration:
     tables = values.get("splits")
     if not (isinstance(tables, list) and tables and all(isinstance(t, dict) for t in tables)):
         refuse("splits", tables, "one [[splits]] table or more")
-    splits = []
+    splits, robots = [], dict[str, RobotSource]()
     for number, own in enumerate(tables):
         where = f"splits[{number}]"
         merged = checked_table(where, {**common, **own}, KEYS["split"])
-        splits.append(_split(where, merged))
+        merged["arms"] = _named_arms(where, merged["arms"], folder, robots)
+        joints = [
+            len(robots[arm].joints if arm in robots else cura6.JOINTS) for arm in merged["arms"]
+        ]
+        splits.append(_split(where, merged, min(joints)))
     _check_splits(splits)
-    return Configuration(**top, mismatch=tuple(sorted(widths.items())), splits=tuple(splits))
+    return Configuration(
+        **top,
+        mismatch=tuple(sorted(widths.items())),
+        splits=tuple(splits),
+        robots=tuple(robots[name] for name in sorted(robots)),
+    )
 
 
 TABLES = ("mismatch", "episodes", "splits")
@@ -148,7 +185,31 @@ TABLES = ("mismatch", "episodes", "splits")
 SLOT, MARGIN = 3.0, 3.5
 
 
-def _split(where: str, values: dict[str, Any]) -> Split:
+def _named_arms(
+    where: str, asked: tuple[str, ...], folder: Path, robots: dict[str, RobotSource]
+) -> tuple[str, ...]:
+    """The arms' names in the dataset; those that are not the package's own go into ``robots``."""
+    names = []
+    for arm in asked:
+        if arm in cura6.NAMES:
+            names.append(arm)
+            continue
+        try:
+            found = find_robot(arm, folder)
+        except ValueError as error:
+            hint = closest(arm, (*cura6.NAMES, *ROBOTS))
+            raise ValueError(f"{where}.arms: {error}{hint}") from None
+        if robots.setdefault(found.name, found) != found or found.name in names:
+            refuse(f"{where}.arms", arm, f"another file name: two arms would be {found.name}")
+        names.append(found.name)
+    return tuple(names)
+
+
+def _split(where: str, values: dict[str, Any], joints: int) -> Split:
+    if values["links"] is None:
+        values["links"] = tuple(range(min(2, joints), joints + 1))
+    elif max(values["links"]) > joints:
+        refuse(f"{where}.links", values["links"], f"1 to {joints}, which every arm of it has")
     quick = values["quick_episodes"]
     if quick is None:
         values["quick_episodes"] = max(1, round(0.02 * values["episodes"]))

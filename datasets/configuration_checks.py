@@ -177,7 +177,8 @@ SPLIT = {
     ),
     "seconds": Key(number(1, 600), "seconds, 1 to 600", 60.0),
     "arms": Key(
-        several(one_of(*cura6.NAMES), distinct=True), f"a list of {', '.join(cura6.NAMES)}"
+        several(text, distinct=True),
+        f"a list of {', '.join(cura6.NAMES)}, names of `tauguard robot` or robot files",
     ),
     "individuals": Key(
         several(whole(-1, 2**31), distinct=True), "a list of different seeds, -1 for no mismatch"
@@ -193,7 +194,7 @@ SPLIT = {
         f"a list of {', '.join(KINDS)}",
         ("strike", "pulse", "strike", "clamp"),
     ),
-    "links": Key(several(whole(1, len(cura6.JOINTS))), "a list of links, 1 to 6", (2, 3, 4, 5, 6)),
+    "links": Key(several(whole(1, 40)), "a list of links, counted from 1", None),
     "severities": Key(
         several(span(0.1, 500, equal=False)), "a list of [low, high] in N m, 0.1 to 500", STRATA
     ),

@@ -12,9 +12,9 @@ from typing import IO, Any
 
 from tauguard.datasets.code_identity import code, computed_bits, versions
 from tauguard.datasets.configuration import Configuration
+from tauguard.datasets.robots import nominal_xml
 from tauguard.datasets.schedule import stated_balance
 from tauguard.datasets.shard import fault, manifest_path, read_lines
-from tauguard.models import cura6
 from tauguard.whole_file import PART, remove_parts, write_whole
 
 #: Of the folder's layout; a reader refuses newer ones.
@@ -114,7 +114,7 @@ def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
                     f"{folder}: not empty, and no dataset; name a new or an empty folder"
                 )
             remove_parts(folder)
-            _begin(folder, head)
+            _begin(folder, head, configuration)
             yield
     finally:
         if made:
@@ -132,7 +132,9 @@ def head_of(configuration: Configuration) -> dict[str, Any]:
         "hours": configuration.hours,
         "shards": {s.name: shard_count(configuration, s.name) for s in configuration.splits},
         "planned": stated_balance(configuration),
-        "arms_sha256": {arm: _sha256(cura6.arm_xml(arm)) for arm in arms_of(configuration)},
+        "arms_sha256": {
+            arm: _sha256(nominal_xml(arm, configuration.robots)) for arm in arms_of(configuration)
+        },
         "configuration": json.loads(configuration.to_json()),
     }
 
@@ -167,11 +169,11 @@ def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _begin(folder: Path, head: dict[str, Any]) -> None:
+def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> None:
     for name in ("data", "manifest", "arms"):
         (folder / name).mkdir(exist_ok=True)
     for arm in head["arms_sha256"]:
-        _write_once(folder / "arms" / f"{arm}.xml", cura6.arm_xml(arm))
+        _write_once(folder / "arms" / f"{arm}.xml", nominal_xml(arm, configuration.robots))
     _write_once(folder / HEAD, json.dumps(head, indent=1, sort_keys=True) + "\n")
 
 

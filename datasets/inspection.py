@@ -22,6 +22,7 @@ from tauguard.datasets.dataset_folder import (
     shards,
 )
 from tauguard.datasets.reader import episodes_of
+from tauguard.datasets.robots import check_unchanged
 from tauguard.datasets.schedule import Balance, Planned
 from tauguard.datasets.shard import PHYSICS_RATE, data_path, manifest_path, simulated
 from tauguard.envs import Episode
@@ -220,8 +221,10 @@ def line_of(folder: Path, name: str) -> dict[str, Any]:
 def same_again(folder: Path, line: dict[str, Any]) -> tuple[Trace | None, bool]:
     """The episode simulated from its line alone, and whether its samples are those stored."""
     episode = Episode.from_json(json.dumps(line["episode"]))
-    one = Planned(line["split"], line["number"], line["arm"], line["individual"], episode)
     configuration = configuration_in(folder)
+    check_unchanged(line["arm"], configuration.robots)
+    source = configuration.source_of(line["arm"])
+    one = Planned(line["split"], line["number"], line["arm"], line["individual"], episode, source)
     if not line["rows"]:
         return None, True
     trace, _ = simulated(one, with_residual=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -100,12 +101,15 @@ def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trac
         return
     path = folder / wanted[0]["shard"]
     arms = {arm: arm_xml(folder, arm) for arm in {line["arm"] for line in wanted}}
+    configuration = configuration_in(folder)
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             for line in wanted:
-                yield trace_of(
+                trace = trace_of(
                     file.read_row_group(line["row_group"]), line, {"arm.xml": arms[line["arm"]]}
                 )
+                source = configuration.source_of(line["arm"])
+                yield replace(trace, meta={**trace.meta, "arm_source": source})
     except FileNotFoundError:
         raise FileNotFoundError(
             f"{path}: missing; the same `tauguard generate` that made the dataset makes it again"

@@ -36,6 +36,7 @@ class Planned:
     arm: str
     individual: int  #: seed of its mismatch, -1 for none
     episode: Episode
+    source: str = ""  #: what the arm is made from; "": its name
 
     @property
     def name(self) -> str:
@@ -76,7 +77,8 @@ def planned(configuration: Configuration, split: Split, number: int) -> Planned:
         temperature=float(rng.uniform(*split.temperature)),
         arm=arm,
     )
-    return Planned(split.name, number, arm, individual, episode)
+    source = configuration.source_of(arm)
+    return Planned(split.name, number, arm, individual, episode, source)
 
 
 def all_planned(configuration: Configuration) -> Iterator[Planned]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -24,11 +24,12 @@ from tauguard.datasets.columns_of_shards import (
     table,
 )
 from tauguard.datasets.configuration import Configuration, Split
+from tauguard.datasets.robots import check_unchanged
 from tauguard.datasets.schedule import Planned, planned
 from tauguard.detectors import RobotNumbers, observe
 from tauguard.envs import Simulation, SimulationDiverged
 from tauguard.envs.plant import untimed
-from tauguard.models import Drive, cura6, pin_model
+from tauguard.models import Drive, pin_model
 from tauguard.traces import Trace
 from tauguard.whole_file import whole_file, write_whole
 
@@ -96,8 +97,11 @@ def make_shard(task: ShardTask) -> Done:
     folder = Path(task.folder)
     kept = fault(folder, task.split, task.number) is None
     if not kept:
+        episodes = [planned(configuration, split, n) for n in numbers]
+        for arm in {one.arm for one in episodes}:
+            check_unchanged(arm, configuration.robots)
         with untimed():
-            _write(folder, task, configuration, [planned(configuration, split, n) for n in numbers])
+            _write(folder, task, configuration, episodes)
     return Done(task.split, task.number, len(numbers), len(numbers) * split.seconds, kept)
 
 
@@ -164,11 +168,11 @@ def _write_episodes(
     stream: BinaryIO, configuration: Configuration, episodes: list[Planned], code_hash: str
 ) -> list[dict[str, Any]]:
     """Write the samples, a row group an episode; returns the episodes' lines."""
-    like = schema(len(cura6.JOINTS), configuration.residual)
+    like = schema(configuration.most_joints, configuration.residual)
     lines, groups = [], 0
     with pq.ParquetWriter(stream, like, **writing(like)) as writer:
         for one, trace, residual, outcome in _simulated(configuration, episodes):
-            line = _line(one, trace, outcome)
+            line = _line(one, trace, outcome, configuration.joints_of(one.arm))
             line["key"] = one.key(configuration, code_hash)
             line["row_group"] = groups if line["rows"] else None
             if trace is not None:
@@ -212,7 +216,7 @@ def _simulated(
 
 def simulated(one: Planned, with_residual: bool) -> tuple[Trace, Array | None]:
     """An episode at the rate of the physics, with the observer's residual (T, n) if wanted."""
-    simulation = Simulation(one.episode)
+    simulation = Simulation(replace(one.episode, arm=one.source or one.arm))
     trace = simulation.run()
     if not with_residual:
         return trace, None
@@ -229,7 +233,9 @@ def residual_of(trace: Trace, robot: RobotNumbers, drive: Drive) -> Array:
     return observe(robot, trace.t, trace.q, trace.qd, tau, OBSERVER_GAIN, threads=1)
 
 
-def _line(one: Planned, trace: Trace | None, outcome: str) -> dict[str, Any]:
+def _line(
+    one: Planned, trace: Trace | None, outcome: str, joints: tuple[str, ...]
+) -> dict[str, Any]:
     episode = one.episode
     collisions = () if trace is None else _given(trace.truth).collisions
     return {
@@ -243,7 +249,7 @@ def _line(one: Planned, trace: Trace | None, outcome: str) -> dict[str, Any]:
         "temperature": episode.temperature,
         "seconds": episode.seconds,
         "rows": 0 if trace is None else len(trace.t),
-        "joints": list(cura6.JOINTS),
+        "joints": list(joints),
         "outcome": outcome,
         "planned_collisions": len(episode.collisions),
         "collisions": [collision_line(c) for c in collisions],

@@ -12,6 +12,13 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.models import cura6, derive
+from tauguard.models.arm_drive import (
+    PRESLIDING,
+    level_friction,
+    like_cura6,
+    stated_drive,
+    with_speeds,
+)
 from tauguard.models.arm_file import (
     ARM_BITS,
     OBSTACLE_BITS,
@@ -20,7 +27,7 @@ from tauguard.models.arm_file import (
     ArmFile,
     read_arm,
 )
-from tauguard.models.drive import Drive, Friction, cura6_drive
+from tauguard.models.drive import Drive, cura6_drive
 from tauguard.models.known_robots import ROBOTS, find_file, known_names
 from tauguard.models.robot import Robot, per_joint
 
@@ -29,12 +36,6 @@ __all__ = ["ARM_BITS", "NAMED", "OBSTACLE_BITS", "STICK_RADIUS", "Arm", "Facts",
 
 #: Arms that need no file.
 NAMED = cura6.NAMES
-#: Presliding of joints whose friction is known by its level alone [rad].
-_PRESLIDING = 1.5e-3
-#: The back-EMF brakes a joint no faster than with this time constant [s].
-_FADE_TIME = 4e-3
-#: Gear and gain [N m/A] of drives that nobody states.
-_GEAR, _GAIN = 100.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -63,13 +64,13 @@ class Facts:
         """What controller and observer know: the drive with all friction, the file's included."""
         if not (self.damping.any() or self.friction_loss.any()):
             return self.drive
-        own = self.drive.friction or _friction(np.zeros_like(self.damping), self.damping * 0)
+        own = self.drive.friction or level_friction(np.zeros_like(self.damping), self.damping * 0)
         known = replace(
             own,
             coulomb=own.coulomb + self.friction_loss,
             static=own.static + self.friction_loss,
             viscous=own.viscous + self.damping,
-            bristle_stiffness=own.bristle_stiffness + self.friction_loss / _PRESLIDING,
+            bristle_stiffness=own.bristle_stiffness + self.friction_loss / PRESLIDING,
         )
         return replace(self.drive, friction=known)
 
@@ -215,7 +216,9 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
         limit = derive.torque_limit(model, joints, limit)
         if np.isfinite(limit).all():
             said.derived("torque_limit", "none in the file: holds and accelerates the arm")
-    drive = _drive(robot.drive, limit, said)
+    elif robot.torque_limit is None:
+        said.sources["torque_limit"] += derive.implausible_limit(model, joints, limit)
+    drive = stated_drive(robot.drive, limit, said.sources)
     armature = _rotor(robot.drive, model, joints, limit, drive, said)
     for name, inertia in zip(joints, armature, strict=True):
         spec.joint(name).armature = inertia
@@ -225,7 +228,10 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
     words = "the file's limits" if np.isfinite(file.max_speed).all() else "none in the file: 2"
     tip = model.body(file.links[-1]).id
     speed = said.row("max_speed", speed, words)
-    drive = _with_speeds(drive, speed, derive.lightest_inertia(model, joints))
+    drive = with_speeds(drive, speed, derive.lightest_inertia(model, joints))
+    if robot.drive.like is not None:
+        lossy = (model.dof_damping[dofs] > 0) | (model.dof_frictionloss[dofs] > 0)
+        drive = like_cura6(drive, speed, lossy)
     inertia = derive.servo_inertia(model, joints)
     facts = Facts(
         name=Path(robot.file).stem,
@@ -270,50 +276,6 @@ class _Said:
 
     def derived(self, name: str, words: str) -> None:
         self.sources[name] = f"derived: {words}"
-
-
-def _friction(coulomb: Array, viscous: Array) -> Friction:
-    n = len(coulomb)
-    return Friction(
-        coulomb=coulomb,
-        static=coulomb,
-        stribeck_velocity=np.full(n, 0.03),
-        viscous=viscous,
-        bristle_stiffness=coulomb / _PRESLIDING,
-        load=np.zeros(n),
-    )
-
-
-def _drive(stated: Any, limit: Array, said: _Said) -> Drive:
-    n = said.joints
-    gear, constant = stated.row("gear", n), stated.row("torque_constant", n)
-    current = stated.row("current_limit", n)
-    ratio = np.full(n, _GEAR) if gear is None else gear
-    gain = np.full(n, _GAIN) if constant is None else ratio * constant
-    coulomb, viscous = stated.row("coulomb", n), stated.row("viscous", n)
-    friction = None
-    if coulomb is not None or viscous is not None:
-        zero = np.zeros(n)
-        friction = _friction(
-            zero if coulomb is None else coulomb, zero if viscous is None else viscous
-        )
-    named = [
-        k for k in ("gear", "torque_constant", "coulomb", "viscous") if stated.row(k, n) is not None
-    ]
-    rest = "no losses, no ripple, no lag" if friction is None else "no ripple, no lag"
-    given = said.sources.get("drive", "given" if named else "")
-    assumed = [] if constant is not None else [f"{_GAIN:g} N m/A"]
-    said.sources["drive"] = "; ".join(x for x in (given, *assumed, rest) if x)
-    return Drive(gain, ratio, limit / gain if current is None else current, None, friction)
-
-
-def _with_speeds(drive: Drive, speed: Array, lightest: Array) -> Drive:
-    """Torque that falls above the largest speed, slowly enough for a step of a few milliseconds."""
-    limit = drive.torque_limit
-    if not np.isfinite(limit).all():
-        return drive
-    span = np.maximum(speed, limit * _FADE_TIME / lightest)
-    return replace(drive, rated_speed=speed, no_load_speed=speed + span)
 
 
 def _rotor(

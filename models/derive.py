@@ -17,6 +17,11 @@ ROTOR_SHARE = 0.05
 #: A torque limit that nobody states holds the arm this many times, overcomes the friction of the
 #: file twice, and accelerates the largest inertia so [rad/s^2] (a UR10e's base: 27).
 HOLDING_FACTOR, SPARE_ACCELERATION = 2.0, 30.0
+#: Strongest joint's torque limit over what gravity asks of the most loaded one: UR5, UR10, Panda,
+#: xArm7, Z1, Kinova j2s6s200 and the CURA6-like arm have 1.6 to 4.1. Outside of this it is marked.
+PLAUSIBLE = (1.0, 8.0)
+#: Gravity turns no hinge of an arm whose largest such torque over its weight is below this [m].
+SHORTEST_LEVER = 0.02
 #: Joint speed of an arm whose file states none [rad/s], and acceleration of every such arm.
 DEFAULT_SPEED, DEFAULT_ACCELERATION = 2.0, 10.0
 #: Poses that inertia and gravity are looked at in.
@@ -76,12 +81,39 @@ def holding_torque(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
     """Largest torque that gravity needs over the random poses [N m], shape (n,)."""
     at = joint_ids(model, joints)
     adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]
-    data, most = mujoco.MjData(model), np.zeros(len(at))
+    data, most, torque = mujoco.MjData(model), np.zeros(len(at)), np.zeros(model.nv)
     for pose in random_poses(model, joints):
         data.qpos[adr] = pose
-        mujoco.mj_forward(model, data)
-        most = np.maximum(most, np.abs(data.qfrc_bias[dof]))
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 0, torque)
+        most = np.maximum(most, np.abs(torque[dof]))
     return most
+
+
+def implausible_limit(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) -> str:
+    """What is odd about a file's torque limits [N m], shape (n,), in words; "" for nothing.
+
+    A serial arm's strongest joint gives a few times what gravity asks of the most loaded one.
+    """
+    hinge = model.jnt_type[joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_HINGE
+    if not hinge.any():
+        return ""
+    needed = np.where(hinge, holding_torque(model, joints), 0.0)
+    weight = float(np.linalg.norm(model.opt.gravity)) * float(model.body_mass.sum())
+    held, most = int(np.argmax(needed)), int(np.argmax(np.where(hinge, limit, 0.0)))
+    if needed[held] < SHORTEST_LEVER * weight:
+        return ""  # axes that gravity does not turn: nothing to compare with
+    low, high = PLAUSIBLE
+    ratio = limit[most] / needed[held]
+    if low <= ratio <= high:
+        return ""
+    return (
+        f"; implausible: {limit[most]:.3g} N m at {joints[most]}, where gravity asks at most "
+        f"{needed[held]:.2g} N m of {joints[held]} ({ratio:.2g} times; cobots have 1.6 to 4.1): "
+        "state torque_limit"
+    )
 
 
 def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) -> Array:

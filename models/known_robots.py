@@ -51,7 +51,15 @@ _UR_SIZES = {
 ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
     dict(
         [
-            _row("ur3", "ur_description/urdf/ur3_robot.urdf", None, _UR_SOURCE, home=_UR_HOME),
+            _row(
+                "ur3",
+                "ur_description/urdf/ur3_robot.urdf",
+                None,
+                _UR_SOURCE | _UR_SIZES,
+                home=_UR_HOME,
+                torque_limit=(56.0, 56.0, 28.0, 12.0, 12.0, 12.0),
+                max_speed=(3.1416, 3.1416, 3.1416, 6.2832, 6.2832, 6.2832),
+            ),
             _row("ur5", "ur_description/urdf/ur5_robot.urdf", None, _UR_SOURCE, home=_UR_HOME),
             _row("ur10", "ur_description/urdf/ur10_robot.urdf", None, _UR_SOURCE, home=_UR_HOME),
             _row(
@@ -130,7 +138,13 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
             ),
             _row("z1", "z1_description/urdf/z1.urdf", "unitree_z1", {}),
             _row("j2s6s200", "kinova_description/robots/kinova.urdf", None, {}),
-            _row("so100", "so_arm_description/urdf/so100.urdf", None, {}),
+            _row(
+                "so100",
+                "so_arm_description/urdf/so100.urdf",
+                None,
+                {"torque_limit": "stall torque of a Feetech STS3215 at 12 V, 30 kg cm"},
+                torque_limit=2.94,
+            ),
         ]
     )
 )

@@ -33,10 +33,17 @@ class RobotDrive:
     current_limit: float | Numbers | None = None  #: [A]
     coulomb: float | Numbers | None = None  #: [N m]
     viscous: float | Numbers | None = None  #: [N m s/rad]
+    like: str | None = None
+    """``"cura6"``: joints of which neither this nor the file states friction get that arm's losses
+    (:mod:`tauguard.models.losses`), all joints its ripple, lag and sensor noise."""
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the field."""
+        if self.like not in (None, "cura6"):
+            raise ValueError(f'drive.like {self.like!r}: expected "cura6"')
         for field in fields(self):
+            if field.name == "like":
+                continue
             value = getattr(self, field.name)
             if value is None:
                 continue

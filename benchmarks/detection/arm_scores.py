@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,6 +28,7 @@ class Extent:
     calibration_hours: float
     hours: float  #: fresh, free of collisions
     per_stratum: int  #: judged collisions of a stratum at one speed
+    under: Conditions = field(default_factory=Conditions)
 
 
 @dataclass(frozen=True)
@@ -60,17 +61,18 @@ class Arm:
 def arm_scores(job: tuple[Extent, int, int]) -> Arm:
     """Train, simulate and score the arm ``job[2]`` of the study's seed ``job[1]``."""
     extent, seed, arm = job
-    return scored(extent, seed, arm, train(seed, arm, extent.names, extent.training))
+    return scored(extent, seed, arm, train(seed, arm, extent.names, extent.training, extent.under))
 
 
 def scored(extent: Extent, seed: int, arm: int, detectors: dict[str, FittedDetector]) -> Arm:
     """Simulate and score detectors that are trained already."""
-    known = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
+    payloads = tuple(sorted(map(float, set(TRAINING_PAYLOADS))))
+    known, under = replace(extent.under, payloads=payloads), extent.under
     return Arm(
         arm,
         _free(detectors, stream(seed, CALIBRATE, 9), arm, extent.calibration_hours, known),
-        _free(detectors, stream(seed, TEST, 9), arm, extent.hours, None),
-        _struck(detectors, stream(seed, TEST, 10, arm), arm, extent.per_stratum),
+        _free(detectors, stream(seed, TEST, 9), arm, extent.hours, under),
+        _struck(detectors, stream(seed, TEST, 10, arm), arm, extent.per_stratum, under),
     )
 
 
@@ -79,7 +81,7 @@ def _free(
     seed: int,
     arm: int,
     hours: float,
-    under: Conditions | None,
+    under: Conditions,
 ) -> Free:
     """Episode by episode, speed by speed."""
     pools = [free_pool(seed, speed, (arm,), hours / len(SPEEDS), under) for speed in SPEEDS]
@@ -89,11 +91,15 @@ def _free(
 
 
 def _struck(
-    detectors: dict[str, FittedDetector], seed: int, arm: int, per_stratum: int
+    detectors: dict[str, FittedDetector],
+    seed: int,
+    arm: int,
+    per_stratum: int,
+    under: Conditions,
 ) -> dict[str, list[Blow]]:
     found: dict[str, list[Blow]] = {name: [] for name in detectors}
     for k, speed in enumerate(SPEEDS if per_stratum else ()):
-        for struck in struck_pool(seed, speed, (arm,), per_stratum, first=k):
+        for struck in struck_pool(seed, speed, (arm,), per_stratum, conditions=under, first=k):
             for name, detector in detectors.items():
                 found[name] += _blows(detector, struck)
     return found

@@ -59,17 +59,27 @@ def training_groups(names: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def train(
-    seed: int, arm: int, names: Sequence[str], training: Training
+    seed: int,
+    arm: int,
+    names: Sequence[str],
+    training: Training,
+    conditions: Conditions | None = None,
 ) -> dict[str, FittedDetector]:
     """The detectors of one arm, trained on its slices."""
-    return fitted(seed, arm, {name: make_detector(name) for name in names}, training)
+    detectors = {name: make_detector(name) for name in names}
+    return fitted(seed, arm, detectors, training, conditions)
 
 
 def fitted(
-    seed: int, arm: int, detectors: Mapping[str, Detector], training: Training
+    seed: int,
+    arm: int,
+    detectors: Mapping[str, Detector],
+    training: Training,
+    conditions: Conditions | None = None,
 ) -> dict[str, FittedDetector]:
     """The same for detectors that need not be in the registry."""
-    traces, robot = training.traces(seed, arm), nominal_design()
+    under = conditions or Conditions()
+    traces, robot = training.traces(seed, arm, under), nominal_design(under.robot)
     return {name: detector.fit(traces, robot) for name, detector in detectors.items()}
 
 

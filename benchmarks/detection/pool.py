@@ -38,6 +38,8 @@ GROUP, ROUNDS = 5, 8
 
 Stratum = tuple[float, float]
 Wish = tuple[str, Stratum]
+#: Of a collision that is in none.
+_NONE = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,9 @@ class Conditions:
     scale: float = 1.0  #: of the mismatch between the arm and what is believed of it
     timestep: float = 1e-3  #: [s]
     without: tuple[str, ...] = ()  #: parts of the drives that are left out
+    robot: str = "cura6"  #: a name or a file
+    joints: int = 6  #: of the robot
+    share: float = 1.0  #: of the payloads, torques and least forces that are for the CURA6-like arm
 
     def arm(self, seed: int) -> Mismatch:
         """The arm ``seed`` under these conditions."""
@@ -57,10 +62,32 @@ class Conditions:
         return replace(plain, **{n: self.scale * getattr(plain, n) for n in names})
 
     def applied(self, episode: Episode) -> Episode:
-        """``episode`` at this temperature and time step."""
+        """``episode`` of this robot, at this temperature and time step."""
         if self.temperature is not None:
             episode = replace(episode, temperature=self.temperature)
-        return replace(episode, timestep=self.timestep)
+        return replace(
+            episode,
+            timestep=self.timestep,
+            arm=self.robot,
+            payload_g=self.share * episode.payload_g,
+            collisions=tuple(self._planned(plan) for plan in episode.collisions),
+        )
+
+    def _planned(self, plan: CollisionPlan) -> CollisionPlan:
+        return replace(
+            plan,
+            link=min(plan.link, self.joints),
+            severity=plan.severity and self.torques(plan.severity),
+            force=plan.force and self.forces(plan.force),
+        )
+
+    def torques(self, stratum: Stratum) -> Stratum:
+        """A stratum of this robot [N m]."""
+        return self.share * stratum[0], self.share * stratum[1]
+
+    def forces(self, span: tuple[float, float]) -> tuple[float, float]:
+        """Lowest and highest peak contact force of its collisions [N]."""
+        return self.share * span[0], span[1]
 
     def simulated(self, episode: Episode) -> Trace:
         """``episode`` under these conditions."""
@@ -131,8 +158,9 @@ def struck_pool(
             assert trace.truth is not None
             kept = []
             for collision in trace.truth.collisions:
-                wish = (collision.kind, _stratum(collision, strata))
-                good = missing[wish] > 0 and _counts(collision, trace, forces)
+                own = {under.torques(stratum): stratum for stratum in strata}
+                wish = (collision.kind, own.get(_stratum(collision, [*own]), _NONE))
+                good = missing[wish] > 0 and _counts(collision, trace, under.forces(forces))
                 missing[wish] -= int(good)
                 kept.append(good)
             yield Struck(arm, payload, trace, tuple(kept))
@@ -156,7 +184,7 @@ def _plans(
 
 def _stratum(collision: Collision, strata: Sequence[Stratum]) -> Stratum:
     found = [s for s in strata if s[0] <= collision.peak_tau < s[1]]
-    return found[0] if found else (0.0, 0.0)
+    return found[0] if found else _NONE
 
 
 def _counts(collision: Collision, trace: Trace, forces: tuple[float, float]) -> bool:

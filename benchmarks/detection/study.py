@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tauguard.benchmarks.detection import chart as detection_chart
+from tauguard.benchmarks.detection import foreign, variations
 from tauguard.benchmarks.detection import rows as report
 from tauguard.benchmarks.detection import table as detection_table
-from tauguard.benchmarks.detection import variations
 from tauguard.benchmarks.detection.fleet import (
     NETWORK,
     TEST,
@@ -71,6 +71,7 @@ NOTES = {
     "training_size": "at the third point, one speed and arm; few collisions, wide intervals.",
     "conditions": "what training did not have, at the third point, one speed and arm; nothing is "
     "learnt anew.",
+    "robot": foreign.NOTE,
     "sigma": "the length of the SRQ kernel, at the third point, one speed and arm.",
     "sample_rate": "a kilohertz beside the rate of the arm in the dissertation.",
     "headline": "the best detector (one for all cells) and SVR-SRQ beside the dissertation's SVR. "
@@ -126,7 +127,13 @@ QUICK = Size(
 )
 
 
-def run(quick: bool, seed: int, detector: str | None = None, keep: str | None = None) -> list[Row]:
+def run(
+    quick: bool,
+    seed: int,
+    detector: str | None = None,
+    keep: str | None = None,
+    robot: str | None = None,
+) -> list[Row]:
     """Rows of all studies; see :mod:`tauguard.benchmarks.detection.rows` for their fields.
 
     Args:
@@ -134,7 +141,12 @@ def run(quick: bool, seed: int, detector: str | None = None, keep: str | None = 
         seed: of all arms and motions.
         detector: one more method, as module:Class.
         keep: folder of what is done already, and goes on being done.
+        robot: these arms instead, parted by commas: rows ``robot`` alone.
     """
+    if robot is not None:
+        if detector is not None:
+            raise ValueError("--detector, --robot: one of them; robots have detectors of their own")
+        return foreign.run([name.strip() for name in robot.split(",")], quick, seed, keep)
     size = QUICK if quick else FULL
     if detector is not None and detector not in size.detectors:
         make_detector(detector)  # names what is wrong before anything is simulated
@@ -250,4 +262,7 @@ def shown(rows: list[Row]) -> list[Row]:
 
 def draw(rows: list[Row], figure: Figure) -> None:
     """See :func:`tauguard.benchmarks.detection_chart.draw`."""
-    detection_chart.draw(rows, figure)
+    if all(row["study"] == "robot" for row in rows):
+        foreign.draw(rows, figure)
+    else:
+        detection_chart.draw(rows, figure)

@@ -23,7 +23,9 @@ def nominal_arm(traces: Sequence[Trace]) -> ArmModel:
     arm = traces[0].attachments.get("arm.xml")
     if arm is None:
         raise ValueError("no arm.xml attached: train on recordings that tauguard simulated")
-    return _believed(arm, load_arm(traces[0].meta.get("arm", "cura6")).facts.drive)
+    meta = traces[0].meta
+    name = meta.get("arm_source", meta.get("arm", "cura6"))
+    return _believed(arm, load_arm(name).facts.drive)
 
 
 def nominal_design(name: str = "cura6") -> ArmModel:

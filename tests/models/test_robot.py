@@ -4,7 +4,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from tauguard.models import ROBOTS, Robot, RobotDrive, SceneSpec, compose, load_arm, pin_model
+from tauguard.models import (
+    ROBOTS,
+    Robot,
+    RobotDrive,
+    SceneSpec,
+    compose,
+    cura6_drive,
+    load_arm,
+    pin_model,
+)
 from tests.models.arms import random_arm
 
 
@@ -137,3 +146,40 @@ def test_a_known_arm_without_its_model_says_what_to_install(monkeypatch):
     monkeypatch.setattr("tauguard.models.known_robots.menagerie_file", lambda name: None)
     with pytest.raises(FileNotFoundError, match=r"extra `arms`.*or give a file"):
         load_arm("panda")
+
+
+@pytest.mark.parametrize(("factor", "marked"), [(0.2, True), (1.5, False), (40.0, True)])
+def test_torque_limits_that_cannot_be_are_marked(tmp_path, factor, marked):
+    """Two links of 2 kg, 0.4 m long: gravity asks 2 g (0.2 + 0.6) = 15.7 N m of the first."""
+    limit = factor * 2 * 9.81 * (0.2 + 0.6)
+    link = '<geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.01" mass="2"/>'
+    joint = f'<joint name="j{{}}" axis="0 1 0" actuatorfrcrange="{-limit} {limit}"/>'
+    path = tmp_path / "two.xml"
+    path.write_text(
+        f'<mujoco><worldbody><body name="a">{joint.format(1)}{link}<body name="b" pos="0.4 0 0">'
+        f"{joint.format(2)}{link}</body></body></worldbody></mujoco>"
+    )
+    source = load_arm(str(path)).facts.sources["torque_limit"]
+    assert ("implausible" in source) == marked
+    assert ("of j1" in source) == marked
+    assert (
+        "implausible"
+        not in load_arm(Robot(str(path), torque_limit=20.0)).facts.sources["torque_limit"]
+    )
+
+
+def test_losses_like_the_cura6s_are_shares_of_the_limits(arm):
+    own, like = cura6_drive(), load_arm(Robot(str(arm(5)), drive=RobotDrive(like="cura6"))).facts
+    drive, shares = like.drive, own.friction.coulomb / own.torque_limit
+    quiet = (like.damping == 0) & (like.friction_loss == 0)
+    given = drive.friction.coulomb / drive.torque_limit
+    assert ((given >= shares.min()) & (given <= shares.max()))[quiet].all()
+    assert (given[~quiet] == 0).all()
+    noise = drive.sensors.current_noise / drive.current_limit
+    assert noise == pytest.approx(np.mean(own.sensors.current_noise / own.current_limit))
+    assert drive.ripple.amplitude.shape == (len(like.joints), len(own.ripple.cycles))
+    assert "shares of limits" in like.sources["drive"]
+    stated = Robot(str(arm(5)), drive=RobotDrive(like="cura6", coulomb=0.5))
+    assert load_arm(stated).facts.drive.friction.coulomb == pytest.approx(0.5)
+    with pytest.raises(ValueError, match=r'drive\.like .*expected "cura6"'):
+        RobotDrive(like="ur5")

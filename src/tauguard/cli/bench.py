@@ -40,7 +40,7 @@ def command(
         quick: a shorter run, 60 s or less on 2 cores (the full one takes up to 30 minutes).
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
-        robot: arms of the study `arms`, by name or file, parted by commas.
+        robot: arms of the studies `arms` and `detection`, by name or file, parted by commas.
         keep: folder for what `guard`, `entries`, `detection`, `detection_parts`,
             `detection_ladder` and `false_alarms` have done; what it holds is not done again. The
             last four leave results of other versions, or of other sources of simulation and
@@ -59,8 +59,8 @@ def command(
         return
     if detector is not None and name != "detection":
         raise ValueError(f"--detector goes with the study detection, not with {name}")
-    if robot is not None and name != "arms":
-        raise ValueError(f"--robot goes with the study arms, not with {name}")
+    if robot is not None and name not in ("arms", "detection"):
+        raise ValueError(f"--robot goes with the studies arms and detection, not with {name}")
     if keep is not None and name not in KEEPING:
         raise ValueError(f"--keep goes with the studies {', '.join(KEEPING)}, not with {name}")
     given = {"detector": detector, "robot": robot, "keep": None if keep is None else str(keep)}

@@ -1,0 +1,93 @@
+"""Arms of a dataset that are not the package's own: where each comes from, and what it was."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tauguard.models import Robot, Scene, SceneSpec, compose, cura6
+
+#: What a dataset calls an arm is part of a file's name.
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}")
+
+
+@dataclass(frozen=True)
+class RobotSource:
+    """An arm by name or file, as it was when the dataset was described."""
+
+    name: str  #: what the dataset calls it: the name asked for, or the file's without its ending
+    source: str  #: a name that :func:`tauguard.models.load_arm` knows, or a file's whole path
+    joints: tuple[str, ...]
+    sha256: str  #: of all that its simulation depends on
+
+
+def find_robot(asked: str, folder: Path) -> RobotSource:
+    """The arm that a configuration in ``folder`` asks for.
+
+    Raises:
+        ValueError: no such arm, one that cannot be used, or an unfit file name.
+    """
+    file = next((p.resolve() for p in (folder / asked, Path(asked)) if p.is_file()), None)
+    source, name = (str(file), file.stem) if file else (asked, asked)
+    try:
+        scene = _scene(source)
+    except FileNotFoundError as error:
+        raise ValueError(str(error)) from None
+    if not _NAME.fullmatch(name):
+        raise ValueError(
+            f"{asked}: expected a file name of letters, digits, -, _ and dots, up to 40"
+        )
+    if file and name in cura6.NAMES:
+        raise ValueError(f"{asked}: expected another file name, {name} is an arm of the package")
+    return RobotSource(name, source, scene.joint_names, _digest(scene))
+
+
+def nominal_xml(name: str, robots: Sequence[RobotSource]) -> str:
+    """The nominal arm as MJCF: what an observer may believe."""
+    for robot in robots:
+        if robot.name == name:
+            return _scene(robot.source).arm_xml
+    return cura6.arm_xml(name)
+
+
+def check_unchanged(name: str, robots: Sequence[RobotSource]) -> None:
+    """``ValueError`` where an arm's file is not what it was when the dataset was described."""
+    for robot in robots:
+        if robot.name == name and _digest(_scene(robot.source)) != robot.sha256:
+            raise ValueError(
+                f"arm {name}: {robot.source} is not what the dataset was begun with; restore the "
+                "file, or name another folder"
+            )
+
+
+def _scene(source: str) -> Scene:
+    named = [Path(source)]
+    if source.lower().endswith(".toml") and named[0].is_file():
+        named.append(Path(Robot.from_toml(source).file))
+    return _composed(source, tuple(file.stat().st_mtime_ns for file in named if file.is_file()))
+
+
+@functools.lru_cache(maxsize=16)
+def _composed(source: str, changed: tuple[int, ...]) -> Scene:
+    """The nominal scene; its text takes seconds to write where there are detailed meshes."""
+    return compose(SceneSpec(arm=source), visuals=False)
+
+
+def _digest(scene: Scene) -> str:
+    """Over the nominal arm, its shapes included, and every number that its file does not have."""
+    facts = scene.facts
+    rest = {key: value for key, value in asdict(facts).items() if key not in ("name", "sources")}
+    text = json.dumps(rest, sort_keys=True, default=_plain)
+    return hashlib.sha256(f"{scene.arm_xml}\n{text}".encode()).hexdigest()
+
+
+def _plain(value: object) -> object:
+    assert isinstance(value, np.ndarray)
+    return value.tolist()

@@ -1,0 +1,120 @@
+"""The drives of an arm whose file says little of them: stated, assumed, or like the CURA6's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tauguard.arrays import Array, Bools
+from tauguard.models import cura6
+from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
+from tauguard.models.robot import RobotDrive
+
+#: Presliding of joints whose friction is known by its level alone [rad].
+PRESLIDING = 1.5e-3
+#: The back-EMF brakes a joint no faster than with this time constant [s].
+_FADE_TIME = 4e-3
+#: Gear and gain [N m/A] of drives that nobody states.
+_GEAR, _GAIN = 100.0, 10.0
+
+
+def level_friction(coulomb: Array, viscous: Array) -> Friction:
+    """Friction of which only two numbers a joint are known [N m, N m s/rad], shapes (n,)."""
+    n = len(coulomb)
+    return Friction(
+        coulomb=coulomb,
+        static=coulomb,
+        stribeck_velocity=np.full(n, 0.03),
+        viscous=viscous,
+        bristle_stiffness=coulomb / PRESLIDING,
+        load=np.zeros(n),
+    )
+
+
+def stated_drive(stated: RobotDrive, limit: Array, sources: dict[str, str]) -> Drive:
+    """What a robot's description says of its drives; ``sources`` gets a note of what is assumed."""
+    n = len(limit)
+    gear, constant = stated.row("gear", n), stated.row("torque_constant", n)
+    current = stated.row("current_limit", n)
+    ratio = np.full(n, _GEAR) if gear is None else gear
+    gain = np.full(n, _GAIN) if constant is None else ratio * constant
+    coulomb, viscous = stated.row("coulomb", n), stated.row("viscous", n)
+    friction = None
+    if coulomb is not None or viscous is not None:
+        zero = np.zeros(n)
+        friction = level_friction(
+            zero if coulomb is None else coulomb, zero if viscous is None else viscous
+        )
+    named = [
+        k for k in ("gear", "torque_constant", "coulomb", "viscous") if stated.row(k, n) is not None
+    ]
+    rest = "no losses, no ripple, no lag" if friction is None else "no ripple, no lag"
+    given = sources.get("drive", "given" if named else "")
+    assumed = [] if constant is not None else [f"{_GAIN:g} N m/A"]
+    if stated.like is not None:
+        rest = "ripple, lag, noise and missing friction: the CURA6-like arm's, as shares of limits"
+    sources["drive"] = "; ".join(x for x in (given, *assumed, rest) if x)
+    return Drive(gain, ratio, limit / gain if current is None else current, None, friction)
+
+
+def with_speeds(drive: Drive, speed: Array, lightest: Array) -> Drive:
+    """Torque that falls above the largest speed, slowly enough for a step of a few milliseconds."""
+    limit = drive.torque_limit
+    if not np.isfinite(limit).all():
+        return drive
+    span = np.maximum(speed, limit * _FADE_TIME / lightest)
+    return replace(drive, rated_speed=speed, no_load_speed=speed + span)
+
+
+def like_cura6(drive: Drive, speed: Array, lossy: Bools) -> Drive:
+    """``drive`` with friction, ripple, lag and sensor noise of the CURA6-like arm's class.
+
+    Coulomb friction is a share of the torque limit and viscous friction of the limit over the
+    largest speed; ripple and noise of the currents are shares of the current limit; the rise of the
+    friction with load goes with one over the limit. Each share is the mean over that arm's joints.
+
+    Args:
+        drive: a joint's friction that it states is kept.
+        speed: largest joint speeds [rad/s], shape (n,).
+        lossy: joints to which the file gives friction: they get no more, shape (n,).
+
+    Raises:
+        ValueError: a joint without a torque limit.
+    """
+    limit, current = drive.torque_limit, drive.current_limit
+    if not np.isfinite(limit).all():
+        raise ValueError("drive.like: a joint has no torque limit; state torque_limit")
+    like, stated = cura6_drive(), drive.friction
+    own, ripple, sensors = like.friction, like.ripple, like.sensors
+    assert own is not None
+    assert ripple is not None
+    assert sensors is not None
+    most, fastest = like.torque_limit, np.array(cura6.MAX_SPEED)
+    coulomb = np.where(lossy, 0.0, limit * np.mean(own.coulomb / most))
+    viscous = np.where(lossy, 0.0, limit / speed * np.mean(own.viscous * fastest / most))
+    if stated is not None:
+        known = (stated.coulomb > 0) | (stated.viscous > 0)
+        coulomb = np.where(known, stated.coulomb, coulomb)
+        viscous = np.where(known, stated.viscous, viscous)
+    friction = Friction(
+        coulomb=coulomb,
+        static=coulomb * np.mean(own.static / own.coulomb),
+        stribeck_velocity=np.full(len(limit), np.mean(own.stribeck_velocity)),
+        viscous=viscous,
+        bristle_stiffness=coulomb / PRESLIDING,
+        load=np.mean(own.load * most) / limit,
+    )
+    heights = np.mean(ripple.amplitude / like.current_limit[:, None], axis=0)
+    turns = np.arange(float(len(limit)))
+    noise, quantum = sensors.current_noise, sensors.current_quantum
+    return replace(
+        drive,
+        electrical_time_constant=like.electrical_time_constant,
+        friction=friction,
+        ripple=Ripple(ripple.cycles, np.outer(current, heights), np.outer(turns, ripple.phase[1])),
+        sensors=Sensors(
+            current_noise=current * np.mean(noise / like.current_limit),
+            current_quantum=current * np.mean(quantum / like.current_limit),
+        ),
+    )

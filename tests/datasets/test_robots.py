@@ -1,0 +1,125 @@
+"""Datasets of arms that are not the package's: by file, checked, the same bytes, true labels."""
+
+import json
+import textwrap
+
+import numpy as np
+import pytest
+
+from tauguard.datasets import inspection
+from tauguard.datasets.configuration import Configuration, load
+from tauguard.datasets.dataset_folder import lines
+from tauguard.datasets.generation import generate_dataset
+from tauguard.datasets.reader import read
+from tauguard.detectors import RobotNumbers, inverse_dynamics
+from tauguard.detectors.calibration.nominal import nominal_arm
+from tauguard.envs import CollisionPlan, Episode, Simulation
+from tauguard.models import load_arm, pin_model
+from tests.models.arms import random_arm
+
+from .conftest import contents
+
+MIXED = """
+    name = "mixed"
+    seed = 3
+    rate = 100
+    episodes_per_shard = 1
+    [[splits]]
+    name = "train"
+    episodes = 2
+    seconds = 6.6
+    struck = 1.0
+    individuals = [0]
+    speeds = [40]
+    severities = [[4, 64]]
+    arms = ["cura6", "robots/other.toml"]
+"""
+#: Of seven joints.
+SEED = 3
+
+
+@pytest.fixture
+def described(tmp_path):
+    folder = tmp_path / "robots"
+    folder.mkdir()
+    (folder / "arm.xml").write_text(random_arm(SEED))
+    (folder / "other.toml").write_text('file = "arm.xml"\n[drive]\nlike = "cura6"\n')
+    (tmp_path / "mixed.toml").write_text(textwrap.dedent(MIXED))
+    return tmp_path / "mixed.toml"
+
+
+def test_any_workers_give_the_same_bytes_and_the_arm_goes_with_them(described, tmp_path):
+    configuration = load(described)
+    assert Configuration.from_json(configuration.to_json()) == configuration
+    for workers in (1, 2):
+        generate_dataset(configuration, tmp_path / str(workers), workers=workers)
+    assert contents(tmp_path / "1") == contents(tmp_path / "2")
+    assert inspection.verified(tmp_path / "1") == []
+    (line,) = [x for x in lines(tmp_path / "1") if x["arm"] == "other"]
+    arm = load_arm(str(described.parent / "robots" / "other.toml"))
+    assert line["joints"] == list(arm.joints)
+    assert str(tmp_path) not in json.dumps(line)
+    _, same = inspection.same_again(tmp_path / "1", line)
+    assert same
+    (stored,) = read(tmp_path / "1", arm="other")
+    assert stored.joint_names == arm.joints
+    believed = nominal_arm([stored])
+    assert believed.robot.joints == len(arm.joints)
+    np.testing.assert_array_equal(believed.drive_gain, arm.facts.drive.gain)
+
+    (described.parent / "robots" / "arm.xml").write_text(random_arm(SEED + 1))
+    with pytest.raises(ValueError, match=r"arm other: .*other\.toml is not what the dataset was"):
+        inspection.same_again(tmp_path / "1", line)
+    with pytest.raises(ValueError, match="holds another dataset"):
+        generate_dataset(load(described), tmp_path / "1", workers=1)
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ("robots/none.urdf", r"splits\[0\]\.arms: arm 'robots/none\.urdf': no such file or name"),
+        ("robots/broken.xml", r"splits\[0\]\.arms: arm .*broken\.xml"),
+        ("robots/cura6.xml", "expected another file name, cura6 is an arm of the package"),
+        ("robots/two words.xml", "expected a file name of letters"),
+        ("other.xml", "expected another file name: two arms would be other"),
+    ],
+)
+def test_an_arm_that_cannot_be_is_named_before_anything_is_written(described, asked, message):
+    folder = described.parent
+    (folder / "robots" / "broken.xml").write_text("<mujoco><worldbody/></mujoco>")
+    for name in ("robots/cura6.xml", "robots/two words.xml", "other.xml"):
+        (folder / name).write_text(random_arm(SEED))
+    described.write_text(described.read_text().replace('"cura6"', f'"{asked}"'))
+    with pytest.raises(ValueError, match=message):
+        load(described)
+
+
+def test_a_split_strikes_links_that_its_arms_have(described):
+    few = 'file = "arm.xml"\njoints = ["{}"]\n'.format(
+        '", "'.join(load_arm(str(described.parent / "robots" / "arm.xml")).joints[:3])
+    )
+    (described.parent / "robots" / "other.toml").write_text(few)
+    assert load(described).splits[0].links == (2, 3)
+    described.write_text(described.read_text() + "links = [5]\n")
+    with pytest.raises(ValueError, match=r"links = \(5,\): expected 1 to 3, which every arm"):
+        load(described)
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("kind", ["strike", "clamp", "pulse"])
+def test_the_labels_are_what_the_motion_was_pushed_by(tmp_path, seed, kind):
+    """Newton's law along the trace: tau_ext = M dv/dt + bias - tau, from Pinocchio's numbers."""
+    path = tmp_path / "arm.xml"
+    path.write_text(random_arm(seed))
+    plans = tuple(CollisionPlan(kind, time=t, link=4) for t in (0.6, 2.2))
+    simulation = Simulation(
+        Episode(1, 4.0, 60.0, arm=str(path), collisions=plans, ideal_drive=True)
+    )
+    trace = simulation.run()
+    assert trace.truth.collisions
+    robot = RobotNumbers.from_pin(pin_model(simulation.scene.arm_xml))
+    qdd = np.diff(trace.qd, axis=0) / trace.dt
+    needed = inverse_dynamics(robot, trace.q[:-1], trace.qd[:-1], qdd)
+    pushed = needed - simulation.scene.drive.gain * trace.current[:-1]
+    largest = np.abs(trace.truth.tau_ext).max()
+    np.testing.assert_allclose(pushed, trace.truth.tau_ext[:-1], atol=1e-6 * largest)
