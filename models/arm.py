@@ -253,6 +253,11 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
         gripper=file.gripper,
         sources=said.sources,
     )
+    if file.mended:
+        names = ", ".join(file.mended[:4]) + (", ..." if len(file.mended) > 4 else "")
+        said.sources["inertia"] = (
+            f"no body can have the file's of {names}: made the nearest possible"
+        )
     if file.gripper:
         said.sources["gripper"] = f"{robot.gripper}ed: {', '.join(file.gripper)}".replace(
             "passiveed", "passive"

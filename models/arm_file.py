@@ -14,6 +14,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.models.mjcf import SpecText, compiled
 from tauguard.models.robot_check import checked_robot, checked_text
+from tauguard.models.urdf_inertia import mend_inertias
 
 #: Collision bits: what the arm has and what obstacles have, so that the arm never meets itself.
 ARM_BITS, OBSTACLE_BITS = 1, 2
@@ -43,6 +44,7 @@ class ArmFile:
     home: Array | None  #: joint positions of the file's first keyframe [rad], shape (n,)
     gripper: tuple[str, ...]  #: joints below the flange
     model: mujoco.MjModel  #: of ``spec``, compiled without its shapes
+    mended: tuple[str, ...]  #: links of a URDF whose inertia no body can have
 
 
 def read_arm(
@@ -69,7 +71,11 @@ def read_arm(
         ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
             joints; the message says what would work.
     """
-    spec = _urdf_spec(path) if _is_urdf(path) else mujoco.MjSpec.from_file(str(checked_robot(path)))
+    mended: tuple[str, ...] = ()
+    if _is_urdf(path):
+        spec, mended = _urdf_spec(path)
+    else:
+        spec = mujoco.MjSpec.from_file(str(checked_robot(path)))
     _name_joints(spec)
     model = compiled(spec)
     limits, speeds = _torque_limits(model), _speeds(path)
@@ -95,7 +101,7 @@ def read_arm(
     at = [names.index(name) for name in joints]
     home = None if keyframe is None else keyframe[[address[name] for name in joints]]
     speed = np.array([speeds.get(name, np.inf) for name in joints])
-    return ArmFile(spec, links, joints, limits[at], speed, home, gripper, model)
+    return ArmFile(spec, links, joints, limits[at], speed, home, gripper, model, mended)
 
 
 def _mark_tools(spec: mujoco.MjSpec, tool: str | None) -> None:
@@ -131,12 +137,14 @@ def _parsed(path: Path) -> ElementTree.Element:
         raise ValueError(f"not well-formed XML ({error})") from None
 
 
-def _urdf_spec(path: Path) -> mujoco.MjSpec:
+def _urdf_spec(path: Path) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
     """A URDF whose meshes are where its ``package://`` names lead, going up from its folder.
 
     Shapes that only show, and meshes that are not there or that MuJoCo does not read, are left out.
+    The second value names the links whose inertia was made possible.
     """
     root = _parsed(path)
+    mended = mend_inertias(root)
     for link in root.findall("link"):
         for shape in link.findall("visual"):
             link.remove(shape)
@@ -153,7 +161,8 @@ def _urdf_spec(path: Path) -> mujoco.MjSpec:
         root.remove(old)
     extension = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(extension, "compiler", {"strippath": "false", "fusestatic": "false"})
-    return mujoco.MjSpec.from_string(checked_text(ElementTree.tostring(root, encoding="unicode")))
+    text = checked_text(ElementTree.tostring(root, encoding="unicode"))
+    return mujoco.MjSpec.from_string(text), mended
 
 
 def _mesh_file(urdf: Path, name: str) -> Path | None:
@@ -318,7 +327,8 @@ def _branches(moving: list[mujoco.MjsBody]) -> str:
         parts.append(f"{body.name} ({len(names)} joints: {shown})")
     return (
         f"it branches into {'; '.join(parts)}; expected one serial chain of joints. Name those of "
-        'the arm, Robot(file, joints=("...", ...)), and the others are welded'
+        'the arm, Robot(file, joints=("...", ...)) or joints = ["...", ...] in a TOML file, and '
+        "the others are welded"
     )
 
 

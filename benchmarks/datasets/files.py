@@ -21,7 +21,8 @@ from tauguard.report import Row
 RATES = (1000, 500, 100)
 #: Episodes of the runs whose memory is compared.
 COUNTS, QUICK_COUNTS = (100, 1000, 10_000), (10, 50)
-#: A run in a process of its own: peak memory of it and of its workers.
+#: A run in a process of its own: peak memory of it and of its workers. The peak of a process in
+#: ``getrusage`` counts what its parent had when it started, that in ``/proc`` does not.
 RUN = """
 import json, resource, sys
 from pathlib import Path
@@ -29,8 +30,12 @@ from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.generation import generate_dataset
 if __name__ == "__main__":
     generate_dataset(Configuration.from_json(Path(sys.argv[1]).read_text()), Path(sys.argv[2]), 2)
-    who = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    print(json.dumps([resource.getrusage(w).ru_maxrss / 1024 for w in who]))
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    status = Path("/proc/self/status")
+    if status.exists():
+        own = int(status.read_text().partition("VmHWM:")[2].split()[0])
+    worker = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    print(json.dumps([own / 1024, worker / 1024]))
 """
 
 
@@ -69,7 +74,7 @@ def memory_rows(quick: bool, seed: int) -> list[Row]:
             )
         parent, worker = json.loads(done.stdout)
         rows.append(
-            {"study": "memory", "episodes": count, "command [MB]": parent, "worker [MB]": worker}
+            {"study": "memory", "episodes": count, "command [MiB]": parent, "worker [MiB]": worker}
         )
     return rows
 

@@ -48,7 +48,7 @@ NOTE = (
 )
 
 FULL = Extent(NAMES, Training(free=10), 0.3, 0.4, 1)
-QUICK = Extent(NAMES[:3], Training(slices=4, free=6, free_seconds=20.0), 0.05, 0.03, 0)
+QUICK = Extent(NAMES[:3], Training(slices=6, free=4, free_seconds=20.0), 0.1, 0.1, 1)
 
 
 def run(names: Sequence[str], quick: bool, seed: int, keep: str | None = None) -> list[Row]:
@@ -56,7 +56,7 @@ def run(names: Sequence[str], quick: bool, seed: int, keep: str | None = None) -
 
     Args:
         names: robots, by name or file.
-        quick: little motion and no collisions: a try.
+        quick: six minutes of motion for the thresholds, and six more to judge.
         seed: of all arms and motions.
         keep: folder of what is done already.
 
