@@ -3,7 +3,7 @@
 import tomllib
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.datasets.configuration import NAMED, Configuration, load, parse
@@ -92,6 +92,7 @@ def test_a_name_that_does_not_ship_is_met_with_those_that_do():
         load("cura6-twins")
 
 
+@settings(deadline=None)
 @given(values=st.integers(1, 9), seed=st.integers(0, 99), count=st.integers(0, 60))
 def test_a_deck_deals_every_value_equally_often(values, seed, count):
     found = [dealt(range(values), [seed], i) for i in range(count)]

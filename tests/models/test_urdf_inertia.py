@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.models import load_arm
@@ -19,6 +19,7 @@ ARM = """<robot name="r"><link name="base"/>
 GOOD = 'ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"'
 
 
+@settings(deadline=None)
 @given(
     entries=st.lists(st.floats(-10, 10), min_size=6, max_size=6),
     size=st.sampled_from([1e-6, 1e-3, 1.0]),
