@@ -57,11 +57,11 @@ def possible_inertia(tensor: Array, mass: float) -> Array:
     moments, axes = np.linalg.eigh(tensor)
     if moments[2] <= 0:
         ball = (3 * mass / (4 * np.pi * DENSITY)) ** (1 / 3)
-        return 0.4 * mass * ball**2 * np.eye(3)
+        return np.diag(np.full(3, 0.4 * mass * ball**2))
     moments = np.maximum(moments, max(LEAST_MOMENT * moments[2], SMALLEST))
     moments[2] = min(moments[2], 0.999 * (moments[0] + moments[1]))
     mended: Array = axes @ np.diag(np.sort(moments)) @ axes.T
-    return (mended + mended.T) / 2
+    return np.asarray((mended + mended.T) / 2)
 
 
 def _possible(tensor: Array) -> bool:
