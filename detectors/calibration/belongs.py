@@ -74,6 +74,17 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
     return found
 
 
+def torque_per_ampere(arm: ArmModel, traces: Sequence[Trace]) -> float:
+    """What the drives give over what the columns hold, root mean square [N m/A].
+
+    Over all joints and samples, so the joints that carry the arm count, not a wrist joint whose
+    gain nothing fixes. About 1 for joint torques told as currents; 8 to 12 for three geared arms.
+    """
+    current = np.concatenate([trace.current for trace in traces])
+    torque = current * arm.drive_gain
+    return float(np.sqrt((torque**2).mean() / max(float((current**2).mean()), 1e-12)))
+
+
 def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace]) -> None:
     """Refuse a robot file whose arm needs other torques against gravity than the logs show.
 

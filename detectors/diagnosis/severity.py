@@ -69,11 +69,12 @@ class ContactTorque:
     """What a contact did at the joints, from its beginning to the end of the look at it."""
 
     row: int  #: of the peak, among the look's samples
-    seconds: float  #: that it touched [s]
+    seconds: float  #: that it touched, of the 0.4 s or so that are looked at [s]
     impulse: Array  #: integral of tau_ext [N m s], shape (n,)
     peak: Array  #: tau_ext at its peak [N m], shape (n,)
     shape: float  #: peak over mean
     hidden: float  #: share of its time that the samples do not resolve
+    goes_on: bool = False  #: it still touched when the look ended
 
     @property
     def mean(self) -> Array:
@@ -99,7 +100,7 @@ class ContactTorque:
         whole = np.trapezoid(after.residual[part], after.t[part], axis=0) + after.lag * step
         shape = along[top] / max(float(along[part].mean()), 1e-12)
         hidden = min(width / seconds, UNRESOLVED)
-        return cls(top, seconds, whole, torque[top], float(shape), hidden)
+        return cls(top, seconds, whole, torque[top], float(shape), hidden, last == len(after.t) - 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.evaluation.metrics import poisson_rate
+from tauguard.detectors.methods.free_logs import JudgedLog, Sifted
 from tauguard.detectors.methods.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Trace
 
 #: A regime that all logs together show for less is not known [s].
 SEEN = 3.0
-#: Of a sudden torque on a standing joint, what counts for long enough: the observer (30/s) lets it
-#: in while the baseline (0.15 s) takes it up.
-COUNTS = 0.63
+#: Of a torque on a standing joint that rises within 0.1 s, what counts for long enough: the
+#: observer (30/s) lets it in while the baseline (0.15 s) takes it up. And of one that takes 1 s.
+COUNTS, COUNTS_SLOWLY = 0.6, 0.15
 #: An upper threshold, from which on a robot is to stop, over the lower one of contact.
 UPPER = 1.5
 #: Joints of the arms that libfranka speaks to.
@@ -37,12 +38,15 @@ class ThresholdCard:
     moving: Array  #: on one in motion, median over the logs [N m], (n,)
     starting: Array  #: on one that starts [N m], (n,)
     tool: dict[str, tuple[float, float]]
-    """Force at the last link's origin [N], standing and moving: found in half and in 95 % of all
-    poses and directions; infinite where no force is found in so many."""
+    """Force at the last link's origin [N]: "standing" and pushed within 0.1 s, "slowly" (the same,
+    pushed over 1 s), "stopped" or held by static friction, "moving"; found in half and in 95 % of
+    all poses and directions; infinite where no force is found in so many."""
     moment: float  #: at the last link that is found moving, in half of them [N m]
-    seconds: float  #: of collision-free motion
+    seconds: float  #: of the logs
     alarms: int  #: in left-out logs, under bounds from the others
-    false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %)
+    false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %), if all of them are false
+    logs: tuple[JudgedLog, ...]  #: each judged by the others; empty: not known one by one
+    left_out: tuple[JudgedLog, ...]  #: that stood out, and were not learned from
     unseen: dict[str, tuple[str, ...]]  #: joints by regime that the logs do not show
 
     @property
@@ -68,12 +72,15 @@ class ThresholdCard:
         return {"tool_force_limit_n": UPPER * self.tool["moving"][1]}
 
 
-def threshold_card(detector: FittedFreeMotion, traces: Sequence[Trace]) -> ThresholdCard:
+def threshold_card(
+    detector: FittedFreeMotion, traces: Sequence[Trace], sifted: Sifted | None = None
+) -> ThresholdCard:
     """The card of a fitted detector.
 
     Args:
         detector: fitted.
         traces: its training logs, for poses, regimes and bounds in motion.
+        sifted: these logs judged one by one (default: only their alarms' number is known).
     """
     bound, robot = detector.bound, detector.arm.robot
     judged = [detector.judge(trace) for trace in traces]
@@ -88,21 +95,27 @@ def threshold_card(detector: FittedFreeMotion, traces: Sequence[Trace]) -> Thres
     )
     poses = np.concatenate([t.q[:: max(1, len(t.q) // POSES)] for t in traces])
     poses = poses[:: max(1, len(poses) // POSES)]
-    standing = bound.rest / COUNTS
+    levels = {
+        "standing": bound.rest / COUNTS,
+        "slowly": bound.rest / COUNTS_SLOWLY,
+        "stopped": (bound.rest + bound.stop) / COUNTS,
+        "moving": usual,
+    }
+    logs = sifted.kept if sifted is not None else ()
+    alarms = sum(len(log.alarms) for log in logs) if logs else detector.alarms
     return ThresholdCard(
         robot.joint_names,
-        standing,
-        (bound.rest + bound.stop) / COUNTS,
+        levels["standing"],
+        levels["stopped"],
         usual,
         np.maximum(usual, sliding) + bound.start,
-        {
-            "standing": _tool(detector, poses, standing),
-            "moving": _tool(detector, poses, usual),
-        },
+        {name: _tool(detector, poses, level) for name, level in levels.items()},
         _tool(detector, poses, usual, moment=True)[0],
         detector.seconds,
-        detector.alarms,
-        poisson_rate(detector.alarms, detector.seconds / 3600),
+        alarms,
+        poisson_rate(alarms, detector.seconds / 3600),
+        logs,
+        sifted.left_out if sifted is not None else (),
         _unseen(traces, robot.joint_names),
     )
 

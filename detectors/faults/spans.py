@@ -21,6 +21,7 @@ class Span:
     start: float  #: [s]
     end: float  #: [s]
     reason: str = ""  #: of a fault, its first
+    score: float = 0.0  #: of a collision, its largest
 
 
 @dataclass
@@ -35,6 +36,8 @@ class Spans:
         if answer.state == FAULT:
             self._take_back(t)
         self.mark(COLLISION, answer.alarm, t, "")
+        if answer.alarm and (span := self._open.get(COLLISION)) is not None:
+            span.score = max(span.score, answer.score)
         self.mark(FAULT, bool(answer.reason), t, answer.reason)
 
     def of(self, state: str) -> list[Span]:

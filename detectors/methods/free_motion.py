@@ -166,7 +166,8 @@ class FreeMotion:
         prior = FittedFreeMotion(whole, dt, bound, UNKNOWN_LOAD, 0.0, 0)
         left_out = [replace(prior, arm=model) for model in models] + [prior] * len(standing)
         parts = [*moving, *standing]
-        judged = [_told(one, r).judge(r.trace) for one, r in zip(left_out, parts, strict=True)]
+        own_arms = zip(parts, left_out, strict=True)
+        judged = [with_load_of(part, one).judge(part.trace) for part, one in own_arms]
         alarms = 0
         for fold in range(FOLDS):
             own = range(fold, len(parts), FOLDS)
@@ -174,7 +175,8 @@ class FreeMotion:
                 continue
             fresh = learned(bound, [j for k, j in enumerate(judged) if k not in own])
             for k in own:
-                alarms += _alarms(_told(replace(left_out[k], bound=fresh), parts[k]), parts[k])
+                judge = with_load_of(parts[k], replace(left_out[k], bound=fresh))
+                alarms += _alarms(judge, parts[k])
         seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
         return replace(prior, bound=learned(bound, judged), seconds=seconds, alarms=alarms)
 
@@ -201,7 +203,8 @@ def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmMo
     return models, whole
 
 
-def _told(detector: FittedFreeMotion, recording: Recording) -> FittedFreeMotion:
+def with_load_of(recording: Recording, detector: FittedFreeMotion) -> FittedFreeMotion:
+    """The detector of the arm with the load that a recording is known to carry."""
     return detector if recording.load is None else detector.carrying(recording.load)
 
 

@@ -147,12 +147,12 @@ def detect_with(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
     detection = replace(detection, alarms=find_alarms(trace.t, detection.alarm, SERIES))
     strange = bool(detection.alarm[rows].mean() > STRANGE)
     judged = rows if strange else rows & ~_near(detection)
-    notes = list(plausible(arm.robot, trace, tau, residual, judged, LOG_GAIN, touched=strange))
+    doubts = plausible(arm.robot, trace, tau, residual, judged, LOG_GAIN, touched=strange)
+    notes = [] if strange else list(doubts)
     if strange:
         notes.append(
-            "alarms fill much of this log: it carries a load that no training log carried, it is "
-            "held all the time, or this is not the arm, the joints' order, the sign or the unit of "
-            "the currents that the detector was trained on"
+            "alarms fill much of this log; if it was not touched as often as that, tell what the "
+            "arm carried (--payload), and check that model, robot file and log are of one arm"
         )
     return LogDetection(
         detection,

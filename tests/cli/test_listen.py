@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tauguard.cli.listen import check_source, report
+from tauguard.cli.listen import Terminal, check_source, report
 from tauguard.datasets.live import PlayedSource, SourceClosed, UrServer, UrSource
 from tauguard.datasets.live.listening import BINS, Heard, listen
 from tauguard.datasets.live.packets import Fault, Packets
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, RobotNumbers, make_detector, train
 from tauguard.detectors.faults.detection import detect_with_faults
-from tauguard.detectors.faults.monitor import Monitor
+from tauguard.detectors.faults.monitor import Answer, Monitor
 from tauguard.envs import simulate
 from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
 from tauguard.traces.trace import Trace
@@ -79,6 +79,28 @@ def test_over_rtde_nothing_is_lost(alarm, struck):
     assert np.array(heard.scores).tobytes() == alarm.detect(struck).score.tobytes()
     quantiles = heard.quantiles()
     assert 0 < quantiles["median"] <= quantiles["p99"]
+
+
+def test_every_line_says_why(struck, capsys):
+    terminal, samples = Terminal(1.0), iter(Handed(struck).read(0) for _ in range(6))
+    wrong = "torque: the current of a works against the motion (-0.52 of ...)"
+    for answer in (
+        Answer("free", False, 0.2, ""),
+        Answer("collision", True, 1.5, ""),
+        Answer("collision", True, 1.6, ""),
+        Answer("collision", True, 1.7, wrong),
+        Answer("collision", True, 1.8, wrong.replace("52", "61")),
+        Answer("fault", False, 0.5, wrong),
+    ):
+        terminal.show(next(samples), answer)
+    shown = capsys.readouterr().out.replace("\r", "").strip().split("\n")
+    lines = [line.split("s  ", 1)[1].strip() for line in shown]
+    assert lines == [
+        "free",
+        "collision: score 1.50 above 1.00",
+        f"collision: score 1.70 above 1.00; {wrong}",
+        f"fault: {wrong}",
+    ]
 
 
 def test_latencies_beyond_the_last_bin_are_not_given_a_number(capsys):

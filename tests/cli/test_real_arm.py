@@ -32,7 +32,7 @@ def test_calibrate_train_detect(folder, tmp_path, capsys):
     for rms in excitation:
         assert all(a < b for a, b in zip(rms, [2.0, 2.3, 1.0, 0.4, 0.4, 0.3], strict=True))
     main(["train", "--free", *logs, "--robot", str(robot), *common, "--model", str(model)])
-    assert "4 collision-free logs" in capsys.readouterr().out
+    assert "trained on 4 logs" in capsys.readouterr().out
     log = str(folder / "free" / TEST)
     main(["detect", log, "--robot", str(robot), *common, "--model", str(model), "--payload", "0"])
     assert "0 alarms in 38" in capsys.readouterr().out

@@ -11,6 +11,7 @@ from tauguard.cli.train import never_moved
 from tauguard.datasets.drives import DRIVES, preset_drive
 from tauguard.detectors.calibration.arm_file import load_arm
 from tauguard.detectors.calibration.recording import Load
+from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 
 COLUMNS = {"t": 0, "q": [1, 2, 3], "qd": [4, 5, 6], "current": [7, 8, 9]}
@@ -160,7 +161,7 @@ def test_logs_of_a_standing_arm_are_left_out_of_calibration(folder, tmp_path, ca
     assert "note: still.csv: no joint moves in it" in capsys.readouterr().out
     columns = ["--columns", str(folder / "columns.json")]
     main(["train", "--free", *logs, "--robot", out, *columns, "--model", model])
-    assert "trained on 2 collision-free logs" in capsys.readouterr().out
+    assert "trained on 2 logs" in capsys.readouterr().out
 
 
 def test_payloads_by_file_name_or_stem():
@@ -309,6 +310,26 @@ def test_a_load_that_the_torques_do_not_show_is_refused(folder, tmp_path, capsys
     error = fails(capsys, "calibrate", *logs, *given, "--payload", "log1=3")
     assert "log1.csv: 3 kg were told, its torques show" in error
     assert not (tmp_path / "false.xml").exists()
+
+
+def test_a_log_of_pushes_among_free_ones_is_named_and_left_out(folder, calibrated, capsys):
+    trace = record(6)
+    for start in (3.0, 5.5, 12.0, 15.0, 18.0, 21.0):
+        trace = add_contact(trace, GAIN, Added(start, 0.4, (14.0, -18.0, 9.0), "push"))
+    logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
+    arguments = ["train", "--free", *logs, written(folder, "touched.csv", trace)]
+    arguments += [*flags(folder, calibrated.name), "--model", str(folder / "touched.skops")]
+    main(arguments)
+    out = " ".join(capsys.readouterr().out.split())
+    assert "touched.csv stands out: 6 alarms at 3." in out
+    assert "something touched the arm" in out
+    assert "trained on 3 logs" in out
+    assert "not learned from, since its alarms stand out: touched.csv" in out
+    main([*arguments, "--accept", "touched"])
+    out = capsys.readouterr().out
+    assert "kept as --accept says" in out
+    assert "trained on 4 logs" in out
+    assert "--accept other: no log 'other'" in fails(capsys, *arguments, "--accept", "other")
 
 
 def test_a_standing_arm_alone_teaches_no_motion(folder, tmp_path, capsys):

@@ -10,7 +10,7 @@ import tyro
 if TYPE_CHECKING:
     from tauguard.detectors.calibration.identification import Identified
 
-#: Gains of geared joints are larger [N m/A].
+#: Geared joints give more torque per ampere over all [N m/A]; torques told as currents about 1.
 SMALL_GAIN = 2.0
 SOURCES = {
     "torques": "the logs' torques",
@@ -56,9 +56,10 @@ def command(
         json: write the figures here as JSON.
     """
     from tauguard.cli.real_logs import doubts, loaded, moving, read_logs, start
+    from tauguard.cli.robot_files import check_named
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import check_loads, left_out
-    from tauguard.detectors.calibration.belongs import check_signs, check_weight
+    from tauguard.detectors.calibration.belongs import check_signs, check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import identify
     from tauguard.report import write_json
 
@@ -68,6 +69,8 @@ def command(
     told = dict(zip(traces, loaded(traces, payload), strict=True))
     traces = moving(traces)
     recordings = [told[name] for name in traces]
+    if not gains:
+        check_named(robot, columns, list(traces.values()))
     arm, source = start(numbers, recordings, columns, gains, scale)
     chosen = "gains" if source in ("preset", "torques") else source
     for name, trace in traces.items():
@@ -76,10 +79,10 @@ def command(
     if chosen == "gains":
         check_weight(numbers, found.arm.robot, list(traces.values()))
         check_loads(arm, list(traces), recordings)
-    elif (abs(found.arm.drive_gain) < SMALL_GAIN).all():
+    elif (ratio := torque_per_ampere(found.arm, list(traces.values()))) < SMALL_GAIN:
         print(
-            f"note: all gains are below {SMALL_GAIN:g} N m/A, as those of joint torques told as "
-            "currents: if the columns hold N m, say --torque"
+            f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as little as if "
+            "they held joint torques: if they are in N m, say --torque"
         )
     held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
     for note in doubts(found.arm, traces, recordings, held):

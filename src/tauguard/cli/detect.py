@@ -116,7 +116,8 @@ def watched(
     model: Path, trace: Trace, payload: str | None, robot: Path
 ) -> tuple[Trace, Any, LogDetection]:
     """The log in the joints of a trained detector, the detector, and what it saw."""
-    from tauguard.cli.real_logs import carried, check_robot, is_torque, matched
+    from tauguard.cli.real_logs import carried, is_torque, matched
+    from tauguard.cli.robot_files import check_robot
     from tauguard.detectors import load_model
     from tauguard.detectors.methods.free_motion import carrying
     from tauguard.detectors.thresholds.quiet_start import detect_with
@@ -186,6 +187,7 @@ def torques(contact_torque: ContactTorque) -> dict[str, Any]:
     """What a contact did at the joints, ready for JSON."""
     return {
         "contact_s": contact_torque.seconds,
+        "contact_goes_on": contact_torque.goes_on,
         "peak_torque_nm": contact_torque.peak.tolist(),
         "joint_impulse_nms": contact_torque.impulse.tolist(),
     }

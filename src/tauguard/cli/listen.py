@@ -61,7 +61,7 @@ def command(
         record: write what was heard as MCAP here.
         rerun: `view` opens the rerun viewer; FILE.rrd records what it would show.
     """
-    from tauguard.cli.real_logs import check_robot
+    from tauguard.cli.robot_files import check_robot
     from tauguard.datasets.live.display import Behind
     from tauguard.datasets.live.listening import listen
     from tauguard.detectors import load_model
@@ -86,7 +86,7 @@ def command(
         print(DISCLAIMER, flush=True)
         source = stack.enter_context(opened(ur, port, play, columns, stdin, ros, reconnect, alarm))
         check_source(source, alarm, model)
-        views = [stack.enter_context(Behind(Terminal().show))]
+        views = [stack.enter_context(Behind(Terminal(alarm.threshold).show))]
         if rerun is not None:
             views.append(stack.enter_context(Behind(charts(robot, shown, alarm))))
         monitor = Monitor(alarm, alarm.inputs)
@@ -163,22 +163,31 @@ def opened(
 class Terminal:
     """The state in the terminal: a line where it changes, and the score where it is a terminal."""
 
-    def __init__(self, every: float = 0.1) -> None:
-        """Show the score every so many seconds."""
-        self._every, self._next, self._state = every, 0.0, ""
+    def __init__(self, threshold: float = 1.0, every: float = 0.1) -> None:
+        """Show the score, whose threshold is this, every so many seconds."""
+        self._threshold, self._every, self._next = threshold, every, 0.0
+        self._said = "", ""
         self._live = sys.stdout.isatty()
 
     def show(self, sample: Sample, answer: Answer) -> None:
-        """One answer."""
+        """One answer: a line where the state changes, or what it is said for."""
         now = time.monotonic()
-        if answer.state != self._state:
-            self._state = answer.state
-            why = f": {answer.reason}" if answer.reason else ""
+        kind = answer.reason.partition(":")[0]
+        if answer.state != self._said[0] or (kind and kind != self._said[1]):
+            self._said = answer.state, kind
+            why = why_text(answer, self._threshold)
             print(f"\r{sample.t:10.3f} s  {answer.state}{why}".ljust(79), flush=True)
         elif self._live and now >= self._next:
             self._next = now + self._every
             print(f"\r{sample.t:10.3f} s  {answer.state}  score {answer.score:.2f} ", end="")
             sys.stdout.flush()
+
+
+def why_text(answer: Answer, threshold: float) -> str:
+    """Why a sample is a fault or a collision; nothing for a free one."""
+    parts = [f"score {answer.score:.2f} above {threshold:.2f}"] if answer.alarm else []
+    parts += [answer.reason] if answer.reason else []
+    return f": {'; '.join(parts)}" if parts else ""
 
 
 def charts(
@@ -226,7 +235,7 @@ def summary(heard: Heard, events: list[str], alarm: CollisionAlarm) -> dict[str,
         "samples": heard.samples,
         "seconds": heard.last - heard.first if heard.samples else 0.0,
         "alarms": len(collisions),
-        "events": [{"start": s.start, "end": s.end} for s in collisions],
+        "events": [{"start": s.start, "end": s.end, "score": s.score} for s in collisions],
         "faults": [{"start": s.start, "end": s.end, "reason": s.reason} for s in faults],
         "connection": events,
         "ended": heard.ended,
@@ -237,7 +246,10 @@ def summary(heard: Heard, events: list[str], alarm: CollisionAlarm) -> dict[str,
 def report(result: dict[str, Any]) -> None:
     """The figures for a reader."""
     for event in result["events"]:
-        print(f"collision {event['start']:.3f} s to {event['end']:.3f} s")
+        line = (
+            f"collision {event['start']:.3f} s to {event['end']:.3f} s: score {event['score']:.2f}"
+        )
+        print(f"{line} above {result['score_threshold']:.2f}")
     for fault in result["faults"]:
         print(f"fault {fault['start']:.3f} s to {fault['end']:.3f} s: {fault['reason']}")
     for line in result["connection"]:

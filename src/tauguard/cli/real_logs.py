@@ -16,44 +16,6 @@ if TYPE_CHECKING:
 
 #: No load of an arm's is told heavier than this [kg]: it would be grams.
 HEAVIEST = 100.0
-#: Lengths of one arm's robot files differ by no more [m], nor do its rotations.
-SAME_PLACE = 1e-3
-
-
-def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
-    """Refuse a robot file that is none, or that is not of the arm that a model was trained on.
-
-    Its joints must be those, and stand where they did: calibration changes masses, not lengths.
-
-    Raises:
-        ValueError: one line that names both files.
-    """
-    import numpy as np
-
-    from tauguard.detectors import RobotNumbers
-    from tauguard.detectors.calibration.held_joints import holding
-    from tauguard.models import pin_model
-
-    try:
-        numbers = RobotNumbers.from_pin(pin_model(robot))
-    except ValueError as error:
-        name = "" if str(robot) in str(error) else f"{robot}: "
-        raise ValueError(f"{name}{error}") from None
-    own, names = numbers.joint_names, trained.joint_names
-    if not set(names) <= set(own):
-        raise ValueError(
-            f"{robot} has the joints {', '.join(own)}; {model} was trained on {', '.join(names)}"
-        )
-    held = holding(numbers, [name for name in own if name not in names])
-    order = [held.joint_names.index(name) for name in names]
-    moved = np.abs(held.translation[order] - trained.translation).max(axis=1)
-    turned = np.abs(held.rotation[order] - trained.rotation).max(axis=(1, 2))
-    if (moved > SAME_PLACE).any() or (turned > SAME_PLACE).any():
-        joint = int(np.argmax(np.maximum(moved, turned)))
-        raise ValueError(
-            f"{robot} is not the arm that {model} was trained on: {names[joint]} stands "
-            f"{1e3 * moved[joint]:.0f} mm from where it stood; give the robot file of training"
-        )
 
 
 def robot_numbers(robot: Path, given: tuple[str, ...] | None = None) -> RobotNumbers:
@@ -214,16 +176,16 @@ def loaded(traces: dict[str, Trace], payload: tuple[str, ...]) -> list[Recording
     loads: dict[str, Load | None] = {}
     for text in payload:
         name, _, value = text.rpartition("=")
-        loads[_log_named(name, text, list(traces))] = _load(text, value)
+        loads[log_named(name, f"--payload {text}", list(traces))] = _load(text, value)
     return [Recording(trace, loads.get(name, Load())) for name, trace in traces.items()]
 
 
-def _log_named(name: str, text: str, logs: list[str]) -> str:
-    """The log of this file name, or of this name without its ending."""
+def log_named(name: str, flag: str, logs: list[str]) -> str:
+    """The log of this file name, or of this name without its ending, that a flag names."""
     found = [log for log in logs if name == log] or [log for log in logs if name == Path(log).stem]
     if len(found) != 1:
         there = f"two are called {name!r}" if found else f"no log {name!r}"
-        raise ValueError(f"--payload {text}: {there}; there are {', '.join(logs)}")
+        raise ValueError(f"{flag}: {there}; there are {', '.join(logs)}")
     return found[0]
 
 
@@ -377,6 +339,10 @@ def watched_arm(
                 "--gains, --viscous and --coulomb, or give the robot's own file"
             )
         return calibrated, f"the calibration in {robot.name}"
+    if not gains:
+        from tauguard.cli.robot_files import check_named
+
+        check_named(robot, columns, [trace])
     source = "the flags"
     if is_torque(trace) and not gains:
         gains, source = (1.0,) * numbers.joints, "the log's torques"

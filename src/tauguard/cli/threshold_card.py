@@ -9,28 +9,43 @@ from typing import TYPE_CHECKING
 from tauguard.whole_file import whole_file
 
 if TYPE_CHECKING:
+    from tauguard.arrays import Array
     from tauguard.detectors.evaluation.threshold_card import ThresholdCard
+    from tauguard.detectors.methods.free_logs import JudgedLog
 
 #: Logs shorter than this say nothing of alarms per hour, logs shorter than that hardly [s].
 SHORTEST, SHORT = 300.0, 1800.0
+#: Alarms of a log whose seconds are listed.
+LISTED = 6
+#: What each force at the tool holds for.
+TOOL = {
+    "standing": "standing for some seconds, pushed within 0.1 s",
+    "slowly": "standing for some seconds, pushed over 1 s",
+    "stopped": "just stopped, or standing while static friction holds the push first",
+    "moving": "moving",
+}
 
 
 def text(card: ThresholdCard) -> str:
     """One page."""
     from tauguard.report import table
 
-    joints = zip(card.joints, card.standing, card.stopped, card.moving, card.starting, strict=True)
     rows = [
-        {
-            "found from [N m]": name,
-            "standing": f"{standing:.1f}",
-            "just stopped": f"{stopped:.1f}",
-            "moving": f"{moving:.1f}",
-            "starting": f"{starting:.1f}",
-        }
-        for name, standing, stopped, moving, starting in joints
+        {"found from [N m]": joint}
+        | {name: f"{values[j]:.1f}" for name, values in _levels(card).items()}
+        for j, joint in enumerate(card.joints)
     ]
     return "\n".join([table(rows), *(line for part in _lines(card) for line in _wrapped(part))])
+
+
+def _levels(card: ThresholdCard) -> dict[str, Array]:
+    """Torques that are found, in the order of table and picture."""
+    return {
+        "standing": card.standing,
+        "just stopped": card.stopped,
+        "moving": card.moving,
+        "starting": card.starting,
+    }
 
 
 def rate_text(high: float, seconds: float, said: str) -> str:
@@ -52,19 +67,16 @@ def _wrapped(line: str) -> list[str]:
 
 
 def _lines(card: ThresholdCard) -> list[str]:
-    rate = card.false_alarms_per_hour
-    half, most = zip(*(card.tool[k] for k in ("standing", "moving")), strict=True)
     lines = [
-        f"at the tool: {half[0]:.0f} N standing and {half[1]:.0f} N moving, in half of all poses "
-        f"and directions; {most[0]:.0f} N and {most[1]:.0f} N in 95 % of them",
-        "all of contacts that last 0.1 s and more: an alarm needs 24 ms above a bound at rest and "
-        "40 ms in motion, so a shorter blow has to be harder",
-        f"false alarms: {card.alarms} in {card.seconds / 60:.1f} min, each part under "
-        "calibration and bounds from the others"
-        + rate_text(
-            rate["high"], card.seconds, ", so at most {} per hour (95 %) on motion like this"
-        ),
+        "force at the tool that is found, in half (in 95 %) of all poses and directions:",
+        *(f"  {_force(card, name)} {said}" for name, said in TOOL.items()),
+        "a contact has to last 0.1 s: an alarm needs 24 ms above a bound at rest and 40 ms in "
+        "motion, so a shorter blow has to be harder",
+        _alarms(card),
     ]
+    if card.left_out:
+        names = ", ".join(f"{log.name} ({times(log)})" for log in card.left_out)
+        lines.append(f"not learned from, since its alarms stand out: {names}")
     if card.unseen:
         parts = "; ".join(
             f"{name}: {'all joints' if len(joints) == len(card.joints) else ', '.join(joints)}"
@@ -93,6 +105,31 @@ def _lines(card: ThresholdCard) -> list[str]:
     return lines
 
 
+def _force(card: ThresholdCard, name: str) -> str:
+    half, most = card.tool[name]
+    return f"{half:4.0f} N ({most:.0f} N)".ljust(16)
+
+
+def _alarms(card: ThresholdCard) -> str:
+    """How many alarms the logs themselves raise, and in which."""
+    high = card.false_alarms_per_hour["high"]
+    said = f"alarms in these logs: {card.alarms} in {card.seconds / 60:.1f} min, each "
+    said += "log" if len(card.logs) > 1 else "part"
+    said += " under calibration and bounds from the others"
+    if own := [f"{log.name} ({times(log)})" for log in card.logs if log.alarms]:
+        said += f": {', '.join(own)}; where something touched the arm, leave that log out"
+    return said + rate_text(
+        high, card.seconds, "; at most {} false alarms per hour (95 %) on motion like this"
+    )
+
+
+def times(log: JudgedLog) -> str:
+    """How many alarms a log has, and at which seconds: "3 alarms at 1.2, 3.4, 5.6 s"."""
+    starts = [f"{alarm.start:.1f}" for alarm in log.alarms]
+    shown = ", ".join(starts[:LISTED]) + (" ..." if len(starts) > LISTED else "")
+    return f"{len(starts)} alarm{'' if len(starts) == 1 else 's'} at {shown} s"
+
+
 def draw(target: Path, card: ThresholdCard) -> None:
     """The card as a picture (PNG)."""
     import matplotlib
@@ -106,14 +143,8 @@ def draw(target: Path, card: ThresholdCard) -> None:
     figure, (bars, words) = plt.subplots(
         2, 1, figsize=(9, sum(sizes)), height_ratios=sizes, layout="constrained"
     )
-    levels = {
-        "standing": card.standing,
-        "moving": card.moving,
-        "just stopped": card.stopped,
-        "starting": card.starting,
-    }
     place = np.arange(len(card.joints))
-    for k, (name, values) in enumerate(levels.items()):
+    for k, (name, values) in enumerate(_levels(card).items()):
         drawn = bars.bar(place + 0.2 * (k - 1.5), values, 0.2, label=name)
         bars.bar_label(drawn, fmt="%.1f", fontsize=6, padding=1)
     bars.set_xticks(place, card.joints, rotation=20, ha="right")

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tauguard.detectors import CollisionAlarm, FreeScores
+    from tauguard.detectors.methods.free_logs import Sifted
     from tauguard.detectors.methods.free_motion import FittedFreeMotion
     from tauguard.traces import Trace
 
@@ -27,6 +28,7 @@ def command(
     payload: tuple[str, ...] = (),
     torque: bool = False,
     card: Path | None = None,
+    accept: tuple[str, ...] = (),
     arm: str | None = None,
 ) -> None:
     """Train a detector and write its model file.
@@ -48,14 +50,15 @@ def command(
         false_alarms_per_hour: what the threshold aims at on motion like the training's
             (default: 10), or guarantees with --calibration.
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
-        free: collision-free logs of a real arm, files or a folder; a contact in them raises the
-            bounds, so that others like it are missed later.
+        free: collision-free logs of a real arm, files or a folder. A contact in them would raise
+            the bounds; a log that stands out by its alarms is named and left out.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains.
         columns: of CSV files, see `tauguard detect`.
         gains: N m per ampere, one a joint (known for calibrated robot files and for ur10e).
         payload: what the logs carried, see `tauguard calibrate`.
         torque: with --free, the logs hold joint torques in N m, see `tauguard calibrate`.
         card: with --free, draw the card here (PNG).
+        accept: with --free, logs to learn from even if they stand out.
         arm: of a dataset with several arms, the one that the detector is for.
     """
     if (traces is None) == (not free):
@@ -73,6 +76,7 @@ def command(
             "--payload": payload,
             "--torque": torque,
             "--card": card,
+            "--accept": accept,
         }
         if given := [name for name, value in own.items() if value]:
             raise ValueError(f"{', '.join(given)}: with --free only, not with --traces")
@@ -86,7 +90,7 @@ def command(
         raise ValueError(
             "--false-alarms-per-hour: with --traces only; the card of --free says how many"
         )
-    free_motion(free, robot, target, columns, gains, payload, torque, card)
+    free_motion(free, robot, target, columns, gains, payload, torque, card, accept)
 
 
 def _target(model: Path | None) -> Path:
@@ -168,9 +172,12 @@ def free_motion(
     payload: tuple[str, ...],
     torque: bool,
     card: Path | None,
+    accept: tuple[str, ...] = (),
 ) -> None:
-    """Train on collision-free logs."""
+    """Train on logs in which nothing touched the arm, as far as that is known."""
+    from tauguard.cli.odd_logs import sifted_logs
     from tauguard.cli.real_logs import doubts, is_torque, loaded, read_logs, start
+    from tauguard.cli.robot_files import check_named
     from tauguard.detectors import CollisionAlarm, save_model
     from tauguard.detectors.calibration.arm_file import load_arm
     from tauguard.detectors.calibration.belongs import check_signs, check_weight
@@ -180,12 +187,15 @@ def free_motion(
     traces, numbers = read_logs(free, columns, robot, torque)
     recordings = loaded(traces, payload)
     arm = load_arm(robot)
+    if arm is None and not gains:
+        check_named(robot, columns, list(traces.values()))
     if arm is None or gains:
         arm, _ = start(numbers, recordings, columns, gains, "gains")
     elif is_torque(recordings[0].trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"{robot.name} was calibrated on currents, the logs hold torques")
     for name, trace in traces.items():
         check_signs(arm, name, trace)
+    traces, recordings, sifted = sifted_logs(traces, recordings, arm, accept)
     detector = FreeMotion().fit(recordings, arm)
     check_weight(arm.robot, detector.arm.robot, list(traces.values()))
     unmoved = never_moved(list(traces.values()))
@@ -193,8 +203,9 @@ def free_motion(
         print(f"note: {note}")
     usual = UsualInput.of(list(traces.values()), detector.arm)
     save_model(CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual), model)
-    print(f"{model}: trained on {len(traces)} collision-free logs, {detector.seconds:.0f} s")
-    show_card(detector, list(traces.values()), card)
+    logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
+    print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")
+    show_card(detector, list(traces.values()), sifted, card)
 
 
 def never_moved(traces: list[Trace]) -> list[str]:
@@ -211,12 +222,14 @@ def never_moved(traces: list[Trace]) -> list[str]:
     ]
 
 
-def show_card(detector: FittedFreeMotion, traces: list[Trace], target: Path | None) -> None:
+def show_card(
+    detector: FittedFreeMotion, traces: list[Trace], sifted: Sifted, target: Path | None
+) -> None:
     """Print what the detector can find, and draw it."""
     from tauguard.cli.threshold_card import draw, text
     from tauguard.detectors.evaluation.threshold_card import threshold_card
 
-    found = threshold_card(detector, traces)
+    found = threshold_card(detector, traces, sifted)
     print(text(found))
     if target is not None:
         draw(target, found)

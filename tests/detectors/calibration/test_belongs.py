@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import ArmModel
-from tauguard.detectors.calibration.belongs import check_signs, check_weight, drag
+from tauguard.detectors.calibration.belongs import (
+    check_signs,
+    check_weight,
+    drag,
+    torque_per_ampere,
+)
 from tests.detectors.synthetic_arm import GAIN, nominal, record
 
 
@@ -40,3 +45,10 @@ def test_an_arm_of_another_weight_is_refused(factor):
 def test_an_arm_without_gravity_says_nothing():
     robot = replace(nominal(), gravity=np.zeros(3))
     check_weight(robot, robot.with_inertial(5 * robot.inertial), [record(3)])
+
+
+def test_one_gain_that_nothing_fixes_hides_no_torques():
+    torques = replace(record(3), current=record(3).current * GAIN)
+    found = np.array([1.1, 0.9, 3.0])  # the last joint carries little
+    assert torque_per_ampere(ArmModel(nominal(), found), [torques]) < 1.3
+    assert torque_per_ampere(ArmModel(nominal(), GAIN), [record(3)]) > 6.0
