@@ -82,7 +82,7 @@ def test_over_rtde_nothing_is_lost(alarm, struck):
 
 
 def test_every_line_says_why(struck, capsys):
-    terminal, samples = Terminal(1.0), iter(Handed(struck).read(0) for _ in range(6))
+    terminal, samples = Terminal(1.0), iter(Handed(struck).read(0) for _ in range(8))
     wrong = "torque: the current of a works against the motion (-0.52 of ...)"
     for answer in (
         Answer("free", False, 0.2, ""),
@@ -90,6 +90,8 @@ def test_every_line_says_why(struck, capsys):
         Answer("collision", True, 1.6, ""),
         Answer("collision", True, 1.7, wrong),
         Answer("collision", True, 1.8, wrong.replace("52", "61")),
+        Answer("collision", True, 0.0, "gap: nothing for 40 ms"),
+        Answer("collision", True, 0.0, f"settling again after {wrong}"),
         Answer("fault", False, 0.5, wrong),
     ):
         terminal.show(next(samples), answer)
@@ -99,6 +101,7 @@ def test_every_line_says_why(struck, capsys):
         "free",
         "collision: score 1.50 above 1.00",
         f"collision: score 1.70 above 1.00; {wrong}",
+        "collision: its alarm was up before; gap: nothing for 40 ms",
         f"fault: {wrong}",
     ]
 

@@ -166,15 +166,17 @@ class Terminal:
     def __init__(self, threshold: float = 1.0, every: float = 0.1) -> None:
         """Show the score, whose threshold is this, every so many seconds."""
         self._threshold, self._every, self._next = threshold, every, 0.0
-        self._said = "", ""
+        self._state, self._said = "", set[str]()
         self._live = sys.stdout.isatty()
 
     def show(self, sample: Sample, answer: Answer) -> None:
-        """One answer: a line where the state changes, or what it is said for."""
+        """One answer: a line where the state changes, and one for each further kind of reason."""
         now = time.monotonic()
-        kind = answer.reason.partition(":")[0]
-        if answer.state != self._said[0] or (kind and kind != self._said[1]):
-            self._said = answer.state, kind
+        kind = answer.reason.removeprefix("settling again after ").partition(":")[0]
+        changed = answer.state != self._state
+        if changed or (kind and kind not in self._said):
+            self._said = {kind} if changed else self._said | {kind}
+            self._state = answer.state
             why = why_text(answer, self._threshold)
             print(f"\r{sample.t:10.3f} s  {answer.state}{why}".ljust(79), flush=True)
         elif self._live and now >= self._next:
@@ -185,7 +187,9 @@ class Terminal:
 
 def why_text(answer: Answer, threshold: float) -> str:
     """Why a sample is a fault or a collision; nothing for a free one."""
-    parts = [f"score {answer.score:.2f} above {threshold:.2f}"] if answer.alarm else []
+    above = f"score {answer.score:.2f} above {threshold:.2f}"
+    held = "its alarm was up before"
+    parts = [above if answer.score > threshold else held] if answer.alarm else []
     parts += [answer.reason] if answer.reason else []
     return f": {'; '.join(parts)}" if parts else ""
 
