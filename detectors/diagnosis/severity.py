@@ -100,7 +100,9 @@ class ContactTorque:
         whole = np.trapezoid(after.residual[part], after.t[part], axis=0) + after.lag * step
         shape = along[top] / max(float(along[part].mean()), 1e-12)
         hidden = min(width / seconds, UNRESOLVED)
-        return cls(top, seconds, whole, torque[top], float(shape), hidden, last == len(after.t) - 1)
+        return cls(
+            top, seconds, whole, torque[top], float(shape), hidden, bool(last == len(after.t) - 1)
+        )
 
 
 @dataclass(frozen=True, eq=False)
