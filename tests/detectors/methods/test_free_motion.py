@@ -57,6 +57,19 @@ def test_what_a_push_leaves_is_taken_up(alarm):
     assert found.alarms[0].end < 13.5
 
 
+@pytest.mark.parametrize("size", [0.6, 2.0])
+def test_a_push_beside_a_biased_current_is_found(alarm, fitted, size):
+    trace = record(9, seconds=32.0)
+    current = trace.current.copy()
+    current[trace.t >= 14.0, 1] += size * fitted.bound.least[1] / GAIN[1]
+    biased = replace(trace, current=current)
+    for start in (20.0, 25.0):
+        biased = add_contact(biased, GAIN, Added(start, 0.4, (14.0, -18.0, 9.0), "push"))
+    starts = [one.start for one in alarm.detect(biased).alarms]
+    assert [any(s < x < s + 0.3 for x in starts) for s in (20.0, 25.0)] == [True, True]
+    assert any(14.0 < x < 14.5 for x in starts) == (size > 1)  # below the bound it is not seen
+
+
 def test_bounds_follow_motion_and_what_the_logs_taught(alarm):
     """The native bounds against their formula, from the trace's own speeds."""
     trace = record(7, dwell=(8.0, 14.0))
