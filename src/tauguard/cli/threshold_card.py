@@ -106,8 +106,8 @@ def _lines(card: ThresholdCard) -> list[str]:
 
 
 def _force(card: ThresholdCard, name: str) -> str:
-    half, most = card.tool[name]
-    return f"{half:4.0f} N ({most:.0f} N)".ljust(16)
+    half, most = (f"{n:.0f}" if n >= 10 else f"{n:.1f}" for n in card.tool[name])
+    return f"{half:>4} N ({most} N)".ljust(16)
 
 
 def _alarms(card: ThresholdCard) -> str:
