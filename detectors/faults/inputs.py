@@ -99,12 +99,23 @@ class UsualInput:
             # At least two, so that one packet that comes twice is not called frozen.
             2 + max(_longest_run(np.asarray(_same(trace).all(axis=1))) for trace in traces),
             window,
-            np.max([3 * np.abs(trace.current).max(axis=0) + 1 for trace in traces], axis=0),
+            _believable(traces, arm),
             MARGIN * np.max([_beyond(trace, 1) for trace in traces], axis=0) + RESOLUTION,
             MARGIN * np.max([_beyond(trace, window) for trace in traces], axis=0) + RESOLUTION,
             np.max([_stuck(trace) for trace in traces], axis=0),
             np.ones((3, len(traces[0].joint_names))) if arm is None else torque_ratios(traces, arm),
         )
+
+
+def _believable(traces: Sequence[Trace], arm: ArmModel | None) -> Array:
+    """Largest current that is not a fault [A], shape (n,).
+
+    Three times the joint's own, or what gives three times the torque of the arm's strongest joint:
+    a joint that needs little, such as one about a vertical axis, feels a hard contact as much.
+    """
+    own = np.max([np.abs(trace.current).max(axis=0) for trace in traces], axis=0)
+    gain = np.ones(len(own)) if arm is None else np.abs(arm.drive_gain)
+    return np.asarray(np.maximum(3 * own + 1, 3 * (own * gain).max() / gain))
 
 
 def _beyond(trace: Trace, window: int) -> Array:

@@ -1,6 +1,7 @@
 """Faults that samples show by themselves: each is named at once, and free motion has none."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -178,3 +179,14 @@ def test_nothing_to_learn_from_is_said():
 def test_other_joints_are_refused(usual):
     with pytest.raises(ValueError, match="one entry a joint"):
         FaultCheck(usual).step(0.0, np.zeros(2), np.zeros(3), np.zeros(3))
+
+
+def test_a_hard_contact_on_a_joint_that_needs_little_is_no_fault():
+    """A first joint about a vertical axis gives 2 N m in free motion; a push asks for 20."""
+    free = motion(0)
+    quiet = replace(free, current=free.current * [0.1, 1.0, 1.0])
+
+    def pushed(t, q, qd, current):
+        current[:500, 0] += np.sin(np.arange(500) / 500 * np.pi) * 6.0
+
+    assert not any(said(UsualInput.of([quiet]), quiet, pushed))
