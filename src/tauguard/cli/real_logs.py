@@ -71,7 +71,8 @@ def read_one(log: Path, columns: str | None, torque: bool = False) -> Trace:
 
     read = read_log(log, column_map(columns))
     for note in read.notes:
-        print(f"note: {log.name}: {note}")
+        said = note.replace("taken as current [A]", "joint torque [N m]") if torque else note
+        print(f"note: {log.name}: {said}")
     if not torque:
         return read.trace
     return dataclasses.replace(read.trace, meta={**read.trace.meta, "effort": "torque"})

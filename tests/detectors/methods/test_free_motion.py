@@ -58,7 +58,8 @@ def test_what_a_push_leaves_is_taken_up(alarm):
 
 
 @pytest.mark.parametrize("size", [0.6, 2.0])
-def test_a_push_beside_a_biased_current_is_found(alarm, fitted, size):
+def test_a_push_beside_a_biased_current_is_found(fitted, size):
+    alarm = CollisionAlarm(fitted, 1.0, CONFIRMATION)  # of a load that is not told
     trace = record(9, seconds=32.0)
     current = trace.current.copy()
     current[trace.t >= 14.0, 1] += size * fitted.bound.least[1] / GAIN[1]
