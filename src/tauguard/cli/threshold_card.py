@@ -68,7 +68,7 @@ def _wrapped(line: str) -> list[str]:
 
 def _lines(card: ThresholdCard) -> list[str]:
     lines = [
-        "force at the tool that is found, in half (in 95 %) of all poses and directions:",
+        "force found at the tool: in half (in 95 %) of all poses and directions",
         *(f"  {_force(card, name)} {said}" for name, said in TOOL.items()),
         "a contact has to last 0.1 s: an alarm needs 24 ms above a bound at rest and 40 ms in "
         "motion, so a shorter blow has to be harder",
