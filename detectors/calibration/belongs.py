@@ -78,7 +78,7 @@ def torque_per_ampere(arm: ArmModel, traces: Sequence[Trace]) -> float:
     """What the drives give over what the columns hold, root mean square [N m/A].
 
     Over all joints and samples, so the joints that carry the arm count, not a wrist joint whose
-    gain nothing fixes. About 1 for joint torques told as currents; 8 to 12 for three geared arms.
+    gain nothing fixes. 0.9 to 1.1 for joint torques told as currents, 4 to 16 for currents.
     """
     current = np.concatenate([trace.current for trace in traces])
     torque = current * arm.drive_gain
