@@ -161,7 +161,7 @@ def _receive(pipe: Connection, process: BaseProcess) -> Any:
     try:
         result, error, told = pipe.recv()
     except (EOFError, ConnectionError):
-        process.join(5)
+        process.join(1)  # its pipe is closed: it is about to end, and the command with it
         code = process.exitcode or 0
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         raise WorkerDied(f"a worker process died ({how})") from None
@@ -176,5 +176,5 @@ def _end(crew: dict[Connection, BaseProcess]) -> None:
     for process in crew.values():
         process.kill()
     for pipe, process in crew.items():
-        process.join(5)
+        process.join(2)
         pipe.close()
