@@ -35,7 +35,7 @@ class RobotDrive:
     viscous: float | Numbers | None = None  #: [N m s/rad]
     like: str | None = None
     """``"cura6"``: joints of which neither this nor the file states friction get that arm's losses
-    (:mod:`tauguard.models.losses`), all joints its ripple, lag and sensor noise."""
+    (:mod:`tauguard.models.arm_drive`), all joints its ripple, lag and sensor noise."""
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the field."""

@@ -56,7 +56,8 @@ def possible_inertia(tensor: Array, mass: float) -> Array:
     """An inertia near ``tensor`` that a body can have [kg m^2], shape (3, 3)."""
     moments, axes = np.linalg.eigh(tensor)
     if moments[2] <= 0:
-        ball = (3 * mass / (4 * np.pi * DENSITY)) ** (1 / 3)
+        # MuJoCo names the link of a mass below 0.
+        ball = (3 * max(mass, 0.0) / (4 * np.pi * DENSITY)) ** (1 / 3)
         return np.diag(np.full(3, 0.4 * mass * ball**2))
     moments = np.maximum(moments, max(LEAST_MOMENT * moments[2], SMALLEST))
     moments[2] = min(moments[2], 0.999 * (moments[0] + moments[1]))

@@ -61,8 +61,13 @@ def run(names: Sequence[str], quick: bool, seed: int, keep: str | None = None) -
         keep: folder of what is done already.
 
     Raises:
-        ValueError: no such robot, or one that cannot be used.
+        ValueError: a robot that cannot be used, or two of one name.
+        FileNotFoundError: no such robot.
     """
+    stems = [Path(name).stem for name in names]
+    twice = next((stem for stem in stems if stems.count(stem) > 1), None)
+    if twice is not None:
+        raise ValueError(f"--robot: two arms are called {twice!r}; expected different file names")
     extent = QUICK if quick else FULL
     with _descriptions(keep) as folder, Workers() as each:
         unders = [conditions(name, folder) for name in names]
@@ -83,12 +88,12 @@ def run(names: Sequence[str], quick: bool, seed: int, keep: str | None = None) -
 def _descriptions(keep: str | None) -> Iterator[Path]:
     """A folder for descriptions of robots: within ``keep``, else for this run only."""
     if keep is None:
-        with TemporaryDirectory() as folder:
-            yield Path(folder)
+        with TemporaryDirectory() as made:
+            yield Path(made)
     else:
-        folder = str(Path(keep, "robots").resolve())
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        yield Path(folder)
+        folder = Path(keep, "robots").resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+        yield folder
 
 
 def conditions(name: str, folder: Path) -> Conditions:

@@ -54,3 +54,12 @@ def test_an_arm_with_such_a_link_loads_and_says_so(tmp_path, bad):
     path.write_text(ARM.format(bad.replace('izz="', 'izz="x')))
     with pytest.raises(ValueError, match=r"link 'tip': inertia izz 'x.*': expected a number"):
         load_arm(str(path))
+
+
+def test_a_mass_below_zero_is_refused_with_its_link(tmp_path):
+    path = tmp_path / "arm.urdf"
+    text = ARM.replace('<mass value="1"/>', '<mass value="-1"/>')
+    path.write_text(text.format(GOOD.replace("0.01", "-0.01")))
+    assert possible_inertia(-np.eye(3), -1.0).dtype == float
+    with pytest.raises(ValueError, match=r"mass and inertia of moving bodies must be.*'tip'"):
+        load_arm(str(path))

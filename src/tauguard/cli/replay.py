@@ -23,7 +23,8 @@ def command(
 ) -> None:
     """Turn an MCAP recording into an .rrd that shows the arm moving beside its signals.
 
-    With --web it is shown in a browser; so is an .rrd file, or the folder of `evaluate --events`.
+    With --web it is shown in a browser; so is an .rrd file, or the folder of `evaluate --events` or
+    `report`.
 
     Args:
         path: an MCAP file written by tauguard; with --web also an .rrd file or a folder of them.

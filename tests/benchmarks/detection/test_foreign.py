@@ -40,6 +40,8 @@ def test_the_packages_arms_and_descriptions_are_taken_as_they_are(arm, tmp_path)
         foreign.conditions("nobody", tmp_path)
     with pytest.raises(ValueError, match="one of them"):
         study.run(True, 0, detector="cusum", robot="cura6")
+    with pytest.raises(ValueError, match="two arms are called 'arm'; expected different"):
+        study.run(True, 0, robot=f"{arm}, other/arm.urdf")
 
 
 def test_a_row_judges_the_harder_collisions_by_the_arms_share():
