@@ -83,7 +83,8 @@ def test_every_arm_is_struck_in_its_own_episodes_and_with_several_payloads(monke
     made = {5: [], 6: []}
     nothing = simulate(Episode(seed=1, seconds=0.1))
 
-    def struck(episode):
+    def struck(episode, without):
+        assert not without
         made[episode.mismatch.seed].append(episode)
         return nothing
 
