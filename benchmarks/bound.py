@@ -3,58 +3,88 @@
 from __future__ import annotations
 
 import importlib
-import json
+import warnings
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from tauguard.benchmarks import STUDIES
+from tauguard.benchmarks.gaps import Gaps
 from tauguard.benchmarks.glance import detection, kernels
 from tauguard.benchmarks.panels import panels, rows_of
 from tauguard.benchmarks.run import chart
+from tauguard.benchmarks.study_file import read_study
 from tauguard.report import Row
 from tauguard.report.page import folded, page, picture, tables
-from tauguard.report.pareto import svg
+from tauguard.report.pareto import Panel, svg
 from tauguard.whole_file import write_whole
 
 #: A file of a study, read.
 Found = Mapping[str, Any]
+#: Other files of figures that the folder of a report holds.
+BESIDE = ("hard-cases.json", "wrong.json")
 
 
-def bind(folder: Path, cases: Sequence[Row], failed: Mapping[str, str], mistakes: str = "") -> Path:
+def bind(
+    folder: Path, cases: Sequence[Row], failed: Mapping[str, str], gaps: Gaps, mistakes: str = ""
+) -> Path:
     """Write ``index.html`` of the studies' files in ``folder`` and the rows of the hard cases.
 
     Args:
-        folder: what :func:`tauguard.benchmarks.collect.collect` has written.
+        folder: what :func:`tauguard.benchmarks.collect.collect` has written, or anything else: a
+            file that is damaged, of another program or of a part of a study is named in the page.
         cases: rows of :func:`tauguard.hard_cases.run`.
         failed: why, for each study that has no file.
+        gaps: gets a line for each part that is not shown.
         mistakes: HTML that links to recordings of what a detector got wrong.
     """
-    found = {
-        name: json.loads(path.read_text())
-        for name in STUDIES
-        if (path := folder / f"{name}.json").exists() and name not in failed
-    }
+    found = _read(folder, failed, gaps)
     rows = {name: one["rows"] for name, one in found.items()}
+    studies = {f"Study: {name}": _study(name, one, gaps) for name, one in found.items()}
     sections = {
-        "How fast, how wrong, beside whom": _first(rows),
-        "Collisions found, false alarms": _found(rows),
-        "Error against microseconds": _pareto(rows),
-        "Asked and not reached": _missed(rows),
-        "What each modelled thing costs": _costs(rows),
+        "How fast, how wrong, beside whom": _first(rows, gaps),
+        "Collisions found, false alarms": _found(rows, gaps),
+        "Error against microseconds": _pareto(rows, gaps),
+        "Asked and not reached": _missed(rows, gaps),
+        "What each modelled thing costs": _costs(rows, gaps),
         "Hard cases": _cases(cases),
         "Mistakes to look at": mistakes,
-        "What was measured": _measured(found, failed),
-        **{f"Study: {name}": _study(name, one) for name, one in found.items()},
+        "What was measured": _measured(found, failed, _others(folder)),
+        **studies,
     }
     target = folder / "index.html"
-    text = page("tauguard: speed against error", sections, _where(found))
-    write_whole(target, text)
+    write_whole(target, page("tauguard: speed against error", sections, _where(found, gaps)))
     return target
 
 
-def _where(found: Mapping[str, Found]) -> str:
+def _read(folder: Path, failed: Mapping[str, str], gaps: Gaps) -> dict[str, Found]:
+    """The studies whose files are theirs; the others, and parts that are missing, are gaps."""
+    found: dict[str, Found] = {}
+    for name in STUDIES:
+        path = folder / f"{name}.json"
+        if name in failed or not path.exists():
+            continue
+        try:
+            found[name] = read_study(path, name)
+        except (OSError, ValueError) as error:
+            gaps.add(name, str(error))
+            continue
+        if not found[name]["rows"]:
+            gaps.add(name, "its file has no rows")
+        if "incomplete" in found[name]:
+            gaps.add(name, f"incomplete: {found[name]['incomplete']}")
+    return found
+
+
+def _others(folder: Path) -> list[str]:
+    """JSON files that are not named after a study."""
+    known = {f"{name}.json" for name in STUDIES} | set(BESIDE)
+    return sorted(path.name for path in folder.glob("*.json") if path.name not in known)
+
+
+def _where(found: Mapping[str, Found], gaps: Gaps) -> str:
     """The machine and the versions in one paragraph each; more than one where files differ."""
     machines: dict[str, list[str]] = {}
     for name, one in found.items():
@@ -70,55 +100,82 @@ def _where(found: Mapping[str, Found]) -> str:
         f"<p>{escape(text + (' (' + ', '.join(names) + ')' if many else ''))}.</p>"
         for text, names in machines.items()
     ]
-    return f"<p>{escape(runs)}Every time stands beside its error.</p>" + "".join(lines)
+    return (
+        f"<p>{escape(runs)}Every time stands beside its error.</p>"
+        + "".join(lines)
+        + _not_shown(gaps)
+    )
 
 
-def _first(rows: Mapping[str, Sequence[Row]]) -> str:
+def _not_shown(gaps: Gaps) -> str:
+    """The gaps as a list, in front of everything."""
+    items = "".join(f"<li>{escape(line)}</li>" for line in gaps.lines)
+    return f'<div class="no"><p>Not shown, or not whole:</p><ul>{items}</ul></div>' if items else ""
+
+
+def _first(rows: Mapping[str, Sequence[Row]], gaps: Gaps) -> str:
     return (
         "<p>Time and error of each kernel and of a peer in the same run, one thread. "
         "A ratio above 1 says that tauguard is faster.</p>"
-        + (tables(kernels(rows), {}) or "<p>None of these studies is in this report.</p>")
+        + (tables(kernels(rows, gaps), {}) or "<p>None of these studies is in this report.</p>")
     )
 
 
-def _found(rows: Mapping[str, Sequence[Row]]) -> str:
+def _found(rows: Mapping[str, Sequence[Row]], gaps: Gaps) -> str:
     return (
         "<p>Collisions of arms that no threshold was set on, each figure with its 95 % interval. "
         "Simulated: thresholds for one false alarm an hour. Real: pushes on a UR5.</p>"
-        + (tables(detection(rows), {}) or "<p>None of these studies is in this report.</p>")
+        + (tables(detection(rows, gaps), {}) or "<p>None of these studies is in this report.</p>")
     )
 
 
-def _pareto(rows: Mapping[str, Sequence[Row]]) -> str:
-    drawn = panels(rows)
-    pictures = "".join(picture(svg(p).encode(), "svg+xml", p.title) for p in drawn)
+def _pareto(rows: Mapping[str, Sequence[Row]], gaps: Gaps) -> str:
+    drawn = [
+        gaps.attempt(f"figure '{panel.title}'", partial(_drawn, panel), "")
+        for panel in panels(rows, gaps)
+    ]
     return (
         "<p>Left is fast, low is right. The grey line joins what nothing else beats in both. "
         "Circles are tauguard's, squares are peers of the same run.</p>"
-        f'<div class="figures">{pictures}</div>'
+        f'<div class="figures">{"".join(drawn)}</div>'
     )
 
 
-def _missed(rows: Mapping[str, Sequence[Row]]) -> str:
+def _drawn(panel: Panel) -> str:
+    return picture(svg(panel).encode(), "svg+xml", panel.title)
+
+
+def _missed(rows: Mapping[str, Sequence[Row]], gaps: Gaps) -> str:
     """Every bar of a study's closing summary that its run did not reach."""
-    bars = [(name, row) for name, own in rows.items() for row in own if "asked" in row]
-    judged = [(name, row) for name, row in bars if isinstance(row.get("met"), bool)]
-    lost = [
+    none: list[Row] = []
+    bars = [
+        bar
+        for name, own in rows.items()
+        for bar in gaps.attempt(f"bars of {name}", partial(_bars, name, own), none)
+    ]
+    lost = [{key: bar[key] for key in bar if key != "met"} for bar in bars if not bar["met"]]
+    return f"<p>{len(bars) - len(lost)} of {len(bars)} bars are met.</p>" + tables(lost, {})
+
+
+def _bars(name: str, rows: Sequence[Row]) -> list[Row]:
+    return [
         {
             "bench": name,
             "what": row.get("question") or row.get("claim") or row.get("what"),
             "asked": row["asked"],
             "measured": row["measured"],
+            "met": row["met"],
         }
-        for name, row in judged
-        if not row["met"]
+        for row in rows
+        if "asked" in row and isinstance(row.get("met"), bool)
     ]
-    return f"<p>{len(judged) - len(lost)} of {len(judged)} bars are met.</p>" + tables(lost, {})
 
 
-def _costs(rows: Mapping[str, Sequence[Row]]) -> str:
+def _costs(rows: Mapping[str, Sequence[Row]], gaps: Gaps) -> str:
     parts = [
-        tables(own, _notes(name)) if own else f"<p>The study {name} is not in this report.</p>"
+        gaps.attempt(f"costs by {name}", partial(tables, own, _notes(name)), "")
+        if own
+        else f"<p>The study {name} is not in this report.</p>"
         for name, study in (("simulation", "cost"), ("needs", "needs"))
         for own in [rows_of(rows, name, study)]
     ]
@@ -143,7 +200,7 @@ def _cases(rows: Sequence[Row]) -> str:
     )
 
 
-def _measured(found: Mapping[str, Found], failed: Mapping[str, str]) -> str:
+def _measured(found: Mapping[str, Found], failed: Mapping[str, str], others: Sequence[str]) -> str:
     runs = [
         {
             "bench": name,
@@ -155,11 +212,12 @@ def _measured(found: Mapping[str, Found], failed: Mapping[str, str]) -> str:
         for name, one in found.items()
     ]
     absent = [n + (f" ({failed[n]})" if n in failed else "") for n in STUDIES if n not in found]
-    lost = ", ".join(absent)
+    lost, beside = ", ".join(absent), ", ".join(others)
     return (
         "<p>A quick run shows the form of the answers, a full run their size.</p>"
         + tables(runs, {})
         + (f"<p>Not in this report: {escape(lost)}.</p>" if lost else "")
+        + (f"<p>Files of no study, not read: {escape(beside)}.</p>" if beside else "")
     )
 
 
@@ -172,17 +230,23 @@ def _module(name: str) -> Any:
     return importlib.import_module(f"tauguard.benchmarks.{STUDIES[name].module}")
 
 
-def _study(name: str, found: Found) -> str:
-    shown: Callable[[list[Row]], list[Row]] | None = getattr(_module(name), "shown", None)
-    rows = shown(found["rows"]) if shown else found["rows"]
-    try:
-        figure = picture(chart(_module(name), found["rows"]), "png", f"chart of {name}")
-    except (AttributeError, IndexError, KeyError, StopIteration, TypeError, ValueError) as error:
-        # Figures of another build, or of a part of the study: the tables are there all the same.
-        figure = f"<p>These rows have no chart ({escape(repr(error))}).</p>"
+def _study(name: str, found: Found, gaps: Gaps) -> str:
+    study, rows = _module(name), found["rows"]
+    missing = "<p>Not shown: see the top of this page.</p>"
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always", UserWarning)
+        figure = gaps.attempt(
+            f"chart of {name}",
+            lambda: picture(chart(study, rows), "png", f"chart of {name}"),
+            missing,
+        )
+    for doubt in dict.fromkeys(str(one.message) for one in doubts):
+        gaps.add(f"chart of {name}", doubt)  # an empty panel is no error to matplotlib
+    shown: Callable[[list[Row]], list[Row]] = getattr(study, "shown", list)
+    text = gaps.attempt(f"tables of {name}", lambda: tables(shown(rows), _notes(name)), missing)
     run = f"{'quick' if found['quick'] else 'full'} run, seed {found['seed']}"
     stopped = f"; incomplete: {found['incomplete']}" if "incomplete" in found else ""
     return (
         f"<p>{escape(STUDIES[name].line)} ({escape(run + stopped)}).</p>"
-        f"<figure>{figure}</figure>" + folded("Tables", tables(rows, _notes(name)))
+        f"<figure>{figure}</figure>" + folded("Tables", text)
     )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import time
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
+from tauguard.benchmarks.study_file import read_study
 from tauguard.report import versions
 
 
@@ -17,15 +16,22 @@ def collect(folder: Path, names: Iterable[str], *, quick: bool, seed: int) -> di
     """Run the studies ``names`` that ``folder`` does not hold of these settings and versions.
 
     Each leaves ``NAME.json``, ``NAME.png`` and ``NAME.log``. A study that fails does not stop the
-    others.
+    others. A file of that name which no study wrote is left as it is.
 
     Returns:
-        Why, for each study that failed: the last line that it printed.
+        Why, for each study that failed: the last line that it printed, or what is wrong with the
+        file that is there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     failed: dict[str, str] = {}
     for name in names:
-        if _there(folder / f"{name}.json", quick, seed):
+        try:
+            there = _there(folder / f"{name}.json", name, quick, seed)
+        except (OSError, ValueError) as error:
+            failed[name] = f"{error}; move it away"
+            print(f"{name}: {failed[name]}", flush=True)
+            continue
+        if there:
             print(f"{name}: there already")
             continue
         start = time.monotonic()
@@ -36,11 +42,11 @@ def collect(folder: Path, names: Iterable[str], *, quick: bool, seed: int) -> di
     return failed
 
 
-def _there(path: Path, quick: bool, seed: int) -> bool:
-    try:
-        found: dict[str, Any] = json.loads(path.read_text())
-    except (OSError, ValueError):
+def _there(path: Path, name: str, quick: bool, seed: int) -> bool:
+    """Whether the file holds what this run would; ``ValueError`` if it is no study's."""
+    if not path.exists():
         return False
+    found = read_study(path, name)
     same = (found["quick"], found["seed"], found["versions"]) == (quick, seed, versions())
     return same and "incomplete" not in found
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
+from tauguard.benchmarks.gaps import Gaps
 from tauguard.benchmarks.panels import Studies, number, rows_of
 from tauguard.report import Row, cell
 
@@ -20,18 +22,47 @@ def time_text(us: float) -> str:
     return f"{us / size:.3g} {unit}"
 
 
-def kernels(studies: Studies) -> list[Row]:
+def kernels(studies: Studies, gaps: Gaps) -> list[Row]:
     """Time and error of each kernel, its peer's of the same run, and the ratio of both times."""
-    sources: tuple[Callable[[Studies], Iterator[Row]], ...] = (
-        _queries,
-        _frames,
-        _convex,
-        _impacts,
-        _meshes,
-        _steps,
-        _online,
-    )
-    return [row for source in sources for row in source(studies)]
+    sources = {
+        "cloth, queries": _queries,
+        "cloth, frames": _frames,
+        "rigid, convex bodies": _convex,
+        "rigid, time of impact": _impacts,
+        "rigid, meshes": _meshes,
+        "environments, steps": _steps,
+        "detection_online": _online,
+    }
+    return _lines(sources, studies, gaps)
+
+
+def _lines(
+    sources: Mapping[str, Callable[[Studies], Iterator[Row]]], studies: Studies, gaps: Gaps
+) -> list[Row]:
+    """The lines of all sources; one whose rows are not as expected is a gap."""
+    no_rows: list[Row] = []
+    made = [
+        gaps.attempt(f"first tables, {name}", partial(_all, source, studies), no_rows)
+        for name, source in sources.items()
+    ]
+    return [row for rows in made for row in rows]
+
+
+def _all(source: Callable[[Studies], Iterator[Row]], studies: Studies) -> list[Row]:
+    return list(source(studies))
+
+
+def _only(rows: Sequence[Row], **wanted: object) -> Row:
+    """The first row with these values.
+
+    Raises:
+        ValueError: there is none.
+    """
+    for row in rows:
+        if all(row.get(key) == value for key, value in wanted.items()):
+            return row
+    asked = ", ".join(f"{key} {value}" for key, value in wanted.items())
+    raise ValueError(f"no row with {asked}")
 
 
 def _line(asked: str, ours: tuple[float, str], peer: str, its: tuple[float, str]) -> Row:
@@ -84,8 +115,7 @@ def _frames(studies: Studies) -> Iterator[Row]:
     if not peers:
         return
     largest = max(peers, key=lambda row: number(row["ab2pf_ms"]) or 0.0)["scene"]
-    frames = rows_of(studies, "cloth", "frame")
-    own = next(row for row in frames if row["method"] == "ab2pf" and row["scene"] == largest)
+    own = _only(rows_of(studies, "cloth", "frame"), method="ab2pf", scene=largest)
     error = f"{own['missed']} missed, {own['late']} late of {own['ab2pf_hits']:,}"
     for row in peers:
         if row["scene"] == largest:
@@ -139,13 +169,15 @@ def _meshes(studies: Studies) -> Iterator[Row]:
 def _steps(studies: Studies) -> Iterator[Row]:
     rows = rows_of(studies, "environments", "step")
     if rows:
-        take = {row["what"]: number(row["us_per_action"]) or 0.0 for row in rows}
-        peer = next(name for name in take if name.startswith("mujoco.rollout"))
-        strayed = next(r["q_difference_rad"] for r in rows if r["what"] == peer)
-        error = f"joints within {strayed:.0e} rad of rollout's"
+        peers = [row for row in rows if str(row["what"]).startswith("mujoco.rollout")]
+        if not peers:
+            raise ValueError("no row of mujoco.rollout")
+        error = f"joints within {peers[0]['q_difference_rad']:.0e} rad of rollout's"
+        own = _only(rows, what="the environment")
+        ours, its = (number(row["us_per_action"]) or 0.0 for row in (own, peers[0]))
         what = "10 ms of an arm with drives, observations and rewards"
-        ours = take["the environment"], error
-        yield _line(what, ours, "mujoco.rollout of the bare physics", (take[peer], "same motion"))
+        peer = "mujoco.rollout of the bare physics"
+        yield _line(what, (ours, error), peer, (its, "same motion"))
 
 
 def _online(studies: Studies) -> Iterator[Row]:
@@ -166,9 +198,9 @@ def _online(studies: Studies) -> Iterator[Row]:
 # -- detection -------------------------------------------------------------------------------------
 
 
-def detection(studies: Studies) -> list[Row]:
+def detection(studies: Studies, gaps: Gaps) -> list[Row]:
     """What detectors find and how often they are wrong: simulated arms, then real ones."""
-    return [*_simulated(studies), *_real(studies)]
+    return _lines({"detection": _simulated, "real_arm": _real}, studies, gaps)
 
 
 def _simulated(studies: Studies) -> Iterator[Row]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
+from tauguard.benchmarks.gaps import Gaps
 from tauguard.report import Row
 from tauguard.report.pareto import Panel, Point
 
@@ -83,17 +85,23 @@ CONVEX = {
 }
 
 
-def panels(studies: Studies) -> list[Panel]:
+def panels(studies: Studies, gaps: Gaps) -> list[Panel]:
     """The panels of all studies; a row without both figures is no point."""
-    own: tuple[Callable[[Studies], Panel], ...] = (
-        _queries,
-        _frames,
-        _convex,
-        _meshes,
-        _guard,
-        _detectors,
-    )
-    found = [make(studies) for make in own] + [_panel(source, studies) for source in SOURCES]
+    made: dict[str, Callable[[Studies], Panel]] = {
+        "cloth, queries": _queries,
+        "cloth, frames": _frames,
+        "rigid, convex bodies": _convex,
+        "rigid, meshes": _meshes,
+        "guard": _guard,
+        "detectors": _detectors,
+    }
+    for source in SOURCES:
+        made[f"{source.bench}, {source.study}"] = partial(_panel, source)
+    none = Panel("", "", "", ())
+    found = [
+        gaps.attempt(f"error against microseconds, {name}", partial(make, studies), none)
+        for name, make in made.items()
+    ]
     return [panel for panel in found if panel.points]
 
 

@@ -39,7 +39,7 @@ def command(
             alarm, with a page that `tauguard replay --web` opens.
         late: with --events, a collision found later than this is an event [s].
     """
-    from tauguard.cli.events import EventFolder
+    from tauguard.cli.events import EventFolder, command_to_open
     from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.datasets.arm_splits import episodes_of_splits
     from tauguard.datasets.labelled import labelled
@@ -69,7 +69,7 @@ def command(
             draw(drawn, summary, matchings)
     if wrong is not None:
         page = wrong.finish()
-        print(f"{page}: open it with `tauguard replay --web {page.parent}`")
+        print(f"{page}: open it with `{command_to_open(page.parent)}`")
     if json is not None:
         write_json(json, measured("evaluate", rows))
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +21,11 @@ MOST = 100
 KINDS = ("missed", "late", "false alarm")
 #: The names of the recordings.
 OWN = re.compile(r"(missed|late|false-alarm)-\d+\.rrd")
+
+
+def command_to_open(folder: Path) -> str:
+    """What to type to see the page of a folder of recordings."""
+    return f"tauguard replay --web {shlex.quote(str(folder))}"
 
 
 @dataclass(frozen=True)
@@ -99,10 +106,11 @@ class EventFolder:
         from tauguard.report.page import Link, page, tables
         from tauguard.whole_file import write_whole
 
+        opens = escape(command_to_open(self._folder))
         how = (
             f"<p>{self.counts}. Late is later than {1e3 * self._late:.0f} ms. A recording begins "
             f"{BEFORE} s before its event and lasts {LENGTH:.0f} s; at most {MOST} of a kind are "
-            f"kept. The links work while <code>tauguard replay --web {self._folder}</code> runs; "
+            f"kept. The links work while <code>{opens}</code> runs; "
             "<code>rerun FILE</code> opens a file without it.</p>"
         )
         rows = [{**row, "file": Link(f"open/{row['file']}", row["file"])} for row in self._rows]

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+from html import escape
 from pathlib import Path
+from typing import Any
+from urllib.parse import quote
 
 #: A collision that is found later than this is shown [s].
 LATE = 0.05
@@ -21,19 +25,55 @@ def mistakes(folder: Path, seed: int) -> str:
     """HTML with a link for every collision missed or found late and every false alarm.
 
     The detector and the motions are those of `tauguard demo`. The recordings lie in
-    ``folder/wrong``; they are made once.
+    ``folder/wrong`` and their list in ``folder/wrong.json``; both are made where they are not of
+    this seed and build, which is said before it begins.
 
     Args:
         folder: of the report.
         seed: of the arm and the motions.
+
+    Raises:
+        ValueError: ``wrong.json`` or the folder is something else.
     """
     from tauguard.report import write_json
 
     kept = folder / "wrong.json"
-    if not kept.exists() or json.loads(kept.read_text())["seed"] != seed:
-        write_json(kept, {"seed": seed, **judged(folder / "wrong", seed)})
-    found = json.loads(kept.read_text())
+    found, why = _kept(kept, seed)
+    if why:
+        print(f"mistakes: {why}; training the detector of `tauguard demo`, minutes", flush=True)
+        found = {"seed": seed, "build": _build(), **judged(folder / "wrong", seed)}
+        write_json(kept, found)
     return _html(folder, found["counts"], found["rows"])
+
+
+def _kept(path: Path, seed: int) -> tuple[dict[str, Any], str]:
+    """What is there, and why it has to be made again (nothing if it has not).
+
+    Raises:
+        ValueError: the file is no list of mistakes.
+    """
+    if not path.exists():
+        return {}, "none are recorded yet"
+    try:
+        found = json.loads(path.read_text())
+        own = {"seed": found["seed"], "build": found.get("build")}
+        files = [Path(row["file"]) for row in found["rows"] if row["kind"]]
+        found["counts"] = str(found["counts"])
+    except (ValueError, RecursionError, KeyError, TypeError, AttributeError):
+        raise ValueError(f"{path}: no list of mistakes of this command; move it away") from None
+    if own != {"seed": seed, "build": _build()}:
+        return {}, "those recorded are of another seed or build"
+    if not all((path.with_suffix("") / file.name).is_file() for file in files):
+        return {}, "some recordings are gone"
+    return found, ""
+
+
+def _build() -> str:
+    """A hash of the versions and sources that decide what a detector gets wrong."""
+    from tauguard.datasets.code_identity import sources, tree_digest, versions
+
+    decide = (versions(), sources(), tree_digest("detectors"))
+    return hashlib.sha256(repr(decide).encode()).hexdigest()[:16]
 
 
 def judged(folder: Path, seed: int) -> dict[str, object]:
@@ -56,19 +96,18 @@ def judged(folder: Path, seed: int) -> dict[str, object]:
     return {"counts": wrong.counts, "rows": wrong.rows}
 
 
-def _html(folder: Path, counts: str, rows: list[dict[str, object]]) -> str:
-    from tauguard.cli.events import KINDS
+def _html(folder: Path, counts: str, rows: list[dict[str, Any]]) -> str:
+    from tauguard.cli.events import KINDS, command_to_open
     from tauguard.report.page import Link, tables
 
     shown = [
-        {**row, "file": Link(f"open/wrong/{row['file']}", str(row["file"]))}
+        {**row, "file": Link(f"open/wrong/{quote(str(row['file']))}", str(row["file"]))}
         for kind in KINDS
         for row in [one for one in rows if one["kind"] == kind][:SHOWN]
     ]
+    opens = escape(command_to_open(folder))
     return (
         f"<p>The detector of <code>tauguard demo</code> on motions that it was not trained on: "
-        f"{counts} (late: after {1e3 * LATE:.0f} ms). Each link opens its ten seconds in the "
-        f"browser while <code>tauguard replay --web {folder}</code> shows this page.</p>"
-        + tables(shown, {})
-        + OFFLINE
+        f"{escape(counts)} (late: after {1e3 * LATE:.0f} ms). Each link opens its ten seconds in "
+        f"the browser while <code>{opens}</code> shows this page.</p>" + tables(shown, {}) + OFFLINE
     )
