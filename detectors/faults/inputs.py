@@ -42,17 +42,17 @@ ODD = 3
 FAULTS: dict[int, tuple[str, str]] = {
     1: ("not-finite", "the position of {joint} is {value:g}"),
     2: ("not-finite", "the velocity of {joint} is {value:g}"),
-    3: ("not-finite", "the current of {joint} is {value:g}"),
+    3: ("not-finite", "the current or torque of {joint} is {value:g}"),
     4: ("not-finite", "the time is {value:g}"),
     5: ("time", "the time stamp repeats"),
     6: ("time", "the time goes back by {back:.3g} s"),
     7: ("gap", "nothing for {ms:.3g} ms"),
     8: ("rate", "samples come every {ms:.3g} ms, trained at {dt:.3g} ms"),
     9: ("range", "the velocity of {joint} is {value:.3g} rad/s"),
-    10: ("range", "the current of {joint} is {value:.3g} A, far beyond training's largest"),
+    10: ("range", "the current or torque of {joint} is {value:.3g}, far beyond training's largest"),
     11: ("frozen", "no signal has changed for {value:.0f} samples"),
     12: ("position", "the position of {joint} is off its velocity by {value:.2g} rad"),
-    13: ("stuck", "the current of {joint} stays at {value:.3g} A: saturated or stuck"),
+    13: ("stuck", "the current or torque of {joint} stays at {value:.3g}: saturated or stuck"),
 }
 
 

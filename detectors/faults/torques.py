@@ -21,9 +21,9 @@ SHARE = 0.5
 OPPOSED, LEAST, MOST, MARGIN = -0.4, 0.4, 1.7, 0.4
 #: By the number that the native check answers.
 TEXTS = {
-    14: "torque: the current of {joint} works against the motion ({value:.2f} of the torque that "
-    "the model needs): another sign, exchanged joints, or another arm",
-    15: "torque: the current of {joint} gives {value:.2f} of the torque that the model needs: "
+    14: "torque: {joint} is driven against its motion ({value:.2f} of the torque that the model "
+    "needs): another sign, exchanged joints, another arm, or a push of half a second or more",
+    15: "torque: {joint} is driven with {value:.2f} of the torque that the model needs: "
     "another load, gain or arm, or a saturated or biased current",
 }
 

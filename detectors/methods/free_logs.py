@@ -51,6 +51,7 @@ class JudgedLog:
     """A log under a calibration and bounds from the others."""
 
     name: str
+    begin: float  #: its first time [s]
     seconds: float  #: its length
     alarms: tuple[Alarm, ...]  #: in the log's own time
     level: float  #: median of the largest residual over bound of joints in motion
@@ -132,7 +133,7 @@ def judge_logs(recordings: Mapping[str, Recording], arm: ArmModel) -> list[Judge
         alarms = tuple(alarm for one in own for alarm in one[0])
         t = recording.trace.t
         level = float(np.max([one[1] for one in own], initial=0.0))
-        found.append(JudgedLog(name, float(t[-1] - t[0]), alarms, level))
+        found.append(JudgedLog(name, float(t[0]), float(t[-1] - t[0]), alarms, level))
     return found
 
 

@@ -71,6 +71,18 @@ def test_the_push_is_found_and_nothing_else(log, capsys):
     assert "250 Hz" in text
 
 
+def test_times_of_a_clock_are_printed_from_the_first_sample(log, capsys):
+    table = np.loadtxt(log / "log.csv", delimiter=",")
+    table[:, 0] += 1.7e9
+    np.savetxt(log / "log.csv", table, delimiter=",", fmt="%.17g")
+    run(log, "--gains", "8", "5", "--json", str(log / "figures.json"))
+    (event,) = json.loads((log / "figures.json").read_text())["events"]
+    assert event["start"] > 1.7e9 + 14
+    text = capsys.readouterr().out
+    assert "times count from the log's first sample, at 1700000000.000 s" in text
+    assert f"alarm {event['start'] - 1.7e9:.3f} s to " in text
+
+
 def test_a_coarse_rate_is_said_aloud(log, capsys):
     run(log, "--gains", "8", "5", "--confirmation", "0.003")
     assert "a confirmation of 3 ms is counted as 1 samples (4 ms)" in capsys.readouterr().out

@@ -237,6 +237,7 @@ def summary(
         "name": "detect",
         "log": log.name,
         "joints": list(trace.joint_names),
+        "begin": float(trace.t[0]),
         "seconds": float(trace.t[-1] - trace.t[0]),
         "watched_seconds": watched,
         "detector": found.detection.detector,
@@ -257,6 +258,7 @@ def summary(
 
 def report(result: dict[str, Any]) -> None:
     """The figures for a reader."""
+    from tauguard.cli.real_logs import printed_from
     from tauguard.cli.threshold_card import rate_text
 
     pairs = zip(result["joints"], result["thresholds_nm"], strict=True)
@@ -265,11 +267,16 @@ def report(result: dict[str, Any]) -> None:
         print("thresholds: " + ", ".join(used))
     else:
         print(f"{result['detector']}: score above {result['score_threshold']:.3f} is an alarm")
+    since = printed_from(result["begin"])
+    if since and (result["events"] or result["faults"]):
+        print(f"times count from the log's first sample, at {since:.3f} s")
     for event in result["events"]:
-        line = f"alarm {event['start']:.3f} s to {event['end']:.3f} s, most on {event['joint']}"
+        start, end = event["start"] - since, event["end"] - since
+        line = f"alarm {start:.3f} s to {end:.3f} s, most on {event['joint']}"
         print(f"{line}: {event['summary']}" if event.get("summary") else line)
     for fault in result["faults"]:
-        print(f"fault {fault['start']:.3f} s to {fault['end']:.3f} s: {fault['reason']}")
+        start, end = fault["start"] - since, fault["end"] - since
+        print(f"fault {start:.3f} s to {end:.3f} s: {fault['reason']}")
     if result["fault_seconds"]:
         print(f"faults hide collisions in {result['fault_seconds']:.2f} s of this log")
     count, seconds = result["alarms"], result["watched_seconds"]

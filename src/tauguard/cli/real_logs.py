@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from tauguard.detectors.calibration.recording import Load, Recording
     from tauguard.traces import Trace
 
-
+#: A log that begins later than this is stamped by a clock [s].
+CLOCK = 1e6
 #: No load of an arm's is told heavier than this [kg]: it would be grams.
 HEAVIEST = 100.0
 
@@ -143,8 +144,9 @@ def read_logs(
     traces = {name: matched(trace, numbers.joint_names) for name, trace in traces.items()}
     for log, trace in traces.items():
         for name, row, count, peak in saturated(trace):
+            what, unit = ("torque", "N m") if is_torque(trace) else ("current", "A")
             raise ValueError(
-                f"{log}: the current of {name} stays at {peak:g} A for {count} samples, "
+                f"{log}: the {what} of {name} stays at {peak:g} {unit} for {count} samples, "
                 f"{trace.t[row] - trace.t[0]:.2f} s after the beginning: saturated, "
                 "which says nothing of the torque; leave this log out or cut it there"
             )
@@ -161,6 +163,14 @@ def moving(traces: dict[str, Trace]) -> dict[str, Trace]:
         if not moves(trace):
             print(f"note: {name}: no joint moves in it; calibration leaves it out")
     return {name: trace for name, trace in traces.items() if moves(trace)} or traces
+
+
+def printed_from(begin: float) -> float:
+    """What is taken from printed times of a log that begins at ``begin`` [s].
+
+    0, unless a clock stamped the log, as ROS does. Files keep the log's own times.
+    """
+    return begin if begin > CLOCK else 0.0
 
 
 # -- loads and gains ------------------------------------------------------------------------------

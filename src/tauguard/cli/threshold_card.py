@@ -125,9 +125,13 @@ def _alarms(card: ThresholdCard) -> str:
 
 def times(log: JudgedLog) -> str:
     """How many alarms a log has, and at which seconds: "3 alarms at 1.2, 3.4, 5.6 s"."""
-    starts = [f"{alarm.start:.1f}" for alarm in log.alarms]
+    from tauguard.cli.real_logs import printed_from
+
+    since = printed_from(log.begin)
+    starts = [f"{alarm.start - since:.1f}" for alarm in log.alarms]
     shown = ", ".join(starts[:LISTED]) + (" ..." if len(starts) > LISTED else "")
-    return f"{len(starts)} alarm{'' if len(starts) == 1 else 's'} at {shown} s"
+    after = " after its first sample" if since else ""
+    return f"{len(starts)} alarm{'' if len(starts) == 1 else 's'} at {shown} s{after}"
 
 
 def draw(target: Path, card: ThresholdCard) -> None:

@@ -92,10 +92,10 @@ def stuck_current(t, q, qd, current):
 
 #: The change, the name of the fault, and samples after which it has to be said.
 CASES = [
-    (nan_current, "not-finite: the current of elbow", 1),
+    (nan_current, "not-finite: the current or torque of elbow", 1),
     (huge_velocity, "range: the velocity of wrist", 1),
     (huge_position, "position: the position of shoulder", 1),
-    (huge_current, "range: the current of shoulder", 1),
+    (huge_current, "range: the current or torque of shoulder", 1),
     (same_time, "time: the time stamp repeats", 1),
     (back_in_time, "time: the time goes back by 0.998 s", 1),
     (gap, "gap: nothing for 1e\\+03 ms", 1),
@@ -103,7 +103,7 @@ CASES = [
     (frozen, "(frozen: no signal has changed|position: )", 10),
     (encoder, "position: the position of elbow", 10),
     (reversed_velocity, "position: the position of shoulder", 10),
-    (stuck_current, "stuck: the current of wrist stays at 2.5 A", 10),
+    (stuck_current, "stuck: the current or torque of wrist stays at 2.5", 10),
 ]
 
 

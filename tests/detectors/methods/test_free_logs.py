@@ -71,7 +71,9 @@ def test_too_little_motion_judges_nothing():
 
 
 def log(name, seconds, alarms):
-    return JudgedLog(name, seconds, tuple(Alarm(float(k), k + 0.1) for k in range(alarms)), 0.1)
+    return JudgedLog(
+        name, 0.0, seconds, tuple(Alarm(float(k), k + 0.1) for k in range(alarms)), 0.1
+    )
 
 
 @pytest.mark.parametrize(
