@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.contacts.guard.mocap import Carriers
 from tauguard.contacts.guard.report import Pair
 
 
@@ -33,72 +34,91 @@ def arrest(
     length: float,
     hits: Sequence[Hit],
     judge: Callable[[], list[Hit]],
-) -> list[Hit]:
+) -> tuple[list[Hit], float]:
     """Take the piece of a step again so that no pair passes through.
 
     The velocity at its end is changed by as little as possible, in the metric of the inertia, such
     that the partners of each hit do not move against one another (rigid impact zones: Provot 1997;
-    Bridson, Fedkiw and Anderson 2002); that takes kinetic energy and never adds any. The piece then
-    goes by that velocity. Pairs that meet on this new way are added; if that does not end, all
-    stands still for the piece.
+    Bridson, Fedkiw and Anderson 2002); beyond the work of mocap bodies, that takes kinetic energy
+    and never adds any. The piece then goes by that velocity. Pairs that meet on this new way are
+    added; if that does not end, all but mocap bodies stands still for the piece.
 
     Args:
         model: MjModel.
-        data: MjData after the failed piece; its kinematics are those of the piece's start.
+        data: MjData after the failed piece; its kinematics are those of the piece's start, its
+            mocap poses those of the end.
         qpos: At the piece's start.
         length: Of the piece [s].
         hits: What it let through.
         judge: Judges the way from the start to ``data.qpos``.
 
     Returns:
-        All hits whose partners were stopped.
+        All hits whose partners were stopped, and the work that mocap bodies did by it [J].
     """
     stopped, velocity = list(hits), data.qvel.copy()
     for _ in range(ROUNDS):
-        data.qvel[:] = _joined(model, data, velocity, stopped)
+        data.qvel[:], work = _joined(model, data, velocity, stopped, length)
         data.qpos[:] = qpos
         mujoco.mj_integratePos(model, data.qpos, data.qvel, length)
         more = judge()
         if not more:
-            return stopped
+            return stopped, work
         stopped += more
     data.qpos[:], data.qvel[:] = qpos, 0.0
-    return stopped
+    return stopped, 0.0
 
 
-def _joined(model: Any, data: Any, velocity: Array, hits: Sequence[Hit]) -> Array:
-    """The velocity nearest to ``velocity`` at which the partners of each hit move as one."""
-    rows = np.concatenate([_rows(model, data, hit) for hit in hits])
-    rows = rows[np.abs(rows).max(axis=1) > 0]
+def _joined(
+    model: Any, data: Any, velocity: Array, hits: Sequence[Hit], length: float
+) -> tuple[Array, float]:
+    """The velocity nearest to ``velocity`` at which the partners of each hit move as one.
+
+    With rows J, inertia M, carriers' velocity c and S the impulses, J M^-1 J' S = J v + c; the
+    carriers do the work S c.
+    """
+    carriers = Carriers(model, data, length) if model.nmocap else None
+    parts = [_rows(model, data, hit, carriers) for hit in hits]
+    rows, carried = (np.concatenate([part[k] for part in parts]) for k in range(2))
+    acts = np.abs(rows).max(axis=1) > 0
+    rows, carried = rows[acts], carried[acts]
     if not len(rows):
-        return velocity
+        return velocity, 0.0
     weighted = np.zeros_like(rows)
     mujoco.mj_solveM(model, data, weighted, rows)
-    share = np.linalg.lstsq(rows @ weighted.T, rows @ velocity, rcond=1e-10)[0]
-    return np.asarray(velocity - share @ weighted)
+    share = np.linalg.lstsq(rows @ weighted.T, rows @ velocity + carried, rcond=1e-10)[0]
+    return np.asarray(velocity - share @ weighted), float(share @ carried)
 
 
-def _rows(model: Any, data: Any, hit: Hit) -> Array:
-    """Jacobian of the relative motion of a hit's partners. Shape (R, nv)."""
+def _rows(model: Any, data: Any, hit: Hit, carriers: Carriers | None) -> tuple[Array, Array]:
+    """Jacobian of the relative motion of a hit's partners, shape (R, nv), and what is carried."""
+
+    def of(body: int, point: Array, count: int) -> tuple[Array, Array]:
+        jacobian = np.zeros((6, model.nv))
+        place = np.ascontiguousarray(point)
+        mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], place, body)
+        velocity = np.zeros(6) if carriers is None else carriers.velocity(body, place)
+        return jacobian[:count], velocity[:count]
+
     (first, one), (_, other) = hit.pair
     if first == "geom":
         a, b = (int(model.geom_bodyid[g]) for g in (one, other))
         point = data.xipos[a if model.body_dofnum[model.body_weldid[a]] else b]
-        return _body(model, data, a, point, 6) - _body(model, data, b, point, 6)
+        return _apart([of(a, point, 6)], [of(b, point, 6)])
     points = data.flexvert_xpos[hit.vertices]
     own = [
-        _body(model, data, int(model.flex_vertbodyid[v]), point, 3)
+        of(int(model.flex_vertbodyid[v]), point, 3)
         for v, point in zip(hit.vertices.tolist(), points, strict=True)
     ]
     if hit.pair[1][0] == "flex":
-        return np.concatenate([row - own[0] for row in own[1:]])
+        return _apart(own[1:], own[:1] * (len(own) - 1))
     body = int(model.geom_bodyid[other])
-    with_body = [_body(model, data, body, point, 3) for point in points]
-    return np.concatenate([a - b for a, b in zip(own, with_body, strict=True)])
+    return _apart(own, [of(body, point, 3) for point in points])
 
 
-def _body(model: Any, data: Any, body: int, point: Array, count: int) -> Array:
-    """The first rows of the Jacobian of a point on a body: 3 of its velocity, 3 of its turning."""
-    out = np.zeros((6, model.nv))
-    mujoco.mj_jac(model, data, out[:3], out[3:], np.ascontiguousarray(point), body)
-    return out[:count]
+def _apart(a: Sequence[tuple[Array, Array]], b: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Differences of rows and of velocities, one below the other."""
+    pairs = list(zip(a, b, strict=True))
+    return (
+        np.concatenate([one[0] - other[0] for one, other in pairs]),
+        np.concatenate([one[1] - other[1] for one, other in pairs]),
+    )

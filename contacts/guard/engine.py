@@ -33,6 +33,7 @@ FUNCTIONS = (
     "mj_setState",
     "mj_copyState",
     "mj_mulM",
+    "mj_mulJacVec",
     "mj_jacBodyCom",
     "mj_integratePos",
 )
@@ -49,15 +50,19 @@ _MODEL_ARRAYS = (
     *(f"{kind}_{name}" for kind in ("pair", "geom", "flex") for name in ("margin", "solref")),
     *(f"{kind}_solimp" for kind in ("pair", "geom", "flex")),
     *("geom_priority", "flex_priority", "pair_geom1", "pair_geom2"),
-    *("flex_vertbodyid", "flex_vert"),
+    *("flex_vertbodyid", "flex_vert", "geom_bodyid", "body_rootid", "body_mocapid"),
 )
 _DATA_ARRAYS = (
     *("qpos", "qvel", "energy", "qfrc_actuator", "qfrc_applied", "xfrc_applied"),
-    *("xpos", "xmat", "flexvert_xpos"),
+    *("xpos", "xmat", "flexvert_xpos", "mocap_pos", "mocap_quat"),
 )
 _END_ARRAYS = ("qvel", "energy", "xpos", "xmat", "flexvert_xpos", "cvel")
-_MOVING = ("ncon", "nefc", "contact", "efc_aref", "efc_margin", "efc_vel", "efc_pos")
-_NUMBERS = ("nq", "nv", "nbody", "ngeom", "nflex", "nflexvert", "ntendon")
+_OTHER_ARRAYS = ("energy", "xpos", "xmat", "flexvert_xpos", "mocap_pos", "mocap_quat")
+_MOVING = (
+    *("ncon", "nefc", "contact", "efc_aref", "efc_margin", "efc_vel", "efc_pos", "efc_force"),
+    *("efc_type", "efc_id"),
+)
+_NUMBERS = ("nq", "nv", "nbody", "nmocap", "ngeom", "nflex", "nflexvert", "ntendon")
 _TYPES = {
     "int": ctypes.c_int,
     "mjtNum": ctypes.c_double,
@@ -73,13 +78,14 @@ _TYPES = {
 }
 
 
-def addresses(model: Any, data: Any, end: Any) -> dict[str, int]:
+def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     """Everything that the native guard reads and calls, by name.
 
     Args:
         model: MjModel.
         data: MjData that is stepped.
         end: another MjData of the model.
+        other: one more; ``end`` will do where there are no mocap bodies.
 
     Raises:
         RuntimeError: the installed MuJoCo lays out its structs otherwise than it declares.
@@ -88,11 +94,12 @@ def addresses(model: Any, data: Any, end: Any) -> dict[str, int]:
     out |= {name: _array(model, name) for name in _MODEL_ARRAYS}
     out |= {name: _array(data, name) for name in _DATA_ARRAYS}
     out |= {f"end_{name}": _array(end, name) for name in _END_ARRAYS}
+    out |= {f"other_{name}": _array(other, name) for name in _OTHER_ARRAYS}
     out |= {name: int(getattr(model, name)) for name in _NUMBERS}
     fields, contact = _layout("mjData"), _layout("mjContact")
     base = data._address
     out |= {name: base + int(getattr(fields, name).offset) for name in (*_MOVING, "time")}
-    names = ("dist", "dim", "geom", "flex", "efc_address")
+    names = ("dist", "dim", "geom", "flex", "efc_address", "pos", "frame")
     out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
     option = model._address + int(_layout("mjModel", "opt").opt.offset)
     options = ("timestep", "disableflags", "integrator", "cone", "solver", "iterations")
@@ -102,6 +109,7 @@ def addresses(model: Any, data: Any, end: Any) -> dict[str, int]:
         "model": model._address,
         "data": base,
         "end": end._address,
+        "other": other._address,
         "contact_size": ctypes.sizeof(contact),
         "interpolated": bool(model.nflex) and bool(model.flex_interp.any()),
         "state_size": mujoco.mj_stateSize(model, INTEGRATION),
@@ -110,6 +118,7 @@ def addresses(model: Any, data: Any, end: Any) -> dict[str, int]:
         "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
         "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
         "newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
+        "equality": int(mujoco.mjtConstraint.mjCNSTR_EQUALITY),
         "refsafe": int(mujoco.mjtDisableBit.mjDSBL_REFSAFE),
     }
 

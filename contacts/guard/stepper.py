@@ -18,6 +18,7 @@ from tauguard.contacts.guard.balance import Balance, Books, sheets_of
 from tauguard.contacts.guard.covered import Covered, names
 from tauguard.contacts.guard.crossings import Crossings, elements
 from tauguard.contacts.guard.engine import INTEGRATION, addresses
+from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport
 
 #: What the native part goes by.
@@ -76,12 +77,15 @@ class GuardedStepper:
         self.model, self.data, self.most = model, data, most
         end = mujoco.MjData(model)
         settings = {**SETTINGS, "stiff": float(stiff), "most": float(most)}
-        self._guard = Guard(addresses(model, data, end), settings, (model, data, end))
+        other = mujoco.MjData(model) if model.nmocap else end
+        held = (model, data, end, other)
+        self._guard = Guard(addresses(*held), settings, held)
         covered = Covered(model, self._guard, rigid, cloth)
         self._pairs, self._uncovered = tuple(covered.pairs), tuple(covered.uncovered)
         for sheet in sheets_of(model):
             self._guard.sheet(*sheet.rows())
         self._guard.spins(_turning(model))
+        self._guard.pulled(pulled(model))
         self._elements = [elements(model, flex) for flex in range(model.nflex)]
         self._crossings = None
         if covered.sheets:
@@ -123,6 +127,14 @@ class GuardedStepper:
         if contacts not in self._quiet:
             self._quiet[contacts] = StepReport(1, contacts)
         return self._quiet[contacts]
+
+    def reset(self) -> None:
+        """Take the present state as new: mocap bodies are where they were put.
+
+        Contact parameters are put back and nothing is known of earlier steps. A change of
+        ``data.time`` between two steps does the same for the mocap poses at the next one.
+        """
+        self._guard.reset()
 
     def close(self) -> None:
         """Put every contact parameter back."""
@@ -172,8 +184,11 @@ class GuardedStepper:
         assert self._crossings is not None
         return self._crossings.find(self.data.flexvert_xpos, x_t1.reshape(-1, 3))
 
-    def _arrest(self, rows: list[Any], qpos: int, length: float) -> list[int]:
-        """Stop the partners of these rows from the positions at that address on."""
+    def _arrest(self, rows: list[Any], qpos: int, length: float) -> tuple[list[int], float]:
+        """Stop the partners of these rows from the positions at that address on.
+
+        Also the work that mocap bodies did by it [J].
+        """
         size = ctypes.c_double * self.model.nq
         start = np.array(size.from_address(qpos))
 
@@ -181,8 +196,9 @@ class GuardedStepper:
             return [self._hit(row) for row in self._guard.passing()]
 
         hits = [self._hit(row) for row in rows]
-        stopped = arrest(self.model, self.data, start, length, hits, judge)
-        return [self._pairs.index(pair) for pair in dict.fromkeys(hit.pair for hit in stopped)]
+        stopped, work = arrest(self.model, self.data, start, length, hits, judge)
+        pairs = dict.fromkeys(hit.pair for hit in stopped)
+        return [self._pairs.index(pair) for pair in pairs], work
 
     def _hit(self, row: tuple[int, bool, list[int], list[int]]) -> Hit:
         number, _, features, corners = row

@@ -24,14 +24,16 @@ Entry Account::entry(const double* velocity, double length, const double* x_t1) 
   const double kinetic_end = kinetic(e_.end, e_.qvel);
   e_.energy_pos(e_.model, e_.data);
   e_.energy_pos(e_.model, e_.end);
-  const double before = kinetic(e_.data, velocity) + e_.energy[0] + stretch(e_.flexvert);
+  const double place = mocap_.shifted() ? mocap_.potential() + stretch(mocap_.vertices())
+                                        : e_.energy[0] + stretch(e_.flexvert);
+  const double before = kinetic(e_.data, velocity) + place;
   double driven = 0;
   std::vector<double> mean(velocity, velocity + e_.nv);
   for (int i = 0; i < e_.nv; ++i) {
     mean[i] = 0.5 * (mean[i] + e_.qvel[i]);
     driven += (e_.actuator[i] + e_.applied[i]) * mean[i];
   }
-  driven = length * (driven + pushed(mean.data()));
+  driven = length * (driven + pushed(mean.data())) + mocap_.work(mean.data(), length);
   return {kinetic_end + e_.end_energy[0] + stretch(x_t1) - before - driven, kinetic_end};
 }
 

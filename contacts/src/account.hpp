@@ -1,7 +1,7 @@
 // Energy while a guard is at work: what nothing but contacts can have added.
 #pragma once
 
-#include "engine.hpp"
+#include "mocap.hpp"
 
 namespace tauguard::contacts {
 
@@ -14,7 +14,7 @@ struct Sheet {
 };
 
 struct Entry {
-  double gain;     // of all energy in a piece, less the work of drives and applied forces [J]
+  double gain;     // of all energy in a piece, less the work of drives, mocap and applied forces [J]
   double kinetic;  // at its end [J]
 };
 
@@ -22,8 +22,12 @@ struct Entry {
 // materials count as taken by contacts.
 class Account {
  public:
-  Account(const Engine& engine, std::vector<Sheet> sheets, double share)
-      : e_(engine), sheets_(std::move(sheets)), share_(share), momentum_(engine.nv) {}
+  Account(const Engine& engine, Mocap& mocap, std::vector<Sheet> sheets, double share)
+      : e_(engine),
+        mocap_(mocap),
+        sheets_(std::move(sheets)),
+        share_(share),
+        momentum_(engine.nv) {}
 
   // Start anew from this velocity (nv), at the start of the step that was just made.
   void open(const double* velocity) {
@@ -42,6 +46,7 @@ class Account {
   double pushed(const double* velocity);
 
   const Engine& e_;
+  Mocap& mocap_;
   std::vector<Sheet> sheets_;
   double share_, balance_ = 0, allowed_ = 0;
   std::vector<double> momentum_;

@@ -18,22 +18,25 @@ struct Contact {
   double distance;
   int dim, row;  // condim; its first row, -1: none
   int geom[2], flex[2];
+  const double *at, *normal;  // from the first partner to the second
 };
 
 struct Engine {
   using Step = void (*)(const void*, void*);
   const void* model;
   void *data, *end;  // what is stepped; the kinematics of a step's end
+  void* other;       // with mocap bodies: those of the same joints with other mocap poses
 
   Step step, step1, step2, kinematics, com_pos, com_vel, flex, tendon, make_m, energy_pos;
   void (*get_state)(const void*, const void*, double*, int);
   void (*set_state)(const void*, void*, const double*, int);
   void (*copy_state)(const void*, const void*, void*, int);
   void (*mul_m)(const void*, const void*, double*, const double*);
+  void (*mul_jac)(const void*, const void*, double*, const double*);
   void (*jac_com)(const void*, const void*, double*, double*, int);
   void (*integrate)(const void*, double*, const double*, double);
 
-  int nq, nv, nbody, ngeom, nflex, nflexvert, ntendon;
+  int nq, nv, nbody, nmocap, ngeom, nflex, nflexvert, ntendon;
   Signatures signature;
   int state_size;
   bool interpolated;  // some flex's vertices do not hang on bodies of their own
@@ -44,24 +47,29 @@ struct Engine {
   double *margin[3], *solref[3], *solimp[3];  // by place: an explicit pair, a geom, a flex
   int* priority[3];
   const int *pair_geom1, *pair_geom2;
-  const int* flex_vertbodyid;
+  const int *flex_vertbodyid, *geom_bodyid, *body_rootid, *body_mocapid;
   const double* flex_vert;
 
   // Of the data.
-  double *time, *qpos, *qvel, *energy;
+  double *time, *qpos, *qvel, *energy, *mocap_pos, *mocap_quat;
   const double *actuator, *applied, *wrench;
   const double *xpos, *xmat, *flexvert;
   const int *ncon, *nefc;
   char* const* contacts;
-  std::size_t contact_size, at_dist, at_dim, at_geom, at_flex, at_row;
+  std::size_t contact_size, at_dist, at_dim, at_geom, at_flex, at_row, at_pos, at_frame;
   double *const *efc_aref, *const *efc_margin;
-  double *const *efc_vel, *const *efc_pos;
+  double *const *efc_vel, *const *efc_pos, *const *efc_force;
+  int *const *efc_type, *const *efc_id;
 
   // Of `end`.
   double *end_qvel, *end_energy;
   const double *end_xpos, *end_xmat, *end_flexvert, *end_cvel;
 
-  int discrete, pyramidal, refsafe, newton;  // values of MuJoCo's enumerations
+  // Of `other`.
+  double *other_energy, *other_mocap_pos, *other_mocap_quat;
+  const double *other_xpos, *other_xmat, *other_flexvert;
+
+  int discrete, pyramidal, refsafe, newton, equality;  // values of MuJoCo's enumerations
 
   Contact contact(int k) const {
     const char* p = *contacts + static_cast<std::size_t>(k) * contact_size;
@@ -71,7 +79,13 @@ struct Engine {
             *reinterpret_cast<const int*>(p + at_dim),
             *reinterpret_cast<const int*>(p + at_row),
             {geom_ids[0], geom_ids[1]},
-            {flex_ids[0], flex_ids[1]}};
+            {flex_ids[0], flex_ids[1]},
+            reinterpret_cast<const double*>(p + at_pos),
+            reinterpret_cast<const double*>(p + at_frame)};
+  }
+  // How many rows of a contact, from its first one on, act along its normal.
+  int normal_rows(const Contact& c) const {
+    return *cone == pyramidal && c.dim > 1 ? 2 * (c.dim - 1) : 1;
   }
   bool is_discrete() const { return *integrator == discrete; }
 };

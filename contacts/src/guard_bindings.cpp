@@ -33,6 +33,7 @@ void set_functions(const Addresses& a, Engine* e) {
   a.set("mj_makeM", &e->make_m), a.set("mj_energyPos", &e->energy_pos);
   a.set("mj_getState", &e->get_state), a.set("mj_setState", &e->set_state);
   a.set("mj_copyState", &e->copy_state), a.set("mj_mulM", &e->mul_m);
+  a.set("mj_mulJacVec", &e->mul_jac);
   a.set("mj_jacBodyCom", &e->jac_com), a.set("mj_integratePos", &e->integrate);
 }
 
@@ -51,13 +52,15 @@ void set_model(const Addresses& a, Engine* e) {
   }
   a.set("pair_geom1", &e->pair_geom1), a.set("pair_geom2", &e->pair_geom2);
   a.set("flex_vertbodyid", &e->flex_vertbodyid), a.set("flex_vert", &e->flex_vert);
+  a.set("geom_bodyid", &e->geom_bodyid), a.set("body_rootid", &e->body_rootid);
+  a.set("body_mocapid", &e->body_mocapid), a.set("nmocap", &e->nmocap);
   a.set("nq", &e->nq), a.set("nv", &e->nv), a.set("nbody", &e->nbody);
   a.set("ngeom", &e->ngeom), a.set("nflex", &e->nflex), a.set("nflexvert", &e->nflexvert);
   a.set("ntendon", &e->ntendon), a.set("interpolated", &e->interpolated);
   a.set("state_size", &e->state_size), a.set("sig_integration", &e->signature.integration);
   a.set("sig_pose", &e->signature.pose), a.set("discrete", &e->discrete);
   a.set("pyramidal", &e->pyramidal), a.set("refsafe", &e->refsafe);
-  a.set("newton", &e->newton);
+  a.set("newton", &e->newton), a.set("equality", &e->equality);
 }
 
 void set_data(const Addresses& a, Engine* e) {
@@ -71,9 +74,16 @@ void set_data(const Addresses& a, Engine* e) {
   a.set("at_flex", &e->at_flex), a.set("at_efc_address", &e->at_row);
   a.set("efc_aref", &e->efc_aref), a.set("efc_margin", &e->efc_margin);
   a.set("efc_vel", &e->efc_vel), a.set("efc_pos", &e->efc_pos);
+  a.set("efc_force", &e->efc_force), a.set("efc_type", &e->efc_type);
+  a.set("efc_id", &e->efc_id), a.set("at_pos", &e->at_pos), a.set("at_frame", &e->at_frame);
+  a.set("mocap_pos", &e->mocap_pos), a.set("mocap_quat", &e->mocap_quat);
   a.set("end_qvel", &e->end_qvel), a.set("end_energy", &e->end_energy);
   a.set("end_xpos", &e->end_xpos), a.set("end_xmat", &e->end_xmat);
   a.set("end_flexvert_xpos", &e->end_flexvert), a.set("end_cvel", &e->end_cvel);
+  a.set("other", &e->other), a.set("other_energy", &e->other_energy);
+  a.set("other_mocap_pos", &e->other_mocap_pos), a.set("other_mocap_quat", &e->other_mocap_quat);
+  a.set("other_xpos", &e->other_xpos), a.set("other_xmat", &e->other_xmat);
+  a.set("other_flexvert_xpos", &e->other_flexvert);
 }
 
 Engine engine_of(const nb::dict& values) {
@@ -135,12 +145,13 @@ class Guard {
     sheets_.push_back({list<std::int32_t>(ends), list<double>(rest), list<double>(stiffness)});
   }
   void spins(Ints dofs) { spins_ = list<int>(dofs); }
+  void pulled(Bytes equalities) { pulled_ = list<char>(equalities); }
 
   // All was added. Whether flexes are covered against flexes: the owner's `_crossing` finds them.
   void start(bool sheets) {
     stepper_ =
         std::make_unique<Stepper>(engine_, std::move(verdict_), std::move(pairs_), std::move(last_),
-                                  std::move(sheets_), std::move(spins_), s_, allowed_);
+                                  std::move(sheets_), std::move(spins_), std::move(pulled_), s_, allowed_);
     Stepper::Crossings find;
     if (sheets) find = [this](std::vector<PairHit>* hits) { add_crossings(hits); };
     stepper_->set_callbacks(find, [this](const std::vector<PairHit>& hits, const double* qpos,
@@ -195,6 +206,7 @@ class Guard {
     return out;
   }
   void close() { stepper_->close(); }
+  void reset() { stepper_->reset(); }
 
  private:
   // Rows (pair, vertices, way) of owner._crossing(x_t1).
@@ -207,13 +219,14 @@ class Guard {
       hits->push_back(std::move(hit));
     }
   }
-  // The pairs that owner._arrest(rows, qpos, length) stopped.
-  std::vector<int> arrested(const std::vector<PairHit>& hits, const double* qpos, double length) {
+  // The pairs that owner._arrest(rows, qpos, length) stopped, and the work of mocap bodies.
+  Stepper::Stopped arrested(const std::vector<PairHit>& hits, const double* qpos, double length) {
     const nb::gil_scoped_acquire acquire;
-    std::vector<int> out;
+    Stepper::Stopped out{};
     const auto from = reinterpret_cast<std::uintptr_t>(qpos);
-    for (const nb::handle pair : owner_.attr("_arrest")(rows_of(hits), from, length))
-      out.push_back(nb::cast<int>(pair));
+    const nb::object found = owner_.attr("_arrest")(rows_of(hits), from, length);
+    for (const nb::handle pair : found[0]) out.pairs.push_back(nb::cast<int>(pair));
+    out.work = nb::cast<double>(found[1]);
     return out;
   }
 
@@ -225,6 +238,7 @@ class Guard {
   Verdict verdict_;
   std::vector<Partners> pairs_;
   std::vector<int> last_, spins_;
+  std::vector<char> pulled_;
   std::vector<Sheet> sheets_;
   std::unique_ptr<Stepper> stepper_;
 };
@@ -240,12 +254,14 @@ void bind_guard(nb::module_& m) {
       .def("partners", &Guard::partners)
       .def("sheet", &Guard::sheet)
       .def("spins", &Guard::spins)
+      .def("pulled", &Guard::pulled)
       .def("start", &Guard::start)
       .def("step", &Guard::step, nb::arg("owner"), nb::arg("each").none())
       .def("report", &Guard::report)
       .def("passing", &Guard::passing)
       .def("stiffened", &Guard::stiffened)
-      .def("close", &Guard::close);
+      .def("close", &Guard::close)
+      .def("reset", &Guard::reset);
 }
 
 }  // namespace tauguard::contacts

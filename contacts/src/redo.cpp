@@ -25,11 +25,10 @@ void Stepper::redo(std::vector<PairHit> hits, bool fresh, const std::function<vo
     for (std::size_t i = 0; i < guarded_.size(); ++i)
       if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
   }
-  double rest = whole_, length = shorter(hits, whole_);
-  while (rest > 0) {
-    length = piece(std::min(length, rest), each);
-    rest = length < rest * (1 - 1e-9) ? rest - length : 0;
-    length = rest;
+  double length = shorter(hits, whole_);
+  for (rest_ = whole_; rest_ > 0; length = rest_) {
+    length = piece(std::min(length, rest_), each);
+    rest_ = length < rest_ * (1 - 1e-9) ? rest_ - length : 0;
   }
   *e_.time = end;
   report_.restored = release();
@@ -41,18 +40,23 @@ void Stepper::redo(std::vector<PairHit> hits, bool fresh, const std::function<vo
 
 // Go on by `length` or less, however many attempts it takes; how far it went.
 double Stepper::piece(double length, const std::function<void()>& each) {
+  const double share = 1 - rest_ / whole_;
+  mocap_.piece(share, 1), mocap_.depart();
   e_.get_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
+  if (mocap_.moves()) e_.copy_state(e_.model, e_.data, e_.other, e_.signature.pose);
   std::copy_n(e_.qvel, e_.nv, velocity_.begin());
   std::copy_n(e_.qpos, e_.nq, qpos_.begin());
   const double begin = *e_.time;
   Entry entry{};
   for (;;) {
+    mocap_.piece(share, length < rest_ * (1 - 1e-9) ? share + length / whole_ : 1);
     rows_.step(length, held(length), push_);
     ++report_.steps;
     if (*e_.time != begin + length) {
       note_reset();
       break;
     }
+    mocap_.arrive();
     std::vector<PairHit> hits = judge();
     note_lost(hits);
     hits = unseen(std::move(hits));
@@ -99,21 +103,40 @@ Entry Stepper::last_resort(double length, const std::vector<PairHit>& hits, Entr
   std::vector<PairHit> through;
   for (const PairHit& hit : hits)
     if (hit.passed) through.push_back(hit);
-  if (!through.empty()) {
-    for (const int pair : arrest_(through, qpos_.data(), length)) arrested_[pair] = 1;
+  double work = 0;
+  const auto again = [&] {
     entry = account_.entry(velocity_.data(), length, x_t1_.data());
+    entry.gain -= work;
+  };
+  if (!through.empty()) {
+    const Stopped stopped = arrest_(through, qpos_.data(), length);
+    for (const int pair : stopped.pairs) arrested_[pair] = 1;
+    work = stopped.work;
+    again();
   }
   const std::vector<double> whole(e_.qvel, e_.qvel + e_.nv);
-  for (const double share : slower) {
-    if (!account_.overdrawn(entry)) break;
-    for (const auto& [pair, speed] : speeds_) arrested_[pair] = 1;
+  const auto go = [&](double share) {
     for (int i = 0; i < e_.nv; ++i) e_.qvel[i] = share * whole[i];
     std::copy(qpos_.begin(), qpos_.end(), e_.qpos);
     e_.integrate(e_.model, e_.qpos, e_.qvel, length);
+  };
+  for (const double share : slower) {
+    if (!account_.overdrawn(entry)) break;
+    for (const auto& [pair, speed] : speeds_) arrested_[pair] = 1;
+    go(share);
     if (passes() && share > 0) continue;
-    entry = account_.entry(velocity_.data(), length, x_t1_.data());
+    again();
   }
+  if (!mocap_.moves()) return entry;
+  // What stands still may be passed by what is moved: then rather too fast.
+  if (passes()) go(1), note_passed(), again();
   return entry;
+}
+
+// Names what passes on the present way.
+void Stepper::note_passed() {
+  for (const PairHit& hit : judge())
+    if (hit.passed) passed_[hit.pair] = 1;
 }
 
 bool Stepper::passes() {

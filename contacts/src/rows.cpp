@@ -75,14 +75,14 @@ void Rows::aim(double length, double push) {
 }
 
 void Rows::aim_contact(const Contact& contact, double length, double push) {
-  const bool pyramids = *e_.cone == e_.pyramidal && contact.dim > 1;
-  const int first = contact.row, count = pyramids ? 2 * (contact.dim - 1) : 1;
+  const int first = contact.row, count = e_.normal_rows(contact);
   const bool discrete = e_.is_discrete();
   const double* now = *e_.efc_vel;
   // Both edges of a pyramid's first direction have the normal speed in their middle.
   const double normal = count > 1 ? 0.5 * (now[first] + now[first + 1]) : now[first];
-  const double speed =
+  const double apart =
       contact.distance > 0 ? -contact.distance / length : std::max(-contact.distance * push, 0.0);
+  const double speed = apart - mocap_.parting(contact) / length;
   for (int row = first; row < first + count; ++row) {
     // Friction acts where they touch; across a gap only what goes along the normal is stopped.
     const double aim = speed + (contact.distance > 0 ? now[row] - normal : 0.0);

@@ -6,8 +6,10 @@
 // towards each other, and in overlap none. The solver then finds the least change of velocity (in
 // the metric of the inertia) that obeys; as all these velocities allow standing still, that change
 // takes energy and never adds any, except for what pushes an overlap out.
+// What mocap bodies carry is taken along by their own velocity, of which MuJoCo's rows know nothing.
 #pragma once
 
+#include "mocap.hpp"
 #include "stiffening.hpp"
 
 namespace tauguard::contacts {
@@ -20,9 +22,10 @@ struct Held {
 
 class Rows {
  public:
-  Rows(const Engine& engine, const std::vector<Partners>& pairs)
+  Rows(const Engine& engine, const std::vector<Partners>& pairs, const Mocap& mocap)
       : e_(engine),
         pairs_(pairs),
+        mocap_(mocap),
         geoms_(engine.ngeom, 0),
         flexes_(static_cast<std::size_t>(engine.nflex), 0) {}
 
@@ -35,6 +38,7 @@ class Rows {
 
   const Engine& e_;
   const std::vector<Partners>& pairs_;
+  const Mocap& mocap_;
   std::vector<char> geoms_, flexes_;
 };
 

@@ -29,26 +29,28 @@ std::vector<int> marked(const std::vector<char>& marks) {
   return out;
 }
 
-// Sets the timestep back at the end, also after an exception.
-struct Timestep {
+// Sets the timestep and mocap poses back at the end, also after an exception.
+struct Back {
   const Engine& e;
   double whole;
-  ~Timestep() { *e.timestep = whole; }
+  Mocap& mocap;
+  ~Back() { *e.timestep = whole, mocap.command(); }
 };
 
 }  // namespace
 
 Stepper::Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pairs,
                  std::vector<int> last_level, std::vector<Sheet> sheets, std::vector<int> spins,
-                 const Settings& settings, double allowed)
+                 std::vector<char> pulled, const Settings& settings, double allowed)
     : e_(engine),
       pairs_(std::move(pairs)),
       last_level_(std::move(last_level)),
       s_(settings),
       verdict_(std::move(verdict)),
-      account_(e_, std::move(sheets), allowed),
+      mocap_(e_, std::move(pulled)),
+      account_(e_, mocap_, std::move(sheets), allowed),
       stiffening_(e_, pairs_),
-      rows_(e_, pairs_),
+      rows_(e_, pairs_, mocap_),
       spins_(std::move(spins)),
       first_(engine.state_size),
       saved_(engine.state_size),
@@ -64,6 +66,7 @@ Stepper::Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pa
 }
 
 bool Stepper::step(const std::function<void()>& each) {
+  if (!mocap_.begin()) verdict_.forget();
   e_.get_state(e_.model, e_.data, first_.data(), e_.signature.integration);
   const bool watched = watched_ > 0;
   if (watched) std::copy_n(e_.qvel, e_.nv, velocity_.begin());
@@ -84,11 +87,15 @@ bool Stepper::step(const std::function<void()>& each) {
     report_.contacts = *e_.ncon;
     const bool released = stands();
     if (lost) report_.passed = marked(passed_);
+    mocap_.remember();
     return !released && !lost;
   }
   watched_ = s_.watched;
-  const Timestep back{e_, whole_};
-  redo(std::move(hits), !watched, each);
+  {
+    const Back back{e_, whole_, mocap_};
+    redo(std::move(hits), !watched, each);
+  }
+  mocap_.remember();
   return false;
 }
 
@@ -108,8 +115,8 @@ std::vector<PairHit> Stepper::judge() {
   e_.kinematics(e_.model, e_.end);
   if (e_.nflex) carry();
   std::vector<Hit> rows;
-  const Poses poses{e_.xpos, e_.xmat, e_.end_xpos, e_.end_xmat, turns()};
-  verdict_.judge(poses, e_.flexvert, x_t1_.data(), &rows);
+  const Poses poses{mocap_.xpos(), mocap_.xmat(), e_.end_xpos, e_.end_xmat, turns()};
+  verdict_.judge(poses, mocap_.flexvert(), x_t1_.data(), &rows);
   std::vector<PairHit> hits;
   for (const Hit& row : rows) {
     const int last = last_level_[row.pair];
@@ -140,6 +147,7 @@ const double* Stepper::turns() {
   e_.com_pos(e_.model, e_.end), e_.com_vel(e_.model, e_.end);
   for (int b = 0; b < e_.nbody; ++b)
     for (int k = 0; k < 3; ++k) turn_[3 * b + k] = h * e_.end_cvel[6 * b + k];
+  mocap_.add_turns(turn_.data());
   return turn_.data();
 }
 
@@ -223,6 +231,12 @@ void Stepper::close() {
   for (const int pair : stiffened()) stiffening_.restore(pair);
   std::fill(guarded_.begin(), guarded_.end(), 0);
   guarded_count_ = watched_ = 0;
+}
+
+void Stepper::reset() {
+  close();
+  verdict_.forget();
+  mocap_.remember();
 }
 
 }  // namespace tauguard::contacts

@@ -56,13 +56,16 @@ class Stepper {
  public:
   // Flexes against flexes: what crosses between two sets of vertices.
   using Crossings = std::function<void(std::vector<PairHit>*)>;
-  // Stops partners of what passed in the piece just tried, from `qpos` on: all pairs it stopped.
-  using Arrest =
-      std::function<std::vector<int>(const std::vector<PairHit>&, const double*, double)>;
+  // Stops partners of what passed in the piece just tried, from `qpos` on.
+  struct Stopped {
+    std::vector<int> pairs;
+    double work;  // that mocap bodies did by it [J]
+  };
+  using Arrest = std::function<Stopped(const std::vector<PairHit>&, const double*, double)>;
 
   Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pairs,
           std::vector<int> last_level, std::vector<Sheet> sheets, std::vector<int> spins,
-          const Settings& settings, double allowed);
+          std::vector<char> pulled, const Settings& settings, double allowed);
 
   const Report& report() const { return report_; }
   const std::vector<double>& first() const { return first_; }
@@ -76,6 +79,8 @@ class Stepper {
   std::vector<PairHit> judge();
   // Put every contact parameter back.
   void close();
+  // The state was set anew: nothing is known from the steps before.
+  void reset();
   std::vector<int> stiffened() const;
 
  private:
@@ -89,6 +94,7 @@ class Stepper {
   void note_reset();
   std::vector<PairHit> unseen(std::vector<PairHit> hits);
   bool solvent();
+  void note_passed();
   bool passes();
   void carry();
   const double* turns();
@@ -101,6 +107,7 @@ class Stepper {
   std::vector<int> last_level_;
   Settings s_;
   Verdict verdict_;
+  Mocap mocap_;
   Account account_;
   Stiffening stiffening_;
   Rows rows_;
@@ -115,7 +122,7 @@ class Stepper {
 
   // Of the step being redone.
   Report report_;
-  double whole_ = 0, push_ = 0;
+  double whole_ = 0, rest_ = 0, push_ = 0;  // of time [s]; of depth [1/s]
   std::map<int, double> speeds_;  // of the pairs that are held [m/s]
   std::vector<char> passed_, arrested_;
 };

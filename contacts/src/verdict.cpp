@@ -192,6 +192,11 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
   }
 }
 
+void Verdict::forget() {
+  for (Pair& pair : pairs_) pair.known = unknown;
+  for (FlexPair& pair : flex_pairs_) std::fill(pair.known.begin(), pair.known.end(), unknown);
+}
+
 void Verdict::judge(const Poses& poses, const double* x_t0, const double* x_t1,
                     std::vector<Hit>* hits) {
   update(poses);

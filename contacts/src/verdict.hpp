@@ -31,6 +31,8 @@ class Verdict {
                      std::vector<std::int32_t> elements, int corners,
                      std::vector<std::uint8_t> skip);
 
+  // Nothing is known of the steps before.
+  void forget();
   void judge(const Poses& poses, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
 
  private:

@@ -1,5 +1,5 @@
 // A random scene under a guarded stepper, wired as contacts/guard does it, but by MuJoCo's headers:
-// convex geoms that fly at a floor and one another, sometimes a cloth.
+// convex geoms that fly at a floor and one another, a mocap paddle, sometimes a cloth.
 #pragma once
 
 #include <array>
@@ -41,6 +41,9 @@ inline std::string mjcf(Random& random, bool cloth, bool reset) {
                      "\"/></option><worldbody><geom type=\"plane\" size=\"5 5 1\"/>";
   const int bodies = 2 + int(random() % 4);
   for (int k = 0; k < bodies; ++k) text += body(random, k);
+  text +=
+      "<body name=\"paddle\" mocap=\"true\" pos=\"0 0 -.5\"><geom type=\"box\" size=\".1 .1 .01\"/>"
+      "</body>";
   if (cloth)
     text +=
         "<flexcomp name=\"cloth\" type=\"grid\" dim=\"2\" count=\"3 3 1\" spacing=\".15 .15 .15\" "
@@ -50,11 +53,11 @@ inline std::string mjcf(Random& random, bool cloth, bool reset) {
   return text + "</worldbody></mujoco>";
 }
 
-inline Engine engine_of(const Scene& scene, mjData* end) {
+inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   mjModel* m = scene.model;
   mjData* d = scene.data;
   Engine e{};
-  e.model = m, e.data = d, e.end = end;
+  e.model = m, e.data = d, e.end = end, e.other = other;
   const auto step = [](void (*f)(const mjModel*, mjData*)) {
     return reinterpret_cast<Engine::Step>(f);
   };
@@ -67,8 +70,11 @@ inline Engine engine_of(const Scene& scene, mjData* end) {
   e.copy_state = reinterpret_cast<decltype(e.copy_state)>(&mj_copyState);
   e.mul_m = reinterpret_cast<decltype(e.mul_m)>(&mj_mulM);
   e.jac_com = reinterpret_cast<decltype(e.jac_com)>(&mj_jacBodyCom);
+  e.mul_jac = reinterpret_cast<decltype(e.mul_jac)>(&mj_mulJacVec);
   e.integrate = reinterpret_cast<decltype(e.integrate)>(&mj_integratePos);
   e.nq = m->nq, e.nv = m->nv, e.nbody = m->nbody, e.ngeom = m->ngeom, e.nflex = m->nflex;
+  e.nmocap = m->nmocap, e.geom_bodyid = m->geom_bodyid, e.body_rootid = m->body_rootid;
+  e.body_mocapid = m->body_mocapid, e.mocap_pos = d->mocap_pos, e.mocap_quat = d->mocap_quat;
   e.nflexvert = m->nflexvert, e.ntendon = m->ntendon;
   e.signature = {mjSTATE_INTEGRATION, mjSTATE_QPOS | mjSTATE_MOCAP_POS | mjSTATE_MOCAP_QUAT};
   e.state_size = mj_stateSize(m, mjSTATE_INTEGRATION);
@@ -93,11 +99,16 @@ inline Engine engine_of(const Scene& scene, mjData* end) {
   e.at_geom = offsetof(mjContact, geom), e.at_flex = offsetof(mjContact, flex);
   e.at_row = offsetof(mjContact, efc_address);
   e.efc_aref = &d->efc_aref, e.efc_margin = &d->efc_margin;
-  e.efc_vel = &d->efc_vel, e.efc_pos = &d->efc_pos;
+  e.at_pos = offsetof(mjContact, pos), e.at_frame = offsetof(mjContact, frame);
+  e.efc_vel = &d->efc_vel, e.efc_pos = &d->efc_pos, e.efc_force = &d->efc_force;
+  e.efc_type = &d->efc_type, e.efc_id = &d->efc_id;
   e.end_qvel = end->qvel, e.end_energy = end->energy, e.end_xpos = end->xpos;
   e.end_xmat = end->xmat, e.end_flexvert = end->flexvert_xpos, e.end_cvel = end->cvel;
+  e.other_energy = other->energy, e.other_xpos = other->xpos, e.other_xmat = other->xmat;
+  e.other_mocap_pos = other->mocap_pos, e.other_mocap_quat = other->mocap_quat;
+  e.other_flexvert = other->flexvert_xpos;
   e.discrete = mjINT_DISCRETE, e.pyramidal = mjCONE_PYRAMIDAL;
-  e.refsafe = mjDSBL_REFSAFE, e.newton = mjSOL_NEWTON;
+  e.refsafe = mjDSBL_REFSAFE, e.newton = mjSOL_NEWTON, e.equality = mjCNSTR_EQUALITY;
   return e;
 }
 
@@ -140,7 +151,7 @@ inline int add_shape(const mjModel* m, int geom, double layer, Verdict* verdict)
 struct Guarded {
   Guarded(std::uint64_t seed, bool cloth, bool reset) : random(seed), scene(text(cloth, reset)) {
     mjModel* m = scene.model;
-    end = mj_makeData(m);
+    end = mj_makeData(m), other = mj_makeData(m);
     Verdict verdict;
     std::vector<Partners> pairs;
     std::vector<int> last, spins;
@@ -155,16 +166,16 @@ struct Guarded {
       if (m->jnt_type[j] == mjJNT_FREE)
         for (int k = 3; k < 6; ++k) spins.push_back(m->jnt_dofadr[j] + k);
     const Settings settings{true, 40, 1e-5, 1.25, 1.0 / 64, 0.2, 10, 16, 1.0 / 8, 0.5, 1.0};
-    stepper.reset(new Stepper(engine_of(scene, end), std::move(verdict), std::move(pairs),
-                              std::move(last), {}, std::move(spins), settings, 0.01));
+    stepper.reset(new Stepper(engine_of(scene, end, other), std::move(verdict), std::move(pairs),
+                              std::move(last), {}, std::move(spins), {}, settings, 0.01));
     stepper->set_callbacks(nullptr, [](const std::vector<PairHit>& hits, const double*, double) {
-      std::vector<int> out;  // nothing is stopped here: it is reported as passed
-      for (const PairHit& hit : hits) out.push_back(hit.pair);
+      Stepper::Stopped out{};  // nothing is stopped here: it is reported as arrested
+      for (const PairHit& hit : hits) out.pairs.push_back(hit.pair);
       return out;
     });
     mj_forward(m, scene.data);
   }
-  ~Guarded() { mj_deleteData(end); }
+  ~Guarded() { mj_deleteData(end), mj_deleteData(other); }
 
   std::string text(bool cloth, bool reset) { return mjcf(random, cloth, reset); }
 
@@ -192,7 +203,7 @@ struct Guarded {
 
   Random random;
   Scene scene;
-  mjData* end;
+  mjData *end, *other;
   std::unique_ptr<Stepper> stepper;
 };
 

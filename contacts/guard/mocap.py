@@ -1,0 +1,70 @@
+"""What mocap bodies carry, and how fast, for what is stopped against them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.arrays import Array
+
+
+class Carriers:
+    """The velocity that mocap bodies give to all that hangs on them, over a piece of a step.
+
+    Args:
+        model: MjModel.
+        data: MjData whose kinematics are those of the piece's start; mocap poses are its end's.
+        length: of the piece [s].
+    """
+
+    def __init__(self, model: Any, data: Any, length: float) -> None:
+        """Read both poses of every mocap body."""
+        self._carrier = model.body_mocapid[model.body_rootid]
+        self._start, self._step = [], []
+        self._length = length
+        for body in np.flatnonzero(model.body_mocapid >= 0).tolist():
+            number = int(model.body_mocapid[body])
+            unit, turn = data.mocap_quat[number].copy(), np.zeros(3)
+            mujoco.mju_normalize4(unit)
+            mujoco.mju_subQuat(turn, unit, data.xquat[body])  # in the body's own frame
+            turn = data.xmat[body].reshape(3, 3) @ turn
+            self._start.append((number, data.xpos[body].copy()))
+            self._step.append((data.mocap_pos[number] - data.xpos[body], turn))
+
+    def velocity(self, body: int, point: Array) -> Array:
+        """Of a point on a body, and its turning: what its carrier gives it, shape (6,)."""
+        carrier = int(self._carrier[body])
+        out = np.zeros(6)
+        for (number, start), (way, turn) in zip(self._start, self._step, strict=True):
+            if number == carrier:
+                arm, turned = point - start, np.zeros(3)
+                angle, quat = float(np.linalg.norm(turn)), np.zeros(4)
+                axis = turn / angle if angle else np.array([1.0, 0, 0])
+                mujoco.mju_axisAngle2Quat(quat, axis, angle)
+                mujoco.mju_rotVecQuat(turned, arm, quat)
+                out[:3], out[3:] = way + turned - arm, turn
+        return out / self._length
+
+
+def pulled(model: Any) -> NDArray[np.uint8]:
+    """By equality: whether something that a mocap body carries takes part in it."""
+    carried = model.body_mocapid[model.body_rootid] >= 0
+    flexes = [
+        bool(carried[model.flex_vertbodyid[begin : begin + count]].any())
+        for begin, count in zip(model.flex_vertadr, model.flex_vertnum, strict=True)
+    ]
+    kinds, objects = mujoco.mjtEq, mujoco.mjtObj
+    of_flexes = (kinds.mjEQ_FLEX, kinds.mjEQ_FLEXVERT, kinds.mjEQ_FLEXSTRAIN)
+    out = np.zeros(model.neq, dtype=np.uint8)
+    for eq in range(model.neq):
+        ends = (int(model.eq_obj1id[eq]), int(model.eq_obj2id[eq]))
+        if model.eq_type[eq] in of_flexes:
+            out[eq] = flexes[ends[0]]
+        elif model.eq_objtype[eq] == objects.mjOBJ_BODY:
+            out[eq] = carried[list(ends)].any()
+        elif model.eq_objtype[eq] == objects.mjOBJ_SITE:
+            out[eq] = carried[model.site_bodyid[list(ends)]].any()
+    return out

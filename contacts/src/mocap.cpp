@@ -1,0 +1,179 @@
+#include "mocap.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tauguard::contacts {
+namespace {
+
+void multiply(const double* a, const double* b, double* out) {
+  out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+  out[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+  out[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+  out[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+}
+
+// Of unit length; no rotation where it has none, as MuJoCo takes it.
+void normalize(const double* quat, double* out) {
+  double sum = 0;
+  for (int k = 0; k < 4; ++k) sum += quat[k] * quat[k];
+  const double length = std::sqrt(sum);
+  for (int k = 0; k < 4; ++k) out[k] = length < 1e-15 ? (k == 0) : quat[k] / length;
+}
+
+// The shortest rotation vector from one orientation to another [rad].
+Vec turn_between(const double* from, const double* to) {
+  double a[4], b[4], d[4];
+  normalize(from, a), normalize(to, b);
+  const double back[4] = {a[0], -a[1], -a[2], -a[3]};
+  multiply(b, back, d);
+  const double sign = d[0] < 0 ? -1 : 1;
+  const Vec axis = {sign * d[1], sign * d[2], sign * d[3]};
+  const double sine = norm(axis);
+  return sine > 0 ? (2 * std::atan2(sine, sign * d[0]) / sine) * axis : Vec{};
+}
+
+void turn_by(const Vec& turn, const double* quat, double* out) {
+  const double angle = norm(turn), half = angle > 0 ? std::sin(angle / 2) / angle : 0.5;
+  const double d[4] = {std::cos(angle / 2), half * turn[0], half * turn[1], half * turn[2]};
+  double unit[4];
+  normalize(quat, unit);
+  multiply(d, unit, out);
+}
+
+// A vector turned by a rotation vector (Rodrigues).
+Vec turned(const Vec& turn, const Vec& v) {
+  const double angle = norm(turn);
+  if (angle == 0) return v;
+  const Vec axis = (1 / angle) * turn;
+  return std::cos(angle) * v + std::sin(angle) * cross(axis, v) +
+         ((1 - std::cos(angle)) * dot(axis, v)) * axis;
+}
+
+}  // namespace
+
+Mocap::Mocap(const Engine& engine, std::vector<char> pulled)
+    : e_(engine), pulled_(std::move(pulled)), start_(engine.nmocap), told_(engine.nmocap) {
+  remember();
+}
+
+void Mocap::read(Poses* poses) const {
+  for (int m = 0; m < e_.nmocap; ++m) {
+    std::copy_n(e_.mocap_pos + 3 * m, 3, (*poses)[m].pos);
+    std::copy_n(e_.mocap_quat + 4 * m, 4, (*poses)[m].quat);
+  }
+}
+
+void Mocap::write(const Poses& poses) {
+  for (std::size_t m = 0; moves_ && m < poses.size(); ++m) {
+    std::copy_n(poses[m].pos, 3, e_.mocap_pos + 3 * m);
+    std::copy_n(poses[m].quat, 4, e_.mocap_quat + 4 * m);
+  }
+}
+
+// The other data's joint positions with these poses: its kinematics.
+void Mocap::stand(const Poses& poses) {
+  for (std::size_t m = 0; m < poses.size(); ++m) {
+    std::copy_n(poses[m].pos, 3, e_.other_mocap_pos + 3 * m);
+    std::copy_n(poses[m].quat, 4, e_.other_mocap_quat + 4 * m);
+  }
+  e_.kinematics(e_.model, e_.other), e_.com_pos(e_.model, e_.other);
+  if (e_.nflex) e_.flex(e_.model, e_.other);
+}
+
+void Mocap::remember() {
+  read(&start_);
+  time_ = *e_.time;
+}
+
+bool Mocap::begin() {
+  const bool followed = *e_.time == time_;
+  if (!followed) read(&start_);
+  moves_ = false;
+  for (int m = 0; m < e_.nmocap; ++m)
+    moves_ = moves_ || !std::equal(start_[m].pos, start_[m].pos + 3, e_.mocap_pos + 3 * m) ||
+             !std::equal(start_[m].quat, start_[m].quat + 4, e_.mocap_quat + 4 * m);
+  jumps_ = true;
+  if (!moves_) return followed;
+  read(&told_);
+  from_ = start_, to_ = told_;
+  e_.copy_state(e_.model, e_.data, e_.other, e_.signature.pose);
+  stand(start_);
+  return followed;
+}
+
+void Mocap::piece(double from, double to) {
+  if (!moves_) return;
+  jumps_ = false;
+  const auto at = [&](double share, std::size_t m) {
+    if (share >= 1) return told_[m];
+    Pose out = start_[m];
+    for (int k = 0; k < 3; ++k) out.pos[k] += share * (told_[m].pos[k] - start_[m].pos[k]);
+    turn_by(share * turn_between(start_[m].quat, told_[m].quat), start_[m].quat, out.quat);
+    return out;
+  };
+  for (std::size_t m = 0; m < told_.size(); ++m) from_[m] = at(from, m), to_[m] = at(to, m);
+}
+
+void Mocap::add_turns(double* turn) const {
+  if (!moves_) return;
+  for (int b = 1; b < e_.nbody; ++b) {
+    const int m = e_.body_mocapid[e_.body_rootid[b]];
+    if (m < 0) continue;
+    const Vec own = turn_between(from_[m].quat, to_[m].quat);
+    for (int k = 0; k < 3; ++k) turn[3 * b + k] += own[k];
+  }
+}
+
+bool Mocap::shifted() {
+  if (!moves_ || jumps_) return false;
+  stand(to_);
+  if (e_.ntendon) e_.tendon(e_.model, e_.other);
+  e_.energy_pos(e_.model, e_.other);
+  return true;
+}
+
+// How far a point goes that the carrier of a body takes along; it is where the data's kinematics
+// are: at the start of a piece, at the end of a step that jumps.
+Vec Mocap::way(int body, const double* point) const {
+  const int m = e_.body_mocapid[e_.body_rootid[body]];
+  if (m < 0) return {};
+  const Pose &from = from_[m], &to = to_[m], &at = jumps_ ? to : from;
+  Vec arm, shift;
+  for (int k = 0; k < 3; ++k) arm[k] = point[k] - at.pos[k], shift[k] = to.pos[k] - from.pos[k];
+  const Vec turn = turn_between(from.quat, to.quat);
+  return jumps_ ? shift + arm - turned(-1.0 * turn, arm) : shift + turned(turn, arm) - arm;
+}
+
+double Mocap::parting(const Contact& contact) const {
+  if (!moves_) return 0;
+  double sum = 0;
+  for (int i = 0; i < 2; ++i) {
+    if (contact.geom[i] < 0) continue;
+    const Vec w = way(e_.geom_bodyid[contact.geom[i]], contact.at);
+    for (int k = 0; k < 3; ++k) sum += (i ? 1 : -1) * contact.normal[k] * w[k];
+  }
+  return sum;
+}
+
+double Mocap::work(const double* velocity, double length) {
+  if (!e_.nmocap || !*e_.nefc) return 0;
+  double sum = 0;
+  for (int k = 0; moves_ && k < *e_.ncon; ++k) {
+    const Contact contact = e_.contact(k);
+    if (contact.row < 0) continue;
+    double force = 0;
+    for (int row = contact.row; row < contact.row + e_.normal_rows(contact); ++row)
+      force += (*e_.efc_force)[row];
+    sum -= force * parting(contact);
+  }
+  if (std::none_of(pulled_.begin(), pulled_.end(), [](char p) { return p; })) return sum;
+  speed_.resize(*e_.nefc);
+  e_.mul_jac(e_.model, e_.data, speed_.data(), velocity);
+  for (int row = 0; row < *e_.nefc; ++row)
+    if ((*e_.efc_type)[row] == e_.equality && pulled_[(*e_.efc_id)[row]])
+      sum += length * (*e_.efc_force)[row] * speed_[row];
+  return sum;
+}
+
+}  // namespace tauguard::contacts

@@ -1,0 +1,69 @@
+// Bodies that the user moves by mocap poses, and all that hangs on them.
+//
+// MuJoCo puts them in their new place at the start of a step, by a jump, and knows no velocity of
+// them. Here the step has a way for them: from where they were at the end of the last one to where
+// they are told to be, straight and turning at a constant rate.
+#pragma once
+
+#include "engine.hpp"
+#include "shapes.hpp"
+
+namespace tauguard::contacts {
+
+class Mocap {
+ public:
+  // `pulled`: by equality, whether something that mocap carries takes part in it.
+  Mocap(const Engine& engine, std::vector<char> pulled);
+
+  // The present poses begin the way of the next step.
+  void remember();
+  // A step begins at the present state; false if something else set it since the last one ended.
+  bool begin();
+  bool moves() const { return moves_; }  // whether the way of this step has a length
+
+  // The next attempt goes from one share of the way to another; the data is at its start.
+  void piece(double from, double to);
+  // Poses of a piece's start, end, and of the step's end as the user wrote them.
+  void depart() { write(from_); }
+  void arrive() { write(to_); }
+  void command() { write(told_); }
+
+  // Where everything is at the start: whole steps are computed with the poses of their end.
+  const double* xpos() const { return jumps() ? e_.other_xpos : e_.xpos; }
+  const double* xmat() const { return jumps() ? e_.other_xmat : e_.xmat; }
+  const double* flexvert() const { return jumps() ? e_.other_flexvert : e_.flexvert; }
+  // Adds how far each body is turned by what carries it (nbody, 3) [rad].
+  void add_turns(double* turn) const;
+
+  // Of a piece: potential energy of the start's joint positions with the poses of its end [J], and
+  // the vertices there. False if nothing moves or the data has these poses anyway.
+  bool shifted();
+  double potential() const { return e_.other_energy[0]; }
+  const double* vertices() const { return e_.other_flexvert; }
+
+  // How far both partners part along the contact's normal by what carries them [m].
+  double parting(const Contact& contact) const;
+  // What was done on everything else, by contacts and equalities; `velocity` is the mean [J].
+  double work(const double* velocity, double length);
+
+ private:
+  struct Pose {
+    double pos[3], quat[4];
+  };
+  using Poses = std::vector<Pose>;  // by mocap number
+
+  bool jumps() const { return moves_ && jumps_; }
+  void read(Poses* poses) const;
+  void write(const Poses& poses);
+  void stand(const Poses& poses);
+  Vec way(int body, const double* point) const;
+
+  const Engine& e_;
+  std::vector<char> pulled_;
+  Poses start_, told_, from_, to_;
+  std::vector<double> speed_;
+  double time_ = 0;
+  bool moves_ = false, jumps_ = true;
+};
+
+}  // namespace tauguard::contacts
