@@ -115,7 +115,9 @@ def _rows(model: Any, data: Any, hit: Hit, carriers: Carriers | None) -> tuple[A
     return _apart(own, [of(body, point, 3) for point in points])
 
 
-def _apart(a: Sequence[tuple[Array, Array]], b: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+def _apart(
+    a: Sequence[tuple[Array, Array]], b: Sequence[tuple[Array, Array]]
+) -> tuple[Array, Array]:
     """Differences of rows and of velocities, one below the other."""
     pairs = list(zip(a, b, strict=True))
     return (

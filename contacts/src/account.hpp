@@ -14,7 +14,7 @@ struct Sheet {
 };
 
 struct Entry {
-  double gain;     // of all energy in a piece, less the work of drives, mocap and applied forces [J]
+  double gain;  // of all energy in a piece, less the work of drives, mocap and applied forces [J]
   double kinetic;  // at its end [J]
 };
 

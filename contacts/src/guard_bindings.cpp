@@ -149,9 +149,9 @@ class Guard {
 
   // All was added. Whether flexes are covered against flexes: the owner's `_crossing` finds them.
   void start(bool sheets) {
-    stepper_ =
-        std::make_unique<Stepper>(engine_, std::move(verdict_), std::move(pairs_), std::move(last_),
-                                  std::move(sheets_), std::move(spins_), std::move(pulled_), s_, allowed_);
+    stepper_ = std::make_unique<Stepper>(engine_, std::move(verdict_), std::move(pairs_),
+                                         std::move(last_), std::move(sheets_), std::move(spins_),
+                                         std::move(pulled_), s_, allowed_);
     Stepper::Crossings find;
     if (sheets) find = [this](std::vector<PairHit>* hits) { add_crossings(hits); };
     stepper_->set_callbacks(find, [this](const std::vector<PairHit>& hits, const double* qpos,

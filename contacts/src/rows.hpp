@@ -6,7 +6,8 @@
 // towards each other, and in overlap none. The solver then finds the least change of velocity (in
 // the metric of the inertia) that obeys; as all these velocities allow standing still, that change
 // takes energy and never adds any, except for what pushes an overlap out.
-// What mocap bodies carry is taken along by their own velocity, of which MuJoCo's rows know nothing.
+// What mocap bodies carry is taken along by their own velocity, of which MuJoCo's rows know
+// nothing.
 #pragma once
 
 #include "mocap.hpp"

@@ -123,7 +123,7 @@ class Stepper {
   // Of the step being redone.
   Report report_;
   double whole_ = 0, rest_ = 0, push_ = 0;  // of time [s]; of depth [1/s]
-  std::map<int, double> speeds_;  // of the pairs that are held [m/s]
+  std::map<int, double> speeds_;            // of the pairs that are held [m/s]
   std::vector<char> passed_, arrested_;
 };
 

@@ -85,7 +85,8 @@ Tally play(Guarded& g, bool hard, int steps) {
     check(quiet || report.steps >= 1, "a report without a step");
     if (!hard && !lost)
       for (int b = 1; b < m->nbody; ++b)
-        check(m->body_geomnum[b] == 0 || m->body_mocapid[b] >= 0 || d->xpos[3 * b + 2] > -0.1, "a body below the floor");
+        check(m->body_geomnum[b] == 0 || m->body_mocapid[b] >= 0 || d->xpos[3 * b + 2] > -0.1,
+              "a body below the floor");
   }
   g.stepper->close();
   check(same(parameters(m), before), "contact parameters are not put back");

@@ -54,9 +54,7 @@ def test_plain_steps_lose_it():
 
 @pytest.mark.parametrize(("stop", "lost"), [(0.26, False), (0.4, True)])
 def test_between_a_paddle_and_a_wall_the_body_stays_or_the_pair_is_named(stop, lost):
-    model, data = scene(
-        1e-3, world='<geom name="wall" type="box" pos=".3 0 0" size=".001 .3 .3"/>'
-    )
+    model, data = scene(1e-3, world='<geom name="wall" type="box" pos=".3 0 0" size=".001 .3 .3"/>')
     guard, passed = GuardedStepper(model, data), set()
     while data.mocap_pos[0, 0] < stop:
         data.mocap_pos[0, 0] += 5e-3
