@@ -51,6 +51,7 @@ def write_rrd(
     *,
     whole: bool = False,
     explained: Sequence[Explained] = (),
+    about: str = "",
 ) -> None:
     """Write a recording that ``rerun FILE`` opens with its own layout.
 
@@ -65,6 +66,7 @@ def write_rrd(
             default the trace's first attachment that ends in ``.xml``.
         whole: keep what comes before the first detected collision.
         explained: what each alarm was; contacts are drawn as blue arrows.
+        about: a line above the text, on what the recording is shown for.
 
     Raises:
         ValueError: no model, a model without the trace's joints, an empty trace.
@@ -83,7 +85,7 @@ def write_rrd(
         draft = Path(folder) / "draft.rrd"
         recording = rr.RecordingStream("tauguard", recording_id=path.stem)
         recording.save(draft)
-        text = page(trace, detection, explained)
+        text = page(trace, detection, explained, about)
         if not whole:
             trace, detection = cut(trace, detection, first_moment(trace, detection))
         center = log_scene(recording, trace, scene)

@@ -60,11 +60,17 @@ def cut(
     return trace, detection
 
 
-def page(trace: Trace, detection: Detection | None, explained: Sequence[Explained] = ()) -> str:
-    """The text beside the pictures, in Markdown."""
-    lines: list[str] = []
+def page(
+    trace: Trace, detection: Detection | None, explained: Sequence[Explained] = (), about: str = ""
+) -> str:
+    """The text beside the pictures, in Markdown: what happened first, then how to read it."""
+    lines = [f"## {about}", ""] if about else []
+    if trace.truth is not None:
+        lines += collision_table(trace, detection, explained)
+    else:
+        lines += alarms(detection, explained)
     span = trace.t[-1] - trace.t[0]
-    lines += [f"An arm with {len(trace.joint_names)} joints, {span:.1f} s.", ""]
+    lines += ["", f"An arm with {len(trace.joint_names)} joints, {span:.1f} s.", ""]
     if trace.truth is not None:
         lines += [
             "- **3D**: the arm in its real geometry. A red arrow is the contact force on the arm, "
@@ -77,17 +83,13 @@ def page(trace: Trace, detection: Detection | None, explained: Sequence[Explaine
         lines += [f"- **3D**: a dot is a contact that a checker reported ({names})."]
     if detection is not None:
         lines += [
-            "- **Residual**: what the observer believes acts on each joint from outside.",
+            "- **Residual**: the observer's estimate of the external torque of each joint.",
             f"- **Score**: the output of the {detection.detector} detector; above the red line "
             "is a raw alarm.",
             "- **Alarm and truth**: when the alarm was up, and when there really was a contact.",
         ]
-    lines += ["- **Current**: the measured motor currents, the only input.", ""]
-    if trace.truth is not None:
-        lines += collision_table(trace, detection, explained)
-    else:
-        lines += alarms(detection, explained)
     lines += [
+        "- **Current**: the measured motor currents, the only input.",
         "",
         "Press the space bar to play (at half speed); click into a chart to go to a time.",
         "",
@@ -99,18 +101,18 @@ def page(trace: Trace, detection: Detection | None, explained: Sequence[Explaine
 def collision_table(
     trace: Trace, detection: Detection | None, explained: Sequence[Explained] = ()
 ) -> list[str]:
-    """Markdown rows of the collisions and when each was noticed."""
+    """Markdown rows of the collisions and when each was detected."""
     assert trace.truth is not None
     found = detection.alarms if detection is not None else ()
     rows = sorted(trace.truth.collisions, key=lambda c: c.onset)
     seen = sum(alarm_of(c, found) is not None for c in rows)
-    lines = [f"## {len(rows)} collisions" + (f", {seen} noticed" if detection else ""), ""]
+    lines = [f"## {len(rows)} collisions" + (f", {seen} detected" if detection else ""), ""]
     if not rows:
         return lines
     said = {one.alarm.start: one.summary for one in explained}
-    extra = ("| said |", "-|") if said else ("|", "")
+    extra = ("| diagnosis |", "-|") if said else ("|", "")
     lines += [
-        "| onset [s] | kind | link | peak torque [N m] | noticed after " + extra[0],
+        "| onset [s] | kind | link | peak torque [N m] | detected after " + extra[0],
         "|-|-|-|-|-|" + extra[1],
     ]
     for collision in rows[:LISTED]:

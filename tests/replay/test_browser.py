@@ -1,5 +1,6 @@
 """Recordings in a browser: what is served, to whom, and what a browser shows."""
 
+import dataclasses
 import http.client
 import io
 import socket
@@ -12,10 +13,11 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from tauguard.cli.events import EventFolder
+from tauguard.cli.events import EventFolder, events_of
 from tauguard.detectors import match_detection
 from tauguard.replay import write_rrd
 from tauguard.replay.browser import BrowserReplay
+from tauguard.traces import Alarm
 
 
 def beside(name):
@@ -108,6 +110,22 @@ def test_every_kind_of_mistake_has_its_recording_and_its_row(tmp_path):
     assert names == {"missed-001.rrd", "late-001.rrd", "late-002.rrd", "false-alarm-001.rrd"}
     assert all(f'<a href="open/{name}">{name}</a>' in page for name in names)
     assert "1 missed, 2 late, 1 false alarm" in page
+
+
+def test_a_collision_whose_alarm_came_before_the_touch_says_so():
+    trace, detection = arm.make(hits=3)
+    touch = trace.truth.collisions[0].onset
+    early = Alarm(touch - 0.2, touch + 0.1)
+    said = dataclasses.replace(detection, alarms=(early, *detection.alarms))
+    missed, false = (
+        e
+        for e in events_of(match_detection(said, trace), 1.0)
+        if e.kind in ("missed", "false alarm")
+    )
+    assert missed.text.endswith(f"missed (an alarm was up from {early.start:.2f} s on)")
+    assert false.text == (
+        f"False alarm at {early.start:.2f} s (still up at the strike of {touch:.2f} s)"
+    )
 
 
 @pytest.mark.parametrize("name", ["thesis.txt", "episode-00000.rrd"])

@@ -122,10 +122,11 @@ def test_it_begins_at_the_first_detected_collision(tmp_path):
     assert first_moment(trace, missed) == trace.t[0]
 
 
-def test_the_page_tells_what_was_noticed():
+def test_the_page_tells_what_was_detected():
     trace, detection = arm.make()
-    text = page(trace, detection)
-    assert "2 collisions, 1 noticed" in text
+    text = page(trace, detection, about="Strike on link 3: missed")
+    assert text.startswith("## Strike on link 3: missed")
+    assert "2 collisions, 1 detected" in text
     assert "| 3.000 | strike | 3 | 20.0 | 12 ms |" in text
     assert "| 1.000 | strike | 3 | 20.0 | - |" in text
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tauguard.detectors import Matching
-    from tauguard.traces import Detection, Trace
+    from tauguard.traces import Alarm, Collision, Detection, Trace
 
 #: A recording begins this long before its event and lasts this long [s].
 BEFORE, LENGTH = 0.5, 10.0
@@ -38,6 +38,18 @@ class Event:
     link: int | None = None
     peak_torque: float | None = None  #: [N m]
     delay: float | None = None  #: [s]
+    note: str = ""  #: what else is worth knowing
+
+    @property
+    def text(self) -> str:
+        """All of it in one line."""
+        if self.link is None:
+            what = f"False alarm at {self.at:.2f} s"
+        else:
+            found = "missed" if self.delay is None else f"found after {1e3 * self.delay:.0f} ms"
+            where = f"{self.collision} on link {self.link} at {self.at:.2f} s"
+            what = f"{where}, {self.peak_torque:.1f} N m: {found}"
+        return what[0].upper() + what[1:] + (f" ({self.note})" if self.note else "")
 
 
 def events_of(matching: Matching, late: float) -> Iterator[Event]:
@@ -47,9 +59,18 @@ def events_of(matching: Matching, late: float) -> Iterator[Event]:
         for c, delay in pairs:
             kind = "missed" if delay is None else "late" if delay > late else ""
             if kind == wanted:
-                yield Event(kind, c.onset, c.kind, c.link, c.peak_tau, delay)
+                up = [alarm for alarm in matching.false_alarms if _covers(alarm, c)]
+                note = f"an alarm was up from {up[0].start:.2f} s on" if up else ""
+                yield Event(kind, c.onset, c.kind, c.link, c.peak_tau, delay, note)
     for alarm in matching.false_alarms:
-        yield Event("false alarm", alarm.start)
+        hit = [c for c in matching.collisions if _covers(alarm, c)]
+        note = f"still up at the {hit[0].kind} of {hit[0].onset:.2f} s" if hit else ""
+        yield Event("false alarm", alarm.start, note=note)
+
+
+def _covers(alarm: Alarm, collision: Collision) -> bool:
+    """Whether the alarm began before the touch and was still up: such an alarm finds nothing."""
+    return alarm.start < collision.onset <= alarm.end
 
 
 class EventFolder:
@@ -82,7 +103,11 @@ class EventFolder:
     @property
     def counts(self) -> str:
         """How many of each kind there were, as text."""
-        return ", ".join(f"{count} {kind}" for kind, count in self._found.items())
+        many = {"false alarm": "false alarms"}
+        return ", ".join(
+            f"{count} {kind if count == 1 else many.get(kind, kind)}"
+            for kind, count in self._found.items()
+        )
 
     def add(self, split: str, number: int, matching: Matching, of: tuple[Trace, Detection]) -> None:
         """The events of one recording: the ``number``-th of ``split``."""
@@ -99,7 +124,7 @@ class EventFolder:
 
         start = max(float(trace.t[0]), event.at - BEFORE)
         part, said = cut(trace, detection, start, start + LENGTH)
-        write_rrd(self._folder / name, part, said, whole=True)
+        write_rrd(self._folder / name, part, said, whole=True, about=event.text)
 
     def finish(self) -> Path:
         """Write the page; its path."""
@@ -133,11 +158,12 @@ def _own(path: Path) -> bool:
 def _of(event: Event) -> dict[str, Any]:
     return {
         "kind": event.kind,
-        "at [s]": round(event.at, 3),
+        "at [s]": f"{event.at:.2f}",
         "collision": event.collision or None,
         "link": event.link,
         "peak torque [N m]": None if event.peak_torque is None else round(event.peak_torque, 1),
         "delay [ms]": None if event.delay is None else round(1e3 * event.delay),
+        "note": event.note,
     }
 
 
