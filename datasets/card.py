@@ -54,6 +54,7 @@ split does not share with the first one.
 * `manifest/SPLIT-NNNNNN.jsonl`: a line an episode (arm, speed, payload, seed, collisions, outcome,
   everything needed to simulate it again); the last line is a checksum of the others.
 * `arms/NAME.xml`: the nominal arm, what an observer may believe; the simulated ones differ from it.
+  `arms/NAME.drive.json`: its drive's numbers, where the arm is not one of tauguard's own.
 * `dataset.json`: the whole configuration, versions, what was planned.
 
 ## Columns

@@ -82,8 +82,12 @@ class Configuration:
     @property
     def sha256(self) -> str:
         """Of the JSON text; where on this machine an arm's file lies does not count."""
-        anywhere = replace(self, robots=tuple(replace(r, source="") for r in self.robots))
-        return hashlib.sha256(anywhere.to_json().encode()).hexdigest()
+        nowhere = replace(self, robots=tuple(replace(r, source="") for r in self.robots))
+        return hashlib.sha256(nowhere.to_json().encode()).hexdigest()
+
+    def anywhere(self) -> Configuration:
+        """The same with the names of the arms' files instead of their places on this machine."""
+        return replace(self, robots=tuple(robot.anywhere() for robot in self.robots))
 
     def joints_of(self, arm: str) -> tuple[str, ...]:
         """The joints' names of an arm, base to tip."""
@@ -92,6 +96,11 @@ class Configuration:
     def source_of(self, arm: str) -> str:
         """What :func:`tauguard.models.load_arm` makes the arm from."""
         return next((r.source for r in self.robots if r.name == arm), arm)
+
+    def with_source(self, arm: str, source: str) -> Configuration:
+        """The same with an arm's file at ``source``."""
+        moved = (replace(r, source=source) if r.name == arm else r for r in self.robots)
+        return replace(self, robots=tuple(moved))
 
     @property
     def most_joints(self) -> int:

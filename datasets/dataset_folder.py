@@ -12,14 +12,16 @@ from typing import IO, Any
 
 from tauguard.datasets.code_identity import code, computed_bits, versions
 from tauguard.datasets.configuration import Configuration
-from tauguard.datasets.robots import nominal_xml
+from tauguard.datasets.robots import check_unchanged, nominal_texts
 from tauguard.datasets.schedule import stated_balance
 from tauguard.datasets.shard import fault, manifest_path, read_lines
 from tauguard.whole_file import PART, remove_parts, write_whole
 
 #: Of the folder's layout; a reader refuses newer ones.
-FORMAT = 1
+FORMAT = 2
 HEAD = "dataset.json"
+#: Of an arm's files in ``arms``, by what they are called beside a trace.
+_ENDINGS = {"arm.xml": ".xml", "drive.json": ".drive.json"}
 
 
 def read_head(folder: Path) -> dict[str, Any]:
@@ -132,10 +134,8 @@ def head_of(configuration: Configuration) -> dict[str, Any]:
         "hours": configuration.hours,
         "shards": {s.name: shard_count(configuration, s.name) for s in configuration.splits},
         "planned": stated_balance(configuration),
-        "arms_sha256": {
-            arm: _sha256(nominal_xml(arm, configuration.robots)) for arm in arms_of(configuration)
-        },
-        "configuration": json.loads(configuration.to_json()),
+        "arms_sha256": {name: _sha256(text) for name, text in _arm_files(configuration).items()},
+        "configuration": json.loads(configuration.anywhere().to_json()),
     }
 
 
@@ -146,23 +146,50 @@ def arms_of(configuration: Configuration, splits: tuple[str, ...] | None = None)
 
 
 def arm_xml(folder: Path, arm: str) -> str:
-    """The nominal arm that a dataset was made with, as MJCF.
+    """The nominal arm that a dataset was made with, as MJCF; errors as for :func:`arm_texts`."""
+    return arm_texts(folder, arm)["arm.xml"]
+
+
+def arm_texts(folder: Path, arm: str) -> dict[str, str]:
+    """What goes with every trace of an arm, see ``Scene.nominal_texts``; from the folder alone.
 
     Raises:
-        ValueError: the file is missing or not the one that was written.
+        ValueError: a file is missing or not the one that was written.
     """
-    path = folder / "arms" / f"{arm}.xml"
-    wanted = read_head(folder).get("arms_sha256", {})
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (FileNotFoundError, UnicodeDecodeError):
-        text = ""
-    if not text or wanted.get(arm, _sha256(text)) != _sha256(text):
-        raise ValueError(
-            f"{path}: missing or damaged; the same `tauguard generate` that made the dataset "
-            "writes it again"
-        )
-    return text
+    head = read_head(folder)
+    wanted = head.get("arms_sha256", {})
+    if head["format"] == 1:  # had no drives of arms that are not the package's own
+        wanted = {f"{name}.xml": digest for name, digest in wanted.items()}
+    found = {}
+    for name, ending in _ENDINGS.items():
+        path = folder / "arms" / f"{arm}{ending}"
+        if path.name not in wanted and name != "arm.xml":
+            continue
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (FileNotFoundError, UnicodeDecodeError):
+            text = ""
+        if not text or wanted.get(path.name, _sha256(text)) != _sha256(text):
+            raise ValueError(
+                f"{path}: missing or damaged; the same `tauguard generate` that made the dataset "
+                "writes it again"
+            )
+        found[name] = text
+    if head["format"] == 1:
+        with contextlib.suppress(ValueError):  # then it can be read, but not be trained on
+            robots = configuration_in(folder).robots
+            check_unchanged(arm, robots)
+            found |= nominal_texts(arm, robots)
+    return found
+
+
+def _arm_files(configuration: Configuration) -> dict[str, str]:
+    """The files of ``arms``: names and texts."""
+    return {
+        f"{arm}{_ENDINGS[name]}": text
+        for arm in arms_of(configuration)
+        for name, text in nominal_texts(arm, configuration.robots).items()
+    }
 
 
 def _sha256(text: str) -> str:
@@ -172,8 +199,8 @@ def _sha256(text: str) -> str:
 def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> None:
     for name in ("data", "manifest", "arms"):
         (folder / name).mkdir(exist_ok=True)
-    for arm in head["arms_sha256"]:
-        _write_once(folder / "arms" / f"{arm}.xml", nominal_xml(arm, configuration.robots))
+    for name, text in _arm_files(configuration).items():
+        _write_once(folder / "arms" / name, text)
     _write_once(folder / HEAD, json.dumps(head, indent=1, sort_keys=True) + "\n")
 
 

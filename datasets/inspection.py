@@ -13,7 +13,7 @@ import numpy as np
 from tauguard.datasets.columns_of_shards import collision_line, stored
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import (
-    arm_xml,
+    arm_texts,
     arms_of,
     configuration_in,
     faults,
@@ -153,9 +153,9 @@ def verified(folder: Path) -> list[tuple[str, str]]:
     ]
     for arm in arms_of(configuration_in(folder)):
         try:
-            arm_xml(folder, arm)
+            arm_texts(folder, arm)
         except ValueError as error:
-            found.append((f"arms/{arm}.xml", str(error)))
+            found.append((f"arms/{arm}", str(error)))
     return found
 
 
@@ -218,10 +218,23 @@ def line_of(folder: Path, name: str) -> dict[str, Any]:
     raise ValueError(f"{folder}: no episode {name!r}; expected split/number, such as train/0")
 
 
-def same_again(folder: Path, line: dict[str, Any]) -> tuple[Trace | None, bool]:
-    """The episode simulated from its line alone, and whether its samples are those stored."""
+def same_again(
+    folder: Path, line: dict[str, Any], robot: str | Path | None = None
+) -> tuple[Trace | None, bool]:
+    """The episode simulated from its line alone, and whether its samples are those stored.
+
+    Args:
+        folder: of the dataset.
+        line: of its manifest.
+        robot: the file of the episode's arm, where it is not the package's own.
+
+    Raises:
+        ValueError: the arm's file is not here, or not what the dataset was made with.
+    """
     episode = Episode.from_json(json.dumps(line["episode"]))
     configuration = configuration_in(folder)
+    if robot is not None:
+        configuration = configuration.with_source(line["arm"], str(robot))
     check_unchanged(line["arm"], configuration.robots)
     source = configuration.source_of(line["arm"])
     one = Planned(line["split"], line["number"], line["arm"], line["individual"], episode, source)

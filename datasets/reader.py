@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
 
 from tauguard.datasets.columns_of_shards import trace_of
-from tauguard.datasets.dataset_folder import HEAD, arm_xml, configuration_in, shards
+from tauguard.datasets.dataset_folder import HEAD, arm_texts, configuration_in, shards
 from tauguard.datasets.dataset_folder import arms_of as arms_in
 from tauguard.datasets.logs import read_log
 from tauguard.datasets.shard import data_path, manifest_path, read_lines
@@ -38,7 +37,9 @@ def read(
         arm: of a dataset, only this arm's episodes.
 
     Yields:
-        Traces; those of a dataset have their truth and the nominal arm (``arm.xml``) with them.
+        Traces; those of a dataset have their truth and the nominal arm with them, whose file need
+            not be there any more (``arm.xml``, and ``drive.json`` of arms that are not the
+            package's own).
 
     Raises:
         ValueError: nothing there to read, a damaged shard (it is named), an unknown split or arm, a
@@ -100,16 +101,11 @@ def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trac
     if not wanted:
         return
     path = folder / wanted[0]["shard"]
-    arms = {arm: arm_xml(folder, arm) for arm in {line["arm"] for line in wanted}}
-    configuration = configuration_in(folder)
+    arms = {arm: arm_texts(folder, arm) for arm in {line["arm"] for line in wanted}}
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             for line in wanted:
-                trace = trace_of(
-                    file.read_row_group(line["row_group"]), line, {"arm.xml": arms[line["arm"]]}
-                )
-                source = configuration.source_of(line["arm"])
-                yield replace(trace, meta={**trace.meta, "arm_source": source})
+                yield trace_of(file.read_row_group(line["row_group"]), line, arms[line["arm"]])
     except FileNotFoundError:
         raise FileNotFoundError(
             f"{path}: missing; the same `tauguard generate` that made the dataset makes it again"

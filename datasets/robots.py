@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +23,15 @@ class RobotSource:
     """An arm by name or file, as it was when the dataset was described."""
 
     name: str  #: what the dataset calls it: the name asked for, or the file's without its ending
-    source: str  #: a name that :func:`tauguard.models.load_arm` knows, or a file's whole path
+    source: str
+    """A name that :func:`tauguard.models.load_arm` knows, or a file's whole path; in a dataset's
+    folder the file's name alone."""
     joints: tuple[str, ...]
     sha256: str  #: of all that its simulation depends on
+
+    def anywhere(self) -> RobotSource:
+        """With the file's name instead of its place on this machine."""
+        return replace(self, source=Path(self.source).name)
 
 
 def find_robot(asked: str, folder: Path) -> RobotSource:
@@ -49,18 +55,31 @@ def find_robot(asked: str, folder: Path) -> RobotSource:
     return RobotSource(name, source, scene.joint_names, _digest(scene))
 
 
-def nominal_xml(name: str, robots: Sequence[RobotSource]) -> str:
-    """The nominal arm as MJCF: what an observer may believe."""
+def nominal_texts(name: str, robots: Sequence[RobotSource]) -> dict[str, str]:
+    """The nominal arm, what an observer may believe: see ``Scene.nominal_texts``."""
     for robot in robots:
         if robot.name == name:
-            return _scene(robot.source).arm_xml
-    return cura6.arm_xml(name)
+            return _scene(robot.source).nominal_texts
+    return {"arm.xml": cura6.arm_xml(name)}
 
 
 def check_unchanged(name: str, robots: Sequence[RobotSource]) -> None:
-    """``ValueError`` where an arm's file is not what it was when the dataset was described."""
+    """Check that an arm is what it was when the dataset was described.
+
+    Raises:
+        ValueError: its file is another, or is not there.
+    """
     for robot in robots:
-        if robot.name == name and _digest(_scene(robot.source)) != robot.sha256:
+        if robot.name != name:
+            continue
+        try:
+            same = _digest(_scene(robot.source)) == robot.sha256
+        except FileNotFoundError:
+            raise ValueError(
+                f"arm {name}: no file {robot.source} here; `tauguard inspect --episode` takes it "
+                "by --robot, the file that the dataset was begun with"
+            ) from None
+        if not same:
             raise ValueError(
                 f"arm {name}: {robot.source} is not what the dataset was begun with; restore the "
                 "file, or name another folder"

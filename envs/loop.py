@@ -9,6 +9,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.envs import _plant
+from tauguard.envs.motions import Motion
 from tauguard.envs.plant import Gains, make_plant
 from tauguard.models import Drive, Scene
 
@@ -142,3 +143,21 @@ class SimulationLoop:
                 f"{self.data.time:.3f} s: a smaller timestep or softer contact would hold"
             )
         return out
+
+
+@dataclass(frozen=True)
+class AlongMotion:
+    """A loop along one motion: runs rows of it, recorded over what was recorded before."""
+
+    loop: SimulationLoop
+    motion: Motion
+    feed_forward: Array  #: torque at every row [N m], shape (T, n)
+    recorded: Rollout  #: of the motion's rows
+
+    def __call__(
+        self, start: int, stop: int, wrench: Array | None = None, body: int = -1
+    ) -> Rollout:
+        """Rows ``start`` to ``stop``, with a wrench on a body if one is given."""
+        rows, out = slice(start, stop), self.recorded.rows(start, stop)
+        wanted = self.motion.q[rows], self.motion.qd[rows], self.feed_forward[rows]
+        return self.loop.run(*wanted, wrench, body, out)

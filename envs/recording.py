@@ -135,7 +135,7 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
                 "tauguard": importlib.metadata.version("tauguard"),
                 "mujoco": mujoco.__version__,
             },
-            attachments={"scene.xml": world.scene.xml, "arm.xml": world.scene.arm_xml},
+            attachments={"scene.xml": world.scene.xml, **world.scene.nominal_texts},
         )
 
     def _truth(self, t: Array, tau: Array, contact: Array, region: Array) -> Truth:

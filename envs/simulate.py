@@ -15,7 +15,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import labels
 from tauguard.envs.episode import CollisionPlan, Episode, PayloadPick
-from tauguard.envs.loop import Rollout, SimulationLoop
+from tauguard.envs.loop import AlongMotion, Rollout, SimulationLoop
 from tauguard.envs.motions import Workspace, random_motion
 from tauguard.envs.poses import Poses
 from tauguard.envs.striking import Striking, Window
@@ -144,14 +144,13 @@ class Simulation:
             episode.timestep,
         )
         self.robot = RobotNumbers.from_pin(pin_model(self.scene.arm_model))
-        self._feed_forward = inverse_dynamics(
-            self.robot, self.motion.q, self.motion.qd, self.motion.qdd
-        )
-        self._feed_forward = self._feed_forward + self._known_friction()
+        needed = inverse_dynamics(self.robot, self.motion.q, self.motion.qd, self.motion.qdd)
+        self._feed_forward = needed + self._known_friction()
         self.loop = SimulationLoop(self.scene, self.nominal)
         self.loop.reset(self.motion.q[0])
         self._rollout = self.loop.room_for(len(self.motion.t))
-        self.striking = Striking(self.scene, self.motion, self.loop, self._follow, aim_rng)
+        self._follow = AlongMotion(self.loop, self.motion, self._feed_forward, self._rollout)
+        self.striking = Striking(self.scene, self._follow, aim_rng)
         self._payload = 0.0
         self._windows: list[Window] = []
 
@@ -195,19 +194,6 @@ class Simulation:
         if self.scene.payload_body >= 0 and grams / 1000 != self._payload:
             set_payload(self.loop.model, self.loop.data, self.scene.payload_body, grams / 1000)
             self._payload = grams / 1000
-
-    def _follow(
-        self, start: int, stop: int, wrench: Array | None = None, body: int = -1
-    ) -> Rollout:
-        rows = slice(start, stop)
-        return self.loop.run(
-            self.motion.q[rows],
-            self.motion.qd[rows],
-            self._feed_forward[rows],
-            wrench,
-            body,
-            self._rollout.rows(start, stop),
-        )
 
     def _contacts(self, rollout: Rollout) -> tuple[CheckedContacts, ...]:
         if not self._checkers:
@@ -255,7 +241,7 @@ class Simulation:
             },
             attachments={
                 "scene.xml": scene.xml,
-                "arm.xml": scene.arm_xml,
+                **scene.nominal_texts,
                 "episode.json": episode.to_json(),
             },
         )

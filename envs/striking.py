@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -19,8 +18,7 @@ from tauguard.envs.injection import (
     launch,
     pulse_wrench,
 )
-from tauguard.envs.loop import Rollout, SimulationLoop
-from tauguard.envs.motions import Motion
+from tauguard.envs.loop import AlongMotion, Rollout
 from tauguard.envs.poses import Poses, cross
 from tauguard.models import Scene
 
@@ -54,28 +52,22 @@ class Window:
     peak_force: float  #: [N]
 
 
-class Follow(Protocol):
-    """Runs the loop along the motion's rows and records them, over what was recorded before."""
-
-    def __call__(
-        self, start: int, stop: int, wrench: Array | None = None, body: int = -1
-    ) -> Rollout:
-        """Rows ``start`` to ``stop``, with a wrench on a body if one is given."""
-
-
 class Striking:
     """Carries the planned collisions of one simulation out."""
 
     def __init__(
         self,
         scene: Scene,
-        motion: Motion,
-        loop: SimulationLoop,
-        follow: Follow,
+        follow: AlongMotion,
         rng: np.random.Generator,
     ) -> None:
-        """For one scene and its motion; ``rng`` draws where and which way it is struck."""
-        self._scene, self._motion, self._loop, self._follow = scene, motion, loop, follow
+        """For one scene and its motion; ``rng`` draws where and which way it is struck.
+
+        It knows nothing of the simulation that it serves: a cycle of references would keep each
+        one's megabytes of native memory until Python next looks for cycles, hundreds later.
+        """
+        motion = follow.motion
+        self._scene, self._motion, self._loop, self._follow = scene, motion, follow.loop, follow
         self._rng = rng
         self._aim, self._poses = Aim(scene, motion), Poses(scene)
         self._dt = float(scene.model.opt.timestep)

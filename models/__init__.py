@@ -5,6 +5,7 @@ from tauguard.models.arm import Arm, Facts, load_arm
 from tauguard.models.body_regions import BODY_REGIONS, BodyRegion, body_region
 from tauguard.models.cloth import Cloth
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
+from tauguard.models.drive_text import drive_of, drive_text
 from tauguard.models.impact import blow_velocity, reflected_mass, standard_mass
 from tauguard.models.known_robots import ROBOTS
 from tauguard.models.link_surface import LinkSurface, link_surface
@@ -46,6 +47,8 @@ __all__ = [
     "compose",
     "cura6",
     "cura6_drive",
+    "drive_of",
+    "drive_text",
     "link_surface",
     "load_arm",
     "pin_model",

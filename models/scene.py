@@ -13,6 +13,7 @@ from tauguard.models.arm import NAMED, Arm, Facts, load_arm
 from tauguard.models.checks import rigid_pose
 from tauguard.models.cloth import Cloth, add_cloth
 from tauguard.models.drive import Drive
+from tauguard.models.drive_text import drive_text
 from tauguard.models.mismatch import Mismatch
 from tauguard.models.mjcf import SpecText, without_shapes
 from tauguard.models.obstacles import (
@@ -110,6 +111,17 @@ class Scene:
     def arm_xml(self) -> str:
         """MJCF text of the nominal arm alone: what an observer believes."""
         return str(self.arm_text)
+
+    @property
+    def nominal_texts(self) -> dict[str, str]:
+        """What goes with a recording, so that its arm is known anywhere: names and texts.
+
+        ``arm.xml`` is :attr:`arm_xml`; ``drive.json`` holds the nominal drive
+        (:func:`tauguard.models.drive_of`) of an arm that is not the package's own.
+        """
+        own = self.facts.name in NAMED and self.spec.drive is None
+        drive = {} if own else {"drive.json": drive_text(self.facts.drive)}
+        return {"arm.xml": self.arm_xml, **drive}
 
     @property
     def arm_model(self) -> mujoco.MjModel:

@@ -10,22 +10,32 @@ import numpy as np
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.models import Drive, SceneSpec, compose, load_arm, pin_model
+from tauguard.models import Drive, SceneSpec, compose, cura6, cura6_drive, drive_of, pin_model
 from tauguard.traces import Trace
 
 
 def nominal_arm(traces: Sequence[Trace]) -> ArmModel:
     """What is believed of the recordings' arm before training.
 
+    It comes from what is attached to them, never from a robot's file.
+
     Raises:
         ValueError: no nominal arm is attached to the recordings.
     """
-    arm = traces[0].attachments.get("arm.xml")
-    if arm is None:
+    attached = traces[0].attachments
+    if "arm.xml" not in attached:
         raise ValueError("no arm.xml attached: train on recordings that tauguard simulated")
-    meta = traces[0].meta
-    name = meta.get("arm_source", meta.get("arm", "cura6"))
-    return _believed(arm, load_arm(name).facts.drive)
+    name = traces[0].meta.get("arm", "cura6")
+    if "drive.json" in attached:
+        drive = drive_of(attached["drive.json"])
+    elif name in cura6.NAMES:
+        drive = cura6_drive(name)
+    else:
+        raise ValueError(
+            f"arm {name}: an earlier tauguard made these recordings, which did not keep the "
+            "numbers of its drive (drive.json) with them; make them again"
+        )
+    return _believed(attached["arm.xml"], drive)
 
 
 def nominal_design(name: str = "cura6") -> ArmModel:

@@ -1,6 +1,7 @@
 """Datasets of arms that are not the package's: by file, checked, the same bytes, true labels."""
 
 import json
+import shutil
 import textwrap
 
 import numpy as np
@@ -8,11 +9,12 @@ import pytest
 
 from tauguard.datasets import inspection
 from tauguard.datasets.configuration import Configuration, load
-from tauguard.datasets.dataset_folder import lines
+from tauguard.datasets.dataset_folder import HEAD, lines
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import read
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.detectors.calibration.nominal import nominal_arm
+from tauguard.detectors.features.front_end import FrontEndSettings
 from tauguard.envs import CollisionPlan, Episode, Simulation
 from tauguard.models import load_arm, pin_model
 from tests.models.arms import random_arm
@@ -58,20 +60,63 @@ def test_any_workers_give_the_same_bytes_and_the_arm_goes_with_them(described, t
     (line,) = [x for x in lines(tmp_path / "1") if x["arm"] == "other"]
     arm = load_arm(str(described.parent / "robots" / "other.toml"))
     assert line["joints"] == list(arm.joints)
-    assert str(tmp_path) not in json.dumps(line)
-    _, same = inspection.same_again(tmp_path / "1", line)
+    for text in (json.dumps(line), (tmp_path / "1" / HEAD).read_text()):
+        assert str(tmp_path) not in text
+    own = described.parent / "robots" / "other.toml"
+    _, same = inspection.same_again(tmp_path / "1", line, own)
     assert same
-    (stored,) = read(tmp_path / "1", arm="other")
-    assert stored.joint_names == arm.joints
-    believed = nominal_arm([stored])
-    assert believed.robot.joints == len(arm.joints)
-    np.testing.assert_array_equal(believed.drive_gain, arm.facts.drive.gain)
+    with pytest.raises(ValueError, match=r"arm other: no file other\.toml here; .* by --robot"):
+        inspection.same_again(tmp_path / "1", line)
 
     (described.parent / "robots" / "arm.xml").write_text(random_arm(SEED + 1))
     with pytest.raises(ValueError, match=r"arm other: .*other\.toml is not what the dataset was"):
-        inspection.same_again(tmp_path / "1", line)
+        inspection.same_again(tmp_path / "1", line, own)
     with pytest.raises(ValueError, match="holds another dataset"):
         generate_dataset(load(described), tmp_path / "1", workers=1)
+
+
+def test_a_dataset_is_trained_on_where_the_arms_file_is_not(described, tmp_path):
+    arm = load_arm(str(described.parent / "robots" / "other.toml"))
+    there = tmp_path / "there"
+    generate_dataset(load(described), there, workers=1)
+    (known,) = read(there, arm="other")
+    before = np.array(FrontEndSettings().fit([known], nominal_arm([known])).arm.drive_gain)
+    shutil.move(there, tmp_path / "elsewhere")
+    shutil.rmtree(described.parent / "robots")
+    (stored,) = read(tmp_path / "elsewhere", arm="other")
+    assert stored.joint_names == arm.joints
+    believed = nominal_arm([stored])
+    np.testing.assert_array_equal(believed.drive_gain, arm.facts.drive.gain)
+    cycles = np.outer(arm.facts.drive.gear, arm.facts.drive.ripple.cycles)
+    np.testing.assert_array_equal(believed.friction.cycles, cycles)
+    after = FrontEndSettings().fit([stored], believed).arm.drive_gain
+    np.testing.assert_array_equal(after, before)
+
+    path = tmp_path / "elsewhere" / "arms" / "other.drive.json"
+    path.write_text(path.read_text().replace("0", "1", 1))
+    assert [name for name, _ in inspection.verified(tmp_path / "elsewhere")] == ["arms/other"]
+    with pytest.raises(ValueError, match=r"other\.drive\.json: missing or damaged"):
+        next(read(tmp_path / "elsewhere", arm="other"))
+
+
+def test_an_older_dataset_is_read_and_trained_on_while_its_file_is_the_same(described, tmp_path):
+    folder = tmp_path / "old"
+    generate_dataset(load(described), folder, workers=1)
+    head = json.loads((folder / HEAD).read_text())
+    head["format"] = 1
+    own = (k.removesuffix(".xml") for k in head["arms_sha256"] if k.endswith(".xml"))
+    head["arms_sha256"] = {name: head["arms_sha256"][f"{name}.xml"] for name in own}
+    source = described.parent / "robots" / "other.toml"
+    head["configuration"]["robots"][0]["source"] = str(source)
+    (folder / HEAD).write_text(json.dumps(head))
+    (folder / "arms" / "other.drive.json").unlink()
+    (stored,) = read(folder, arm="other")
+    gain = load_arm(str(source)).facts.drive.gain
+    np.testing.assert_array_equal(nominal_arm([stored]).drive_gain, gain)
+    source.write_text(source.read_text() + "torque_constant = 0.3\n")
+    (stored,) = read(folder, arm="other")
+    with pytest.raises(ValueError, match=r"arm other: an earlier tauguard .* make them again"):
+        nominal_arm([stored])
 
 
 @pytest.mark.parametrize(

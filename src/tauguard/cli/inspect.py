@@ -18,6 +18,7 @@ def command(
     figure: Path | None = None,
     episode: str | None = None,
     mcap: Path | None = None,
+    robot: Path | None = None,
 ) -> None:
     """Show what a generated dataset holds; with --verify read every byte of it.
 
@@ -33,14 +34,16 @@ def command(
             that it has the same bytes.
         mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
             turns that into an .rrd.
+        robot: with --episode, the file of its arm, if that is not the package's own: the dataset
+            has its hash and the numbers that training needs, not its shapes.
     """
     from tauguard.datasets import inspection
     from tauguard.report import write_json
 
-    if mcap is not None and episode is None:
-        raise ValueError("--mcap goes with --episode: say which one")
+    if (mcap or robot) is not None and episode is None:
+        raise ValueError("--mcap and --robot go with --episode: say which one")
     if episode is not None:
-        again(folder, episode, mcap)
+        again(folder, episode, mcap, robot)
         return
     report = inspection.report(folder)
     report["damaged"] = dict(inspection.verified(folder)) if verify else None
@@ -117,13 +120,13 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def again(folder: Path, name: str, mcap: Path | None) -> None:
+def again(folder: Path, name: str, mcap: Path | None, robot: Path | None) -> None:
     """Simulate one episode again and compare it with what is stored."""
     from tauguard.datasets.inspection import line_of, same_again
     from tauguard.traces import write_mcap
 
     line = line_of(folder, name)
-    trace, same = same_again(folder, line)
+    trace, same = same_again(folder, line, robot)
     print(f"{name}: {line['outcome']}; {line['rows']} rows, key {line['key'][:12]}")
     print("simulated again: the same bytes" if same else "simulated again: OTHER bytes")
     if mcap is not None and trace is not None:

@@ -1,0 +1,50 @@
+"""The numbers of a drive as text, so that a recording of any arm has them with it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from tauguard.models.drive import Drive, Friction, Ripple, Sensors
+
+#: Of the text; a reader refuses newer ones.
+VERSION = 1
+_PARTS = {"friction": Friction, "ripple": Ripple, "sensors": Sensors}
+
+
+def drive_text(drive: Drive) -> str:
+    """``drive`` as JSON, every digit; :func:`drive_of` makes an equal one."""
+    return json.dumps({"version": VERSION, **asdict(drive)}, sort_keys=True, default=_plain)
+
+
+def drive_of(text: str) -> Drive:
+    """The drive that :func:`drive_text` wrote.
+
+    Raises:
+        ValueError: other text, or that of a newer version (its number is named).
+    """
+    try:
+        values: dict[str, Any] = json.loads(text)
+        version = values.pop("version")
+        if version != VERSION:
+            raise ValueError(f"drive: of version {version}; this tauguard reads {VERSION}")
+        for name, kind in _PARTS.items():
+            if values[name] is not None:
+                values[name] = kind(**_arrays(values[name]))
+        return Drive(**_arrays(values))
+    except (LookupError, TypeError, AttributeError, RecursionError, json.JSONDecodeError) as error:
+        raise ValueError(f"drive: not the numbers of one ({error})") from None
+
+
+def _plain(value: object) -> object:
+    assert isinstance(value, np.ndarray)
+    # JSON has no infinity, which a current limit may be.
+    return np.where(np.isfinite(value), value.astype(object), value.astype(str)).tolist()
+
+
+def _arrays(values: dict[str, Any]) -> dict[str, Any]:
+    known = (np.array(v, float) if isinstance(v, list) else v for v in values.values())
+    return dict(zip(values, known, strict=True))
