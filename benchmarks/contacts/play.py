@@ -35,6 +35,7 @@ class Played:
     seconds: float  #: of the processor, for stepping alone
     calls: float  #: of ``mj_step`` for each step
     velocity: list[float]  #: of the first body at the end [m/s]
+    added: float = 0.0  #: the most energy by which redone steps changed it in sum; 0 with drives
 
 
 @dataclass(frozen=True)
@@ -129,11 +130,12 @@ def unwarned() -> Iterator[None]:
 def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> Played:
     """Play ``scene`` to its end: ``method`` is ``guarded`` or one of MuJoCo's modes."""
     model, data = scene.start(timestep, MODES.get(method, 0), stiff)
-    referee = Referee(model, data)
+    referee = Referee(model, data, scene.given)
     guard = GuardedStepper(model, data) if method == "guarded" else None
     every = max(1, round(LOOK / timestep))
     steps = round(scene.seconds / timestep) + 1
     spent, begin, calls, exhausted, arrested, touched = 0.0, 0.0, 0, False, False, False
+    change, added = 0.0, 0.0
 
     def each() -> None:
         nonlocal begin
@@ -142,7 +144,10 @@ def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> 
         begin += time.thread_time() - paused
 
     for k in range(steps):
+        if scene.move is not None:
+            scene.move(data, data.time + timestep)
         begin = time.thread_time()
+        report = None
         if guard is None:
             mujoco.mj_step(model, data)
         else:
@@ -152,6 +157,9 @@ def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> 
             arrested |= bool(report.arrested)
             touched |= report.steps > 1
         spent += time.thread_time() - begin
+        if report is not None and report.balance is not None and not model.nu:
+            change += float(np.diff(report.balance.energy.sum(axis=1))[0]) / referee.unit
+            added = max(added, change)
         if k % every == every - 1 or k == steps - 1:
             referee.look()
             if not np.isfinite(referee.energy):
@@ -170,4 +178,5 @@ def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> 
         spent,
         calls / steps,
         velocity[3:].tolist(),
+        added,
     )

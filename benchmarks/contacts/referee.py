@@ -16,21 +16,24 @@ class Referee:
 
     Attributes:
         energy: The most that kinetic, potential and elastic energy have been in all, less the
-            potential and elastic one of the start, over the kinetic one of the start.
+            potential and elastic one of the start, over :attr:`unit`.
+        unit: ``given``, or the kinetic energy of the start [J].
 
     Args:
         model: MjModel.
         data: MjData in the first state.
+        given: What energy is measured by [J]; if not given, the kinetic one of the start.
     """
 
-    def __init__(self, model: Any, data: Any) -> None:
+    def __init__(self, model: Any, data: Any, given: float | None = None) -> None:
         """Look at the first state."""
         self._model, self._data = model, data
         self._scratch = mujoco.MjData(model)
         self._sheets = sheets_of(model)
         self._deep = Deep(model, data)
         self.energy, self.diverged = 1.0, False
-        self._start, self._kinetic = self._energies()
+        self._start, kinetic = self._energies()
+        self.unit = kinetic if given is None else given
 
     @property
     def passed(self) -> bool:
@@ -50,7 +53,7 @@ class Referee:
         self._deep.look(self._data)
         if not self._model.nu:
             total = sum(self._energies()) - self._start
-            self.energy = max(self.energy, total / self._kinetic)
+            self.energy = max(self.energy, total / self.unit)
 
     def _energies(self) -> tuple[float, float]:
         """Potential and elastic, and kinetic energy [J]."""

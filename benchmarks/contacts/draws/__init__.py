@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from tauguard.benchmarks.contacts.draws import built, rigid, soft
+from tauguard.benchmarks.contacts.draws import built, crowded, moved, rigid, soft
 from tauguard.benchmarks.contacts.draws.world import Thrown
 
-#: Every family: what draws one of its scenes.
+#: Every family: what draws one of its scenes. Seeds go by the order: new ones come last.
 FAMILIES: dict[str, Callable[[np.random.Generator], Thrown]] = {
     "plate": rigid.plate,
     "pair": rigid.pair,
@@ -22,6 +22,15 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Thrown]] = {
     "joined": built.joined,
     "spin": built.spin,
     "soft": soft.soft,
+    "mill": crowded.mill,
+    "grid": crowded.grid,
+    "small": crowded.small,
+    "door": moved.door,
+    "servo": moved.servo,
+    "whips": moved.whips,
+    "paddle": moved.paddle,
+    "squeeze": moved.squeeze,
+    "needles": soft.needles,
 }
 
 

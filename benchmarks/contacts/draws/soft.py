@@ -1,4 +1,4 @@
-"""Scenes with flexes: cloth and flags, ropes, soft blocks."""
+"""Scenes with flexes: cloth and flags, ropes, soft blocks, needles into small cloth."""
 
 from __future__ import annotations
 
@@ -6,11 +6,17 @@ import mujoco
 import numpy as np
 
 from tauguard.benchmarks.contacts.draws.world import (
+    AFTER,
+    FREE,
+    GYRATION,
     KINDS,
+    SPINS,
     Thrown,
+    any_way,
     between,
     settle,
     shape,
+    slab,
     thrown,
     world,
 )
@@ -89,3 +95,44 @@ def soft(rng: np.random.Generator) -> Thrown:
     x = data.flexvert_xpos
     place = [*x.mean(axis=0)[:2] + rng.uniform(-0.01, 0.01, 2), x[:, 2].max() + gap]
     return thrown("soft", rng, spec, timestep, speed, place, "body", gap, slide=0.0)
+
+
+#: Of :func:`needles`: half sizes, the least and the most half thickness [m], mass [kg], reach [m].
+_THIN = {
+    "CAPSULE": ((None, 0.03, 0), 5e-4, 3e-3, 0.01, 0.035),
+    "BOX": ((0.03, 0.02, None), 5e-4, 3e-3, 0.05, 0.04),
+    "CYLINDER": ((0.02, None, 0), 5e-4, 3e-3, 0.03, 0.03),
+    "ELLIPSOID": ((0.03, 0.01, None), 1e-3, 5e-3, 0.03, 0.035),
+}
+
+
+def needles(rng: np.random.Generator) -> Thrown:
+    """A needle, plate, disc or lens onto a small net, pinned or free, over a floor or not."""
+    count, spacing = int(rng.integers(4, 8)), 0.02
+    corners = f"0 {count - 1} {count * (count - 1)} {count**2 - 1}"
+    pins = f'<pin id="{corners}"/>' if rng.random() < 0.7 else ""
+    spec = mujoco.MjSpec.from_string(f"""<mujoco><worldbody>
+      <flexcomp name="soft" type="grid" dim="2" count="{count} {count} 1" mass=".05"
+        spacing="{spacing} {spacing} {spacing}" radius="{between(rng, 1e-3, 4e-3):.5f}">
+        <edge equality="true" damping=".001"/>{pins}
+        <contact selfcollide="none" condim="3"/></flexcomp></worldbody></mujoco>""")
+    timestep, speed = settle(spec, rng, FREE[:4]), between(rng, 1.0, 30.0)
+    body = spec.worldbody.add_body(name="body")
+    body.add_freejoint(name="body")
+    kind = str(rng.choice(list(_THIN)))
+    form, least, most, mass, reach = _THIN[kind]
+    thin, kinds = between(rng, least, most), mujoco.mjtGeom
+    size = [thin if x is None else x for x in form]
+    body.add_geom(name="body", type=getattr(kinds, f"mjGEOM_{kind}"), size=size, mass=mass)
+    if rng.random() < 0.4:
+        floor = spec.worldbody.add_body(name="floor", pos=[0, 0, -0.03])
+        slab(rng, floor, "floor", (0.2, 0.2, 1e-3), 1.0)
+    model = spec.compile()
+    qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
+    at, dof = int(model.joint("body").qposadr[0]), int(model.joint("body").dofadr[0])
+    qpos[at : at + 3] = [*rng.uniform(-0.02, 0.02, 2), reach + 0.01]
+    if rng.random() < 0.5:
+        qpos[at + 3 : at + 7] = any_way(rng)
+    qvel[dof + 2] = -speed
+    qvel[dof + 3 : dof + 6] = rng.normal(size=3) * min(GYRATION / timestep, rng.choice(SPINS))
+    return Thrown("needles", spec, qpos, qvel, timestep, (reach + 0.01) / speed + AFTER, "body")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,6 +41,9 @@ class Thrown:
     seconds: float
     geom: str  #: name of the one whose velocity at the end is compared
     ctrl: Array = field(default_factory=lambda: np.zeros(0))  #: of the actuators, shape (nu,)
+    #: Writes the mocap poses for this time [s] into the data, before each step.
+    move: Callable[[Any, float], None] | None = None
+    given: float | None = None  #: what energy is measured by, if not the kinetic one at first [J]
 
     @property
     def speed(self) -> float:
@@ -89,6 +93,11 @@ def settle(
     option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{solver}")
     option.cone = int(rng.integers(2))
     return float(rng.choice(TIMESTEPS))
+
+
+def any_way(rng: np.random.Generator) -> Array:
+    """A random orientation, w first."""
+    return np.roll(Rotation.from_quat(rng.normal(size=4)).as_quat(), 1)
 
 
 def between(rng: np.random.Generator, low: float, high: float) -> float:

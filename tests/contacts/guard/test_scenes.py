@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tauguard.benchmarks.contacts.referee import Referee
 from tauguard.contacts import GuardedStepper
 from tauguard.contacts.guard.balance import sheets_of
 from tauguard.models.cloth import Cloth, add_cloth
@@ -200,6 +201,59 @@ def test_an_ellipsoid_does_not_fly_through_a_flag(speed, timestep):
     size = [0.025, 0.01, 0.015]
     model, data = into_cloth(ellipsoid, size, "spin", speed, timestep, "edge")
     run(model, data, 0.04 / speed + 0.015, stays_on_its_side(model, data))
+
+
+@pytest.mark.parametrize(
+    ("radius", "speed", "timestep"), [(5e-4, 5, 2e-3), (1e-3, 10, 5e-3), (2e-3, 20, 1e-3)]
+)
+def test_a_needle_does_not_go_through_a_small_net(radius, speed, timestep):
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco>
+      <option timestep="{timestep}" gravity="0 0 0"/><worldbody>
+      <flexcomp name="net" type="grid" dim="2" count="6 6 1" spacing=".02 .02 .02" radius=".002"
+        mass=".05"><edge equality="true" damping=".001"/><pin id="0 5 30 35"/>
+        <contact selfcollide="none"/></flexcomp>
+      <body name="body" pos=".005 .008 .04" euler="30 0 0"><freejoint/>
+        <geom name="body" type="capsule" size="{radius} .03" mass=".01"/></body>
+      </worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    data.qvel[-4] = -speed
+    mujoco.mj_forward(model, data)
+    run(model, data, 0.01 / speed + 0.01, stays_on_its_side(model, data))
+
+
+def whip(number, links, speed, rng):
+    """A chain of thin links on ball joints, about the z axis at its first, and its velocity."""
+    chain = ""
+    for k in reversed(range(links)):
+        joint = '<joint type="ball"/>' if k else '<joint axis="0 0 1"/>'
+        place = ".08 0 0" if k else f"-.2 0 {0.05 * number}"
+        chain = f"""<body pos="{place}">{joint}<geom name="link{number}{k}" type="capsule"
+          fromto=".004 0 0 .076 0 0" size=".003" mass=".02"/>{chain}</body>"""
+    return chain, rng.normal(size=3 * links - 2) * speed
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_whips_pass_neither_one_another_nor_a_post_and_redone_steps_add_no_energy(seed):
+    rng = np.random.default_rng(seed)
+    chains, speeds = zip(*(whip(k, 3 + k, 40.0, rng) for k in range(2)), strict=True)
+    post = '<geom name="post" type="cylinder" pos=".1 .1 0" size=".003 .2"/>'
+    model = model_of("".join(chains), post, timestep=1e-3)
+    data = mujoco.MjData(model)
+    data.qvel[:] = np.concatenate(speeds)
+    mujoco.mj_forward(model, data)
+    guard, referee = GuardedStepper(model, data), Referee(model, data)
+    kinetic, change, redone = energy(model, data)[1], 0.0, 0
+    for _ in range(60):
+        before = sum(energy(model, data))
+        report = guard.step(referee.look)
+        assert not report.exhausted
+        referee.look()
+        assert not referee.passed
+        if report.steps > 1:
+            redone += 1
+            change += sum(energy(model, data)) - before
+            assert change <= 0.02 * kinetic
+    assert redone > 0
 
 
 def test_an_arm_that_is_driven_into_a_plate_stays_above_it():
