@@ -232,7 +232,7 @@ def whip(number, links, speed, rng):
     return chain, rng.normal(size=3 * links - 2) * speed
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [3, 6])
 def test_whips_pass_neither_one_another_nor_a_post_and_redone_steps_add_no_energy(seed):
     rng = np.random.default_rng(seed)
     chains, speeds = zip(*(whip(k, 3 + k, 40.0, rng) for k in range(2)), strict=True)
