@@ -53,11 +53,6 @@ class MeshCCD:
             than ab2pf and exact have no queries of points.
 
     Attributes:
-        faces: Rows of vertices, an own copy, read-only; ``Frame.vf`` counts them. Shape (F, 3).
-        edges: Edges of faces and those given, each once, smaller vertex first, read-only;
-            ``Frame.ee`` counts them. Shape (E, 2).
-        points: Those given that no face or edge has. Shape (P,).
-        groups: As given.
         method, threads, volume: As given, ``threads`` with 0 as the number of processors.
         broad_stats: Counts and seconds of the last :meth:`candidates`; empty before.
 
@@ -98,22 +93,25 @@ class MeshCCD:
 
     @property
     def faces(self) -> NDArray[np.int32]:
-        """Rows of vertices, shape (F, 3)."""
+        """Rows of vertices, an own copy, read-only; ``Frame.vf`` counts them. Shape (F, 3)."""
         return self._topology.faces
 
     @property
     def edges(self) -> NDArray[np.int32]:
-        """Rows of vertices, shape (E, 2)."""
+        """Edges of faces and those given, each once, smaller vertex first, read-only.
+
+        ``Frame.ee`` counts them. Shape (E, 2).
+        """
         return self._topology.edges
 
     @property
     def points(self) -> NDArray[np.int32]:
-        """Loose points, shape (P,)."""
+        """Those given that no face or edge has. Shape (P,)."""
         return self._topology.loose.points
 
     @property
     def groups(self) -> Groups | None:
-        """Which parts meet."""
+        """Which parts meet, as given."""
         return self._topology.groups
 
     @property

@@ -14,12 +14,17 @@ suppress_warnings = ["myst.xref_missing"]
 
 autodoc_default_options = {"members": True, "imported-members": True}
 autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented_params"  # fields of data classes: as attributes
+autodoc_type_aliases = {"ArrayLike": "ArrayLike"}
 autodoc_member_order = "bysource"
 napoleon_google_docstring = True
+napoleon_use_ivar = True
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"tauguard {release}"
 html_show_sourcelink = False
+html_static_path = ["style"]
+html_css_files = ["narrow.css"]
 html_sidebars = {"**": []}
 html_theme_options = {
     "header_links_before_dropdown": 4,

@@ -146,7 +146,8 @@ def peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row]
         repeats,
         process_time,
     )
-    n_vf, n_ee = len(found.fv_candidates), len(found.ee_candidates)
+    lists = found.fv_candidates, found.ee_candidates  # each call makes a list of millions
+    n_vf, n_ee = map(len, lists)
     rows: list[Row] = []
     narrow = {
         "AdditiveCCD": (ipctk.AdditiveCCD(), limit),
@@ -154,7 +155,7 @@ def peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row]
     }
     for name, (method, most) in narrow.items():
         seconds = {}
-        for kind, clear in _clear(ipctk, found, answer, most).items():
+        for kind, clear in _clear(*lists, answer, most).items():
             part = ipctk.Candidates()
             setattr(part, f"{kind}_candidates", clear)
             start = process_time()
@@ -178,13 +179,11 @@ def peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row]
     return rows
 
 
-def _clear(ipctk: Any, found: Any, answer: Any, most: int) -> dict[str, list[Any]]:
+def _clear(fv: list[Any], ee: list[Any], answer: Any, most: int) -> dict[str, list[Any]]:
     """Up to ``most`` candidates of each kind, evenly over the list, without the true hits."""
     hits = {tuple(pair) for pair in answer.vf.tolist()}
-    fv = found.fv_candidates
     clear_fv = [c for c in fv[:: 1 + len(fv) // most] if (c.vertex_id, c.face_id) not in hits]
     hits = {tuple(pair) for pair in answer.ee.tolist()}
-    ee = found.ee_candidates
     clear_ee = [
         c
         for c in ee[:: 1 + len(ee) // most]

@@ -90,15 +90,15 @@ def on_recording(frame: Frame, seed: int, limit: int, calls: int, repeats: int) 
     found.build(mesh, *map(np.asfortranarray, frame.step), 0.0, ipctk.LBVH())
     rng = np.random.default_rng(seed)
     rows: list[Row] = []
-    for vertex in (True, False):
-        candidates = found.fv_candidates if vertex else found.ee_candidates
-        chosen = sorted(rng.permutation(len(candidates))[:limit])
-        candidates = [candidates[i] for i in chosen]
+    lists = {True: found.fv_candidates, False: found.ee_candidates}  # each makes a new list
+    for vertex, every in lists.items():
+        chosen = sorted(rng.permutation(len(every))[:limit])
+        candidates = [every[i] for i in chosen]
         queries = Queries(vertex, *frame.step, _rows(candidates, vertex, ccd.edges, frame.faces))
         truth = solver(queries, "ab2pf")()
         rows += _methods(frame.name, len(found), queries, truth, repeats)
         rows += _peers(ipctk, frame.name, mesh, candidates, queries, truth, rng, calls, rows[-1])
-    return rows + _both_kinds(rows, len(found.fv_candidates), len(found.ee_candidates))
+    return rows + _both_kinds(rows, len(lists[True]), len(lists[False]))
 
 
 def _both_kinds(rows: list[Row], n_vf: int, n_ee: int) -> list[Row]:

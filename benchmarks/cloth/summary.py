@@ -9,7 +9,7 @@ from tauguard.report import Row
 FRAME_MEANS = {"iccd": 2.3, "vcd": 1.34}
 PEERS = {"ipctk AdditiveCCD": 10, "ipctk TightInclusionCCD": 100}
 FRAME_PEER = ("ipctk LBVH + AdditiveCCD", 10)
-#: Of a mean that is asked over all scenes, where the recorded ones are not there.
+#: Of a mean that is asked over all scenes, where the recorded ones are not among the rows.
 ABSENT = "not judged: data absent"
 
 

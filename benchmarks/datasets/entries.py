@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 
 #: The dataset, and the rate that thresholds aim at.
 NAME, PER_HOUR = "tauguard-collisions-v1", 10.0
-#: The detector of the quick run, and episodes of each split there.
-QUICK, QUICK_EPISODES = ("residual-thresholds",), {"train": 12, "test": 4}
+#: The detector of the quick run, and episodes of each split there, each so long [s].
+QUICK, QUICK_EPISODES, QUICK_SECONDS = ("residual-thresholds",), {"train": 6, "test": 2}, 30.0
 
 #: What the columns mean.
 NOTES = {
@@ -96,7 +96,13 @@ def configuration(quick: bool, seed: int) -> Configuration:
     if not quick:
         return whole
     splits = tuple(
-        replace(split, episodes=QUICK_EPISODES[split.name], arms=("cura6",))
+        replace(
+            split,
+            episodes=QUICK_EPISODES[split.name],
+            arms=("cura6",),
+            seconds=QUICK_SECONDS,
+            collisions=8,
+        )
         for split in whole.splits
         if split.name in QUICK_EPISODES
     )

@@ -175,7 +175,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     from tauguard.models import Mismatch
 
     arm = Mismatch(seed=seed)
-    names = ("moving-thresholds", "current-network") if quick else NAMES
+    names = ("moving-thresholds", "residual-thresholds") if quick else NAMES
     detectors = trained(names, arm, 40 + 4 * seed, quick=quick)
     return guarantee_rows(detectors, arm, QUICK if quick else Plan(), 41 + 4 * seed, None)
 

@@ -116,9 +116,8 @@ class Size:
 
 
 FULL = Size(3, 1.0, Extent(tuple(forms()), Training(), 0.4, 0.6, 1))
-QUICK = Size(
-    1, 30.0, Extent(tuple(forms()), Training(slices=3, free=4, free_seconds=12.0), 0.02, 0.02, 0)
-)
+FEW = (WHOLE, "payload tracking", "mined negatives")
+QUICK = Size(1, 30.0, Extent(FEW, Training(slices=2, free=4, free_seconds=12.0), 0.02, 0.02, 0))
 
 
 def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
@@ -127,7 +126,7 @@ def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     kept = Kept.of(keep, "detection_parts", seed, size)
     seeds = [61_000 + 100 * seed + k for k in range(size.arms)]
     with Workers() as each:
-        training = [(size.extent.training, seed, arm) for arm in seeds]
+        training = [(size.extent, seed, arm) for arm in seeds]
         detectors = list(kept.over(each, "train")(trained, training))
         jobs = [(size.extent, seed, *one) for one in zip(seeds, detectors, strict=True)]
         arms = list(kept.over(each, "arm")(of_arm, jobs))
@@ -146,10 +145,11 @@ def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     return rows
 
 
-def trained(job: tuple[Training, int, int]) -> Forms:
-    """Every form, trained for one arm."""
-    training, seed, arm = job
-    return fitted(seed, arm, forms(), training)
+def trained(job: tuple[Extent, int, int]) -> Forms:
+    """The forms of the extent, trained for one arm."""
+    extent, seed, arm = job
+    every = forms()
+    return fitted(seed, arm, {name: every[name] for name in extent.names}, extent.training)
 
 
 def of_arm(job: tuple[Extent, int, int, Forms]) -> Arm:

@@ -117,12 +117,12 @@ PARTS = ("training_size", "conditions", "sigma", "sample_rate")
 FULL = Size(3, ALL, Training(), 0.75, 10.0, 1.0, 13, 5, variations=True)
 QUICK = Size(
     1,
-    ("srq-svr", "srq-svr-plain", "current-network", "residual-thresholds"),
-    Training(slices=10, free=8, free_seconds=25.0),
+    ("srq-svr", "current-network", "residual-thresholds"),
+    Training(slices=5, free=4, free_seconds=20.0),
     0.1,
     0.1,
     0.1,
-    2,
+    1,
     0,
 )
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 #: Samples a second: of UR's CB and e-Series; blows in the log of a full and of a quick run.
-RATES, BLOWS = (125.0, 500.0), (195, 6)
+RATES, BLOWS = (125.0, 500.0), (195, 3)
 #: Training: collision-free seconds, speeds [%], and false alarms an hour that it aims at.
 SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
 #: Samples of which each stage is timed.

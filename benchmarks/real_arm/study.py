@@ -91,17 +91,17 @@ def run(quick: bool, seed: int) -> list[Row]:
     if not arms:
         found.append({"study": "real arm", "log": "no logs: set TAUGUARD_DATA to their folder"})
     for arm in tqdm(arms, desc="arms", unit="arm", disable=None):
-        found += arm_rows(arm, 3 if quick else 6, np.random.default_rng(seed))
+        found += arm_rows(arm, 6, 1 if quick else 6, np.random.default_rng(seed))
     return found + trained_with.rows(quick, seed)
 
 
-def arm_rows(arm: ArmData, folds: int, rng: np.random.Generator) -> list[Row]:
-    """The rows of one arm."""
+def arm_rows(arm: ArmData, folds: int, turns: int, rng: np.random.Generator) -> list[Row]:
+    """The rows of one arm; of its ``folds`` of free logs, so many ``turns`` are left out."""
     start, free = nominal(arm), recordings(arm, arm.free)
     contact = recordings(arm, ("contact",))
     tallies: dict[str, Tally] = {}
     names = list(free)
-    for fold in range(min(folds, len(names))):
+    for fold in range(min(turns, len(names))):
         held = names[fold::folds]
         fitted = FreeMotion().fit([r for n, r in free.items() if n not in held], start)
         for name in held:

@@ -40,20 +40,16 @@ MOMENTS = 2
 def rows(quick: bool, seed: int) -> list[Row]:
     """A row an arm and a training length."""
     found: list[Row] = []
-    turns = 1 if quick else PARTS
+    turns, lengths = (1, SECONDS[1:2]) if quick else (PARTS, SECONDS)
     for arm in available():
-        found += _arm_rows(arm.name, nominal(arm), recordings(arm, arm.free), turns, seed)
-    drawn = range(100 + ARMS * seed, 100 + ARMS * seed + (2 if quick else ARMS))
+        start, logs = nominal(arm), recordings(arm, arm.free)
+        found += [_row(arm.name, start, logs, seconds, turns, seed) for seconds in lengths]
+    drawn = range(100 + ARMS * seed, 100 + ARMS * seed + (1 if quick else ARMS))
     for number in tqdm(drawn, desc="simulated", unit="arm", disable=None):
         start, logs = drawn_arm(number, 4 if quick else LOGS)
-        found += _arm_rows(f"simulated {number}", start, logs, 1, seed)
+        name = f"simulated {number}"
+        found += [_row(name, start, logs, seconds, 1, seed) for seconds in lengths]
     return found
-
-
-def _arm_rows(
-    name: str, start: ArmModel, logs: Mapping[str, Recording], turns: int, seed: int
-) -> list[Row]:
-    return [_row(name, start, logs, seconds, turns, seed) for seconds in SECONDS]
 
 
 def _row(

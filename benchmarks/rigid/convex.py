@@ -52,7 +52,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     """Static cells, dynamic cells, the batch path and the hard cases."""
     rng = np.random.default_rng(seed)
     per_cell, exact_sample, coal_pairs = (
-        (30_000, 100, 1_500) if quick else (1_000_000, 10_000, 20_000)
+        (10_000, 100, 500) if quick else (1_000_000, 10_000, 20_000)
     )
     rows: list[Row] = []
     for pair in PAIRS:
@@ -61,7 +61,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     for pair in PUBLISHED:
         rows += dynamic_rows(rng, pair, per_cell // 5, exact_sample // 4)
     rows += batch_rows(rng, 200_000 if quick else 1_000_000)
-    rows += coherent_rows(rng, 20_000 if quick else 100_000, 6 if quick else 20)
+    rows += coherent_rows(rng, 10_000 if quick else 100_000, 4 if quick else 20)
     rows += [hard_row(name, rng, 500 if quick else 20_000) for name in HARD]
     return rows
 

@@ -23,14 +23,15 @@ PAIRS = (("boxes", "boxes"), ("boxes", "tetrahedra"), ("tetrahedra", "tetrahedra
 def run(quick: bool, seed: int) -> list[Row]:
     """Random pairs, apart and in each other, and the hard cases of tetrahedra."""
     rng = np.random.default_rng(seed)
-    count, exact = (1_000, 20) if quick else (20_000, 300)
+    # The truth of a pair of boxes takes rational arithmetic half a minute.
+    count, exact, of_boxes = (1_000, 10, 0) if quick else (20_000, 300, 2)
     rows: list[Row] = []
     for kinds in PAIRS:
         a, b = (KINDS[kind](rng, 4 * count) for kind in kinds)
         hit = native_overlap(a, b, "auto")[0]
         for outcome in (False, True):
             index = np.flatnonzero(hit == outcome)[:count]
-            known = exact if kinds == ("tetrahedra", "tetrahedra") else 2
+            known = exact if kinds == ("tetrahedra", "tetrahedra") else of_boxes
             cell = take(a, index), take(b, index)
             label = "collision" if outcome else "non-collision"
             rows.append(gap_row("-".join(kinds), label, *cell, known))

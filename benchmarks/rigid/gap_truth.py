@@ -7,10 +7,8 @@ from itertools import combinations
 from math import isqrt, lcm
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauguard.benchmarks.rigid.truth import Vector, Vectors, cross, dot, exact_vertices, sub
-from tauguard.rigid import Hulls
 from tauguard.rigid.rounded import Solid, parts
 
 
@@ -121,8 +119,3 @@ def extent(a: Solid, b: Solid, i: int) -> float:
     points = [*exact_vertices(parts(a)[0], i)[0], *exact_vertices(parts(b)[0], i)[0]]
     span = [float(max(p[k] for p in points) - min(p[k] for p in points)) for k in range(3)]
     return float(np.linalg.norm(span)) + float(_radii(a, b, i))
-
-
-def as_hulls(points: list[NDArray[np.float64]]) -> Hulls:
-    """A batch of hulls from the vertices of each."""
-    return Hulls(np.concatenate(points), np.cumsum([0, *map(len, points)]))

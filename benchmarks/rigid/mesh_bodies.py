@@ -25,7 +25,7 @@ def run(quick: bool, seed: int) -> list[Row]:
     rng = np.random.default_rng(seed)
     mesh = load(quick)
     tree = MeshTree(mesh.vertices, mesh.faces)
-    return [mesh_row(rng, mesh, tree, kind, 60 if quick else 1_000) for kind in BODIES]
+    return [mesh_row(rng, mesh, tree, kind, 20 if quick else 1_000) for kind in BODIES]
 
 
 def mesh_row(rng: np.random.Generator, mesh: Mesh, tree: MeshTree, kind: str, n: int) -> Row:

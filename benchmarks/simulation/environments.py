@@ -55,12 +55,12 @@ def run(quick: bool, seed: int) -> list[Row]:
     The full run trains a detector first, on the motions of ``tauguard demo``.
     """
     # Many short blocks in turn: whatever else the machine does hits every competitor alike.
-    rows = steps(50, 15 if quick else 60, seed)
-    rows += vectors(50, 10 if quick else 40, seed)
+    rows = steps(50, 5 if quick else 60, seed)
+    rows += vectors(50, 5 if quick else 40, seed)
     known: dict[str, Any] = {"contact": None, "observer": "observer"}
     if not quick:
         known["trained detector"] = trained_detector(seed)
-    rows += reactions(2 if quick else 10, seed, known)
+    rows += reactions(1 if quick else 10, seed, known)
     return rows + answers(rows)
 
 

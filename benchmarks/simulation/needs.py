@@ -60,7 +60,7 @@ class Size:
 
 
 FULL = Size(12, 18, 9, 24, (*PARTS, *OTHERS))
-QUICK = Size(3, 4, 2, 2, ("friction", "ripple"))
+QUICK = Size(2, 3, 1, 1, ("friction",))
 
 
 @dataclass(frozen=True)

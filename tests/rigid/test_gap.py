@@ -6,9 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.benchmarks.rigid.cases import HARD, KINDS
-from tauguard.benchmarks.rigid.gap_truth import as_hulls, exact_gap, extent
+from tauguard.benchmarks.rigid.gap_truth import exact_gap, extent
 from tauguard.rigid import Boxes, Capsules, Hulls, Polygons, Rounded, Spheres, Tetrahedra, distance
 from tauguard.rigid import overlap as overlap_of
+
+
+def as_hulls(points):
+    """A batch of hulls from the vertices of each."""
+    return Hulls(np.concatenate(points), np.cumsum([0, *map(len, points)]))
+
 
 TOLERANCE = 3e-14
 
