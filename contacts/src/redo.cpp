@@ -9,6 +9,10 @@ namespace {
 // Shares of its way that a piece with too much energy goes instead, until it has not.
 constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 
+// Where stopping alone helps, shorter pieces are lost work: how much longer the least piece becomes
+// by each, up to this share of a step.
+constexpr double longer = 4, longest = 0.25;
+
 }  // namespace
 
 // `fresh` opens the account of energy anew.
@@ -25,10 +29,14 @@ void Stepper::redo(std::vector<PairHit> hits, bool fresh, const std::function<vo
     for (std::size_t i = 0; i < guarded_.size(); ++i)
       if (guarded_[i]) speeds_[static_cast<int>(i)] = 0;
   }
+  least_ = !fresh && stops_ > 0 ? longer * s_.smallest : s_.smallest;
+  stops_ = 0;
   double length = shorter(hits, whole_);
-  for (rest_ = whole_; rest_ > 0; length = rest_) {
+  for (rest_ = whole_; rest_ > 0;) {
+    const int stops = stops_;
     length = piece(std::min(length, rest_), each);
     rest_ = length < rest_ * (1 - 1e-9) ? rest_ - length : 0;
+    length = stops_ > stops ? least_ * whole_ : rest_;
   }
   *e_.time = end;
   report_.restored = release();
@@ -63,7 +71,7 @@ double Stepper::piece(double length, const std::function<void()>& each) {
     entry = account_.entry(velocity_.data(), length, x_t1_.data());
     const bool fails = !bearable(hits, length);
     if (!fails && !account_.overdrawn(entry)) break;
-    if (length <= s_.smallest * whole_ || report_.steps >= s_.most) {
+    if (length <= least_ * whole_ || report_.steps >= s_.most) {
       entry = last_resort(length, hits, entry);
       break;
     }
@@ -112,6 +120,7 @@ Entry Stepper::last_resort(double length, const std::vector<PairHit>& hits, Entr
     const Stopped stopped = arrest_(through, qpos_.data(), length);
     for (const int pair : stopped.pairs) arrested_[pair] = 1;
     work = stopped.work;
+    ++stops_, least_ = std::min(longer * least_, longest);
     again();
   }
   const std::vector<double> whole(e_.qvel, e_.qvel + e_.nv);

@@ -123,6 +123,8 @@ class Stepper {
   // Of the step being redone.
   Report report_;
   double whole_ = 0, rest_ = 0, push_ = 0;  // of time [s]; of depth [1/s]
+  double least_ = 0;                        // share of the step that is not cut
+  int stops_ = 0;                           // of partners, in the last step that was redone
   std::map<int, double> speeds_;            // of the pairs that are held [m/s]
   std::vector<char> passed_, arrested_;
 };
