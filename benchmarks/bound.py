@@ -214,7 +214,8 @@ def _measured(found: Mapping[str, Found], failed: Mapping[str, str], others: Seq
     absent = [n + (f" ({failed[n]})" if n in failed else "") for n in STUDIES if n not in found]
     lost, beside = ", ".join(absent), ", ".join(others)
     return (
-        "<p>A quick run shows the form of the answers, a full run their size.</p>"
+        "<p>A quick run shows the form of the answers, a full run their size. Of all quick studies "
+        "two run at a time: their times are those of a busy machine.</p>"
         + tables(runs, {})
         + (f"<p>Not in this report: {escape(lost)}.</p>" if lost else "")
         + (f"<p>Files of no study, not read: {escape(beside)}.</p>" if beside else "")

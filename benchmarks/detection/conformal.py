@@ -51,7 +51,7 @@ class Plan:
     confidence: float = 0.95
 
 
-QUICK = Plan(asked=(120.0, 300.0), seconds=20.0, calibration=14, fresh=20)
+QUICK = Plan(asked=(120.0, 300.0), seconds=20.0, calibration=14, fresh=12)
 
 
 def episodes(seed: int, count: int, seconds: float, arm: Mismatch) -> Iterator[Episode]:

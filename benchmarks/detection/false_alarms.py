@@ -58,7 +58,7 @@ class Size:
 
 FULL = Size(10, (0.25, 1.0, 5.0), Extent(NAMES, Training(), 0.75, 1.4, 1), 40)
 LITTLE = Training(slices=4, free=4, free_seconds=20.0)
-QUICK = Size(2, (5.0, 30.0), Extent(NAMES, LITTLE, 0.05, 0.03, 0), 2)
+QUICK = Size(1, (5.0, 30.0), Extent(NAMES, LITTLE, 0.05, 0.03, 0), 2)
 
 
 def arms_of(

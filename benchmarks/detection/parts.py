@@ -116,7 +116,7 @@ class Size:
 
 
 FULL = Size(3, 1.0, Extent(tuple(forms()), Training(), 0.4, 0.6, 1))
-FEW = (WHOLE, "payload tracking", "mined negatives")
+FEW = (WHOLE, "payload tracking")
 QUICK = Size(1, 30.0, Extent(FEW, Training(slices=2, free=4, free_seconds=12.0), 0.02, 0.02, 0))
 
 
