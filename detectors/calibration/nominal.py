@@ -10,8 +10,12 @@ import numpy as np
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.models import Drive, SceneSpec, compose, cura6, cura6_drive, drive_of, pin_model
+from tauguard.models import Drive, SceneSpec, compiled, compose, cura6, cura6_drive, drive_of, pin_model
 from tauguard.traces import Trace
+
+#: Slopes of a robot file's ``frictionloss`` [rad/s]: MuJoCo's constraint has no presliding, and
+#: slips from some 1e-3 rad/s times that loss over the inertia [N m, kg m^2].
+DRY = (0.003, 0.01)
 
 
 def nominal_arm(traces: Sequence[Trace]) -> ArmModel:
@@ -51,7 +55,10 @@ def nominal_design(name: str = "cura6") -> ArmModel:
 def _believed(xml: str, drive: Drive) -> ArmModel:
     # The ripple's frequencies follow from the gear; its heights and phases are identified.
     cycles = np.outer(drive.gear, drive.ripple.cycles) if drive.ripple else np.empty((0, 0))
-    robot = RobotNumbers.from_pin(pin_model(xml))
+    model = compiled(xml)
+    robot = RobotNumbers.from_pin(pin_model(model))
     columns = FrictionModel(cycles=cycles)
+    if model.dof_frictionloss.any():
+        columns = replace(columns, slopes=(*DRY, *columns.slopes))
     weights = np.zeros((robot.joints, columns.columns))
     return ArmModel(robot, drive.gain, replace(columns, weights=weights))

@@ -51,13 +51,13 @@ class SrqSvr(Windowed):
         few = 0 < self.vectors < len(regressor.vectors)
         return regressor.reduced(self.vectors) if few else regressor
 
-    def bare(self, front: FrontEnd) -> Scaling:
+    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """The scaling before its factor is known."""
-        return replace(front.scaling(self.units), compress=True)
+        return self.compressed(traces, front)
 
     def scaling(self, traces: Sequence[Trace], front: FrontEnd, shape: WindowShape) -> Scaling:
         """Bring the median distance of windows to ``distance``."""
-        bare = self.bare(front)
+        bare = self.bare(traces, front)
         if self.distance <= 0:
             return bare
         rng = np.random.default_rng(self.seed)
@@ -83,7 +83,7 @@ class PlainSrqSvr(SrqSvr):
     )
     name: ClassVar[str] = "srq-svr-plain"
 
-    def bare(self, front: FrontEnd) -> Scaling:
+    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """Residuals in N m."""
         return Scaling(front.joints)
 

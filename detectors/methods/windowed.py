@@ -14,6 +14,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.evaluation.events import free_rows
+from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.native_stream import NativeStream
 from tauguard.detectors.features.scaling import Scaling
@@ -27,6 +28,8 @@ from tauguard.traces.trace import Trace
 REFERENCE = (20.0, 20.0, 15.0, 6.0)
 #: A target above this is a collision that can be felt.
 FELT = 0.05
+#: Share of the samples of collision-free motion that may be beyond what counts one.
+RARE = 1e-3
 #: Windows that are evaluated at once: memory stays small.
 CHUNK = 20_000
 
@@ -79,7 +82,19 @@ class Windowed(ABC):
 
     def scaling(self, traces: Sequence[Trace], front: FrontEnd, shape: WindowShape) -> Scaling:
         """How the residual is scaled."""
-        return replace(front.scaling(self.units), compress=True)
+        return self.compressed(traces, front)
+
+    def compressed(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
+        """The residual in ``units`` envelopes, or more of a joint that free motion asks more of.
+
+        The envelope is a deviation. Where collision-free motion leaves nearly nothing but at starts
+        and reversals (dry friction), its peaks are dozens of deviations: the asinh would bring them
+        near to collisions, and resolve what lies below them instead.
+        """
+        plain = front.scaling(self.units)
+        free = [np.abs(front.scaled(t, plain)[free_rows(t, front.settle)]) for t in traces]
+        most = np.quantile(np.concatenate(free), 1 - RARE, axis=0)
+        return replace(plain, envelope=_widened(plain, np.maximum(most, 1.0)), compress=True)
 
     def finished(self, regressor: Regressor) -> Regressor:
         """What is kept of the last regressor."""
@@ -120,6 +135,14 @@ class Windowed(ABC):
                 worst = peaks(evaluated(regressor, p.signal, shape, rows), share, gap)
                 found.append(shape.of(p.signal, rows[worst]))
         return np.concatenate(found)
+
+
+def _widened(scaling: Scaling, factors: Array) -> Envelope:
+    """The envelope with that of the scaled joints times ``factors``."""
+    assert scaling.envelope is not None
+    weights = scaling.envelope.weights.copy()
+    weights[list(scaling.joints)] *= factors[:, None]
+    return Envelope(weights)
 
 
 def evaluated(
