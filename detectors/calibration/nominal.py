@@ -10,7 +10,16 @@ import numpy as np
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.models import Drive, SceneSpec, compiled, compose, cura6, cura6_drive, drive_of, pin_model
+from tauguard.models import (
+    Drive,
+    SceneSpec,
+    compiled,
+    compose,
+    cura6,
+    cura6_drive,
+    drive_of,
+    pin_model,
+)
 from tauguard.traces import Trace
 
 #: Slopes of a robot file's ``frictionloss`` [rad/s]: MuJoCo's constraint has no presliding, and
