@@ -78,9 +78,9 @@ class Form(SrqSvr):
     graded: bool = True  #: labels grow with the torque; else 0 and 1
     envelope: bool = True  #: residuals over their envelope, compressed; else in N m
 
-    def bare(self, front: FrontEnd) -> Scaling:
+    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """The scaling before its factor."""
-        return super().bare(front) if self.envelope else Scaling(front.joints)
+        return super().bare(traces, front) if self.envelope else Scaling(front.joints)
 
     def prepare(self, trace: Trace, front: FrontEnd, scaling: Scaling) -> Prepared:
         """With labels of either kind."""
