@@ -124,7 +124,7 @@ def _first(rows: Mapping[str, Sequence[Row]], gaps: Gaps) -> str:
 def _found(rows: Mapping[str, Sequence[Row]], gaps: Gaps) -> str:
     return (
         "<p>Collisions of arms that no threshold was set on, each figure with its 95 % interval. "
-        "Simulated: thresholds for one false alarm an hour. Real: pushes on a UR5.</p>"
+        "Simulated: thresholds that aim at 0.25 false alarms an hour. Real: pushes on a UR5.</p>"
         + (tables(detection(rows, gaps), {}) or "<p>None of these studies is in this report.</p>")
     )
 

@@ -172,7 +172,8 @@ def _steps(studies: Studies) -> Iterator[Row]:
         peers = [row for row in rows if str(row["what"]).startswith("mujoco.rollout")]
         if not peers:
             raise ValueError("no row of mujoco.rollout")
-        error = f"joints within {peers[0]['q_difference_rad']:.0e} rad of rollout's"
+        strayed = peers[0]["q_difference_rad"]
+        error = f"joints within {f'{strayed:.0e}' if strayed else '0'} rad of rollout's"
         own = _only(rows, what="the environment")
         ours, its = (number(row["us_per_action"]) or 0.0 for row in (own, peers[0]))
         what = "10 ms of an arm with drives, observations and rewards"
@@ -204,7 +205,7 @@ def detection(studies: Studies, gaps: Gaps) -> list[Row]:
 
 
 def _simulated(studies: Studies) -> Iterator[Row]:
-    """Every detector at the threshold for one false alarm an hour, all speeds together."""
+    """Every detector at the threshold for a rate of false alarms, all speeds together."""
     rows = [r for r in rows_of(studies, "detection", "hourly") if r["speed"] == 0]
     for row in rows:
         delay = row["delay_ms"]

@@ -215,7 +215,7 @@ def _guard(studies: Studies) -> Panel:
 
 
 def _detectors(studies: Studies) -> Panel:
-    """Detectors at the threshold for one false alarm an hour, where both studies are there."""
+    """Detectors at the threshold for a rate of false alarms, where both studies are there."""
     rows = rows_of(studies, "detection_online", "step")
     cost = {row["detector"]: number(row["us"]) for row in rows}
     points = []
@@ -223,7 +223,7 @@ def _detectors(studies: Studies) -> Panel:
         us, found = cost.get(row["detector"]), number(row["sensitivity"])
         if row["speed"] == 0 and us is not None and found is not None:
             points.append(Point(row["detector"], us, 1 - found))
-    title = "Detectors online, set for one false alarm an hour"
+    title = "Detectors online, aimed at 0.25 false alarms an hour"
     return Panel(title, "microseconds a sample", "share missed from 16 N m up", tuple(points))
 
 

@@ -14,7 +14,7 @@ STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem;
        color: #1b1b1b; background: #fff; }
 h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
-nav a { margin-right: 1rem; white-space: nowrap; }
+nav a { margin-right: 1rem; display: inline-block; }
 .wide { overflow-x: auto; margin: 0.5rem 0 1.5rem; }
 table { border-collapse: collapse; font-size: 0.8rem; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid #ddd; padding: 0.2rem 0.6rem; text-align: left;
@@ -26,11 +26,11 @@ img { max-width: 100%; height: auto; min-width: 0; } figure { margin: 1rem 0; }
 figure img { width: 56rem; }
 .no { background: #fde3d3; } .yes { background: #e1f0fa; } .note { color: #444; }
 summary { cursor: pointer; padding: 0.3rem 0; } code { background: #f4f4f4; }
-@media (max-width: 40rem) { nav a { white-space: normal; } th, td { padding: 0.2rem 0.3rem; } }
+@media (max-width: 40rem) { th, td { padding: 0.2rem 0.3rem; } }
 @media print {
   body { font-size: 10pt; max-width: none; padding: 0; } table { font-size: 7.5pt; }
   nav, details { display: none; } .wide { overflow: visible; }
-  h2, h4 { break-after: avoid; } tr, img { break-inside: avoid; }
+  h2, h4, h2 + p { break-after: avoid; } tr, img { break-inside: avoid; }
   figure img { width: auto; max-height: 9cm; } .figures img { flex: 1 1 8cm; max-width: 9cm; }
 }
 """

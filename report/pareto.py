@@ -85,9 +85,12 @@ def _scale(panel: Panel, axes: Any) -> None:
 
     axes.set_xscale("log")
     costs = [p.cost for p in panel.points]
+    decades = max(costs) > 8 * min(costs)
     if max(costs) < 1e3 * min(costs):
-        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_major_locator(
+            LogLocator(subs=(1, 2, 5) if decades else (1, 1.5, 2, 3, 5, 7))
+        )
+    axes.xaxis.set_major_formatter("{x:,.10g}")
     axes.xaxis.set_minor_locator(NullLocator())
     above = [p.error for p in panel.points if p.error > 0]
     if above and max(above) > 20 * min(above):

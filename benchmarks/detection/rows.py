@@ -148,7 +148,7 @@ def cells(by_speed: BySpeed, thresholds: Spread, names: Sequence[str]) -> list[R
 
 
 def hourly(by_speed: BySpeed, thresholds: Spread, names: Sequence[str]) -> list[Row]:
-    """``hourly``: the same at one false alarm an hour; speed 0 is all speeds together."""
+    """``hourly``: the same at the rate of false alarms aimed at; speed 0 is all speeds together."""
     found_rows: list[Row] = []
     for name in names:
         whole = Tally()
