@@ -176,10 +176,10 @@ def arm_texts(folder: Path, arm: str) -> dict[str, str]:
             )
         found[name] = text
     if head["format"] == 1:
-        with contextlib.suppress(ValueError):  # then it can be read, but not be trained on
+        with contextlib.suppress(ValueError, OSError):  # it can be read, but not be trained on
             robots = configuration_in(folder).robots
             check_unchanged(arm, robots)
-            found |= nominal_texts(arm, robots)
+            found = nominal_texts(arm, robots) | found
     return found
 
 

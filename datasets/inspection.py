@@ -229,11 +229,14 @@ def same_again(
         robot: the file of the episode's arm, where it is not the package's own.
 
     Raises:
-        ValueError: the arm's file is not here, or not what the dataset was made with.
+        ValueError: the arm's file is not here, or not what the dataset was made with, or a file
+            for an arm of the package.
     """
     episode = Episode.from_json(json.dumps(line["episode"]))
     configuration = configuration_in(folder)
     if robot is not None:
+        if line["arm"] not in {one.name for one in configuration.robots}:
+            raise ValueError(f"arm {line['arm']} is the package's own: no file of it is asked for")
         configuration = configuration.with_source(line["arm"], str(robot))
     check_unchanged(line["arm"], configuration.robots)
     source = configuration.source_of(line["arm"])

@@ -1,5 +1,6 @@
 """Datasets of arms that are not the package's: by file, checked, the same bytes, true labels."""
 
+import hashlib
 import json
 import shutil
 import textwrap
@@ -67,6 +68,8 @@ def test_any_workers_give_the_same_bytes_and_the_arm_goes_with_them(described, t
     assert same
     with pytest.raises(ValueError, match=r"arm other: no file other\.toml here; .* by --robot"):
         inspection.same_again(tmp_path / "1", line)
+    with pytest.raises(ValueError, match="arm cura6 is the package's own"):
+        inspection.same_again(tmp_path / "1", line | {"arm": "cura6"}, own)
 
     (described.parent / "robots" / "arm.xml").write_text(random_arm(SEED + 1))
     with pytest.raises(ValueError, match=r"arm other: .*other\.toml is not what the dataset was"):
@@ -113,10 +116,18 @@ def test_an_older_dataset_is_read_and_trained_on_while_its_file_is_the_same(desc
     (stored,) = read(folder, arm="other")
     gain = load_arm(str(source)).facts.drive.gain
     np.testing.assert_array_equal(nominal_arm([stored]).drive_gain, gain)
+    own, text = folder / "arms" / "cura6.xml", "<mujoco/>"  # that build's arm, not this one's
+    own.write_text(text)
+    head["arms_sha256"]["cura6"] = hashlib.sha256(text.encode()).hexdigest()
+    (folder / HEAD).write_text(json.dumps(head))
+    assert next(read(folder, arm="cura6")).attachments["arm.xml"] == text
     source.write_text(source.read_text() + "torque_constant = 0.3\n")
     (stored,) = read(folder, arm="other")
     with pytest.raises(ValueError, match=r"arm other: an earlier tauguard .* make them again"):
         nominal_arm([stored])
+    head["configuration"]["robots"][0]["source"] = "/" + 300 * "x"  # it cannot even be looked at
+    (folder / HEAD).write_text(json.dumps(head))
+    assert list(next(read(folder, arm="other")).attachments) == ["arm.xml"]
 
 
 @pytest.mark.parametrize(
