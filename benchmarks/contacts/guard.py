@@ -58,12 +58,12 @@ NOTES = {
     "scenes in which partners had to be stopped; energy: the most there was over what there was at "
     "first (with mocap: over that of all bodies at twice its speed), and in how many scenes it "
     f"was above {ADDED:g}; redone above: of those in which the guard redid a step, with more than "
-    "in plain steps also; redone added: the most that redone steps added in sum (with mocap: its "
-    "work); over plain: time over that of plain steps of the same scene; over fixed: over the "
-    "largest fixed step (stiff contacts) from which on all finer ones hold that scene, fixed_ms, "
-    "tried in one scene of four; unknown: of these, scenes that none holds; error: of the first "
-    "body's velocity at the end against the finest fixed step, over the thrown body's speed. "
-    "Medians. What squeeze draws cannot be held and is to be reported.",
+    "in plain steps also; redone added: the most that redone steps gave in sum, what contacts had "
+    "taken and the work of mocap included; over plain: time over that of plain steps of the same "
+    "scene; over fixed: over the largest fixed step (stiff contacts) from which on all finer ones "
+    "hold that scene, fixed_ms, tried in one scene of four; unknown: of these, scenes that none "
+    "holds; error: of the first body's velocity at the end against the finest fixed step, over the "
+    "thrown body's speed. Medians. What squeeze draws cannot be held and is to be reported.",
     "overhead": "a step of a scene in which nothing is to be guarded, plain and guarded.",
 }
 
