@@ -234,15 +234,15 @@ def _module(name: str) -> Any:
 def _study(name: str, found: Found, gaps: Gaps) -> str:
     study, rows = _module(name), found["rows"]
     missing = "<p>Not shown: see the top of this page.</p>"
-    with warnings.catch_warnings(record=True) as doubts:
+    with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always", UserWarning)
         figure = gaps.attempt(
             f"chart of {name}",
             lambda: picture(chart(study, rows), "png", f"chart of {name}"),
             missing,
         )
-    for doubt in dict.fromkeys(str(one.message) for one in doubts):
-        gaps.add(f"chart of {name}", doubt)  # an empty panel is no error to matplotlib
+    for line in dict.fromkeys(str(one.message) for one in raised):
+        gaps.add(f"chart of {name}", line)  # an empty panel is no error to matplotlib
     shown: Callable[[list[Row]], list[Row]] = getattr(study, "shown", list)
     text = gaps.attempt(f"tables of {name}", lambda: tables(shown(rows), _notes(name)), missing)
     run = f"{'quick' if found['quick'] else 'full'} run, seed {found['seed']}"
