@@ -67,7 +67,9 @@ class Estimator:
         noise: list[float],
         clip: float,
         every: int,
-        payload_weight: float,
+        lasting: float,
+        transition: float,
+        weighted: bool,
         fusion: list[float],
         plain_gain: float,
     ) -> None: ...

@@ -50,7 +50,9 @@ UNKNOWNS: dict[str, dict[str, float]] = {
     "payload tracking": {"payload": 0.0, "moment": 0.0},
     "friction errors": {"viscous": 0.0, "coulomb": 0.0},
     "torque offsets": {"offset": 0.0},
-    "weight of an uncertain payload": {"payload_weight": 0.0},
+    "errors that last": {"lasting": 1.0},
+    "error of changing friction": {"transition": 0.0},
+    "weight of what is uncertain": {"weighted": False},
 }
 #: Columns of the laws that say nothing of the parts.
 LEFT_OUT = ("detector", "law", "arms", "inside", "stated_low", "stated_high", "alarms_an_arm")

@@ -46,20 +46,27 @@ class Unknowns:
     fast: float = 1.0  #: time constant of the offset [s]
     clip: float = 3.0  #: an innovation z above this many standard deviations c counts c^2/z
     every: float = 0.01  #: time between two corrections [s]
-    payload_weight: float = 0.0
-    """The unexplained residual of joint j is multiplied by noise_j / sqrt(noise_j^2 + w s_j^2) with
-    this weight w and s_j the standard deviation that the uncertain payload gives the residual. 0
-    leaves the residual as it is; above 1 where model errors last longer than ``every``."""
+    lasting: float = 1.0
+    """Corrections that an error of the model lasts for: the variance of a correction's noise is so
+    many times ``noise^2``. With 1 the filter takes every correction for news."""
+    transition: float = 0.0
+    """Relative error of friction that has just changed: with c_j how far it is from its low-pass of
+    30/s [N m], (transition c_j)^2 is added to ``noise^2``."""
+    weighted: bool = False
+    """The unexplained residual of joint j is multiplied by noise_j / sqrt(noise_j^2 + (transition
+    c_j)^2 + s_j^2), with s_j the standard deviation that the uncertain payload gives it."""
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
-        if not (np.isfinite(self.payload_weight) and self.payload_weight >= 0):
-            raise ValueError(f"payload_weight {self.payload_weight}: expected a number, 0 or more")
+        for name, least in (("lasting", 1.0), ("transition", 0.0)):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= least):
+                raise ValueError(f"{name} {value}: expected a number, {least:g} or more")
 
     @classmethod
     def for_detection(cls) -> Unknowns:
-        """For detectors: model errors last some 0.2 s, twenty corrections."""
-        return cls(payload_weight=20.0)
+        """For detectors: model errors last some 0.2 s, and are a tenth of a change of friction."""
+        return cls(lasting=20.0, transition=0.1, weighted=True)
 
     @classmethod
     def none(cls) -> Unknowns:
@@ -153,7 +160,9 @@ class Estimator:
             [float(s) for s in arm.noise],
             self.unknowns.clip,
             max(1, round(self.unknowns.every / self.dt)),
-            self.unknowns.payload_weight,
+            self.unknowns.lasting,
+            self.unknowns.transition,
+            self.unknowns.weighted,
             arm.sensors.fusion_gains(self.dt) if arm.sensors else [],
             PLAIN_GAIN,
         )

@@ -12,10 +12,16 @@
 // An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is,
 // the less it says about the model, and the sooner it is a collision.
 //
-// What the unknowns do not explain counts less where the payload is still uncertain: with s the
-// deviation that its covariance gives the residual, `payload_weight` times the variance s^2 is
-// added to the noise's. More than 1, because errors of the model last longer than the time between
-// two corrections, each of which takes them for news.
+// Errors of the model last longer than the time between two corrections, each of which would take
+// them for news: the noise of a correction has `lasting` times its variance, or the filter soon
+// trusts a wrong payload, and friction errors many times their deviation, more than what it sees.
+//
+// Where friction has just changed (a joint breaks away, stops or turns) the model is wrong by a
+// share `transition` of the change: a variance that is added to the noise's.
+//
+// What the unknowns do not explain counts less where payload or friction is uncertain (`weighted`):
+// it is divided by the deviation of noise, payload and change of friction together, in units of the
+// noise's.
 //
 // The plain residual is that of an observer of rate `plain_gain` that tracks nothing.
 #pragma once
@@ -30,8 +36,9 @@
 
 namespace tauguard::detectors {
 
-constexpr int payload_numbers = 4;          // mass and first moment
-constexpr int per_joint = 3;                // offset, viscous, Coulomb
+constexpr int payload_numbers = 4;  // mass and first moment
+constexpr int per_joint = 3;        // offset, viscous, Coulomb
+constexpr int coulomb_at = 2;
 constexpr double acceleration_rate = 30.0;  // [1/s]
 
 struct EstimatorSettings {
@@ -42,10 +49,12 @@ struct EstimatorSettings {
   std::vector<double> persistence;  // time constants of the unknowns [s], 4 + 3 n
   std::vector<double> noise;        // standard deviation of the residual [N m], n
   double clip = 3.0;
-  int every = 10;               // samples between two corrections
-  double payload_weight = 0.0;  // see above; 0: all of the unexplained residual counts
-  std::vector<double> fusion;   // of position and velocity, 6 n; empty: velocity as measured
-  double plain_gain = 100.0;    // [1/s]
+  int every = 10;              // samples between two corrections
+  double lasting = 1.0;        // corrections that an error of the model lasts for
+  double transition = 0.0;     // relative error of friction that has just changed
+  bool weighted = false;       // see above; false: all of the unexplained residual counts
+  std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
+  double plain_gain = 100.0;   // [1/s]
 };
 
 class Estimator {
@@ -65,7 +74,7 @@ class Estimator {
         gathered_(m_),
         row_(m_) {
     for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_,
-                    &decay_, &plain_, &plain_tau_, &plain_tau_before_, &smooth_})
+                    &decay_, &plain_, &plain_tau_, &plain_tau_before_, &smooth_, &usual_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
       v->resize(payload_numbers * n_);
@@ -115,7 +124,7 @@ class Estimator {
     std::copy(qd, qd + n_, smooth_.begin());
     fusion_.reset(q, qd);
     for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
-    for (auto* v : {&residual_, &plain_, &load_, &own_, &theta_, &covariance_})
+    for (auto* v : {&residual_, &plain_, &load_, &own_, &usual_, &theta_, &covariance_})
       std::fill(v->begin(), v->end(), 0.0);
     for (std::size_t a = 0; a < m_; ++a)
       covariance_[a * m_ + a] = set_.deviation[a] * set_.deviation[a];
@@ -143,7 +152,7 @@ class Estimator {
       }
       own_now_[per_joint * j] = 1.0;
       own_now_[per_joint * j + 1] = viscous;
-      own_now_[per_joint * j + 2] = coulomb;
+      own_now_[per_joint * j + coulomb_at] = coulomb;
     }
   }
 
@@ -175,6 +184,7 @@ class Estimator {
                                  load_beta_[a], load_beta_before_[a], 0.0);
       for (std::size_t a = j * per_joint; a < (j + 1) * per_joint; ++a)
         own_[a] += decay_[j] * (-own_before_[a] - own_[a]);
+      usual_[j] += smooth_decay_ * (own_[per_joint * j + coulomb_at] - usual_[j]);
     }
   }
 
@@ -197,13 +207,19 @@ class Estimator {
   }
 
   double certainty(std::size_t j) const {
-    if (!(set_.payload_weight > 0)) return 1.0;
+    if (!set_.weighted) return 1.0;
     const double* h = &load_[payload_numbers * j];
     const double noise = set_.noise[j] * set_.noise[j];
-    double payload = 0.0;
+    double more = changed(j);
     for (int a = 0; a < payload_numbers; ++a)
-      for (int b = 0; b < payload_numbers; ++b) payload += h[a] * covariance_[a * m_ + b] * h[b];
-    return payload > 0 ? std::sqrt(noise / (noise + set_.payload_weight * payload)) : 1.0;
+      for (int b = 0; b < payload_numbers; ++b) more += h[a] * covariance_[a * m_ + b] * h[b];
+    return more > 0 ? std::sqrt(noise / (noise + more)) : 1.0;
+  }
+
+  // Variance of the residual because friction differs from its usual value of late [(N m)^2].
+  double changed(std::size_t j) const {
+    const double off = set_.transition * (own_[per_joint * j + coulomb_at] - usual_[j]);
+    return off * off;
   }
 
   // The Kalman filter: time update over `elapsed` seconds, then one scalar update per joint.
@@ -223,7 +239,7 @@ class Estimator {
     std::fill(row_.begin(), row_.end(), 0.0);
     for (int a = 0; a < payload_numbers; ++a) row_[a] = load_[payload_numbers * j + a];
     for (int a = 0; a < per_joint; ++a) row_[first + a] = own_[per_joint * j + a];
-    double variance = set_.noise[j] * set_.noise[j];
+    double variance = set_.lasting * (set_.noise[j] * set_.noise[j] + changed(j));
     for (std::size_t b = 0; b < m_; ++b) {
       double sum = 0.0;
       for (int a = 0; a < payload_numbers; ++a) sum += covariance_[b * m_ + a] * row_[a];
@@ -254,7 +270,7 @@ class Estimator {
   std::vector<double> theta_, covariance_, gathered_, row_;
   std::vector<double> p_, beta_, p_before_, beta_before_, tau_, tau_before_, residual_, decay_;
   std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_;
-  std::vector<double> own_now_, own_before_, own_, smooth_;
+  std::vector<double> own_now_, own_before_, own_, smooth_, usual_;
   std::vector<double> plain_, plain_tau_, plain_tau_before_;
   double decay_dt_ = -1.0, smooth_decay_ = 0.0, plain_decay_ = 0.0;
   int since_ = 0;

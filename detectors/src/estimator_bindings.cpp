@@ -94,8 +94,8 @@ void bind_estimator(nb::module_& m) {
            [](Estimator* self, const Chain& chain, const FrictionBasis& basis,
               const Numbers& drive_gain, const Numbers& gain, const Numbers& weights,
               const Numbers& deviation, const Numbers& persistence, const Numbers& noise,
-              double clip, int every, double payload_weight, const Numbers& fusion,
-              double plain_gain) {
+              double clip, int every, double lasting, double transition, bool weighted,
+              const Numbers& fusion, double plain_gain) {
              const std::size_t n = chain.joints.size(), unknown = payload_numbers + per_joint * n;
              require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
                          weights.size() == n * basis.columns() && deviation.size() == unknown &&
@@ -105,7 +105,7 @@ void bind_estimator(nb::module_& m) {
                      "Estimator: array lengths differ");
              new (self) Estimator(chain, basis,
                                   {drive_gain, gain, weights, deviation, persistence, noise, clip,
-                                   every, payload_weight, fusion, plain_gain});
+                                   every, lasting, transition, weighted, fusion, plain_gain});
            })
       .def_prop_ro("started", &Estimator::started)
       .def(

@@ -69,7 +69,7 @@ def test_fewer_vectors_say_nearly_the_same(alarm, unseen):
     )
     error = few(windows) - machine(windows)
     assert np.sqrt(np.mean(error**2)) < 0.005
-    assert np.abs(error).max() < 0.03
+    assert np.abs(error).max() < 0.06
 
 
 def test_held_out_traces_are_collision_free_and_not_trained_on(training):
