@@ -97,7 +97,7 @@ def test_friction_that_has_just_changed_counts_less(robot, drive_gain):
 def test_an_error_that_lasts_is_not_taken_for_friction_that_changed(training, alarm):
     trace = next(t for t in training if not t.truth.collisions)
     arm, rng = alarm.detector.arm, np.random.default_rng(0)
-    # Torques of the deviation that is believed, each lasting 0.2 s: the model is right but for them.
+    # Torques of the deviation that is believed, each for 0.2 s; else the model is right.
     held = np.repeat(rng.normal(size=(len(trace.t) // 200 + 1, 6)), 200, axis=0)[: len(trace.t)]
     current = trace.current + held * arm.noise / arm.drive_gain
     worst = {}
