@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -46,7 +46,7 @@ NOTES = {
 }
 WHOLE, LEVELS = "nothing", "speed levels"
 #: Parts of the state that is estimated with the residual, by what is left out.
-UNKNOWNS: dict[str, dict[str, float]] = {
+UNKNOWNS: dict[str, dict[str, Any]] = {
     "payload tracking": {"payload": 0.0, "moment": 0.0},
     "friction errors": {"viscous": 0.0, "coulomb": 0.0},
     "torque offsets": {"offset": 0.0},
