@@ -52,19 +52,24 @@ class Carriers:
 def pulled(model: Any) -> NDArray[np.uint8]:
     """By equality: whether something that a mocap body carries takes part in it."""
     carried = model.body_mocapid[model.body_rootid] >= 0
-    flexes = [
-        bool(carried[model.flex_vertbodyid[begin : begin + count]].any())
-        for begin, count in zip(model.flex_vertadr, model.flex_vertnum, strict=True)
-    ]
+    flexes = [bool(carried[_bodies(model, flex)].any()) for flex in range(model.nflex)]
     kinds, objects = mujoco.mjtEq, mujoco.mjtObj
     of_flexes = (kinds.mjEQ_FLEX, kinds.mjEQ_FLEXVERT, kinds.mjEQ_FLEXSTRAIN)
     out = np.zeros(model.neq, dtype=np.uint8)
     for eq in range(model.neq):
         ends = (int(model.eq_obj1id[eq]), int(model.eq_obj2id[eq]))
-        if model.eq_type[eq] in of_flexes:
+        if int(model.eq_type[eq]) in of_flexes:
             out[eq] = flexes[ends[0]]
         elif model.eq_objtype[eq] == objects.mjOBJ_BODY:
             out[eq] = carried[list(ends)].any()
         elif model.eq_objtype[eq] == objects.mjOBJ_SITE:
             out[eq] = carried[model.site_bodyid[list(ends)]].any()
     return out
+
+
+def _bodies(model: Any, flex: int) -> NDArray[np.int32]:
+    """Bodies that a flex hangs on, by its vertices, or by nodes where it is interpolated."""
+    vertices = model.flex_vertadr[flex] + np.arange(model.flex_vertnum[flex])
+    nodes = model.flex_nodeadr[flex] + np.arange(model.flex_nodenum[flex])
+    bodies = np.concatenate([model.flex_vertbodyid[vertices], model.flex_nodebodyid[nodes]])
+    return np.asarray(bodies[bodies >= 0], dtype=np.int32)

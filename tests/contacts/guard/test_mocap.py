@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.contacts import GuardedStepper
+from tauguard.contacts.guard.mocap import pulled
 
 GEOMS = {
     "ball": 'type="sphere" size=".02"',
@@ -118,6 +119,31 @@ def test_a_gripper_welded_to_mocap_follows_it_and_pushes_what_is_in_its_way(thic
         mujoco.mj_step(model, free)
         assert data.qpos[0] < data.qpos[7]
     assert abs(data.qpos[0] - free.qpos[0]) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("flag", "beside", "expected"),
+    [
+        ('dim="2" count="4 4 1"><edge equality="true"/><pin id="0 1"/>', "", [1]),
+        ("", 'dim="2" count="4 4 1"><edge equality="true"/>', [0]),
+        ("", 'dim="3" count="3 3 3" dof="trilinear"><edge equality="strain"/>', [0]),
+    ],
+)
+def test_equalities_of_a_flag_on_a_mocap_pole_count_as_pulled_and_others_do_not(
+    flag, beside, expected
+):
+    def flex(text):
+        return (
+            text
+            and f"""<flexcomp name="flag" type="grid" spacing=".1 .1 .1" mass="1" {text}
+          <contact selfcollide="none"/></flexcomp>"""
+        )
+
+    pole = '<body name="pole" mocap="true"><geom size=".01"/>'
+    model = mujoco.MjModel.from_xml_string(
+        f"<mujoco><worldbody>{flex(beside)}{pole}{flex(flag)}</body></worldbody></mujoco>"
+    )
+    assert pulled(model).tolist() == expected
 
 
 def test_put_somewhere_else_nothing_is_on_the_way():
