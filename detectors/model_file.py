@@ -26,7 +26,9 @@ from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.strangers import reading
 from tauguard.whole_file import write_whole
 
-FORMAT, VERSION = "tauguard model", 1
+#: The version changes with what a detector computes from the same content, too: a threshold of
+#: one version means something else in another. 2: the filter of `Unknowns.for_detection`.
+FORMAT, VERSION = "tauguard model", 2
 #: The kind of file that holds a trained detector with its threshold.
 ALARM = "collision-alarm"
 #: Versions that are written into a file.
