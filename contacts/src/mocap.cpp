@@ -53,7 +53,7 @@ Vec turned(const Vec& turn, const Vec& v) {
 }  // namespace
 
 Mocap::Mocap(const Engine& engine, std::vector<char> pulled)
-    : e_(engine), pulled_(std::move(pulled)), start_(engine.nmocap), told_(engine.nmocap) {
+    : e_(engine), pulled_(std::move(pulled)), start_(engine.nmocap), commanded_(engine.nmocap) {
   remember();
 }
 
@@ -87,32 +87,32 @@ void Mocap::remember() {
 }
 
 bool Mocap::begin() {
-  const bool followed = *e_.time == time_;
-  if (!followed) read(&start_);
+  const bool continued = *e_.time == time_;
+  if (!continued) read(&start_);
   moves_ = false;
   for (int m = 0; m < e_.nmocap; ++m)
     moves_ = moves_ || !std::equal(start_[m].pos, start_[m].pos + 3, e_.mocap_pos + 3 * m) ||
              !std::equal(start_[m].quat, start_[m].quat + 4, e_.mocap_quat + 4 * m);
   jumps_ = true;
-  if (!moves_) return followed;
-  read(&told_);
-  from_ = start_, to_ = told_;
+  if (!moves_) return continued;
+  read(&commanded_);
+  from_ = start_, to_ = commanded_;
   e_.copy_state(e_.model, e_.data, e_.other, e_.signature.pose);
   stand(start_);
-  return followed;
+  return continued;
 }
 
 void Mocap::piece(double from, double to) {
   if (!moves_) return;
   jumps_ = false;
   const auto at = [&](double share, std::size_t m) {
-    if (share >= 1) return told_[m];
+    if (share >= 1) return commanded_[m];
     Pose out = start_[m];
-    for (int k = 0; k < 3; ++k) out.pos[k] += share * (told_[m].pos[k] - start_[m].pos[k]);
-    turn_by(share * turn_between(start_[m].quat, told_[m].quat), start_[m].quat, out.quat);
+    for (int k = 0; k < 3; ++k) out.pos[k] += share * (commanded_[m].pos[k] - start_[m].pos[k]);
+    turn_by(share * turn_between(start_[m].quat, commanded_[m].quat), start_[m].quat, out.quat);
     return out;
   };
-  for (std::size_t m = 0; m < told_.size(); ++m) from_[m] = at(from, m), to_[m] = at(to, m);
+  for (std::size_t m = 0; m < commanded_.size(); ++m) from_[m] = at(from, m), to_[m] = at(to, m);
 }
 
 void Mocap::add_turns(double* turn) const {

@@ -2,7 +2,7 @@
 //
 // MuJoCo puts them in their new place at the start of a step, by a jump, and knows no velocity of
 // them. Here the step has a way for them: from where they were at the end of the last one to where
-// they are told to be, straight and turning at a constant rate.
+// they are commanded to be, straight and turning at a constant rate.
 #pragma once
 
 #include "engine.hpp"
@@ -26,7 +26,7 @@ class Mocap {
   // Poses of a piece's start, end, and of the step's end as the user wrote them.
   void depart() { write(from_); }
   void arrive() { write(to_); }
-  void command() { write(told_); }
+  void command() { write(commanded_); }
 
   // Where everything is at the start: whole steps are computed with the poses of their end.
   const double* xpos() const { return jumps() ? e_.other_xpos : e_.xpos; }
@@ -60,7 +60,7 @@ class Mocap {
 
   const Engine& e_;
   std::vector<char> pulled_;
-  Poses start_, told_, from_, to_;
+  Poses start_, commanded_, from_, to_;
   std::vector<double> speed_;
   double time_ = 0;
   bool moves_ = false, jumps_ = true;
