@@ -48,7 +48,7 @@ INTEGRATION = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 _MODEL_ARRAYS = (
     *(f"{kind}_{name}" for kind in ("pair", "geom", "flex") for name in ("margin", "solref")),
-    *(f"{kind}_solimp" for kind in ("pair", "geom", "flex")),
+    *(f"{kind}_{name}" for kind in ("pair", "geom", "flex") for name in ("solimp", "friction")),
     *("geom_priority", "flex_priority", "pair_geom1", "pair_geom2"),
     *("flex_vertbodyid", "flex_vert", "geom_bodyid", "body_rootid", "body_mocapid"),
 )

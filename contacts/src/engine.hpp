@@ -45,6 +45,7 @@ struct Engine {
   double* timestep;
   int *disableflags, *integrator, *cone, *solver, *iterations;
   double *margin[3], *solref[3], *solimp[3];  // by place: an explicit pair, a geom, a flex
+  double* friction[3];
   int* priority[3];
   const int *pair_geom1, *pair_geom2;
   const int *flex_vertbodyid, *geom_bodyid, *body_rootid, *body_mocapid;

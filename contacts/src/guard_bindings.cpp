@@ -47,6 +47,7 @@ void set_model(const Addresses& a, Engine* e) {
     a.set((kind + "_margin").c_str(), &e->margin[k]);
     a.set((kind + "_solref").c_str(), &e->solref[k]);
     a.set((kind + "_solimp").c_str(), &e->solimp[k]);
+    a.set((kind + "_friction").c_str(), &e->friction[k]);
     e->priority[k] = nullptr;
     if (k > 0) a.set((kind + "_priority").c_str(), &e->priority[k]);
   }

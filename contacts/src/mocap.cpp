@@ -145,6 +145,13 @@ Vec Mocap::way(int body, const double* point) const {
   return jumps_ ? shift + arm - turned(-1.0 * turn, arm) : shift + turned(turn, arm) - arm;
 }
 
+bool Mocap::carries(const Partners& pair) const {
+  const auto hangs = [&](const Place& p) {
+    return p.kind == Place::geom && e_.body_mocapid[e_.body_rootid[e_.geom_bodyid[p.number]]] >= 0;
+  };
+  return moves_ && (hangs(pair.first) || hangs(pair.second));
+}
+
 double Mocap::parting(const Contact& contact) const {
   if (!moves_) return 0;
   double sum = 0;

@@ -7,6 +7,7 @@
 
 #include "engine.hpp"
 #include "shapes.hpp"
+#include "stiffening.hpp"
 
 namespace tauguard::contacts {
 
@@ -41,6 +42,8 @@ class Mocap {
   double potential() const { return e_.other_energy[0]; }
   const double* vertices() const { return e_.other_flexvert; }
 
+  // Whether one of the partners is a geom that hangs on a mocap body, and some mocap body moves.
+  bool carries(const Partners& pair) const;
   // How far both partners part along the contact's normal by what carries them [m].
   double parting(const Contact& contact) const;
   // What was done on everything else, by contacts and equalities; `velocity` is the mean [J].

@@ -10,6 +10,11 @@ constexpr double rigid = 1e-6;
 
 constexpr int least_iterations = 100;
 
+// Numbers of friction by place (an explicit pair, a geom, a flex), how many of them are sliding
+// friction, and the least that MuJoCo takes (mjMINMU).
+constexpr int frictions[] = {5, 3, 3}, tangents[] = {2, 1, 1};
+constexpr double least_friction = 1e-5;
+
 // Puts margins, parameters and flags back, whatever happens within the step.
 class Borrowed {
  public:
@@ -45,6 +50,9 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
     const Place at = pairs_[h.pair].carrier;
     double* margin = e_.margin[at.kind] + at.number;
     borrowed.set(margin, std::max(*margin, h.margin));
+    if (mocap_.carries(pairs_[h.pair]))
+      for (int k = 0; k < tangents[at.kind]; ++k)
+        borrowed.set(e_.friction[at.kind] + frictions[at.kind] * at.number + k, least_friction);
     if (discrete) {
       borrowed.set(e_.solref[at.kind] + 2 * at.number, rigid);
       borrowed.set(e_.solref[at.kind] + 2 * at.number + 1, 1.0);

@@ -7,7 +7,9 @@
 // the metric of the inertia) that obeys; as all these velocities allow standing still, that change
 // takes energy and never adds any, except for what pushes an overlap out.
 // What mocap bodies carry is taken along by their own velocity, of which MuJoCo's rows know
-// nothing.
+// nothing. They push without friction: MuJoCo's friction lets what slides at a speed v part at
+// mu v, so that a ball between a paddle and a table, which must slide on one of them, would leave
+// at many times the paddle's speed.
 #pragma once
 
 #include "mocap.hpp"
