@@ -54,16 +54,14 @@ FIXED = (5e-4, 2e-4, 1e-4, 5e-5)
 ADDED = 1.02
 
 NOTES = {
-    "thrown": "held: nothing passed through; silent: it did, and no report said so; arrested: "
-    "scenes in which partners had to be stopped; energy: the most there was over what there was at "
-    "first (with mocap: over that of all bodies at twice its speed), and in how many scenes it "
-    f"was above {ADDED:g}; redone above: of those in which the guard redid a step, with more than "
-    "in plain steps also; redone added: the most that redone steps gave in sum, what contacts had "
-    "taken and the work of mocap included; over plain: time over that of plain steps of the same "
-    "scene; over fixed: over the largest fixed step (stiff contacts) from which on all finer ones "
-    "hold that scene, fixed_ms, tried in one scene of four; unknown: of these, scenes that none "
-    "holds; error: of the first body's velocity at the end against the finest fixed step, over the "
-    "thrown body's speed. Medians. What squeeze draws cannot be held and is to be reported.",
+    "thrown": "held: nothing passed; silent: it did, unreported; arrested: scenes with partners "
+    "stopped; energy: the most over that at first (mocap: over all bodies at twice its speed); "
+    f"above: scenes with more than {ADDED:g}; redone above: of those redone, with more than plain "
+    "steps; redone added: most that redone steps gave, rebound and mocap's work included; over "
+    "plain: time over plain steps'; over fixed: over the largest fixed step (stiff contacts) from "
+    "which all finer ones hold, fixed_ms, one scene in four; unknown: none holds; error: of the "
+    "first body's last velocity against the finest step's, over the speed. Medians. Squeeze cannot "
+    "be held.",
     "overhead": "a step of a scene in which nothing is to be guarded, plain and guarded.",
 }
 

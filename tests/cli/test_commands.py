@@ -132,8 +132,8 @@ def test_detect_with_a_trained_model(tmp_path, capsys):
     from tauguard.models import cura6
 
     episodes = [
-        *struck_episodes(5, 1, 5, (30.0,)),
-        *free_episodes(5, 2, 12.0, (30.0,)),
+        *struck_episodes(6, 1, 5, (30.0,)),
+        *free_episodes(6, 2, 12.0, (30.0,)),
     ]
     paths = write_dataset(episodes, tmp_path, workers=1)
     model, robot = tmp_path / "model.skops", tmp_path / "arm.xml"

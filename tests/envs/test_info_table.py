@@ -13,7 +13,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "environments.md"
 
 
 def table():
-    text = PAGE.read_text().partition("### What `info` holds")[2]
+    text = PAGE.read_text().partition("## What `info` holds")[2]
     lines = next(part for part in text.split("\n\n") if part.startswith("| key")).splitlines()[2:]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     assert all(len(row) == 4 and row[3] for row in cells)

@@ -3,13 +3,17 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tauguard.benchmarks.rigid.gap_truth import as_hulls
 from tauguard.benchmarks.rigid.truth import exact_vertices
-from tauguard.rigid import Boxes, Capsules, Motion, Rounded, Spheres, Tetrahedra
+from tauguard.rigid import Boxes, Capsules, Hulls, Motion, Rounded, Spheres, Tetrahedra
 from tauguard.rigid.rounded import parts
 
 REST = Motion(np.eye(4), np.zeros(3), np.zeros(3))
 EYE = np.eye(3)[None]
+
+
+def as_hulls(points):
+    """A batch of hulls from the vertices of each."""
+    return Hulls(np.concatenate(points), np.cumsum([0, *map(len, points)]))
 
 
 def motions(rng, n, reach, speed=2.0):

@@ -1,5 +1,8 @@
 """Signed distance against rational arithmetic: right sign, right length, points that show it."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,11 +13,8 @@ from tauguard.benchmarks.rigid.gap_truth import exact_gap, extent
 from tauguard.rigid import Boxes, Capsules, Hulls, Polygons, Rounded, Spheres, Tetrahedra, distance
 from tauguard.rigid import overlap as overlap_of
 
-
-def as_hulls(points):
-    """A batch of hulls from the vertices of each."""
-    return Hulls(np.concatenate(points), np.cumsum([0, *map(len, points)]))
-
+sys.path.insert(0, str(Path(__file__).parent))
+from moving import as_hulls
 
 TOLERANCE = 3e-14
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.rigid.gap_truth import as_hulls
 from tauguard.rigid import (
     Hulls,
     MeshTree,
@@ -21,7 +20,7 @@ from tauguard.rigid import (
 from tauguard.rigid.rounded import parts
 
 sys.path.insert(0, str(Path(__file__).parent))
-from moving import REST, corners_of, motions, placed, rounded
+from moving import REST, as_hulls, corners_of, motions, placed, rounded
 
 
 def soup(rng, n=40):
