@@ -22,8 +22,8 @@ def command(
 
     Args:
         out: the folder of the page and of each study's figures (JSON) and chart.
-        quick: shorter runs, all of them together five minutes on 2 cores (full ones take up to 30
-            minutes each).
+        quick: shorter runs, all of them together five to six minutes on 2 idle cores (full ones
+            take up to 30 minutes each).
         seed: of every random input.
         study: these studies only (default: all that `tauguard bench list` names).
         bound: run no study, bind those that the folder holds.
