@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.datasets.code_identity import sources, tree_digest
+from tauguard.datasets.code_identity import detection_sources
 from tauguard.detectors.registry import file_type
 from tauguard.report import versions
 from tauguard.whole_file import whole_file
@@ -44,7 +44,7 @@ class Kept:
         """
         if keep is None:
             return cls(None)
-        build = (versions(), sources(), tree_digest("detectors"))
+        build = (versions(), *detection_sources())
         digest = hashlib.sha256(repr((size, build)).encode()).hexdigest()[:8]
         folder = Path(keep) / f"{study}-seed{seed}-{digest}"
         try:

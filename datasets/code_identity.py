@@ -45,6 +45,11 @@ def sources() -> str:
     return digest.hexdigest()
 
 
+def detection_sources() -> tuple[str, str]:
+    """What the sources of simulation and detectors are, which decide a detector's answers."""
+    return sources(), tree_digest("detectors")
+
+
 @functools.cache
 def tree_digest(room: str) -> str:
     """SHA-256 over the Python and XML sources of one folder of the package."""

@@ -97,6 +97,6 @@ def test_results_of_other_builds_and_versions_are_not_used(tmp_path, monkeypatch
     folders = [Kept.of(str(tmp_path), "study", 0, "size").folder]
     monkeypatch.setattr(kept, "versions", lambda: {"tauguard": "0.0"})
     folders.append(Kept.of(str(tmp_path), "study", 0, "size").folder)
-    monkeypatch.setattr(kept, "tree_digest", lambda room: f"other {room}")
+    monkeypatch.setattr(kept, "detection_sources", lambda: ("other",))
     folders.append(Kept.of(str(tmp_path), "study", 0, "size").folder)
     assert len(set(folders)) == 3

@@ -9,9 +9,8 @@ from scipy.spatial.transform import Rotation
 from tauguard.benchmarks.contacts.draws.world import (
     AFTER,
     FREE,
-    GYRATION,
-    SPINS,
     Thrown,
+    any_spin,
     any_way,
     between,
     shape,
@@ -74,7 +73,7 @@ def grid(rng: np.random.Generator) -> Thrown:
     tilt = Rotation.from_euler("xy", rng.uniform(-60, 60, 2), degrees=True)
     qpos[3:7] = np.roll(tilt.as_quat(), 1)
     qvel[2] = -speed
-    qvel[3:6] = rng.normal(size=3) * min(GYRATION / timestep, rng.choice(SPINS))
+    qvel[3:6] = any_spin(rng, timestep)
     return Thrown("grid", spec, qpos, qvel, timestep, height / speed + AFTER, "body")
 
 
@@ -103,5 +102,5 @@ def small(rng: np.random.Generator) -> Thrown:
     height = 2 * float(np.linalg.norm(size)) + 0.012 * scale + rng.random() * speed * timestep
     qpos[at + 2], qpos[at + 3 : at + 7] = height, any_way(rng)
     qvel[dof + 2] = -speed
-    qvel[dof + 3 : dof + 6] = rng.normal(size=3) * min(GYRATION / timestep, rng.choice(SPINS))
+    qvel[dof + 3 : dof + 6] = any_spin(rng, timestep)
     return Thrown("small", spec, qpos, qvel, timestep, height / speed + AFTER, "body")

@@ -12,8 +12,8 @@ from tauguard.benchmarks.contacts.draws.world import (
     AFTER,
     FREE,
     GYRATION,
-    SPINS,
     Thrown,
+    any_spin,
     any_way,
     between,
     shape,
@@ -127,7 +127,7 @@ def door(rng: np.random.Generator) -> Thrown:
     at, dof = int(model.joint("body").qposadr[0]), int(model.joint("body").dofadr[0])
     qpos[at + 1], qpos[at + 3 : at + 7] = 0.02 + reach, any_way(rng)
     qvel[dof + 1] = -speed
-    qvel[dof + 3 : dof + 6] = rng.normal(size=3) * min(GYRATION / timestep, rng.choice(SPINS))
+    qvel[dof + 3 : dof + 6] = any_spin(rng, timestep)
     qvel[model.joint("door").dofadr[0]] = rng.uniform(-1, 1) * min(speed, 20)
     return Thrown("door", spec, qpos, qvel, timestep, (0.1 + reach) / speed + AFTER, "body")
 

@@ -8,10 +8,9 @@ import numpy as np
 from tauguard.benchmarks.contacts.draws.world import (
     AFTER,
     FREE,
-    GYRATION,
     KINDS,
-    SPINS,
     Thrown,
+    any_spin,
     any_way,
     between,
     settle,
@@ -134,5 +133,5 @@ def needles(rng: np.random.Generator) -> Thrown:
     if rng.random() < 0.5:
         qpos[at + 3 : at + 7] = any_way(rng)
     qvel[dof + 2] = -speed
-    qvel[dof + 3 : dof + 6] = rng.normal(size=3) * min(GYRATION / timestep, rng.choice(SPINS))
+    qvel[dof + 3 : dof + 6] = any_spin(rng, timestep)
     return Thrown("needles", spec, qpos, qvel, timestep, (reach + 0.01) / speed + AFTER, "body")

@@ -100,6 +100,11 @@ def any_way(rng: np.random.Generator) -> Array:
     return np.roll(Rotation.from_quat(rng.normal(size=4)).as_quat(), 1)
 
 
+def any_spin(rng: np.random.Generator, timestep: float) -> Array:
+    """A random angular velocity that turns some :data:`GYRATION` a step at the most [rad/s]."""
+    return np.asarray(rng.normal(size=3) * min(GYRATION / timestep, rng.choice(SPINS)))
+
+
 def between(rng: np.random.Generator, low: float, high: float) -> float:
     """Uniform in the logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))

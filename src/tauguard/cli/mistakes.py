@@ -69,10 +69,11 @@ def _kept(path: Path, seed: int) -> tuple[dict[str, Any], str]:
 
 
 def _build() -> str:
-    """A hash of the versions and sources that decide what a detector gets wrong."""
-    from tauguard.datasets.code_identity import sources, tree_digest, versions
+    """A hash of what decides a detector's answers."""
+    from tauguard.datasets.code_identity import detection_sources
+    from tauguard.report import versions
 
-    decide = (versions(), sources(), tree_digest("detectors"))
+    decide = (versions(), *detection_sources())
     return hashlib.sha256(repr(decide).encode()).hexdigest()[:16]
 
 
