@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 #: The shipped detector, and others of which the first two read the same residual.
 NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds", "boosting")
 #: The law of the product, and the false alarms per hour that its threshold aims at.
-LAW, ASKED = "likeliest tail", 1.0
+LAW, ASKED = "usual tail", 1.0
 
 NOTE = (
     "One individual of each robot, thresholds from its own motion for one false alarm an hour. "

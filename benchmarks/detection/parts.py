@@ -136,7 +136,7 @@ def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     cases = [(name, name, True) for name in size.extent.names] + [(LEVELS, WHOLE, False)]
     rows = []
     for part, name, normalised in cases:
-        case = judged(arms, name, "likeliest tail", size.asked, normalised)
+        case = judged(arms, name, "usual tail", size.asked, normalised)
         price = price_row(case, "all", case.arms) or {}
         row = {**rate_row(case, "all", case.arms), **price, "study": "parts"}
         for column in LEFT_OUT:

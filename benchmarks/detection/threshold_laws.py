@@ -22,7 +22,7 @@ AS_IT_IS = SpeedLevels(np.zeros(1), np.zeros(1), np.ones(1))
 #: How a threshold is chosen: the product's way, the rate expected over all draws of the episodes,
 #: and a bound that is enough in 80 % of the draws.
 LAWS: dict[str, Callable[[Sequence[FreeScores], ExpectedRate, float], float]] = {
-    "likeliest tail": lambda known, _, asked: threshold_for_rate(known, asked),
+    "usual tail": lambda known, _, asked: threshold_for_rate(known, asked),
     "mean over draws": lambda _, expected, asked: expected.threshold(asked),
     "80 % bound": lambda _, expected, asked: expected.threshold(asked, 0.8),
 }

@@ -4,7 +4,7 @@ Alarms are blocks of the merge gap whose peak exceeds the threshold. Rates that 
 motion shows follow a generalised Pareto tail of the blocks' peaks. Episodes are drawn again with
 replacement, since the moments of one are alike, and every draw has a tail of its own. Tails that
 the same motion allows differ most in rare alarms, and a few of them give many: the expected rate is
-the mean over the draws, above the rate of the likeliest tail. That a tail ends is believed only as
+the mean over the draws, above the rate of any one tail that is likely. That a tail ends is believed only as
 far as the peaks show it beyond chance.
 
 No tail knows of moments that no episode shows, nor where it ends. An interval therefore holds the
@@ -23,15 +23,12 @@ from scipy import optimize, stats
 
 from tauguard.arrays import Array
 from tauguard.detectors.thresholds.free_scores import FreeScores
-from tauguard.detectors.thresholds.rates import Tail
+from tauguard.detectors.thresholds.rates import BEYOND_CHANCE, Tail, shape_error
 
 #: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
 TAIL = 0.05
 #: Bounds of the tail's shape where the peaks do not show that it ends, and the lowest if they do.
 SHAPES, LOWEST = (0.0, 0.5), -0.5
-#: Standard errors of the shape that a tail must be below 0 to end. One of n peaks is about
-#: sqrt(4 / 3n) near the shape 0 (Hosking & Wallis 1987).
-BEYOND_CHANCE = 3.0
 #: How often episodes are drawn again to see how far a rate can be trusted.
 DRAWS = 200
 
@@ -169,5 +166,5 @@ def _draws(episodes: int) -> NDArray[np.int64]:
 def _shapes(peaks: Array) -> tuple[float, float]:
     """Bounds of the shape of every draw's tail, from the peaks of all, in descending order."""
     whole = Tail.of(peaks, max(2, round(TAIL * len(peaks))), (LOWEST, SHAPES[1]))
-    error = float(np.sqrt(4 / 3 / max(whole.count, 1)))
-    return max(LOWEST, min(SHAPES[0], whole.shape + BEYOND_CHANCE * error)), SHAPES[1]
+    margin = BEYOND_CHANCE * shape_error(whole.count)
+    return max(LOWEST, min(SHAPES[0], whole.shape + margin)), SHAPES[1]

@@ -1,7 +1,7 @@
 """From collision-free motion to a threshold: the one way, for the command line and all studies.
 
 Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
-(:mod:`.speed_levels`), and the threshold is where the likeliest tail of their peaks has the rate of
+(:mod:`.speed_levels`), and the threshold is where the tail of their peaks has the rate of
 false alarms that is accepted (:mod:`.rates`), or the one that a calibration set guarantees
 (:mod:`.guarantee`). What the motion allows besides is told by :mod:`.expected_rate`.
 """
@@ -24,7 +24,7 @@ from tauguard.detectors.thresholds.rates import tail_level
 from tauguard.traces.trace import Trace
 
 #: Share of the blocks whose peaks the tail is fitted to.
-TAIL = 0.02
+TAIL = 0.05
 #: Share of the collision-free training traces that the threshold comes from.
 HELD_OUT = 0.34
 

@@ -113,6 +113,6 @@ def test_arms_are_kept_and_not_made_again(tmp_path, monkeypatch):
     monkeypatch.setattr(false_alarms, "arm_scores", None)
     rows = false_alarms.run(True, 3, str(tmp_path))
     assert {row["study"] for row in rows} == {"arms", "known"}
-    assert "likeliest tail" in table(rows, notes=false_alarms.NOTES)
+    assert "usual tail" in table(rows, notes=false_alarms.NOTES)
     figure = pytest.importorskip("matplotlib.figure").Figure()
     false_alarms.draw(rows, figure)

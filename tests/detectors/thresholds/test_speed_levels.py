@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate, Tails
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.law import threshold_for_rate, with_rate
-from tauguard.detectors.thresholds.rates import Tail, block_maxima, tail_level
+from tauguard.detectors.thresholds.rates import USUAL_SHAPE, Tail, block_maxima, tail_level
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels, recent_speed
 from tauguard.traces import Trace
 
@@ -116,27 +117,42 @@ def test_a_tail_of_too_few_peaks_is_the_largest():
 
 
 def test_a_tail_says_how_many_peaks_to_expect_above_the_level_that_it_gives():
-    peaks = np.sort(np.random.default_rng(3).exponential(size=5000))[::-1]
+    peaks = np.sort(pareto(np.random.default_rng(3), 5000))[::-1]
     tail = Tail.of(peaks, 100)
     of_many = Tails(*np.array([[tail.base, tail.scale, tail.shape, tail.count]]).T)
     for allowed in (0.1, 1.0, 30.0):
         assert of_many.above(tail.level(allowed)) == pytest.approx(allowed)
-    # An exponential's level that 0.1 of 5,000 exceed is log(50,000).
-    assert tail.level(0.1) == pytest.approx(np.log(50_000), rel=0.25)
+    # 0.1 of 5,000 exceed the level with the chance 1 / 50,000.
+    assert tail.level(0.1) == pytest.approx((50_000**0.2 - 1) / 0.2, rel=0.25)
+
+
+@pytest.mark.parametrize("shape", [-0.4, 0.0, 0.2, 0.6])
+def test_a_shape_other_than_the_usual_counts_where_peaks_show_it_beyond_chance(shape):
+    rng = np.random.default_rng(6)
+    few, many = (
+        [Tail.of(np.sort(pareto(rng, 20 * n, shape))[::-1], n).shape for _ in range(50)]
+        for n in (30, 3000)
+    )
+    assert np.mean(np.abs(np.array(few) - USUAL_SHAPE) < 0.1) > 0.6
+    assert np.mean(many) == pytest.approx(np.clip(shape, -0.5, 0.5), abs=0.1)
+
+
+def pareto(rng, count, shape=USUAL_SHAPE):
+    return stats.genpareto(shape).rvs(count, random_state=rng)
 
 
 def test_the_rate_of_a_threshold_lies_in_the_interval_that_its_calibration_states():
     rng = np.random.default_rng(5)
 
     def episodes(count):
-        return [FreeScores(rng.exponential(size=3000), np.ones(3000), 60.0) for _ in range(count)]
+        return [FreeScores(pareto(rng, 3000), np.ones(3000), 60.0) for _ in range(count)]
 
     known = episodes(45)
     threshold = threshold_for_rate(known, 1.0)
     expected = ExpectedRate.of(known)
     low, high = expected.interval(threshold)
-    # Blocks of 25 pieces exceed u with probability 25 exp(-u): 7,200 blocks an hour.
-    true = 7200 * 25 * np.exp(-threshold)
+    # 7,200 blocks of 25 pieces an hour.
+    true = 7200 * 25 * stats.genpareto(USUAL_SHAPE).sf(threshold)
     assert low < true < high
     assert low < 1.0 < high
     assert expected.threshold(1.0, confidence=0.9) > threshold
