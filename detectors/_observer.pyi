@@ -187,6 +187,7 @@ def kernel_scores(
     coef: Array,
     intercept: float,
     sigma: float,
+    graded: bool,
 ) -> Scores: ...
 def python_scores(make: Callable[[], object], joints: int) -> Scores: ...
 

@@ -27,8 +27,9 @@ from tauguard.strangers import reading
 from tauguard.whole_file import write_whole
 
 #: The version changes with what a detector computes from the same content, too: a threshold of
-#: one version means something else in another. 2: the filter of `Unknowns.for_detection`.
-FORMAT, VERSION = "tauguard model", 2
+#: one version means something else in another. 2: the filter of `Unknowns.for_detection`; 3: scores
+#: of regressors are severities.
+FORMAT, VERSION = "tauguard model", 3
 #: The kind of file that holds a trained detector with its threshold.
 ALARM = "collision-alarm"
 #: Versions that are written into a file.

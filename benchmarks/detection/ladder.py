@@ -49,7 +49,6 @@ from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.evaluation.metrics import HEADLINE
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
 from tauguard.detectors.features.scaling import Scaling
-from tauguard.detectors.features.training import Prepared, binary_target
 from tauguard.report import Row
 from tauguard.report import rate as wilson
 from tauguard.report.charts import errorbars
@@ -75,19 +74,11 @@ PER_HOUR = 0.25
 class Form(SrqSvr):
     """A form between the dissertation's and ours."""
 
-    graded: bool = True  #: labels grow with the torque; else 0 and 1
     envelope: bool = True  #: residuals over their envelope, compressed; else in N m
 
     def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """The scaling before its factor."""
         return super().bare(traces, front) if self.envelope else Scaling(front.joints)
-
-    def prepare(self, trace: Trace, front: FrontEnd, scaling: Scaling) -> Prepared:
-        """With labels of either kind."""
-        if self.graded:
-            return super().prepare(trace, front, scaling)
-        target = binary_target(trace)
-        return self.prepared(trace, front, scaling, target, target > 0)
 
 
 def _form(parts: int, mined: int, windows: int) -> Form:

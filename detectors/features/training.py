@@ -24,27 +24,66 @@ class Prepared:
     struck: Bools  #: rows with a collision that can be felt, shape (T,)
 
 
-def severity_target(trace: Trace, joints: Sequence[int], reference: Array, gain: float) -> Array:
-    """The training target: sum over ``joints`` of |tau_ext| / reference, lagged as the observer is.
+#: Torques of joints 1, 2, ... that count alike in the training target; the last is repeated. Only
+#: their ratios matter.
+ALIKE = (20.0, 20.0, 15.0, 6.0)
+#: The sum of torques, in its unit, that half of the training collisions exceed.
+MEDIAN_SEVERITY = 2.5
+#: A target above this is a collision that can be felt.
+FELT = 0.05
+#: No target counts more: its severity is 49.
+HIGHEST = 0.98
 
-    Labels 0/1 do not grow with torque and fail as a ranking. x / (1 + x) keeps the target within
-    [0, 1), so that hard blows do not spend the regressor's bounded weights.
+
+def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float) -> list[Array]:
+    """The training target: x / (1 + x) of x = sum over ``joints`` of |tau_ext|, in a unit.
+
+    The torques are lagged as the observer is, and weighted by :data:`ALIKE`. The unit is such that
+    the peaks of x of the collisions have the median :data:`MEDIAN_SEVERITY`: arms of all sizes have
+    the same targets. Labels 0/1 do not grow with torque and fail as a ranking. x / (1 + x) keeps
+    the target within [0, 1), so that hard blows do not spend the regressor's bounded weights.
 
     Args:
-        trace: with truth, else the target is 0.
+        traces: without truth the target is 0.
         joints: 0-based.
-        reference: torque that counts 1, shape (len(joints),) [N m].
         gain: of the observer [1/s].
+
+    Returns:
+        One target a trace, shape (T,).
     """
+    alike = np.array([ALIKE[min(k, len(ALIKE) - 1)] for k in range(len(joints))])
+    totals = [_total(trace, list(joints), alike, gain) for trace in traces]
+    highest = [
+        float(total[(trace.t >= c.onset) & (trace.t <= c.end)].max(initial=0.0))
+        for trace, total in zip(traces, totals, strict=True)
+        for c in (trace.truth.collisions if trace.truth else ())
+    ]
+    felt = [value for value in highest if value > 0]
+    unit = float(np.median(felt)) / MEDIAN_SEVERITY if felt else 1.0
+    return [total / (unit + total) for total in totals]
+
+
+def severity(target: Array) -> Array:
+    """x of a target x / (1 + x), no more than that of :data:`HIGHEST`.
+
+    A regressor's output cannot exceed 1 by much however hard the blow. Peaks of x have a tail that
+    can be extrapolated, and at any speed a blow can exceed what free motion leaves.
+    """
+    bounded = np.minimum(target, HIGHEST)
+    found: Array = bounded / (1 - bounded)
+    return found
+
+
+def _total(trace: Trace, joints: list[int], alike: Array, gain: float) -> Array:
+    """Lagged external torques, weighted and summed, shape (T,)."""
     if trace.truth is None:
         return np.zeros(len(trace.t))
-    external = trace.truth.tau_ext[:, list(joints)] / reference
+    external = trace.truth.tau_ext[:, joints] / alike
     nothing = np.zeros_like(external)
     gains = np.full(external.shape[1], gain)
-    lagged = -low_pass(gains, intervals(trace.t, len(trace.t)), nothing, nothing, external)
-    total = np.abs(lagged).sum(axis=1)
-    squashed: Array = total / (1 + total)
-    return squashed
+    lagged = low_pass(gains, intervals(trace.t, len(trace.t)), nothing, nothing, external)
+    total: Array = np.abs(lagged).sum(axis=1)
+    return total
 
 
 def binary_target(trace: Trace) -> Array:

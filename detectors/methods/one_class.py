@@ -28,6 +28,7 @@ class OneClass(Windowed):
     windows: int = 3_000
     mined: int = 1_000  #: of the rarest collision-free moments, added in each of two rounds
     sigma: float = 3.0  #: of the SRQ kernel
+    graded: bool = False
     outside: float = 0.05  #: share of the training windows that may lie outside
     name: ClassVar[str] = "one-class"
 

@@ -11,7 +11,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings
 from tauguard.detectors.features.scaling import Scaling
-from tauguard.detectors.features.training import Prepared, binary_target, draw_windows
+from tauguard.detectors.features.training import draw_windows
 from tauguard.detectors.features.windows import WindowShape, median_distance
 from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.methods.svr_regressor import SrqSVR
@@ -55,13 +55,19 @@ class SrqSvr(Windowed):
         """The scaling before its factor is known."""
         return self.compressed(traces, front)
 
-    def scaling(self, traces: Sequence[Trace], front: FrontEnd, shape: WindowShape) -> Scaling:
+    def scaling(
+        self,
+        traces: Sequence[Trace],
+        targets: Sequence[Array],
+        front: FrontEnd,
+        shape: WindowShape,
+    ) -> Scaling:
         """Bring the median distance of windows to ``distance``."""
         bare = self.bare(traces, front)
         if self.distance <= 0:
             return bare
         rng = np.random.default_rng(self.seed)
-        prepared = [self.prepare(trace, front, bare) for trace in traces]
+        prepared = self.prepared(traces, targets, front, bare)
         windows, target = draw_windows(rng, prepared, shape, SAMPLED)
         spread = median_distance(windows[target > 0], windows[target == 0], rng)
         return replace(bare, factor=self.distance / spread if spread > 0 else 1.0)
@@ -78,6 +84,7 @@ class PlainSrqSvr(SrqSvr):
     mined: int = 0
     distance: float = 3.0
     vectors: int = 0
+    graded: bool = False
     front: FrontEndSettings = field(
         default_factory=lambda: FrontEndSettings(adapt=False, settle=0.5, calibrate=False)
     )
@@ -86,8 +93,3 @@ class PlainSrqSvr(SrqSvr):
     def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """Residuals in N m."""
         return Scaling(front.joints)
-
-    def prepare(self, trace: Trace, front: FrontEnd, scaling: Scaling) -> Prepared:
-        """With the labels 0 and 1."""
-        target = binary_target(trace)
-        return self.prepared(trace, front, scaling, target, target > 0)

@@ -18,16 +18,20 @@ from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.native_stream import NativeStream
 from tauguard.detectors.features.scaling import Scaling
-from tauguard.detectors.features.training import Prepared, draw_windows, peaks, severity_target
+from tauguard.detectors.features.training import (
+    FELT,
+    Prepared,
+    binary_target,
+    draw_windows,
+    peaks,
+    severity,
+    severity_targets,
+)
 from tauguard.detectors.features.windows import WindowShape
 from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.thresholds.confirmation import CONFIRMATION
 from tauguard.traces.trace import Trace
 
-#: Torque that counts 1 in the training target, one a joint; the last is repeated [N m].
-REFERENCE = (20.0, 20.0, 15.0, 6.0)
-#: A target above this is a collision that can be felt.
-FELT = 0.05
 #: Share of the samples of collision-free motion that may be beyond what counts one.
 RARE = 1e-3
 #: Windows that are evaluated at once: memory stays small.
@@ -53,6 +57,7 @@ class Windowed(ABC):
     mined: int = 2_000  #: collision-free moments added in each of two rounds
     units: float = 5.0  #: envelopes that count one before the asinh
     seed: int = 0
+    graded: bool = True  #: targets grow with the torque, and scores are severities; else 0 and 1
     front: FrontEndSettings = field(default_factory=FrontEndSettings)
     name: ClassVar[str] = "windowed"
     mining_gap: ClassVar[float] = 0.05  #: between two mined moments [s]
@@ -70,17 +75,31 @@ class Windowed(ABC):
         """
         front = self.front.fit(traces, arm)
         shape = WindowShape.at(front.dt, confirmation=CONFIRMATION)
-        scaling = self.scaling(traces, front, shape)
-        prepared = [self.prepare(trace, front, scaling) for trace in traces]
+        targets = self.targets(traces, front)
+        scaling = self.scaling(traces, targets, front, shape)
+        prepared = self.prepared(traces, targets, front, scaling)
         x, y = self.draw(np.random.default_rng([self.seed, self.stream_of_seeds]), prepared, shape)
         regressor = self.learn(x, y)
         for _ in range(2 if self.mined else 0):
             hardest = self._mine(prepared, shape, regressor, front.dt)
             x, y = np.concatenate([x, hardest]), np.concatenate([y, np.zeros(len(hardest))])
             regressor = self.learn(x, y)
-        return FittedWindowed(self.name, front, scaling, shape, self.finished(regressor))
+        finished = self.finished(regressor)
+        return FittedWindowed(self.name, front, scaling, shape, finished, self.graded)
 
-    def scaling(self, traces: Sequence[Trace], front: FrontEnd, shape: WindowShape) -> Scaling:
+    def targets(self, traces: Sequence[Trace], front: FrontEnd) -> list[Array]:
+        """What the regressor should say of each trace, shape (T,)."""
+        if self.graded:
+            return severity_targets(traces, front.joints, front.gain)
+        return [binary_target(trace) for trace in traces]
+
+    def scaling(
+        self,
+        traces: Sequence[Trace],
+        targets: Sequence[Array],
+        front: FrontEnd,
+        shape: WindowShape,
+    ) -> Scaling:
         """How the residual is scaled."""
         return self.compressed(traces, front)
 
@@ -100,20 +119,20 @@ class Windowed(ABC):
         """What is kept of the last regressor."""
         return regressor
 
-    def prepare(self, trace: Trace, front: FrontEnd, scaling: Scaling) -> Prepared:
-        """The signal, the target and the usable rows of a training trace."""
-        own = np.array([REFERENCE[min(k, len(REFERENCE) - 1)] for k in range(len(front.joints))])
-        target = severity_target(trace, front.joints, own, front.gain)
-        return self.prepared(trace, front, scaling, target, target > FELT)
-
     @staticmethod
     def prepared(
-        trace: Trace, front: FrontEnd, scaling: Scaling, target: Array, felt: NDArray[np.bool_]
-    ) -> Prepared:
-        """A training trace with its target, and the rows whose collision can be felt."""
-        settled = trace.t >= trace.t[0] + front.settle
-        free = free_rows(trace, front.settle)
-        return Prepared(front.scaled(trace, scaling), target, free, felt & settled)
+        traces: Sequence[Trace], targets: Sequence[Array], front: FrontEnd, scaling: Scaling
+    ) -> list[Prepared]:
+        """Training traces with their targets, and the rows that are free or surely struck."""
+        return [
+            Prepared(
+                front.scaled(trace, scaling),
+                target,
+                free_rows(trace, front.settle),
+                (target > FELT) & (trace.t >= trace.t[0] + front.settle),
+            )
+            for trace, target in zip(traces, targets, strict=True)
+        ]
 
     def draw(
         self, rng: np.random.Generator, prepared: Sequence[Prepared], shape: WindowShape
@@ -165,11 +184,13 @@ class FittedWindowed(OnFrontEnd):
     scaling: Scaling
     shape: WindowShape
     regressor: Regressor
+    graded: bool  #: the regressor says x / (1 + x), and the score is x
 
     def scores(self, trace: Trace) -> Array:
-        """Output of the regressor, shape (T,)."""
+        """Output of the regressor or its :func:`severity`, shape (T,)."""
         signal = self.front.scaled(trace, self.scaling)
-        return evaluated(self.regressor, signal, self.shape, np.arange(len(signal)))
+        output = evaluated(self.regressor, signal, self.shape, np.arange(len(signal)))
+        return severity(output) if self.graded else output
 
     def stream(self) -> NativeStream | WindowStream:
         """The same, sample by sample; of a kernel machine all of it is native."""
@@ -186,6 +207,7 @@ class FittedWindowed(OnFrontEnd):
             weights,
             machine.intercept,
             machine.sigma,
+            self.graded,
         )
         return NativeStream(scores, self.dt)
 
@@ -198,9 +220,11 @@ class WindowStream:
         joints, shape = len(detector.scaling.joints), detector.shape
         self._residual = detector.front.stream(detector.scaling)
         self._window, self._regressor = shape.stream(joints), detector.regressor
+        self._graded = detector.graded
         self._x = np.zeros((1, joints * shape.count))
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
         """The score of this sample."""
         self._window.step(self._residual.step(q, qd, current, dt), self._x)
-        return float(self._regressor(self._x)[0])
+        output = self._regressor(self._x)
+        return float((severity(output) if self._graded else output)[0])

@@ -54,14 +54,15 @@ Source limit_scores(const Estimator& estimator, const std::vector<std::int64_t>&
 Source kernel_scores(const Estimator& estimator, const std::vector<std::int64_t>& joints,
                      const Numbers& weights, double units, double factor, bool compress,
                      std::size_t lag, std::size_t count, In2 vectors, In1 coef, double intercept,
-                     double sigma) {
+                     double sigma, bool graded) {
   require(lag > 0 && count > 0 && vectors.shape(1) == joints.size() * count &&
               coef.shape(0) == vectors.shape(0) && sigma > 0,
           "kernel_scores: vectors of another size than the window, or sigma not above 0");
   return std::make_shared<KernelScores>(
       residual_of(estimator, joints, weights, units, factor, compress),
       Window(joints.size(), lag, count),
-      KernelSum(vectors.data(), coef.data(), coef.shape(0), vectors.shape(1), intercept, sigma));
+      KernelSum(vectors.data(), coef.data(), coef.shape(0), vectors.shape(1), intercept, sigma),
+      graded);
 }
 
 Alarm* make_alarm(Source scores, double dt, double settle, double threshold, std::int64_t samples,

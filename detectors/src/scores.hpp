@@ -90,14 +90,22 @@ class LimitScores final : public Scores {
   std::vector<double> limits_, ratio_;
 };
 
+// A severity x of a target x / (1 + x); no target counts more than 0.98.
+inline double severity(double target) {
+  const double bounded = std::min(target, 0.98);
+  return bounded / (1 - bounded);
+}
+
 // A kernel machine on windows of the scaled residual.
 class KernelScores final : public Scores {
  public:
-  // The window has a column a column of the residual, the kernel the window's size.
-  KernelScores(ScaledResidual residual, Window window, KernelSum kernel)
+  // The window has a column a column of the residual, the kernel the window's size. Of a graded
+  // machine the score is the severity.
+  KernelScores(ScaledResidual residual, Window window, KernelSum kernel, bool graded)
       : residual_(std::move(residual)),
         window_(std::move(window)),
         kernel_(std::move(kernel)),
+        graded_(graded),
         x_(window_.size()) {}
 
   std::size_t joints() const override { return residual_.joints(); }
@@ -107,13 +115,15 @@ class KernelScores final : public Scores {
   }
   double step(const double* q, const double* qd, const double* current, double dt) override {
     window_.step(residual_.step(q, qd, current, dt), x_.data());
-    return kernel_.at(x_.data());
+    const double output = kernel_.at(x_.data());
+    return graded_ ? severity(output) : output;
   }
 
  private:
   ScaledResidual residual_;
   Window window_;
   KernelSum kernel_;
+  bool graded_;
   std::vector<double> x_;
 };
 

@@ -4,8 +4,8 @@ Alarms are blocks of the merge gap whose peak exceeds the threshold. Rates that 
 motion shows follow a generalised Pareto tail of the blocks' peaks. Episodes are drawn again with
 replacement, since the moments of one are alike, and every draw has a tail of its own. Tails that
 the same motion allows differ most in rare alarms, and a few of them give many: the expected rate is
-the mean over the draws, above the rate of any one tail that is likely. That a tail ends is believed only as
-far as the peaks show it beyond chance.
+the mean over the draws. That a tail ends is believed only as far as the peaks show it beyond
+chance.
 
 No tail knows of moments that no episode shows, nor where it ends. An interval therefore holds the
 exact Poisson interval of the episodes that exceed the threshold: 45 minutes without an alarm do not

