@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
+from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, strength, struck_episodes
 from tauguard.envs import Episode, PayloadPick
 from tauguard.models import Mismatch
 
@@ -35,20 +35,19 @@ def demo_plan(seed: int, robot: str = "cura6") -> DemoPlan:
     The showcase is one run of the arm at work: nine collisions of all kinds, then a payload taken
     up without telling the observer.
     """
-    arm = Mismatch(seed=seed)
+    arm, share = Mismatch(seed=seed), strength(robot)
     base = 4 * seed
-    struck = struck_episodes(
-        base, len(TRAINING_PAYLOADS), 5, TRAINING_SPEEDS, TRAINING_PAYLOADS, arm
-    )
-    free = free_episodes(base, 20, 40.0, TRAINING_SPEEDS, TRAINING_PAYLOADS[::2], arm)
-    payloads = (0.0, 1016.0, 4039.0, 2298.0, 782.0)
-    show = struck_episodes(base + 3, 1, 9, (30.0,), (0.0,), arm)[0]
-    pick = PayloadPick(show.seconds + 1.0, 1016.0)
-    judge_struck = struck_episodes(base + 1, 9, 8, SPEEDS, payloads, arm)
-    judge_free = free_episodes(base + 2, 12, 50.0, SPEEDS, payloads[:4], arm)
+    loads = [share * load for load in TRAINING_PAYLOADS]
+    struck = struck_episodes(base, len(loads), 5, TRAINING_SPEEDS, loads, arm, robot)
+    free = free_episodes(base, 20, 40.0, TRAINING_SPEEDS, loads[::2], arm, robot=robot)
+    payloads = [share * load for load in (0.0, 1016.0, 4039.0, 2298.0, 782.0)]
+    show = struck_episodes(base + 3, 1, 9, (30.0,), (0.0,), arm, robot)[0]
+    pick = PayloadPick(show.seconds + 1.0, share * 1016.0)
+    judge_struck = struck_episodes(base + 1, 9, 8, SPEEDS, payloads, arm, robot)
+    judge_free = free_episodes(base + 2, 12, 50.0, SPEEDS, payloads[:4], arm, robot=robot)
     return DemoPlan(
-        train=[replace(episode, arm=robot) for episode in (*struck, *free)],
-        judge_struck=[replace(episode, arm=robot) for episode in judge_struck],
-        judge_free=[replace(episode, arm=robot) for episode in judge_free],
-        showcase=replace(show, seconds=show.seconds + 4.0, picks=(pick,), arm=robot),
+        train=[*struck, *free],
+        judge_struck=judge_struck,
+        judge_free=judge_free,
+        showcase=replace(show, seconds=show.seconds + 4.0, picks=(pick,)),
     )

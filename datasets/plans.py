@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from tauguard.envs import CollisionPlan, Episode, PayloadPick
-from tauguard.models import Mismatch
+from tauguard.models import Mismatch, load_arm
 from tauguard.traces import STRATA
 
 #: Payloads of the dissertation's 15 training slices [g]: 3 without, 2 of each of six.
@@ -66,6 +66,19 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
     return begin + SLOT * collisions + 0.5
 
 
+def strength(robot: str) -> float:
+    """What severities and loads are multiplied by on this robot, at most 1.
+
+    With 1 the hardest severities of :data:`~tauguard.traces.STRATA` begin below the robot's largest
+    torque limit.
+
+    Raises:
+        ValueError: a robot that cannot be used.
+        FileNotFoundError: no such robot.
+    """
+    return min(1.0, float(load_arm(robot).torque_limit.max()) / STRATA[-1][0])
+
+
 def pairing(i: int, speeds: Sequence[float], payloads: Sequence[float]) -> tuple[float, float]:
     """Speed and payload of episode ``i``: both are gone through in turn, and every pair comes.
 
@@ -84,8 +97,19 @@ def struck_episodes(
     speeds: Sequence[float],
     payloads: Sequence[float] = (0.0,),
     mismatch: Mismatch | None = None,
+    robot: str = "cura6",
 ) -> list[Episode]:
-    """Episodes with ``collisions`` each; speeds [%] and payloads [g] as :func:`pairing` has it."""
+    """Episodes with ``collisions`` each; speeds [%] and payloads [g] as :func:`pairing` has it.
+
+    The collisions' severities are those of the robot's :func:`strength`, its payloads as given.
+
+    Raises:
+        ValueError: a robot that cannot be used.
+        FileNotFoundError: no such robot.
+    """
+    joints, share = len(load_arm(robot).joints), strength(robot)
+    links = range(min(2, joints), joints + 1)
+    strata = [(share * low, share * high) for low, high in STRATA]
     children = np.random.SeedSequence([seed, 1]).spawn(count)
     episodes = []
     for i, child in enumerate(children):
@@ -97,9 +121,10 @@ def struck_episodes(
                 seconds=episode_seconds(collisions),
                 speed=speed,
                 payload_g=payload,
-                collisions=collision_plans(rng, collisions),
+                collisions=collision_plans(rng, collisions, strata=strata, links=links),
                 mismatch=mismatch,
                 temperature=float(rng.uniform(25, 45)),
+                arm=robot,
             )
         )
     return episodes
@@ -113,6 +138,7 @@ def free_episodes(
     payloads: Sequence[float] = (0.0,),
     mismatch: Mismatch | None = None,
     picks: bool = False,
+    robot: str = "cura6",
 ) -> list[Episode]:
     """Collision-free episodes; with ``picks`` a payload is taken up half-way through each."""
     children = np.random.SeedSequence([seed, 2]).spawn(count)
@@ -127,6 +153,7 @@ def free_episodes(
             payload_g=payload,
             mismatch=mismatch,
             temperature=float(rng.uniform(25, 45)),
+            arm=robot,
         )
         if picks and payload:
             change = PayloadPick(seconds / 2, payload)

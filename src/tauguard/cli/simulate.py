@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tauguard.envs import Episode
+
+#: Loads of the CURA6-like arm that are gone through by default [g].
+LOADS = (0.0, 1016.0, 4039.0)
 
 
 def command(
@@ -16,7 +18,7 @@ def command(
     collisions: int = 8,
     seconds: float = 20.0,
     speeds: tuple[float, ...] = (10.0, 30.0, 60.0),
-    payloads_g: tuple[float, ...] = (0.0, 1016.0, 4039.0),
+    payloads_g: tuple[float, ...] | None = None,
     seed: int = 0,
     mismatch_seed: int | None = 0,
     checkers: tuple[str, ...] = (),
@@ -34,7 +36,8 @@ def command(
         collisions: injected into each episode; 0 gives collision-free ones.
         seconds: length of a collision-free episode (struck ones are as long as they need).
         speeds: percent of the maximum joint speed, gone through in turn.
-        payloads_g: grams at the flange that the observer is not told, gone through in turn.
+        payloads_g: grams at the flange that the observer does not know, gone through in turn
+            (default: 0, 1016 and 4039, less on an arm whose torque limits are below 64 N m).
         seed: of everything that is drawn.
         mismatch_seed: which arm: how its masses, gains and friction differ from the nominal ones;
             None simulates the nominal arm.
@@ -45,22 +48,24 @@ def command(
         json: write what was simulated here as JSON.
     """
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
-    from tauguard.models import Mismatch, load_arm
+    from tauguard.datasets.plans import strength
+    from tauguard.models import Mismatch
     from tauguard.report import write_json
 
     if episodes < 1:
         raise ValueError(f"--episodes {episodes}: expected 1 or more")
     if collisions < 0:
         raise ValueError(f"--collisions {collisions}: expected 0 or more")
-    load_arm(robot)  # named before anything is simulated
+    if payloads_g is None:
+        share = strength(robot)
+        payloads_g = tuple(share * load for load in LOADS)
     first = 10_000  # smaller seeds are the demo's, whose model may be judged on these episodes
     arm = None if mismatch_seed is None else Mismatch(seed=mismatch_seed)
     planned = (
-        struck_episodes(first + seed, episodes, collisions, speeds, payloads_g, arm)
+        struck_episodes(first + seed, episodes, collisions, speeds, payloads_g, arm, robot)
         if collisions
-        else free_episodes(first + seed, episodes, seconds, speeds, payloads_g, arm)
+        else free_episodes(first + seed, episodes, seconds, speeds, payloads_g, arm, robot=robot)
     )
-    planned = [replace(episode, arm=robot) for episode in planned]
     paths = write_dataset(planned, out, workers, checkers)
     rows = [told(path, episode) for path, episode in zip(paths, planned, strict=True)]
     if json is not None:
