@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, strength, struck_episodes
+from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes, torque_share
 from tauguard.envs import Episode, PayloadPick
 from tauguard.models import Mismatch
 
@@ -35,7 +35,7 @@ def demo_plan(seed: int, robot: str = "cura6") -> DemoPlan:
     The showcase is one run of the arm at work: nine collisions of all kinds, then a payload taken
     up without telling the observer.
     """
-    arm, share = Mismatch(seed=seed), strength(robot)
+    arm, share = Mismatch(seed=seed), torque_share(robot)
     base = 4 * seed
     loads = [share * load for load in TRAINING_PAYLOADS]
     struck = struck_episodes(base, len(loads), 5, TRAINING_SPEEDS, loads, arm, robot)

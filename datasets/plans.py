@@ -66,7 +66,7 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
     return begin + SLOT * collisions + 0.5
 
 
-def strength(robot: str) -> float:
+def torque_share(robot: str) -> float:
     """What severities and loads are multiplied by on this robot, at most 1.
 
     With 1 the hardest severities of :data:`~tauguard.traces.STRATA` begin below the robot's largest
@@ -101,13 +101,13 @@ def struck_episodes(
 ) -> list[Episode]:
     """Episodes with ``collisions`` each; speeds [%] and payloads [g] as :func:`pairing` has it.
 
-    The collisions' severities are those of the robot's :func:`strength`, its payloads as given.
+    The collisions' severities are those of the robot's :func:`torque_share`, its payloads as given.
 
     Raises:
         ValueError: a robot that cannot be used.
         FileNotFoundError: no such robot.
     """
-    joints, share = len(load_arm(robot).joints), strength(robot)
+    joints, share = len(load_arm(robot).joints), torque_share(robot)
     links = range(min(2, joints), joints + 1)
     strata = [(share * low, share * high) for low, high in STRATA]
     children = np.random.SeedSequence([seed, 1]).spawn(count)

@@ -48,7 +48,7 @@ def command(
         json: write what was simulated here as JSON.
     """
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
-    from tauguard.datasets.plans import strength
+    from tauguard.datasets.plans import torque_share
     from tauguard.models import Mismatch
     from tauguard.report import write_json
 
@@ -57,7 +57,7 @@ def command(
     if collisions < 0:
         raise ValueError(f"--collisions {collisions}: expected 0 or more")
     if payloads_g is None:
-        share = strength(robot)
+        share = torque_share(robot)
         payloads_g = tuple(share * load for load in LOADS)
     first = 10_000  # smaller seeds are the demo's, whose model may be judged on these episodes
     arm = None if mismatch_seed is None else Mismatch(seed=mismatch_seed)
