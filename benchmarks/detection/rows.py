@@ -10,7 +10,7 @@ from scipy import stats
 
 from tauguard.benchmarks.detection.judge import Outcome, Tallies, Tally
 from tauguard.benchmarks.detection.oracle import LEVELS, ORACLE, at_level
-from tauguard.benchmarks.detection.thresholds import AMPERES, HOURLY, POINTS, Fleet
+from tauguard.benchmarks.detection.thresholds import AMPERES, HOURLY, ONCE, POINTS, Fleet
 from tauguard.detectors.evaluation.metrics import HEADLINE, poisson_rate
 from tauguard.report import Row
 from tauguard.report import rate as wilson
@@ -51,11 +51,12 @@ def _threshold(values: Sequence[float]) -> Row:
 
 
 def rows(by_speed: BySpeed, thresholds: Spread) -> list[Row]:
-    """All rows: speed, hourly, floor, strata, dissertation, mcnemar, output."""
+    """All rows: speed, hourly, once, floor, strata, dissertation, mcnemar, output."""
     names = list(thresholds)
     return [
         *cells(by_speed, thresholds, names),
         *hourly(by_speed, thresholds, names),
+        *hourly(by_speed, thresholds, names, "once", ONCE),
         *floor(by_speed),
         *strata(by_speed, names),
         *dissertation(by_speed, names),
@@ -147,20 +148,26 @@ def cells(by_speed: BySpeed, thresholds: Spread, names: Sequence[str]) -> list[R
     ]
 
 
-def hourly(by_speed: BySpeed, thresholds: Spread, names: Sequence[str]) -> list[Row]:
+def hourly(
+    by_speed: BySpeed,
+    thresholds: Spread,
+    names: Sequence[str],
+    study: str = "hourly",
+    point: str = HOURLY,
+) -> list[Row]:
     """``hourly``: the same at the rate of false alarms aimed at; speed 0 is all speeds together."""
     found_rows: list[Row] = []
     for name in names:
         whole = Tally()
         for tallies in by_speed.values():
-            whole.add(tallies[name, HOURLY])
-        each = [(s, t[name, HOURLY]) for s, t in by_speed.items()]
+            whole.add(tallies[name, point])
+        each = [(s, t[name, point]) for s, t in by_speed.items()]
         found_rows += [
             {
-                "study": "hourly",
+                "study": study,
                 "detector": name,
                 "speed": speed,
-                **_threshold(thresholds[name][HOURLY]),
+                **_threshold(thresholds[name][point]),
                 **_figures(tally),
                 "hours": tally.free_seconds / 3600,
             }

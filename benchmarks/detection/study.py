@@ -61,6 +61,7 @@ NOTES = {
     "hourly": _JUDGED + "all speeds, at thresholds that aim at 0.25 false alarms an hour; "
     "alarms_per_hour: what came of it in so many hours. Delays from the touch [ms]. tau98: the "
     "least torque above which 98 % are found [N m], by speed.",
+    "once": "the same at thresholds that aim at one false alarm an hour.",
     "floor": "the same collisions by an oracle that is given the true external torque: no detector "
     "that needs as much torque is sooner.",
     "strata": "found of all, by torque [N m]; what is below 4 N m counts in no other rate.",

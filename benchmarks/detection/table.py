@@ -77,6 +77,7 @@ def shown(rows: Sequence[Row]) -> list[Row]:
         by_study.setdefault(row["study"], []).append(row)
     found = _cells(by_study.pop("speed", []))
     found += _hourly(by_study.pop("hourly", []))
+    found += _hourly(by_study.pop("once", []))
     found += by_study.pop("floor", [])
     found += _strata(by_study.pop("strata", []))
     found += _outputs(by_study.pop("output", []))
@@ -110,14 +111,14 @@ def _cells(rows: Sequence[Row]) -> list[Row]:
 
 
 def _hourly(rows: Sequence[Row]) -> list[Row]:
-    """The third point: all speeds together, then tau98 by speed."""
+    """The third point or the fourth: all speeds together, then tau98 by speed."""
     found = []
     for (name,), own in _groups(rows, "detector"):
         whole = next(r for r in own if r["speed"] == 0)
         each = [r for r in own if r["speed"]]
         found.append(
             {
-                "study": "hourly",
+                "study": whole["study"],
                 "detector": name,
                 "threshold": _range(whole),
                 "sensitivity": whole["sensitivity"],

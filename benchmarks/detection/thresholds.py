@@ -26,6 +26,8 @@ AMPERES = (1.6, 2.0)
 HOURLY = "hourly"
 #: Names of the operating points, in the order of the tables.
 POINTS = ("1.6", "2.0", HOURLY)
+#: A fourth point beside them: one false alarm an hour.
+ONCE = "once an hour"
 #: Share of the cases that are the tail, which is extrapolated to rarer ones.
 CASE_TAIL = 0.1
 
@@ -105,7 +107,8 @@ def operated(
     network: rows then compare speed by speed. Where the network raises none in N cases, the others
     may raise one in 2 N. The third is for a rate over all speeds, which the normalised score
     spreads evenly. It bounds the other two, which ask for more alarms over all speeds; at a single
-    one that can leave a detector less specific than the network.
+    one that can leave a detector less specific than the network. A fourth is for one false alarm an
+    hour.
 
     Args:
         detectors: trained, by name.
@@ -123,7 +126,9 @@ def operated(
     for name, detector in detectors.items():
         levels = speed_levels([one for own in free.values() for one in own[name]])
         normal = {speed: [one.over(levels) for one in own[name]] for speed, own in free.items()}
-        hourly = threshold_for_rate([one for own in normal.values() for one in own], per_hour)
+        together = [one for own in normal.values() for one in own]
+        hourly = threshold_for_rate(together, per_hour)
+        once = threshold_for_rate(together, 1.0)
         alarms = {}
         for amperes in AMPERES if network else ():
             if name == network:
@@ -133,5 +138,6 @@ def operated(
             threshold = min(max(shares), hourly)
             alarms[str(amperes)] = CollisionAlarm(detector, threshold, levels=levels)
         alarms[HOURLY] = CollisionAlarm(detector, hourly, levels=levels)
+        alarms[ONCE] = CollisionAlarm(detector, once, levels=levels)
         found[name] = Operated(detector, alarms)
     return found

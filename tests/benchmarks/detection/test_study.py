@@ -39,6 +39,7 @@ from tauguard.benchmarks.detection.pool import (
 )
 from tauguard.benchmarks.detection.study import ALL
 from tauguard.benchmarks.detection.thresholds import (
+    ONCE,
     POINTS,
     Operated,
     at_share,
@@ -280,8 +281,8 @@ def test_rows_have_the_twelve_cells_of_every_detector():
         return Tally([outcome(20.0, 0.01), outcome(5.0, None)], 10, 1, 1, 3600.0)
 
     names = ("srq-svr", "current-network")
-    by_speed = {s: {(n, p): tally() for n in names for p in POINTS} for s in SPEEDS}
-    thresholds = {n: dict.fromkeys(POINTS, (1.0, 2.0, 4.0)) for n in names}
+    by_speed = {s: {(n, p): tally() for n in names for p in (*POINTS, ONCE)} for s in SPEEDS}
+    thresholds = {n: dict.fromkeys((*POINTS, ONCE), (1.0, 2.0, 4.0)) for n in names}
     rows = report.rows(by_speed, thresholds)
     cells = [r for r in rows if r["study"] == "speed"]
     for name in names:
