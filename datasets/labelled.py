@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from tqdm import tqdm
@@ -15,6 +16,8 @@ from tauguard.traces import Trace, read_mcap
 
 def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
     """All MCAP recordings of a folder, in the order of their names; of a dataset its first split.
+
+    ``meta["log"]`` of a recording is the name of its file.
 
     Args:
         folder: of recordings, or a dataset that `tauguard generate` made.
@@ -40,5 +43,5 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
             raise ValueError(f"{path}: no truth in it; simulated recordings have one")
         with reading(path):  # a gap is no watched time, here as in logs
             checked(trace, lambda row: f"sample {row}")
-        traces.append(trace)
+        traces.append(replace(trace, meta={**trace.meta, "log": path.name}))
     return traces

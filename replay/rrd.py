@@ -272,7 +272,7 @@ def log_explained(recording: Any, trace: Trace, explained: Sequence[Explained]) 
 
 
 def log_series(recording: Any, trace: Trace, detection: Detection | None) -> None:
-    """The charts: currents, residuals beside the true torque, score and threshold, force."""
+    """The charts: currents, velocities, residuals, score and threshold, force."""
     starts = thin(trace.t, SERIES_RATE, MOST_POINTS)
     when = times(trace.t[starts])
 
@@ -285,6 +285,7 @@ def log_series(recording: Any, trace: Trace, detection: Detection | None) -> Non
     names = list(trace.joint_names)
     colours = [COLOURS[i % len(COLOURS)] for i in range(len(names))]
     series("current", trace.current, names, colours, 1.0)
+    series("velocity", trace.qd, names, colours, 1.0)
     if detection is not None:
         series("residual", detection.residual, names, colours, 1.2)
         series("score/score", detection.score, [detection.detector], [COLOURS[0]], 1.5)
@@ -363,6 +364,7 @@ def blueprint(trace: Trace, detection: Detection | None, center: Array, radius: 
     if trace.truth is not None:
         charts.append(chart("force", "Contact force, truth [N]", trace.truth.contact_force))
     charts.append(chart("current", "Motor current [A]", trace.current))
+    charts.append(chart("velocity", "Joint velocity [rad/s]", trace.qd))
     return rrb.Blueprint(
         rrb.Horizontal(left, rrb.Vertical(*charts), column_shares=[1, 1]),
         rrb.TimePanel(

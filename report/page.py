@@ -19,7 +19,7 @@ nav a { margin-right: 1rem; display: inline-block; }
 table { border-collapse: collapse; font-size: 0.8rem; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid #ddd; padding: 0.2rem 0.6rem; text-align: left;
          vertical-align: top; }
-th { background: #f4f4f4; }
+th { background: #f4f4f4; } td a { white-space: nowrap; }
 .figures { display: flex; flex-wrap: wrap; gap: 1rem; }
 .figures img { flex: 1 1 24rem; max-width: 35rem; }
 img { max-width: 100%; height: auto; min-width: 0; } figure { margin: 1rem 0; }

@@ -1,5 +1,6 @@
 """The report: studies are run once, a failure stops nothing, the page holds what was found."""
 
+import base64
 import json
 from html import escape
 
@@ -203,6 +204,7 @@ def made(monkeypatch):
         calls.append(seed)
         folder.mkdir(exist_ok=True)
         (folder / "missed-001.rrd").write_bytes(b"")
+        (folder / "missed-001.png").write_bytes(b"picture")
         rows = [{"kind": "missed", "file": "missed-001.rrd", "at [s]": 1.5}]
         return {"counts": "1 missed, 0 late, 0 false alarm", "rows": rows}
 
@@ -220,6 +222,8 @@ def test_mistakes_are_made_once_and_linked(tmp_path, made, capsys):
     assert made == [3]
     assert 'href="open/wrong/missed-001.rrd"' in text
     assert escape(f"replay --web '{folder}'") in text
+    assert base64.b64encode(b"picture").decode() in text
+    assert "no alarm starts in the collision" in text
     assert "<b>" not in text
 
 

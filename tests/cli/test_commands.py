@@ -4,10 +4,12 @@ import json
 import resource
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from tauguard.cli import COMMANDS, main
+from tauguard.cli.evaluate import name_of
 
 
 def run(*args: str) -> None:
@@ -79,7 +81,10 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     model, figures = tmp_path / "model.skops", tmp_path / "figures.json"
     run("train", "--traces", str(struck), "--model", str(model))
     flags = ("--json", str(figures), "--figure", str(tmp_path / "f.png"))
+    flags += ("--events", str(tmp_path / "wrong"), "--late", "0.001")
     run("evaluate", "--traces", str(struck), "--model", str(model), *flags)
+    page = (tmp_path / "wrong" / "index.html").read_text()
+    assert "<td>episode-00000.mcap</td>" in page  # the file, not a number of our own
     row = json.loads(figures.read_text())["rows"][0]
     assert 8 <= row["confusion"]["tp"] + row["confusion"]["fn"] <= 10
     # Judged on what it was trained on: blows from 16 N m up are not missed.
@@ -92,6 +97,11 @@ def test_simulate_train_evaluate(tmp_path, capsys):
     out = capsys.readouterr().out
     assert "sensitivity from 16 N m up" in out
     assert "link or its neighbour" in out
+
+
+def test_an_episode_of_a_dataset_has_the_name_that_inspect_takes():
+    assert name_of(SimpleNamespace(meta={"episode": "test/3"}), 7) == "test/3"
+    assert name_of(SimpleNamespace(meta={}), 0) == "0"
 
 
 def test_a_model_file_that_was_not_named_is_not_replaced(tmp_path, capsys, monkeypatch):

@@ -7,6 +7,7 @@ import socket
 import time
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import unquote
 
 import matplotlib.image
@@ -98,18 +99,75 @@ def test_nothing_is_left_when_it_is_closed(tmp_path):
             assert probe.connect_ex((address[0], int(address[1]))) != 0
 
 
-def test_every_kind_of_mistake_has_its_recording_and_its_row(tmp_path):
-    trace, detection = arm.make(hits=3)  # the first is missed, two are found after 12 ms
-    alarm = detection.alarms[0]
-    false = type(alarm)(trace.t[50], trace.t[60])
-    said = type(detection)(**{**vars(detection), "alarms": (false, *detection.alarms)})
+def with_a_false_alarm():
+    """A trace whose first of three collisions is missed, two found after 12 ms, and an alarm."""
+    trace, detection = arm.make(hits=3)
+    false = Alarm(trace.t[50], trace.t[60])
+    said = dataclasses.replace(detection, alarms=(false, *detection.alarms))
+    return trace, said
+
+
+def test_every_kind_of_mistake_has_its_recording_its_picture_and_its_row(tmp_path):
+    trace, said = with_a_false_alarm()
     folder = EventFolder(tmp_path / "wrong", late=0.01)
-    folder.add("test", 1, match_detection(said, trace), (trace, said))
+    folder.add("test/0", match_detection(said, trace), (trace, said))
     page = folder.finish().read_text()
     names = {p.name for p in (tmp_path / "wrong").glob("*.rrd")}
     assert names == {"missed-001.rrd", "late-001.rrd", "late-002.rrd", "false-alarm-001.rrd"}
     assert all(f'<a href="open/{name}">{name}</a>' in page for name in names)
     assert "1 missed, 2 late, 1 false alarm" in page
+    assert "more than 10 ms after the onset" in page
+    assert page.count("test/0") == 4
+    for name in names:
+        picture = Path(name).with_suffix(".png").name
+        assert f'src="{picture}"' in page
+        drawn = matplotlib.image.imread(tmp_path / "wrong" / picture)
+        assert drawn.shape[1] == 800
+        assert drawn[..., :3].std() > 0.05
+
+
+def test_a_row_has_the_score_beside_its_threshold_the_speed_and_the_load(tmp_path):
+    trace, said = with_a_false_alarm()
+    touch = trace.truth.collisions[0].onset
+    payload = np.where(trace.t < touch, 0.0, 0.75)
+    truth = dataclasses.replace(trace.truth, payload=payload)
+    trace = dataclasses.replace(trace, truth=truth, meta={"speed": "40.0"})
+    score = np.where((trace.t > touch + 0.1) & (trace.t < touch + 0.2), 4.56, 1.0)
+    said = dataclasses.replace(said, score=score)
+    folder = EventFolder(tmp_path / "wrong", late=0.01)
+    folder.add("a.mcap", match_detection(said, trace), (trace, said))
+    missed, *_, false = folder.rows
+    assert (missed["largest score"], false["largest score"]) == (4.56, 1.0)
+    assert {row["threshold"] for row in folder.rows} == {5.0}
+    assert (missed["payload [g]"], false["payload [g]"]) == (750, 0)
+    assert {row["speed [%]"] for row in folder.rows} == {40.0}
+
+
+def test_what_is_not_known_of_a_recording_has_no_column(tmp_path):
+    trace, said = with_a_false_alarm()
+    score = np.full(len(trace.t), -np.inf)  # never settled
+    said = dataclasses.replace(said, score=score)
+    folder = EventFolder(tmp_path / "wrong", late=0.01)
+    folder.add("a.mcap", match_detection(said, trace), (trace, said))
+    page = folder.finish().read_text()
+    assert folder.rows[0]["speed [%]"] == folder.rows[0]["largest score"] == ""
+    assert "<th>speed [%]</th>" not in page
+    assert "<th>payload [g]</th>" in page
+
+
+def test_a_score_above_the_threshold_for_too_short_is_no_largest_score(tmp_path):
+    """A page that showed the raw score would show an alarm where none can be."""
+    trace, said = with_a_false_alarm()
+    touch = trace.truth.collisions[0].onset
+    score = np.where(np.abs(trace.t - touch - 0.1) < 2e-3, 100.0, 1.0)
+    said = dataclasses.replace(said, score=score)
+    alarm = SimpleNamespace(confirmation=0.01, settle=1.0)
+    folder = EventFolder(tmp_path / "wrong", 0.01, alarm)
+    folder.add("a.mcap", match_detection(said, trace), (trace, said))
+    assert folder.rows[0]["largest score"] == 1.0
+    page = folder.finish().read_text()
+    assert "throughout the last 10 ms" in page
+    assert "first 1 s" in page
 
 
 def test_a_collision_whose_alarm_came_before_the_touch_says_so():

@@ -36,7 +36,9 @@ def command(
         json: write the figures here.
         figure: draw them here (PNG).
         events: a folder for ten seconds of every missed collision, late detection and false
-            alarm, with a page that `tauguard replay --web` opens.
+            alarm, with pictures and a page that `tauguard replay --web` opens. A recording is
+            named by its file; with --data as SPLIT/NUMBER, from 0, which `tauguard inspect
+            --episode` takes.
         late: with --events, a collision found later than this is an event [s].
     """
     from tauguard.cli.events import EventFolder, command_to_open
@@ -57,9 +59,12 @@ def command(
         if data is not None
         else iter([(str(traces), iter(labelled(Path(str(traces)))))])
     )
-    rows, wrong = [], None if events is None else EventFolder(events, late)
+    rows: list[dict[str, Any]] = []
+    wrong = None
+    if events is not None:
+        wrong = EventFolder(events, late, alarm)
     for name, recordings in parts:
-        matchings, summary = evaluated(alarm, recordings, name, wrong)
+        matchings, summary = evaluated(alarm, recordings, wrong)
         rows.append({"split": name, **summary} if data is not None else summary)
         print(f"{len(matchings)} recordings in {name}")
         print(text(summary))
@@ -75,16 +80,21 @@ def command(
 
 
 def evaluated(
-    alarm: CollisionAlarm, recordings: Iterable[Trace], split: str, wrong: EventFolder | None
+    alarm: CollisionAlarm, recordings: Iterable[Trace], wrong: EventFolder | None
 ) -> tuple[list[Matching], dict[str, Any]]:
     """Alarms matched with the truth, and all figures; what went wrong is kept by ``wrong``."""
     from tauguard.detectors import diagnosis_figures, figures
     from tauguard.detectors.evaluation.recordings import judged_recordings
 
     matchings, said = [], []
-    for number, one in enumerate(judged_recordings(alarm, recordings), start=1):
+    for number, one in enumerate(judged_recordings(alarm, recordings)):
         matchings.append(one.matching)
         said += one.diagnoses(alarm)
         if wrong is not None:
-            wrong.add(split, number, one.matching, (one.trace, one.detection))
+            wrong.add(name_of(one.trace, number), one.matching, (one.trace, one.detection))
     return matchings, {**figures(matchings), "diagnosis": diagnosis_figures(said)}
+
+
+def name_of(trace: Trace, number: int) -> str:
+    """By which a reader finds a recording: its file, or its split and number in the dataset."""
+    return trace.meta.get("log") or trace.meta.get("episode") or str(number)

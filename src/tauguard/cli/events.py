@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tauguard.detectors import Matching
+    from tauguard.arrays import Array
+    from tauguard.detectors import CollisionAlarm, Matching
     from tauguard.traces import Alarm, Collision, Detection, Trace
 
 #: A recording begins this long before its event and lasts this long [s].
@@ -20,7 +21,7 @@ BEFORE, LENGTH = 0.5, 10.0
 MOST = 100
 KINDS = ("missed", "late", "false alarm")
 #: The names of the recordings.
-OWN = re.compile(r"(missed|late|false-alarm)-\d+\.rrd")
+OWN = re.compile(r"(missed|late|false-alarm)-\d+\.(rrd|png)")
 
 
 def command_to_open(folder: Path) -> str:
@@ -34,6 +35,7 @@ class Event:
 
     kind: str  #: one of :data:`KINDS`
     at: float  #: onset of the collision, or start of the alarm [s]
+    span: tuple[float, float]  #: its window of detection; of a false alarm, the alarm [s]
     collision: str = ""  #: its kind
     link: int | None = None
     peak_torque: float | None = None  #: [N m]
@@ -54,6 +56,8 @@ class Event:
 
 def events_of(matching: Matching, late: float) -> Iterator[Event]:
     """Missed collisions, those found later than ``late`` [s], and false alarms, in this order."""
+    from tauguard.detectors.evaluation.events import detection_window
+
     pairs = list(zip(matching.collisions, matching.delays, strict=True))
     for wanted in ("missed", "late"):
         for c, delay in pairs:
@@ -61,11 +65,12 @@ def events_of(matching: Matching, late: float) -> Iterator[Event]:
             if kind == wanted:
                 up = [alarm for alarm in matching.false_alarms if _covers(alarm, c)]
                 note = f"an alarm was up from {up[0].start:.2f} s on" if up else ""
-                yield Event(kind, c.onset, c.kind, c.link, c.peak_tau, delay, note)
+                span = detection_window(c)
+                yield Event(kind, c.onset, span, c.kind, c.link, c.peak_tau, delay, note)
     for alarm in matching.false_alarms:
         hit = [c for c in matching.collisions if _covers(alarm, c)]
         note = f"still up at the {hit[0].kind} of {hit[0].onset:.2f} s" if hit else ""
-        yield Event("false alarm", alarm.start, note=note)
+        yield Event("false alarm", alarm.start, (alarm.start, alarm.end), note=note)
 
 
 def _covers(alarm: Alarm, collision: Collision) -> bool:
@@ -74,14 +79,15 @@ def _covers(alarm: Alarm, collision: Collision) -> bool:
 
 
 class EventFolder:
-    """Writes a recording of each event, and in the end the page."""
+    """Writes a recording and a picture of each event, and in the end the page."""
 
-    def __init__(self, folder: Path, late: float) -> None:
+    def __init__(self, folder: Path, late: float, alarm: CollisionAlarm | None = None) -> None:
         """Make the folder.
 
         Args:
             folder: new, or one that this has written before.
             late: collisions found later than this are events [s].
+            alarm: the detector; without it the score counts sample by sample.
 
         Raises:
             ValueError: the folder holds something else.
@@ -91,7 +97,7 @@ class EventFolder:
         folder.mkdir(parents=True, exist_ok=True)
         for old in filter(_own, folder.iterdir()):
             old.unlink()
-        self._folder, self._late = folder, late
+        self._folder, self._late, self._alarm = folder, late, alarm
         self._rows: list[dict[str, Any]] = []
         self._found = dict.fromkeys(KINDS, 0)
 
@@ -109,39 +115,64 @@ class EventFolder:
             for kind, count in self._found.items()
         )
 
-    def add(self, split: str, number: int, matching: Matching, of: tuple[Trace, Detection]) -> None:
-        """The events of one recording: the ``number``-th of ``split``."""
+    def add(self, name: str, matching: Matching, of: tuple[Trace, Detection]) -> None:
+        """The events of one recording, under the name by which a reader finds it."""
+        from tauguard.cli.event_page import row_of
+
+        trace, detection = of
+        held = self._held(trace, detection)
         for event in events_of(matching, self._late):
             self._found[event.kind] += 1
             if self._found[event.kind] <= MOST:
-                name = f"{event.kind.replace(' ', '-')}-{self._found[event.kind]:03d}.rrd"
-                self._write(name, event, *of)
-                self._rows.append({"split": split, "recording": number, "file": name, **_of(event)})
+                stem = f"{event.kind.replace(' ', '-')}-{self._found[event.kind]:03d}"
+                row = {"file": f"{stem}.rrd", "recording": name}
+                row |= row_of(event, trace, detection.threshold, held)
+                self._write(event, row, of, held)
+                self._rows.append(row)
 
-    def _write(self, name: str, event: Event, trace: Trace, detection: Detection) -> None:
+    def _held(self, trace: Trace, detection: Detection) -> Array:
+        """The score that was reached throughout the confirmation time, shape (T,)."""
+        from tauguard.detectors.thresholds.confirmation import confirmation_samples
+        from tauguard.detectors.thresholds.rates import sustained
+
+        if self._alarm is None:
+            return detection.score
+        return sustained(detection.score, confirmation_samples(self._alarm.confirmation, trace.dt))
+
+    def _write(
+        self, event: Event, row: dict[str, Any], of: tuple[Trace, Detection], held: Array
+    ) -> None:
+        """The recording and the picture of one event."""
+        from tauguard.cli.event_figure import draw_event
+        from tauguard.cli.event_page import facts
         from tauguard.replay import write_rrd
         from tauguard.replay.story import cut
 
+        trace, detection = of
         start = max(float(trace.t[0]), event.at - BEFORE)
-        part, said = cut(trace, detection, start, start + LENGTH)
-        write_rrd(self._folder / name, part, said, whole=True, about=event.text)
+        part, found = cut(trace, detection, start, start + LENGTH)
+        assert found is not None
+        known, file = facts(row), self._folder / row["file"]
+        write_rrd(file, part, found, whole=True, about=f"{event.text}; {known}")
+        first = int((trace.t < part.t[0]).sum())
+        shown = held[first : first + len(part.t)]
+        draw_event(file.with_suffix(".png"), part, found, shown, f"{event.text}\n{known}")
 
     def finish(self) -> Path:
         """Write the page; its path."""
-        from tauguard.report.page import Link, page, tables
+        from tauguard.cli.event_page import OFFLINE, definitions, events_html
+        from tauguard.report.page import page
         from tauguard.whole_file import write_whole
 
         opens = escape(command_to_open(self._folder))
         how = (
-            f"<p>{self.counts}. Late is later than {1e3 * self._late:.0f} ms. A recording begins "
-            f"{BEFORE} s before its event and lasts {LENGTH:.0f} s; at most {MOST} of a kind are "
-            f"kept. The links work while <code>{opens}</code> runs; "
-            "<code>rerun FILE</code> opens a file without it.</p>"
+            f"<p>{self.counts}. Each file shows {LENGTH:.0f} s of a recording, from {BEFORE} s "
+            f"before the event on; at most {MOST} of a kind are kept. The links open the files in "
+            f"the browser while <code>{opens}</code> runs; <code>rerun FILE</code> opens one "
+            "without.</p>" + definitions(self._late, self._alarm) + OFFLINE
         )
-        rows = [{**row, "file": Link(f"open/{row['file']}", row["file"])} for row in self._rows]
         sections = {
-            kind.capitalize(): tables([_shown(row) for row in rows if row["kind"] == kind], {})
-            or "<p>None.</p>"
+            kind.capitalize(): events_html([r for r in self._rows if r["kind"] == kind])
             for kind in KINDS
         }
         path = self._folder / "index.html"
@@ -153,20 +184,3 @@ class EventFolder:
 def _own(path: Path) -> bool:
     """Whether this command writes files of that name."""
     return path.name == "index.html" or bool(OWN.fullmatch(path.name))
-
-
-def _of(event: Event) -> dict[str, Any]:
-    return {
-        "kind": event.kind,
-        "at [s]": f"{event.at:.2f}",
-        "collision": event.collision or None,
-        "link": event.link,
-        "peak torque [N m]": None if event.peak_torque is None else round(event.peak_torque, 1),
-        "delay [ms]": None if event.delay is None else round(1e3 * event.delay),
-        "note": event.note,
-    }
-
-
-def _shown(row: dict[str, Any]) -> dict[str, Any]:
-    """A row of the page: its kind is the section's name."""
-    return {name: value for name, value in row.items() if name != "kind" and value is not None}

@@ -13,12 +13,6 @@ from urllib.parse import quote
 LATE = 0.05
 #: Rows of each kind in the report; the folder's own page has all.
 SHOWN = 8
-#: Without `tauguard replay --web` nothing answers at these links: they become plain text.
-OFFLINE = (
-    "<script>if (location.protocol === 'file:') "
-    "document.querySelectorAll('a[href^=\"open/\"]')"
-    ".forEach(a => a.replaceWith(a.textContent))</script>"
-)
 
 
 def mistakes(folder: Path, seed: int) -> str:
@@ -88,27 +82,42 @@ def judged(folder: Path, seed: int) -> dict[str, object]:
     plan = demo_plan(seed, "cura6")
     training = list(simulate_all(plan.train, None, "simulate training"))
     detector = train(SrqSvr(), training, nominal_arm(training), FALSE_ALARMS_PER_HOUR)
-    wrong = EventFolder(folder, LATE)
+    wrong = EventFolder(folder, LATE, detector)
     judged = simulate_all([*plan.judge_struck, *plan.judge_free], None, "simulate test")
     for number, trace in enumerate(judged):
         found = detector.detect(trace)
-        wrong.add("test", number, match_detection(found, trace, detector.settle), (trace, found))
+        wrong.add(str(number), match_detection(found, trace, detector.settle), (trace, found))
     wrong.finish()
     return {"counts": wrong.counts, "rows": wrong.rows}
 
 
 def _html(folder: Path, counts: str, rows: list[dict[str, Any]]) -> str:
+    from tauguard.cli.event_page import OFFLINE, definitions
     from tauguard.cli.events import KINDS, command_to_open
-    from tauguard.report.page import Link, tables
+    from tauguard.report.page import Link, folded, tables
 
-    shown = [
-        {**row, "file": Link(f"open/wrong/{quote(str(row['file']))}", str(row["file"]))}
-        for kind in KINDS
-        for row in [one for one in rows if one["kind"] == kind][:SHOWN]
-    ]
+    chosen = [row for kind in KINDS for row in [r for r in rows if r["kind"] == kind][:SHOWN]]
+    address = {row["file"]: f"open/wrong/{quote(str(row['file']))}" for row in chosen}
+    shown = [{**r, "file": Link(address[r["file"]], str(r["file"]))} for r in chosen]
     opens = escape(command_to_open(folder))
     return (
         f"<p>The detector of <code>tauguard demo</code> on motions that it was not trained on: "
-        f"{escape(counts)} (late: after {1e3 * LATE:.0f} ms). Each link opens its ten seconds in "
-        f"the browser while <code>{opens}</code> shows this page.</p>" + tables(shown, {}) + OFFLINE
+        f"{escape(counts)}. Each link opens its ten seconds in the browser while "
+        f"<code>{opens}</code> shows this page.</p>"
+        + tables(shown, {})
+        + _pictures(folder / "wrong", chosen)
+        + folded("What the words mean", definitions(LATE))
+        + OFFLINE
+    )
+
+
+def _pictures(folder: Path, rows: list[dict[str, Any]]) -> str:
+    """The first of each kind, drawn: the score beside its threshold."""
+    from tauguard.report.page import picture
+
+    first = {row["kind"]: Path(row["file"]).with_suffix(".png").name for row in reversed(rows)}
+    there = {kind: folder / name for kind, name in first.items() if (folder / name).is_file()}
+    return "".join(
+        f"<figure>{picture(file.read_bytes(), 'png', f'{kind}: score and threshold')}</figure>"
+        for kind, file in there.items()
     )

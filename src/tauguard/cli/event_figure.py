@@ -1,0 +1,98 @@
+"""A picture of ten seconds: the score beside its threshold, and how fast the arm moved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tauguard.arrays import Array
+    from tauguard.traces import Detection, Trace
+
+#: Scores above so many thresholds are drawn on a logarithmic scale.
+CROWDED = 8.0
+
+
+def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, title: str) -> None:
+    """Draw a stretch of a recording as PNG; the file appears whole or not at all.
+
+    Args:
+        path: of the picture.
+        trace: the stretch, with its truth.
+        detection: of that stretch.
+        held: the score that was reached throughout the confirmation time: above the threshold it
+            is an alarm, shape (T,) of that stretch.
+        title: of the picture.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    import numpy as np
+
+    from tauguard.report.charts import COLOURS, STYLE
+    from tauguard.whole_file import whole_file
+
+    with plt.rc_context(STYLE):
+        figure, (score, speed) = plt.subplots(
+            2, 1, sharex=True, figsize=(8.0, 4.4), height_ratios=(3, 2), layout="constrained"
+        )
+        thin = {"color": COLOURS[5], "linewidth": 0.6}
+        score.plot(detection.t, _drawn(detection.score), label="score", **thin)
+        score.plot(
+            detection.t, _drawn(held), label="score held for the confirmation time", linewidth=1.0
+        )
+        score.axhline(detection.threshold, color="black", linestyle="--", label="threshold")
+        _shade(score, trace, detection)
+        score.set(title=title, ylabel=f"score of\n{detection.detector}")
+        _spread(score, detection)
+        figure.legend(*score.get_legend_handles_labels(), loc="outside lower center", ncols=5)
+        fastest = np.abs(trace.qd).max(axis=1)
+        speed.plot(trace.t, fastest)
+        speed.set(xlabel="time in the recording [s]", ylabel="fastest joint\n[rad/s]")
+        speed.set(ylim=(0, None), xlim=(trace.t[0], trace.t[-1]))
+        with whole_file(path) as stream:
+            figure.savefig(stream, dpi=100, format="png")
+        plt.close(figure)
+
+
+def _spread(axes: Any, detection: Detection) -> None:
+    """A logarithmic scale beyond the usual scores, if peaks would hide the threshold."""
+    import numpy as np
+
+    scores, edge = detection.score[np.isfinite(detection.score)], abs(detection.threshold)
+    if not scores.size or scores.max() <= CROWDED * edge:
+        return
+    usual = max(2 * edge, float(np.quantile(np.abs(scores), 0.9)))
+    if usual > 0:
+        axes.set_yscale("symlog", linthresh=10 ** np.ceil(np.log10(usual)))
+
+
+def _drawn(values: Array) -> Array:
+    """Nothing is drawn where a detector has not settled."""
+    import numpy as np
+
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _shade(axes: Any, trace: Trace, detection: Detection) -> None:
+    """Contacts and alarms as bands, each with one line of the legend."""
+    from tauguard.report.charts import COLOURS
+
+    truth = trace.truth
+    contacts = () if truth is None else [(c.onset, c.end) for c in truth.collisions]
+    alarms = [(a.start, a.end) for a in detection.alarms]
+    first, last = float(trace.t[0]), float(trace.t[-1])
+    bands = (("contact", contacts, COLOURS[2], 0.4), ("alarm", alarms, COLOURS[1], 0.25))
+    for name, spans, colour, alpha in bands:
+        for number, (start, end) in enumerate(spans):
+            axes.axvspan(
+                max(start, first),
+                min(end, last),
+                color=colour,
+                alpha=alpha,
+                label=name if number == 0 else None,
+            )

@@ -1,0 +1,137 @@
+"""What a page of wrong detections says of each: its row, its picture, and what the words mean."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+if TYPE_CHECKING:
+    from tauguard.arrays import Array
+    from tauguard.cli.events import Event
+    from tauguard.detectors import CollisionAlarm
+    from tauguard.traces import Trace
+
+#: Without `tauguard replay --web` nothing answers at these links: they become plain text.
+OFFLINE = (
+    "<script>if (location.protocol === 'file:') "
+    "document.querySelectorAll('a[href^=\"open/\"]')"
+    ".forEach(a => a.replaceWith(a.textContent))</script>"
+)
+
+
+def row_of(event: Event, trace: Trace, threshold: float, held: Array) -> dict[str, Any]:
+    """What happened, in the columns of the page; what is not known is empty.
+
+    Args:
+        event: of this trace.
+        trace: with truth.
+        threshold: of the score.
+        held: the score that was reached throughout the confirmation time, shape (T,).
+    """
+    import numpy as np
+
+    first, last = np.searchsorted(trace.t, [event.span[0] - 1e-9, event.span[1] + 1e-9])
+    scores = held[first : max(last, first + 1)]
+    load = None if trace.truth is None else float(trace.truth.payload[min(first, len(trace.t) - 1)])
+    return {
+        "kind": event.kind,
+        "at [s]": f"{event.at:.2f}",
+        "collision": event.collision,
+        "link": "" if event.link is None else event.link,
+        "peak torque [N m]": "" if event.peak_torque is None else round(event.peak_torque, 1),
+        "delay [ms]": "" if event.delay is None else round(1e3 * event.delay),
+        "largest score": float(f"{scores.max():.3g}") if np.isfinite(scores).any() else "",
+        "threshold": float(f"{threshold:.3g}"),
+        "speed [%]": _planned_speed(trace),
+        "payload [g]": "" if load is None else round(1e3 * load),
+        "note": event.note,
+    }
+
+
+def _planned_speed(trace: Trace) -> float | str:
+    """Percent of the joints' largest speeds that the motion was planned with, if it is written."""
+    try:
+        given = trace.meta.get("speed") or json.loads(trace.attachments["episode.json"])["speed"]
+        return round(float(given), 1)
+    except (KeyError, TypeError, ValueError):
+        return ""
+
+
+def facts(row: Mapping[str, Any]) -> str:
+    """Of a row: which recording it is, how fast the arm was to move, and what it carried."""
+    known = (("speed", "%"), ("payload", "g"))
+    pairs = [(what, row[f"{what} [{unit}]"], unit) for what, unit in known]
+    found = [f"{what} {value:g} {unit}" for what, value, unit in pairs if value != ""]
+    return ", ".join([f"recording {row['recording']}", *found])
+
+
+def events_html(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A table of the rows of one kind, and below it a picture of each."""
+    from tauguard.report.page import Link, tables
+
+    if not rows:
+        return "<p>None.</p>"
+    used = [key for key in rows[0] if key != "kind" and any(row[key] != "" for row in rows)]
+    shown = [
+        {key: Link(_open(row), str(row[key])) if key == "file" else row[key] for key in used}
+        for row in rows
+    ]
+    return tables(shown, {}) + "".join(map(_figure, rows))
+
+
+def _open(row: Mapping[str, Any]) -> str:
+    return f"open/{quote(str(row['file']))}"
+
+
+def _figure(row: Mapping[str, Any]) -> str:
+    stem = str(row["file"]).removesuffix(".rrd")
+    text = f"{stem}: score, threshold and speed"
+    return (
+        f'<figure><img loading="lazy" alt="{escape(text)}" src="{quote(stem)}.png">'
+        f'<figcaption><a href="{escape(_open(row))}">{escape(str(row["file"]))}</a></figcaption>'
+        "</figure>"
+    )
+
+
+def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
+    """What each word of the page means, as an HTML table.
+
+    Args:
+        late: a collision found later than this is late [s].
+        alarm: the detector, whose times are then given.
+    """
+    from tauguard.detectors.evaluation.events import MERGE_GAP, WINDOW
+
+    ms = f"{1e3 * late:.0f} ms"
+    begin = "beginning" if alarm is None else f"first {alarm.settle:.3g} s"
+    time = "confirmation time" if alarm is None else f"last {1e3 * alarm.confirmation:.3g} ms"
+    return _words(
+        {
+            "onset": "of a collision: the first sample whose contact force on the arm is above "
+            f"0 N. Contacts less than {MERGE_GAP} s apart on one link are one collision.",
+            "window": f"from the onset until {WINDOW} s after it; of a clamp, until it ends.",
+            "alarm": f"the score has been above the threshold throughout the {time}. Alarms "
+            f" less than {MERGE_GAP} s apart are one.",
+            "missed": "no alarm starts in the collision's window, or one was up at its onset.",
+            "late": f"the first alarm in the window starts more than {ms} after the onset; "
+            "delay: how long after.",
+            "false alarm": "an alarm that starts in no collision's window.",
+            "largest score": f"that was held throughout the {time}: in the collision's window, or "
+            "while the false alarm was up.",
+            "peak torque": "largest external torque of the collision over joints 1 to 4.",
+            "speed": "planned, in percent of the joints' largest; the pictures show the "
+            "measured speed of the fastest joint.",
+            "payload": "mass carried at the event; the detector is given none.",
+            "recording": "the file, or SPLIT/NUMBER of a dataset as tauguard inspect --episode "
+            "takes it. A bare number is a test motion's. All count from 0.",
+            "not counted": f"what starts in a recording's {begin}, in which the detector settles.",
+        }.items()
+    )
+
+
+def _words(pairs: Iterable[tuple[str, str]]) -> str:
+    rows = "".join(f"<tr><th>{escape(w)}</th><td>{escape(what)}</td></tr>" for w, what in pairs)
+    return f'<div class="wide"><table>{rows}</table></div>'
