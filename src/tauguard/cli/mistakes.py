@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from tauguard.cli.event_page import OFFLINE
+
 #: A collision that is found later than this is shown [s].
 LATE = 0.05
 #: Rows of each kind in the report; the folder's own page has all.
@@ -92,7 +94,7 @@ def judged(folder: Path, seed: int) -> dict[str, object]:
 
 
 def _html(folder: Path, counts: str, rows: list[dict[str, Any]]) -> str:
-    from tauguard.cli.event_page import OFFLINE, definitions
+    from tauguard.cli.event_page import definitions
     from tauguard.cli.events import KINDS, command_to_open
     from tauguard.report.page import Link, folded, tables
 
