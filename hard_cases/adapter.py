@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 from typing import Any, Protocol
 
+from tauguard.hard_cases.case import KINDS
+
 #: The adapters that come with the package: name of the library and where its adapter is.
 BUILT_IN = {
     "tauguard": "tauguard.hard_cases.libraries.ours:Ours",
@@ -43,7 +45,8 @@ def adapters(names: tuple[str, ...] = ()) -> list[Adapter]:
     """Adapters by name of a library or by ``module:Class``; all that are installed by default.
 
     Raises:
-        ValueError: neither a known name nor a class that can be imported.
+        ValueError: neither a known name nor a class that can be imported and made without
+            arguments, or one without a name or without any of the methods.
     """
     if not names:
         return [one for one in map(_installed, BUILT_IN.values()) if one is not None]
@@ -63,7 +66,10 @@ def _named(name: str) -> Adapter:
         raise ValueError(f"adapter {name!r}: there are {', '.join(BUILT_IN)}, or module:Class")
     try:
         return _make(place)
-    except (ImportError, AttributeError) as error:
+    except ModuleNotFoundError as error:
+        where = "; modules are looked for in the working folder and on PYTHONPATH"
+        raise ValueError(f"adapter {name!r}: {error}{where}") from None
+    except (ImportError, AttributeError, TypeError) as error:
         raise ValueError(f"adapter {name!r}: {error}") from None
 
 
@@ -72,5 +78,7 @@ def _make(place: str) -> Adapter:
     made: Any = getattr(importlib.import_module(module), attribute)()
     if not isinstance(getattr(made, "name", None), str):
         raise ValueError(f"adapter {place!r}: it has no name")
+    if not any(hasattr(made, kind) for kind in KINDS):
+        raise ValueError(f"adapter {place!r}: it has none of the methods {', '.join(KINDS)}")
     adapter: Adapter = made
     return adapter

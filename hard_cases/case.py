@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 FOLDER = Path(__file__).parent / "cases"
+#: The kinds of questions; an adapter's method of that name answers them.
+KINDS = (
+    "vertex_face",
+    "edge_edge",
+    "convex_overlap",
+    "convex_sweep",
+    "convex_motion",
+    "scene",
+    "observer",
+)
 #: A time of impact may be early by this share of the step and is never late, but for one rounding.
 EARLY = 1e-5
 ROUNDING = 2.0**-52
@@ -40,18 +53,50 @@ class Case:
     expected: dict[str, Any]
     explained: str = ""
 
-    def right(self, answer: Answer) -> bool:
-        """Whether ``answer`` is right; a time is never late, and early by 1e-5 at most."""
-        if "overlap" in self.expected:
-            return isinstance(answer, bool) and answer == self.expected["overlap"]
+    def right(self, answer: object) -> bool:
+        """Whether ``answer`` is right; a time is never late, and early by 1e-5 at most.
+
+        Raises:
+            TypeError: as :meth:`wrong`.
+        """
+        return not self.wrong(answer)
+
+    def wrong(self, answer: object) -> str:
+        """What is wrong with ``answer`` in a few words; empty if it is right.
+
+        ``missed`` or ``late by ...``: what relies on it lets bodies pass; ``invented`` or
+        ``early by ...``: it is too cautious; ``out of bounds``, ``not a number``.
+
+        Raises:
+            TypeError: of another type than the question asks for.
+        """
+        said, exact = self._plain(answer), self.exact
         if "low" in self.expected:
-            if not isinstance(answer, float):
-                return False
-            return bool(self.expected["low"] <= answer <= self.expected["high"])
-        exact = self.exact
-        if answer is None or exact is None:
-            return answer is None and exact is None
-        return float(exact) - EARLY <= answer <= float(exact) * (1 + ROUNDING)
+            assert said is not None
+            inside = self.expected["low"] <= said <= self.expected["high"]
+            return "" if inside else "out of bounds"
+        if "overlap" in self.expected:
+            there, found = self.expected["overlap"], bool(said)
+        else:
+            there, found = exact is not None, said is not None
+        if not (there and found):
+            return "" if there == found else "missed" if there else "invented"
+        return "" if exact is None or said is None else mistimed(float(exact), said)
+
+    def _plain(self, answer: object) -> Answer:
+        """The answer as a bool, a float or None; NumPy's scalars are taken for Python's."""
+        said: Any = answer.item() if isinstance(answer, np.generic) else answer
+        number = isinstance(said, int | float) and not isinstance(said, bool)
+        if "overlap" in self.expected:
+            expected, fits = "bool", isinstance(said, bool)
+        elif "low" in self.expected:
+            expected, fits = "float", number
+        else:
+            expected, fits = "float or None", number or said is None
+        if not fits:
+            raise TypeError(f"the answer is of type {type(answer).__name__}, expected {expected}")
+        plain: Answer = said
+        return plain
 
     @property
     def exact(self) -> Fraction | None:
@@ -69,8 +114,18 @@ class Case:
         return answer_text(None if self.exact is None else float(self.exact))
 
 
-def answer_text(answer: Answer) -> str:
+def mistimed(exact: float, said: float) -> str:
+    """How far a time is off where it is more than a right answer may be; else empty."""
+    if exact - EARLY <= said <= exact * (1 + ROUNDING):
+        return ""
+    if math.isnan(said):
+        return "not a number"
+    return f"late by {said - exact:.2g}" if said > exact else f"early by {exact - said:.2g}"
+
+
+def answer_text(answer: Any) -> str:
     """An answer as text."""
+    answer = answer.item() if isinstance(answer, np.generic) else answer
     if isinstance(answer, bool):
         return "contact" if answer else "apart"
     return "no contact" if answer is None else f"{answer:.10g}"

@@ -10,10 +10,11 @@ from tauguard.hard_cases.case import Case, answer_text
 
 
 def run(cases: Iterable[Case], libraries: Iterable[Adapter]) -> list[dict[str, Any]]:
-    """Rows with ``case``, ``library``, ``expected``, ``answer``, ``right`` and what the case is.
+    """Rows with ``case``, ``library``, ``expected``, ``answer``, ``right``, ``wrong``, case.
 
-    A library is not asked what it has no method for, or what raises ``NotImplementedError``. What
-    else it raises is its answer, and wrong.
+    ``wrong`` says in a few words what is, see :meth:`Case.wrong`. A library is not asked what it
+    has no method for, or what raises ``NotImplementedError``. What else it raises is its answer,
+    and ``wrong`` is ``failed``.
     """
     libraries = list(libraries)
     asked = [_row(case, one) for case in cases for one in libraries if hasattr(one, case.kind)]
@@ -23,17 +24,20 @@ def run(cases: Iterable[Case], libraries: Iterable[Adapter]) -> list[dict[str, A
 def _row(case: Case, library: Adapter) -> dict[str, Any] | None:
     try:
         answer = getattr(library, case.kind)(**case.given)
-        text, right = answer_text(answer), case.right(answer)
+        wrong = case.wrong(answer)
+        text = answer_text(answer)
     except NotImplementedError:
         return None
     except Exception as error:
-        text, right = f"{type(error).__name__}: {str(error).splitlines()[0]}", False
+        lines = str(error).splitlines() or [""]
+        text, wrong = f"{type(error).__name__}: {lines[0]}", "failed"
     return {
         "case": case.name,
         "library": library.name,
         "expected": case.expected_text,
         "answer": text,
-        "right": right,
+        "right": not wrong,
+        "wrong": wrong,
         "kind": case.kind,
         "why": case.why,
         "origin": case.origin,
@@ -42,20 +46,39 @@ def _row(case: Case, library: Adapter) -> dict[str, Any] | None:
 
 
 def verdicts(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """How many of each kind's cases each library answers, and how many rightly."""
-    counts: dict[tuple[str, str], list[bool]] = {}
+    """How many of each kind's cases each library answers, how many rightly, and what the rest is.
+
+    ``missed_or_late`` lets bodies pass through one another, ``invented_or_early`` is too cautious,
+    ``other`` is out of bounds, no number, or an error.
+    """
+    found: dict[tuple[str, str], list[str]] = {}
     for row in rows:
-        counts.setdefault((row["kind"], row["library"]), []).append(row["right"])
+        found.setdefault((row["kind"], row["library"]), []).append(row["wrong"])
     return [
-        {"kind": kind, "library": library, "cases": len(all_), "right": sum(all_)}
-        for (kind, library), all_ in counts.items()
+        {"kind": kind, "library": library, "cases": len(wrong), **_counts(wrong)}
+        for (kind, library), wrong in found.items()
     ]
 
 
+def _counts(wrong: list[str]) -> dict[str, int]:
+    passes = sum(one.startswith(("missed", "late")) for one in wrong)
+    cautious = sum(one.startswith(("invented", "early")) for one in wrong)
+    right = wrong.count("")
+    other = len(wrong) - right - passes - cautious
+    return {
+        "right": right,
+        "missed_or_late": passes,
+        "invented_or_early": cautious,
+        "other": other,
+    }
+
+
 def by_library(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The same as one row a kind and a column a library: ``11 of 13``, or None if not asked."""
-    found = verdicts(rows)
-    libraries = dict.fromkeys(one["library"] for one in found)
-    kinds = dict.fromkeys(one["kind"] for one in found)
-    right = {(f["kind"], f["library"]): f"{f['right']} of {f['cases']}" for f in found}
-    return [{"kind": k} | {name: right.get((k, name)) for name in libraries} for k in kinds]
+    """One row a kind and a column a library: ``11 of 13`` right, or None if not asked."""
+    found: dict[tuple[str, str], list[bool]] = {}
+    for row in rows:
+        found.setdefault((row["kind"], row["library"]), []).append(row["right"])
+    libraries = dict.fromkeys(library for _, library in found)
+    kinds = dict.fromkeys(kind for kind, _ in found)
+    texts = {key: f"{sum(right)} of {len(right)}" for key, right in found.items()}
+    return [{"kind": k} | {name: texts.get((k, name)) for name in libraries} for k in kinds]

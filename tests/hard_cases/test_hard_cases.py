@@ -1,6 +1,8 @@
 """The hard cases: their answers from exact arithmetic elsewhere, and how libraries are asked."""
 
 import json
+import subprocess
+import sys
 from fractions import Fraction
 
 import mujoco
@@ -13,7 +15,7 @@ from tauguard.benchmarks.rigid.truth import cross, dot
 from tauguard.cli import main
 from tauguard.hard_cases import adapters, load_cases, run
 from tauguard.hard_cases.case import Case
-from tauguard.hard_cases.verdicts import by_library
+from tauguard.hard_cases.verdicts import by_library, verdicts
 
 CASES = load_cases()
 #: Where a scene's answer is MuJoCo's, whose contacts and dry friction yield: docs/hard_cases.md.
@@ -129,6 +131,7 @@ def test_wrong_answers_are_found():
     rows = {row["case"]: row for row in run(CASES, [Wrong()])}
     assert [n for n, r in rows.items() if r["right"]] == ["touches_at_the_start"]
     assert rows["box_in_a_box"]["answer"] == "RuntimeError: no hull"
+    assert rows["box_in_a_box"]["wrong"] == "failed"
     assert "impact_20_m_per_s" not in rows
 
 
@@ -162,6 +165,87 @@ def test_early_is_right_within_a_share_of_the_step_and_late_never():
     assert not case.right(0.4999)
     assert not case.right(0.5000001)
     assert not case.right(None)
+
+
+@pytest.mark.parametrize(
+    ("expected", "answer", "wrong"),
+    [
+        ({"toi": "1/2"}, None, "missed"),
+        ({"toi": "1/2"}, 0.75, "late by 0.25"),
+        ({"toi": "1/2"}, np.float32(0.25), "early by 0.25"),
+        ({"toi": "1/2"}, float("nan"), "not a number"),
+        ({"toi": None}, 0, "invented"),
+        ({"overlap": True}, np.False_, "missed"),
+        ({"overlap": False}, True, "invented"),
+        ({"overlap": True}, np.True_, ""),
+        ({"low": 0, "high": 1}, np.float32(2), "out of bounds"),
+        ({"low": 0, "high": 1}, 1, ""),
+    ],
+)
+def test_what_is_wrong_is_said(expected, answer, wrong):
+    case = Case("c", "vertex_face", "here", "why", {}, expected)
+    assert case.wrong(answer) == wrong
+    assert case.right(answer) == (not wrong)
+
+
+@pytest.mark.parametrize(
+    ("expected", "answer"),
+    [({"overlap": True}, 1), ({"toi": "1"}, True), ({"toi": "0"}, [0.0]), ({"low": 0}, None)],
+)
+def test_an_answer_of_another_type_is_no_answer(expected, answer):
+    with pytest.raises(TypeError, match="expected"):
+        Case("c", "vertex_face", "here", "why", {}, expected).wrong(answer)
+
+
+def test_verdicts_part_what_lets_bodies_pass_from_what_is_too_cautious():
+    said = ["", "missed", "late by 0.1", "early by 0.1", "invented", "failed", "out of bounds"]
+    rows = [{"kind": "scene", "library": "a", "wrong": wrong} for wrong in said]
+    (row,) = verdicts(rows)
+    counts = {"right": 1, "missed_or_late": 2, "invented_or_early": 2, "other": 2}
+    assert row == {"kind": "scene", "library": "a", "cases": 7, **counts}
+
+
+OWN = """
+class Right:
+    name = "mine"
+
+    def vertex_face(self, x_t0, x_t1):
+        return None
+
+
+class Misspelt:
+    name = "misspelt"
+
+    def vertex_faces(self, x_t0, x_t1):
+        return None
+
+
+class Asks:
+    name = "asks"
+
+    def __init__(self, model):
+        pass
+"""
+
+
+def test_an_adapter_in_the_working_folder_is_found(tmp_path):
+    (tmp_path / "my_adapters.py").write_text(OWN)
+
+    def asked(name):
+        command = [
+            sys.executable,
+            "-P",
+            "-c",
+            "import sys, tauguard.cli as c; c.main(sys.argv[1:])",
+        ]
+        command += ["hard-cases", "--case", "tight", "--adapter", f"my_adapters:{name}"]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+
+    assert "1      1" in asked("Right").stdout
+    for name, said in (("Misspelt", "none of the methods"), ("Asks", "positional argument")):
+        refused = asked(name)
+        assert refused.returncode == 2
+        assert said in refused.stderr
 
 
 def test_plain_steps_pass_the_wall_that_the_guard_holds():

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -31,6 +33,9 @@ COMMANDS = {
     "hard-cases": "named cases with exact answers, for our kernels and anybody's",
     "bench": "run one study of speed against error: a table, a figure, --json",
 }
+
+#: ``module:Class`` of the user's own, which may lie in the working folder.
+OWN = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 EPILOG = """\
 `tauguard COMMAND --help` explains a command.
@@ -63,6 +68,8 @@ def main(argv: Sequence[str] | None = None) -> None:
         near = difflib.get_close_matches(name, COMMANDS, n=1)
         hint = f"did you mean {near[0]}?" if near else f"commands: {', '.join(COMMANDS)}"
         fail(f"unknown command {name!r}: {hint}")
+    if any(OWN.fullmatch(arg) for arg in args[1:]):
+        sys.path.append(os.getcwd())  # last, so that nothing of this folder hides a library
     module = importlib.import_module(f"tauguard.cli.{name.replace('-', '_')}")
     for flag, kind in module.command.__annotations__.items():
         given = f"--{flag.replace('_', '-')}"

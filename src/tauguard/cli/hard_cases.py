@@ -13,7 +13,8 @@ def command(
     """Put the hard cases to every library that is installed and print the verdicts.
 
     Args:
-        adapter: libraries to ask: names, or module:Class of your own adapter (default: all).
+        adapter: libraries to ask: names, or module:Class of your own adapter, whose module is
+            looked for in the working folder too (default: all).
         case: names of cases, or beginnings of names (default: all).
         json: write a row for every answer here as JSON.
     """
@@ -25,7 +26,10 @@ def command(
     if not cases:
         raise ValueError(f"case {', '.join(case)}: no case begins so")
     rows = run(cases, adapters(adapter))
-    shown = ("case", "library", "expected", "answer", "right")
+    if not rows:
+        kinds = ", ".join(dict.fromkeys(one.kind for one in cases))
+        raise ValueError(f"none of the libraries has a form of these cases ({kinds})")
+    shown = ("case", "library", "expected", "answer", "right", "wrong")
     print(table([{key: row[key] for key in shown} for row in rows]))
     print("\n" + table(verdicts(rows)))
     if json is not None:
