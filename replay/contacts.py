@@ -68,6 +68,8 @@ def write_contacts_rrd(
         draft = Path(folder) / "draft.rrd"
         recording = rr.RecordingStream("tauguard_contacts", recording_id=path.stem)
         recording.save(draft)
+        # Before any data: a viewer plays until it has read that it is to wait.
+        recording.send_blueprint(_blueprint(_eye(marks or {}, positions, vertices)))
         recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         _log_bodies(recording, model, t, positions, rotations)
         if vertices is not None:
@@ -80,7 +82,6 @@ def write_contacts_rrd(
         for moment, text in notes:
             recording.set_time(TIMELINE, duration=moment)
             recording.log("notes", rr.TextLog(text))
-        recording.send_blueprint(_blueprint(_eye(marks or {}, positions, vertices)))
         recording.flush()
         recording.disconnect()
         os.replace(draft, path)

@@ -69,6 +69,6 @@ def arrows(shown: Sequence[Explained | None], metres: float, longest: float) -> 
     return {
         "vectors": vectors,
         "origins": points - vectors,
-        "labels": [one.summary for one in some],
+        "labels": [f"{one.kind}, estimated" for one in some],  # the page has the summary
         "lengths": np.array([one is not None for one in shown], dtype=int),
     }

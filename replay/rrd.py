@@ -24,6 +24,7 @@ FRAME_RATE = 60.0  # [Hz] of the moving bodies
 SERIES_RATE = 200.0  # [Hz] of the charts
 MOST_FRAMES = 30_000  # a long recording is thinned to this, so that the file stays below 30 MB
 MOST_POINTS = 60_000
+SCORE_TOP = 8.0  # times the threshold: the chart of the score ends there, so that both are seen
 ARROW = 2e-3  # [m/N]: 100 N is drawn 0.2 m long
 LONGEST_ARROW = 0.5  # [m]
 NORMAL = 0.06  # [m], length of a checked contact's normal
@@ -56,7 +57,7 @@ def write_rrd(
     """Write a recording that ``rerun FILE`` opens with its own layout.
 
     A viewer puts its time cursor at a recording's beginning and nothing in the file can say
-    otherwise, so the recording begins at the first detected collision, if there is one.
+    otherwise, so the recording begins at the first detection of a collision, if there is one.
 
     Args:
         path: the ``.rrd`` file; it appears whole or not at all.
@@ -64,7 +65,7 @@ def write_rrd(
         detection: what a detector said about it.
         model: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by
             default the trace's first attachment that ends in ``.xml``.
-        whole: keep what comes before the first detected collision.
+        whole: keep what comes before the first detection.
         explained: what each alarm was; contacts are drawn as blue arrows.
         about: a line above the text, on what the recording is shown for.
 
@@ -88,14 +89,18 @@ def write_rrd(
         text = page(trace, detection, explained, about)
         if not whole:
             trace, detection = cut(trace, detection, first_moment(trace, detection))
-        center = log_scene(recording, trace, scene)
+        shown = bodies(scene)
+        frames = thin(trace.t, FRAME_RATE, MOST_FRAMES)
+        moved = motion(scene, trace.joint_names, trace.q[frames])
+        # Before any data: a viewer plays until it has read that it is to wait.
+        recording.send_blueprint(blueprint(trace, detection, *seen(trace, shown, moved)))
+        log_scene(recording, trace, frames, shown, moved)
         log_checked(recording, trace)
         log_explained(recording, trace, explained)
         log_series(recording, trace, detection)
         log_states(recording, trace, detection)
         page_text = rr.TextDocument(text, media_type="text/markdown")
         recording.log("about", page_text, static=True)
-        recording.send_blueprint(blueprint(trace, detection, *center))
         recording.flush()
         recording.disconnect()
         os.replace(draft, path)
@@ -126,19 +131,22 @@ def entity(*parts: str) -> str:
     return "/".join(rr.escape_entity_path_part(part) for part in parts)
 
 
-def log_scene(recording: Any, trace: Trace, model: Any) -> tuple[Array, float]:
-    """The bodies, obstacles, contacts; the center [m] and radius [m] of what moves."""
-    recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    starts = thin(trace.t, FRAME_RATE, MOST_FRAMES)
-    t = trace.t[starts]
-    shown = bodies(model)
-    moved = motion(model, trace.joint_names, trace.q[starts])
-    truth = trace.truth
-    names = truth.obstacle_names if truth is not None else ()
+def seen(trace: Trace, shown: Sequence[Body], moved: Motion) -> tuple[Array, float]:
+    """Center [m] and radius [m] of what moves, obstacles apart."""
+    names = trace.truth.obstacle_names if trace.truth is not None else ()
     arm = [i for i, body in enumerate(shown) if body.moves and body.name not in names] or [0]
     corners = moved.positions[:, arm].reshape(-1, 3)
     center = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    view = center, float(np.linalg.norm(corners - center, axis=1).max()) + 0.1
+    return center, float(np.linalg.norm(corners - center, axis=1).max()) + 0.1
+
+
+def log_scene(
+    recording: Any, trace: Trace, frames: NDArray[np.int64], shown: Sequence[Body], moved: Motion
+) -> None:
+    """The bodies, obstacles and contacts at these rows of the trace."""
+    recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    t, truth = trace.t[frames], trace.truth
+    names = truth.obstacle_names if truth is not None else ()
     for index, body in enumerate(shown):
         place = entity("scene", body.name)
         for number, piece in enumerate(body.shapes):
@@ -146,20 +154,19 @@ def log_scene(recording: Any, trace: Trace, model: Any) -> tuple[Array, float]:
         if body.shapes and body.name not in names:
             log_pose(recording, place, body, index, t, moved)
     if truth is None:
-        return view
+        return
     for number, name in enumerate(names):
         place = entity("scene", name)
         if not any(body.name == name and body.shapes for body in shown):
             ball = rr.Ellipsoids3D(radii=[0.05], colors=[GREY], fill_mode="solid")
             recording.log(f"{place}/shape_0", ball, static=True)
-        poses = truth.obstacle_poses[starts, number]
+        poses = truth.obstacle_poses[frames, number]
         columns = rr.Transform3D.columns(
             translation=poses[:, :3, 3],
             quaternion=np.roll(quats_wxyz(poses[:, :3, :3]), -1, axis=1),
         )
         rr.send_columns(place, times(t), columns, recording=recording)
-    log_contacts(recording, trace, starts)
-    return view
+    log_contacts(recording, trace, frames)
 
 
 def log_pose(recording: Any, place: str, body: Body, index: int, t: Array, moved: Motion) -> None:
@@ -355,9 +362,10 @@ def blueprint(trace: Trace, detection: Detection | None, center: Array, radius: 
     charts = []
     if detection is not None:
         edge = np.array(detection.threshold)
+        top = SCORE_TOP * detection.threshold if detection.threshold > 0 else np.inf
         charts += [
             chart("residual", "Residual [N m]", detection.residual),
-            chart("score", "Score of the detector", detection.score, edge),
+            chart("score", "Score of the detector", np.minimum(detection.score, top), edge),
         ]
     if detection is not None or trace.truth is not None:
         charts.append(rrb.StateTimelineView(origin="states", name="Alarm and truth"))

@@ -1,4 +1,4 @@
-"""What a viewer of a recording should look at: the first detected collision, and a page of text."""
+"""What a viewer of a recording should look at: the first detection, and a page of text."""
 
 from __future__ import annotations
 
@@ -25,11 +25,15 @@ def alarm_of(collision: Collision, alarms: tuple[Alarm, ...]) -> Alarm | None:
 
 
 def first_moment(trace: Trace, detection: Detection | None) -> float:
-    """Where to begin [s]: the onset of the first detected collision, else the first sample."""
+    """Where to begin [s]: the first alarm of a detected collision, else the first sample.
+
+    At the collision's end, if the alarm comes later: what was struck is to be seen.
+    """
     if trace.truth is None or detection is None:
         return float(trace.t[0])
-    found = [c.onset for c in trace.truth.collisions if alarm_of(c, detection.alarms)]
-    return min(found, default=float(trace.t[0]))
+    found = [(alarm_of(c, detection.alarms), c) for c in trace.truth.collisions]
+    moments = [min(alarm.start, c.end) for alarm, c in found if alarm is not None]
+    return min(moments, default=float(trace.t[0]))
 
 
 def cut(
@@ -84,14 +88,15 @@ def page(
     if detection is not None:
         lines += [
             "- **Residual**: the observer's estimate of the external torque of each joint.",
-            f"- **Score**: the output of the {detection.detector} detector; above the red line "
-            "is a raw alarm.",
+            f"- **Score**: the output of the {detection.detector} detector; above the red line, "
+            f"at {detection.threshold:.3g}, is a raw alarm. High scores leave the chart.",
             "- **Alarm and truth**: when the alarm was up, and when there really was a contact.",
         ]
     lines += [
         "- **Current**: the measured motor currents, the only input.",
         "",
-        "Press the space bar to play (at half speed); click into a chart to go to a time.",
+        "Press the space bar to play (at half speed). Click into a chart with the right button "
+        "to go to a time; the `?` of each view lists its keys.",
         "",
         "*A research tool, not a certified safety function.*",
     ]

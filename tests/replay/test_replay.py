@@ -62,6 +62,17 @@ def columns(path):
     return found
 
 
+def test_the_layout_comes_before_the_data(recording):
+    """A viewer plays until it has read the layout, which says that it is to wait."""
+    printed = subprocess.run(
+        [Path(sys.executable).with_name("rerun"), "rrd", "print", recording[0]],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"RERUN_ANALYTICS": "0"},
+    ).stdout
+    assert 0 < printed.index("BlueprintActivationCommand") < printed.index("- /scene/")
+
+
 def test_rerun_verifies_it(recording):
     done = subprocess.run(
         [Path(sys.executable).with_name("rerun"), "rrd", "verify", recording[0]],
@@ -108,9 +119,10 @@ def test_arrows_only_while_there_is_contact(recording):
     assert touching.size == 0
 
 
-def test_it_begins_at_the_first_detected_collision(tmp_path):
+def test_it_begins_at_the_first_detection(tmp_path):
     trace, detection = arm.make()  # two collisions, the first is missed
-    start = trace.truth.collisions[1].onset
+    start = detection.alarms[0].start
+    assert start > trace.truth.collisions[1].onset
     assert first_moment(trace, detection) == start
     write_rrd(tmp_path / "a.rrd", trace, detection)
     assert min(times[0] for times, _ in columns(tmp_path / "a.rrd").values()) == start

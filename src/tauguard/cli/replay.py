@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import quote
 
 import tyro
 
@@ -30,7 +31,7 @@ def command(
         path: an MCAP file written by tauguard; with --web also an .rrd file or a folder of them.
         out: the recording (default: PATH with the ending .rrd).
         robot: MJCF or URDF file of the robot (default: the one attached to PATH).
-        whole: keep what comes before the first detected collision.
+        whole: keep what comes before the first detection.
         open: show it in the rerun viewer, which listens on 127.0.0.1 only.
         web: serve it and rerun's web viewer on 127.0.0.1, until interrupted.
         port: with --web, of the page (default: a free one).
@@ -69,7 +70,7 @@ def serve(shown: Path, port: int) -> None:
             f"{shown}: no index.html in it; `tauguard evaluate --events {shown}` writes one"
         )
     with BrowserReplay(folder, port) as replay:
-        address = f"{replay.address}/" if shown.is_dir() else replay.url(shown.name)
+        address = f"{replay.address}/" + ("" if shown.is_dir() else f"open/{quote(shown.name)}")
         signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the servers end with it
         print(f"open {address} in a browser; Ctrl-C ends this", flush=True)
         replay.wait()
