@@ -147,7 +147,7 @@ class Size:
 
 
 FULL = Size(3, SPEEDS[::2], 4, 0.1)
-QUICK = Size(1, (30.0,), 1, 0.02, Training(slices=4, free=4, free_seconds=15.0), 600, 60)
+QUICK = Size(1, (30.0,), 1, 0.015, Training(slices=4, free=4, free_seconds=15.0), 600, 60)
 
 #: By row of the ladder, then by speed.
 Found = dict[str, dict[float, Tally]]

@@ -116,13 +116,15 @@ LEARNERS = ("srq-svr", "window-network", "boosting")
 THOROUGH = ("srq-svr",)
 PARTS = ("training_size", "conditions", "sigma", "sample_rate")
 FULL = Size(3, ALL, Training(), 0.75, 10.0, 1.0, 13, 5, variations=True)
+#: Collision-free motion of a quick run, to calibrate and again to judge: an episode a speed [h].
+SIX_MINUTES = 0.095
 QUICK = Size(
     1,
     ("srq-svr", "current-network", "residual-thresholds"),
     Training(slices=5, free=4, free_seconds=20.0),
-    0.1,
-    0.1,
-    0.1,
+    SIX_MINUTES,
+    SIX_MINUTES,
+    SIX_MINUTES,
     1,
     0,
 )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tauguard.benchmarks.detection import chart as detection_chart
+from tauguard.benchmarks.detection import ladder
 from tauguard.benchmarks.detection import rows as report
 from tauguard.benchmarks.detection import study as detection_study
 from tauguard.benchmarks.detection.fleet import (
@@ -360,3 +361,11 @@ def test_a_detector_of_ones_own_is_judged_beside_ours(tmp_path, monkeypatch):
     (_, episode), *_ = free_pool(5, 30.0, (7,), 0.001, seconds=8.0)
     tally = judge_free(fleet, simulate(episode))["mine:Size", "hourly"]
     assert tally.free_seconds == pytest.approx(4.999)
+
+
+def test_a_quick_run_has_one_collision_free_episode_a_speed():
+    """More would double its time: an episode lasts a minute, however little of it is asked for."""
+    size = detection_study.QUICK
+    for hours in (size.hours / size.arms, size.short, size.calibration_hours):
+        assert all(len(free_pool(1, v, (1,), hours / len(SPEEDS))) == 1 for v in SPEEDS)
+    assert all(len(free_pool(1, v, (1,), ladder.QUICK.hours)) == 1 for v in ladder.QUICK.speeds)

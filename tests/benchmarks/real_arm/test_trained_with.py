@@ -1,8 +1,11 @@
 """Trained with little: what the rows say."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from tauguard.benchmarks.real_arm import trained_with
 from tauguard.benchmarks.real_arm.smallest_push import smallest_pushes
 from tauguard.benchmarks.real_arm.trained_with import first_seconds
 from tauguard.detectors import ArmModel
@@ -38,3 +41,17 @@ def test_a_smaller_bound_finds_a_smaller_push(fitted):
 def test_a_log_without_such_moments_has_no_pushes(fitted):
     trace = record(8, dwell=(30.0, 31.0))
     assert smallest_pushes(fitted, trace, False, 3, np.random.default_rng(0)) == []
+
+
+@pytest.mark.parametrize(("quick", "rows"), [(True, 2), (False, 3 * (2 + trained_with.ARMS))])
+def test_a_quick_run_has_one_real_and_one_simulated_arm(monkeypatch, quick, rows):
+    arms = [SimpleNamespace(name=name, free=()) for name in ("first", "second")]
+    monkeypatch.setattr(trained_with, "available", lambda: arms)
+    monkeypatch.setattr(trained_with, "nominal", lambda arm: None)
+    monkeypatch.setattr(trained_with, "recordings", lambda arm, kinds: {})
+    monkeypatch.setattr(trained_with, "drawn_arm", lambda number, logs: (None, {}))
+    monkeypatch.setattr(trained_with, "_row", lambda name, *_: {"arm": name})
+    found = [row["arm"] for row in trained_with.rows(quick, 0)]
+    assert len(found) == rows
+    assert found[0] == "first"
+    assert "simulated 100" in found
