@@ -208,6 +208,7 @@ def _measured(found: Mapping[str, Found], failed: Mapping[str, str], others: Seq
             "run": "quick" if one["quick"] else "full",
             "seed": one["seed"],
             "rows": len(one["rows"]),
+            "load": one["machine"].get("load"),
         }
         for name, one in found.items()
     ]
@@ -215,7 +216,8 @@ def _measured(found: Mapping[str, Found], failed: Mapping[str, str], others: Seq
     lost, beside = ", ".join(absent), ", ".join(others)
     return (
         "<p>A quick run shows the form of the answers, a full run their size. Of all quick studies "
-        "two run at a time: their times are those of a busy machine.</p>"
+        "two run at a time: their times are those of a busy machine. load: programs that wanted to "
+        "run when the study ended; above the number of cores its times are too long.</p>"
         + tables(runs, {})
         + (f"<p>Not in this report: {escape(lost)}.</p>" if lost else "")
         + (f"<p>Files of no study, not read: {escape(beside)}.</p>" if beside else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import io
 from collections.abc import Callable, Mapping
@@ -12,6 +13,7 @@ from tauguard.benchmarks import STUDIES
 from tauguard.benchmarks.harness import Incomplete
 from tauguard.report import Row, measured, table, write_json
 from tauguard.report.charts import STYLE
+from tauguard.report.machine import load, load_line
 from tauguard.whole_file import whole_file
 
 
@@ -29,18 +31,24 @@ def run_study(
     ``more`` holds keywords that this study alone takes.
 
     Raises:
-        ValueError: no such study; the message lists those there are.
+        ValueError: no such study (the message names the nearest, or those there are), or no folder
+            to write the figure or the JSON into.
         Incomplete: parts of the study failed; what the others found was printed and written.
         RuntimeError: the study failed by a defect.
     """
     if name not in STUDIES:
-        raise ValueError(f"no study {name!r}: there are {', '.join(STUDIES) or 'none yet'}")
+        raise ValueError(_no_study(name))
+    figure_path = figure_path or Path(f"bench-{name}.png")
+    for path in (figure_path, json_path):
+        if path is not None and not path.parent.is_dir():
+            raise ValueError(f"{path}: no folder {path.parent}; make it first")
     study = importlib.import_module(f"tauguard.benchmarks.{STUDIES[name].module}")
+    before = load()
     rows, broken = _rows(study, quick, seed, more or {})
     shown: Callable[[list[Row]], list[Row]] | None = getattr(study, "shown", None)
     print(table(shown(rows) if shown else rows, notes=getattr(study, "NOTES", {})))
+    print(load_line(before, load()))
 
-    figure_path = figure_path or Path(f"bench-{name}.png")
     with whole_file(figure_path) as stream:
         stream.write(chart(study, rows, figure_path.suffix[1:] or "png"))
     print(f"figure: {figure_path}")
@@ -51,6 +59,14 @@ def run_study(
     if broken is not None:
         raise broken
     return rows
+
+
+def _no_study(name: str) -> str:
+    """What to type instead."""
+    near = difflib.get_close_matches(name, STUDIES, n=1)
+    if near:
+        return f"no study {name!r}: did you mean {near[0]}? (`tauguard bench list` has all)"
+    return f"no study {name!r}: there are {', '.join(STUDIES) or 'none yet'}"
 
 
 def chart(study: Any, rows: list[Row], kind: str = "png") -> bytes:

@@ -36,14 +36,48 @@ def measured(
     }
 
 
+#: Programs that want to run, over the cores, above which times are those of a busy machine.
+BUSY = 1.25
+
+
 def machine() -> dict[str, Any]:
-    """What the figures were measured on."""
+    """What the figures were measured on; ``load``: see :func:`load`, when this is asked."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
         names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
         model = names[0].split(":", 1)[1].strip() if names else model
-    return {"processor": model, "cores": os.cpu_count(), "system": platform.system()}
+    return {
+        "processor": model,
+        "cores": os.cpu_count(),
+        "system": platform.system(),
+        "load": load(),
+    }
+
+
+def load() -> float | None:
+    """Programs that wanted to run over the last minute, this one among them; None: not known."""
+    try:
+        return round(os.getloadavg()[0], 1)
+    except (AttributeError, OSError):  # Windows, or a system that does not say
+        return None
+
+
+def load_line(begin: float | None, end: float | None) -> str:
+    """What a reader of times must know of the load, in one line.
+
+    Args:
+        begin: :func:`load` before the times were measured.
+        end: the same after it.
+    """
+    known = [each for each in (begin, end) if each is not None]
+    if not known:
+        return "load: not known here; times and their ratios hold for an idle machine"
+    cores = os.cpu_count() or 1
+    text = f"load: {begin} before, {end} after, {cores} core{'s' if cores > 1 else ''}"
+    if max(known) <= BUSY * cores:
+        return text
+    return f"{text}: a busy machine; do not trust times and ratios of times, errors hold"
 
 
 def versions() -> dict[str, str]:

@@ -5,13 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
+import mujoco
+
+from tauguard.contacts.geoms import geom_name
 from tauguard.contacts.guard.balance import Balance
 
 #: A partner of a contact: ("geom", id) or ("flex", id).
 Partner = tuple[str, int]
 #: Both partners of a contact, sorted.
 Pair = tuple[Partner, Partner]
+
+
+def partner_name(model: Any, partner: Partner) -> str:
+    """``geom 'cup'``, ``flex 'sheet'``; by its number where it has no name."""
+    kind, number = partner
+    if kind == "geom":
+        return f"geom {geom_name(model, number)}"
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, number)
+    return f"flex {name!r}" if name else f"flex {number}"
 
 
 @dataclass(frozen=True)
@@ -25,7 +38,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class StepReport:
-    """What one guarded step did."""
+    """What one guarded step did; ``guard.partners(pair)`` gives the names of a pair."""
 
     steps: int  #: calls of ``mj_step``, those that were taken back included
     contacts: int  #: that MuJoCo listed, the most in any piece of the step that stood

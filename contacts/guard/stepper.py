@@ -19,7 +19,7 @@ from tauguard.contacts.guard.covered import Covered, names
 from tauguard.contacts.guard.crossings import Crossings, elements
 from tauguard.contacts.guard.engine import INTEGRATION, addresses
 from tauguard.contacts.guard.mocap import pulled
-from tauguard.contacts.guard.report import Cut, Pair, StepReport
+from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
 
 #: What the native part goes by.
 SETTINGS = {
@@ -99,6 +99,15 @@ class GuardedStepper:
     def pairs(self) -> tuple[Pair, ...]:
         """Those that are covered."""
         return self._pairs
+
+    def partners(self, pair: Pair) -> tuple[str, str]:
+        """Names of both partners of a pair, as :attr:`pairs` and the reports hold them.
+
+        Returns:
+            ``geom 'cup'``, or ``geom 3 (of body 'arm')`` where it has no name; the same of flexes.
+        """
+        first, second = (partner_name(self.model, partner) for partner in pair)
+        return first, second
 
     @property
     def uncovered(self) -> tuple[Pair, ...]:

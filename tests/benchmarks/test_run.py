@@ -60,3 +60,35 @@ def test_what_was_found_is_printed_and_written(monkeypatch, tmp_path, capsys):
     written = json.loads((tmp_path / "f.json").read_text())
     assert written["rows"] == [{"study": "a", "figure": 42}]
     assert "by nought" in written["incomplete"]
+
+
+@pytest.mark.parametrize(("typed", "meant"), [("gard", "guard"), ("detecton", "detection")])
+def test_a_misspelt_study_is_answered_with_the_nearest(capsys, typed, meant):
+    with pytest.raises(SystemExit):
+        main(["bench", typed])
+    said = capsys.readouterr().err
+    assert f"no study {typed!r}: did you mean {meant}?" in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("load", [0.5, 50.0])
+def test_times_come_with_the_load_of_the_machine(monkeypatch, tmp_path, capsys, load):
+    monkeypatch.setattr("os.getloadavg", lambda: (load, load, load))
+    failing(monkeypatch, lambda quick, seed: [{"study": "a", "over_plain": 158.0}])
+    bench(tmp_path)
+    said = capsys.readouterr().out
+    assert f"load: {load} before, {load} after" in said
+    assert ("do not trust" in said) == (load == 50.0)
+    assert json.loads((tmp_path / "f.json").read_text())["machine"]["load"] == load
+
+
+@pytest.mark.parametrize("flag", ["--json", "--figure"])
+def test_a_folder_that_is_not_there_is_named_before_the_study_runs(
+    monkeypatch, tmp_path, capsys, flag
+):
+    ran = []
+    failing(monkeypatch, lambda quick, seed: ran.append(1))
+    with pytest.raises(SystemExit):
+        bench(tmp_path, flag, str(tmp_path / "none" / "f.png"))
+    assert "none; make it first" in capsys.readouterr().err
+    assert not ran

@@ -316,6 +316,22 @@ def test_a_step_that_mujoco_resets_names_every_pair():
     assert report.passed == guard.pairs
 
 
+def test_pairs_of_a_report_have_names():
+    model, data = ball_cloth(speed=50.0).start(5e-3)
+    with GuardedStepper(model, data) as guard:
+        cuts = [cut for _ in range(4) for cut in guard.step().cuts]
+        assert {guard.partners(cut.pair) for cut in cuts} == {("flex 'cloth_sheet'", "geom 'ball'")}
+    spec = mujoco.MjSpec()
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 0.1])
+    body = spec.worldbody.add_body(name="cup", pos=[0, 0, 1])
+    body.add_freejoint()
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0, 0])
+    model = spec.compile()
+    guard = GuardedStepper(model, mujoco.MjData(model))
+    expected = ("geom 0 (of body 'world')", "geom 1 (of body 'cup')")
+    assert [guard.partners(pair) for pair in guard.pairs] == [expected]
+
+
 def test_a_rotor_that_turns_more_than_half_a_turn_a_step_does_not_skip_a_wall():
     """5 rad a step: by the shortest way it would turn back 1.3 rad, away from the wall."""
     model = mujoco.MjModel.from_xml_string("""<mujoco><option timestep="5e-3" gravity="0 0 0"
