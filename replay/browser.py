@@ -88,6 +88,11 @@ class _Server(http.server.ThreadingHTTPServer):
     daemon_threads = True
     viewer = address = ""
 
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that leaves before it has read all is no error of ours."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
 
 class _Folder(http.server.SimpleHTTPRequestHandler):
     """The folder's own files; ``open/NAME`` leads to the viewer with that recording."""

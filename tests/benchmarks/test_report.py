@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 from html import escape
 
 import pytest
@@ -225,6 +226,19 @@ def test_mistakes_are_made_once_and_linked(tmp_path, made, capsys):
     assert base64.b64encode(b"picture").decode() in text
     assert "no alarm starts in the collision" in text
     assert "<b>" not in text
+
+
+def test_the_first_of_each_kind_is_drawn_in_the_order_of_the_table(tmp_path):
+    kinds = ("missed", "late", "false alarm")
+    rows = [
+        {"kind": kind, "file": f"{kind}-{k}.rrd", "at [s]": 1.5} for kind in kinds for k in (1, 2)
+    ]
+    (tmp_path / "wrong").mkdir()
+    for row in rows:
+        (tmp_path / "wrong" / row["file"].replace("rrd", "png")).write_bytes(row["file"].encode())
+    text = mistakes._html(tmp_path, "", rows)
+    drawn = re.findall('base64,([^"]+)', text)
+    assert [base64.b64decode(one).decode() for one in drawn] == [f"{k}-1.rrd" for k in kinds]
 
 
 @pytest.mark.parametrize("change", ["build", "seed", "recording", "old form"])

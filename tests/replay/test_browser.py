@@ -4,6 +4,8 @@ import dataclasses
 import http.client
 import io
 import socket
+import struct
+import threading
 import time
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -61,6 +63,21 @@ def test_the_folders_recordings_and_its_page_are_served_and_nothing_else(replay)
     assert replay.address.startswith("http://127.0.0.1:")
     for path in ("/secret.txt", "/../secret.txt", "/%2e%2e/x.rrd", "/missing.rrd"):
         assert answer(replay, path)[0].status == 404
+
+
+def test_a_browser_that_leaves_early_prints_nothing(tmp_path, capfd):
+    (tmp_path / "large.rrd").write_bytes(bytes(50_000_000))
+    with BrowserReplay(tmp_path) as running:
+        host, port = running.address[7:].split(":")
+        with socket.create_connection((host, int(port)), timeout=10) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            probe.sendall(b"GET /large.rrd HTTP/1.0\r\n\r\n")
+            assert probe.recv(100).startswith(b"HTTP/1.0 200")
+        end = time.monotonic() + 10
+        while threading.active_count() > 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        assert answer(running, "/missing.rrd")[0].status == 404
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_a_link_leads_to_the_viewer_with_that_recording(replay):

@@ -96,7 +96,7 @@ def judged(folder: Path, seed: int) -> dict[str, object]:
 def _html(folder: Path, counts: str, rows: list[dict[str, Any]]) -> str:
     from tauguard.cli.event_page import definitions
     from tauguard.cli.events import KINDS, command_to_open
-    from tauguard.report.page import Link, folded, tables
+    from tauguard.report.page import Link, tables
 
     chosen = [row for kind in KINDS for row in [r for r in rows if r["kind"] == kind][:SHOWN]]
     address = {row["file"]: f"open/wrong/{quote(str(row['file']))}" for row in chosen}
@@ -108,7 +108,7 @@ def _html(folder: Path, counts: str, rows: list[dict[str, Any]]) -> str:
         f"<code>{opens}</code> shows this page.</p>"
         + tables(shown, {})
         + _pictures(folder / "wrong", chosen)
-        + folded("What the words mean", definitions(LATE))
+        + f"<h4>What the words mean</h4>{definitions(LATE)}"
         + OFFLINE
     )
 
@@ -117,8 +117,10 @@ def _pictures(folder: Path, rows: list[dict[str, Any]]) -> str:
     """The first of each kind, drawn: the score beside its threshold."""
     from tauguard.report.page import picture
 
-    first = {row["kind"]: Path(row["file"]).with_suffix(".png").name for row in reversed(rows)}
-    there = {kind: folder / name for kind, name in first.items() if (folder / name).is_file()}
+    first: dict[str, Path] = {}
+    for row in rows:
+        first.setdefault(row["kind"], folder / Path(row["file"]).with_suffix(".png").name)
+    there = {kind: file for kind, file in first.items() if file.is_file()}
     return "".join(
         f"<figure>{picture(file.read_bytes(), 'png', f'{kind}: score and threshold')}</figure>"
         for kind, file in there.items()
