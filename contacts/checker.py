@@ -272,8 +272,9 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
     """The checker ``name`` for ``model``.
 
     Raises:
-        ValueError: no such checker or option (the message lists those there are), or a geom in the
-            model that this checker cannot handle.
+        ValueError: no such checker or option (the message lists those there are), a geom in the
+            model that this checker cannot handle, or a checker without ``name``, ``covers`` or
+            ``check``, or whose ``covers`` are no pairs of kinds.
     """
     if name not in _FACTORIES:
         raise ValueError(f"checker {name!r}: there are {', '.join(_FACTORIES) or 'none'}")
@@ -285,7 +286,17 @@ def checker(name: str, model: Any, **options: Any) -> Checker:
         raise ValueError(
             f"checker {name!r}: {error}; its options are {', '.join(known) or 'none'}"
         ) from None
-    return factory(model, **options)
+    made = factory(model, **options)
+    for needed in ("name", "covers", "check"):
+        if not hasattr(made, needed):
+            raise ValueError(f"checker {name!r}: it has no {needed}; see tauguard.contacts.Checker")
+    for pair in made.covers:
+        if len(pair) != 2 or pair_kind(*pair) != tuple(pair):
+            raise ValueError(
+                f"checker {name!r}: covers {pair!r}; expected pairs of kinds as "
+                "tauguard.contacts.pair_kind gives them"
+            )
+    return made
 
 
 def pair_kind(a: str, b: str) -> tuple[str, str]:

@@ -10,7 +10,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tauguard.contacts.checker import Checker, State, asked, checker, geom_kinds, pair_kind
+from tauguard.contacts.checker import (
+    Checker,
+    Contacts,
+    State,
+    asked,
+    checker,
+    geom_kinds,
+    pair_kind,
+)
 from tauguard.contacts.mujoco_checker import MujocoChecker
 from tauguard.contacts.referee import Referee
 from tauguard.contacts.report import Report, Score
@@ -47,8 +55,8 @@ def compare(
 
     Raises:
         ValueError: an unknown scene or checker, a geom that a checker or the referee cannot
-            handle, options of a checker that is not asked for, a timestep or duration that is not
-            above 0, a ``fine`` below 1.
+            handle, a checker's contact that is not of the model or the step, options of a checker
+            that is not asked for, a timestep or duration that is not above 0, a ``fine`` below 1.
     """
     if isinstance(scene, str):
         if scene not in SCENES:
@@ -59,6 +67,8 @@ def compare(
         raise ValueError(f"seconds {duration}: expected a time above 0")
     if fine is not None and fine < 1:
         raise ValueError(f"fine {fine}: expected 1 or more steps in one")
+    if isinstance(checkers, str):
+        raise ValueError(f"checkers {checkers!r}: expected a list of names, as [{checkers!r}]")
     for name in options or {}:
         if name not in checkers:
             raise ValueError(f"options of {name!r}: the checkers are {', '.join(checkers)}")
@@ -121,7 +131,7 @@ def _simulate(
             clock = time.process_time()
             found = asked(one, before, after)
             run.seconds[name].append(time.process_time() - clock)
-            run.contacts[name].append(found)
+            run.contacts[name].append(_fitting(name, model, found))
         if referee is not None:
             run.verdicts.append(referee.judge(before, after))
         run.times.append(after.time)
@@ -129,6 +139,23 @@ def _simulate(
             run.states.append(after)
         before = after
     return run
+
+
+def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
+    """What a checker reported, if it is of this model and of this step.
+
+    Raises:
+        ValueError: a geom or flex that is none, or a time outside the step.
+    """
+    limits = (("geom", found.geom, -1, model.ngeom - 1), ("flex", found.flex, -1, model.nflex - 1))
+    for field, value, low, high in (*limits, ("time", found.time, 0, 1)):
+        good = (value >= low) & (value <= high)
+        if not good.all():
+            said = value[~good][0]
+            raise ValueError(f"checker {name!r}: {field} {said}, expected {low} to {high}")
+    if ((found.geom < 0) == (found.flex < 0)).any():
+        raise ValueError(f"checker {name!r}: each partner is a geom or a flex, the other is -1")
+    return found
 
 
 def _first_contact(

@@ -60,6 +60,7 @@ class Score:
         us_low: 10 % quantile.
         us_high: 90 % quantile.
         share: Of the processor time of ``mj_step``.
+        not_covered: Contacts that it reported of pairs it does not cover; they are not counted.
         disagreements: By time.
     """
 
@@ -80,6 +81,7 @@ class Score:
     us_low: float = 0.0
     us_high: float = 0.0
     share: float = 0.0
+    not_covered: int = 0
     disagreements: tuple[Disagreement, ...] = ()
 
     @property
@@ -165,10 +167,16 @@ class Report:
         missed = sum(not o.generated for o in self.outcomes)
         lost = sum(not o.held for o in self.outcomes)
         lines.append(
-            f"{self.scene}: {self.steps} steps of {1e3 * self.timestep:g} ms, "
-            f"{len(self.outcomes)} contacts, by MuJoCo {missed} not generated, {lost} not held; "
-            f"mj_step {self.step_us:.0f} us"
+            f"{self.scene}: {self.steps} steps of {1e3 * self.timestep:g} ms, mj_step takes "
+            f"{self.step_us:.0f} us; contacts by the referee: {len(self.outcomes)}, of which "
+            f"MuJoCo did not list {missed} and did not hold {lost}"
         )
+        lines += [
+            f"{one.checker}: {one.not_covered} contacts of pairs that it does not cover, "
+            "not counted"
+            for one in self.scores
+            if one.not_covered
+        ]
         lines += [f"{one.time:8.4f} s  {one}" for one in self.disagreements[:20]]
         if len(self.disagreements) > 20:
             lines.append(f"... and {len(self.disagreements) - 20} more disagreements")
@@ -187,4 +195,4 @@ def pair_names(model: Any, pair: Pair) -> tuple[str, str]:
 def _cell(value: Any) -> str:
     if value is None:
         return "-"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    return f"{round(value, 5) + 0.0:.3g}" if isinstance(value, float) else str(value)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.contacts.checker import Contacts, geom_kinds, pair_kind
+from tauguard.contacts.checker import KINDS, Contacts, geom_kinds
 from tauguard.contacts.referee import TOLERANCE, Event, Pair, Verdicts, events, pair_of
 from tauguard.contacts.report import Disagreement, Outcome, Score, pair_names
 from tauguard.contacts.run import TOUCHING, Run
@@ -25,10 +25,12 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
 
     Recall counts events (a contact of two partners from touch to parting, don't-care ones left
     out), precision counts reports (a step and two partners); both only over kinds of pairs that the
-    checker and the referee cover. A report is a row whose surfaces touch; margins are not scored.
+    checker and the referee cover; no figure is of others than the checker covers. A report is a
+    row whose surfaces touch; margins are not scored.
     """
     kinds = geom_kinds(model)
-    mine = run.contacts[name]
+    given = run.contacts[name]
+    mine = [one.where(_mask(one.geom, kinds, covers)) for one in given]
     reports = _reports(model, run.times, mine)
     counted: dict[str, Any] = {}
     wrong: list[Disagreement] = []
@@ -38,7 +40,8 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
         truth = [e for e in events(model, run.times, verdicts) if e.counts]
         step = float(model.opt.timestep)
         seen = [e.seen(reports.get(e.pair, []), step) for e in truth]
-        right, total, false = _precision(model, run, mine, verdicts, kinds, both)
+        asked = [one.where(_mask(one.geom, kinds, both)) for one in mine]
+        right, total, false = _precision(model, run, asked, verdicts)
         positive, found = _steps(model, mine, verdicts)
         counted = {
             "events": len(truth),
@@ -67,6 +70,7 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
         us_low=float(low),
         us_high=float(high),
         share=float(np.median(run.seconds[name]) / np.median(run.step_seconds)),
+        not_covered=sum(map(len, given)) - sum(map(len, mine)),
         disagreements=tuple(sorted(wrong, key=lambda d: d.time)),
     )
 
@@ -119,20 +123,21 @@ def _reports(
     return dict(out)
 
 
-def _row_kind(kinds: Sequence[str], geom: Any, flex: Any) -> tuple[str, str]:
-    names = ["flex" if g < 0 else kinds[g] for g, _ in zip(geom, flex, strict=True)]
-    return pair_kind(names[0], names[1])
-
-
 def _covered(verdicts: Verdicts, kinds: Sequence[str], covers: Covers) -> Verdicts:
-    keep = _mask(verdicts.geom, verdicts.flex, kinds, covers)
+    keep = _mask(verdicts.geom, kinds, covers)
     fields = ("geom", "flex", "time", "depth", "counts")
     return Verdicts(*(getattr(verdicts, name)[keep] for name in fields))
 
 
-def _mask(geom: Any, flex: Any, kinds: Sequence[str], covers: Covers) -> NDArray[np.bool_]:
-    rows = zip(geom, flex, strict=True)
-    return np.array([_row_kind(kinds, g, f) in covers for g, f in rows], dtype=bool)
+def _mask(geom: Any, kinds: Sequence[str], covers: Covers) -> NDArray[np.bool_]:
+    """Which rows are of pairs in ``covers``; a partner without a geom (-1) is a flex."""
+    codes = np.array([KINDS.index(kind) for kind in (*kinds, "flex")])  # -1 finds the last
+    table = np.zeros((len(KINDS), len(KINDS)), dtype=bool)
+    for a, b in covers:
+        i, j = KINDS.index(a), KINDS.index(b)
+        table[i, j] = table[j, i] = True
+    rows = np.asarray(geom, dtype=np.intp).reshape(-1, 2)
+    return np.asarray(table[codes[rows[:, 0]], codes[rows[:, 1]]], dtype=bool)
 
 
 def _pairs(model: Any, geom: Any, flex: Any) -> list[Pair]:
@@ -144,15 +149,12 @@ def _precision(
     run: Run,
     mine: Sequence[Contacts],
     verdicts: Sequence[Verdicts],
-    kinds: Sequence[str],
-    covers: Covers,
 ) -> tuple[int, int, list[tuple[float, Pair, float]]]:
     """Reports that the referee agrees with (or does not care about), all reports, the others."""
     right = total = 0
     false = []
     for k, (contacts, verdict) in enumerate(zip(mine, verdicts, strict=True)):
         touching = _touching(contacts)
-        touching = touching.where(_mask(touching.geom, touching.flex, kinds, covers))
         said: dict[Pair, float] = {}
         rows = zip(_pairs(model, touching.geom, touching.flex), touching.distance, strict=True)
         for pair, distance in rows:

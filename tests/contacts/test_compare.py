@@ -83,6 +83,64 @@ def test_a_blind_and_a_jumpy_checker_are_told_apart():
     assert {row["checker"] for row in report.rows()} == {"blind", "jumpy"}
 
 
+class Stray(Jumpy):
+    """Reports a pair that it says it does not cover."""
+
+    name = "stray"
+    covers = frozenset({pair_kind("box", "mesh")})
+
+
+def test_pairs_that_a_checker_does_not_cover_are_not_counted():
+    register("stray", Stray)
+    report = compare(bounce(2.0), ["stray"], seconds=0.46)
+    stray = report["stray"]
+    assert stray.not_covered == report.steps == 230
+    assert (stray.events, stray.reports, stray.first, stray.lead_ms) == (0, 0, None, None)
+    assert "stray: 230 contacts of pairs that it does not cover" in str(report)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"geom": [[0, 2]]}, "geom 2, expected -1 to 1"),
+        ({"flex": [[-1, 0]]}, "flex 0, expected -1 to -1"),
+        ({"time": [1.5]}, "time 1.5, expected 0 to 1"),
+        ({"time": [np.nan]}, "time nan"),
+        ({"geom": [[0, -1]]}, "each partner is a geom or a flex"),
+    ],
+)
+def test_a_contact_of_another_model_or_step_is_refused(change, said):
+    class Wrong(Blind):
+        def check(self, before, after):
+            row = {"time": [0.5], "geom": [[0, 1]], "flex": [[-1, -1]], "feature": [[-1, -1]]}
+            row |= {"point": [[0, 0, 0]], "normal": [[1, 0, 0]], "distance": [0.0]}
+            return Contacts(**row | change)
+
+    register("wrong", Wrong, replace=True)
+    with pytest.raises(ValueError, match=f"checker 'wrong': {said}"):
+        compare(bounce(2.0), ["wrong"], seconds=0.01)
+
+
+@pytest.mark.parametrize(
+    ("covers", "said"),
+    [(None, "no covers"), ({("sphere", "box", "x")}, "pair_kind"), ({("ball", "box")}, "'ball'")],
+)
+def test_a_checker_that_is_none_is_refused(covers, said):
+    class Odd:
+        name = "odd"
+
+        def __init__(self, model):
+            if covers is not None:
+                self.covers = covers
+
+        def check(self, before, after):
+            return Contacts.empty()
+
+    register("odd", Odd, replace=True)
+    with pytest.raises(ValueError, match=said):
+        compare(bounce(2.0), ["odd"], seconds=0.01)
+
+
 @pytest.mark.parametrize("build", [ball_cloth, sphere_plate])
 def test_what_mujoco_steps_over_the_swept_checkers_see(build):
     report = compare(build(speed=40.0), timestep=5e-3)
@@ -131,6 +189,8 @@ def test_without_a_referee_there_is_cost_but_no_judgement():
 
 
 def test_bad_input_is_named():
+    with pytest.raises(ValueError, match=r"checkers 'rigid': expected a list of names"):
+        compare("arm_boxes", "rigid")
     with pytest.raises(ValueError, match=r"scene 'moon': there are arm_cloth"):
         compare("moon")
     with pytest.raises(ValueError, match=r"checker 'eye': there are .*mujoco"):
