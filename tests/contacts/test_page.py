@@ -22,7 +22,8 @@ def test_the_blocks_run(block, capsys):
         lines = out.splitlines()
         assert len(lines) >= 2
         assert lines[-1] == "True"
-        assert "('flex', 0), ('geom', 0)" in lines[0]
+        assert "flex 'cloth_sheet'" in lines[0]
+        assert "geom 'ball'" in lines[0]
     else:
         assert "mujoco missed: body ball and flex cloth_sheet" in out
         assert out.splitlines()[-1].startswith("1.0 [")
