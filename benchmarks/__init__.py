@@ -94,7 +94,7 @@ STUDIES: dict[str, Study] = {
     ),
     "faults": Study(
         "faults.study",
-        "faults of samples: which are seen, how soon, false alarms, and what goes untold",
+        "faults of samples: which are seen, how soon, false alarms, and those not reported",
     ),
     "listen": Study(
         "faults.live",

@@ -1,8 +1,8 @@
 """After the alarm: which link, which force, where, and what kind of event, against the truth.
 
 Four ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
-hypothesis (tauguard.detectors.diagnosis.diagnosis). ``exposed``: the same, told that nothing
-reaches link 1, the shoulder on its base. ``usual``: the link of the last joint with a significant
+hypothesis (tauguard.detectors.diagnosis.diagnosis). ``exposed``: the same, where nothing can
+reach link 1, the shoulder on its base. ``usual``: the link of the last joint with a significant
 residual, and the damped least-squares force at the middle of that link. ``told``: as ``surface``,
 but with the true external torque instead of the observer's estimate: what is wrong then is not the
 observer's fault, other contacts explain the same torques.
@@ -56,8 +56,8 @@ METHODS = ("surface", "exposed", "usual", "told")
 EXPOSED = (2, 3, 4, 5, 6)
 
 _ALARMS = (
-    "of the collisions that raised an alarm. surface: this project's; exposed: told that link 1 is "
-    "out of reach; usual, the peer: last joint with a residual, damped least squares at the "
+    "of the collisions that raised an alarm. surface: this project's; exposed: with link 1 out of "
+    "reach; usual, the peer: last joint with a residual, damped least squares at the "
     "middle of its link; told: surface with the true torque, what no observer can better. "
 )
 #: What the columns of each table mean.
@@ -67,8 +67,8 @@ NOTES = {
     "contact": "medians and 95th percentiles " + _ALARMS + "force_error_n: norm of the difference.",
     "kind": "counts: a row a true kind, a column what was said of it. All are simulated, pushes "
     "too: no person made one.",
-    "payload": "loads that nobody told of, taken up and put down. mass_error_g: median, of those "
-    "not called a collision.",
+    "payload": "loads unknown to the detector, taken up and put down. mass_error_g: median, of "
+    "those not called a collision.",
     "severity": NOTE,
     "cost": "wall time of one alarm; aftermath_us is what the residual around it takes first.",
 }

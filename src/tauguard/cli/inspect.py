@@ -30,8 +30,8 @@ def command(
         verify: compare every shard with its checksum in the manifest.
         json: write the figures here.
         figure: draw the figures here (PNG).
-        episode: simulate this episode again, split/number, from its line of the manifest, and check
-            that it has the same bytes.
+        episode: simulate this episode again, split/number (from 0), from its line of the manifest,
+            and check that it has the same bytes.
         mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
             turns that into an .rrd.
         robot: with --episode, the file of its arm, if that is not the package's own: the dataset
