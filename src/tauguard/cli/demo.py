@@ -99,8 +99,11 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
     from tauguard.cli.summary import text
 
     print(text(summary))
+    print(f"  the threshold: for {FALSE_ALARMS_PER_HOUR:.0f} false alarms per hour in training")
     print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
-    print(f"look at the recording with: .uv/bin/uv run rerun {out / 'demo.rrd'}")
+    recording = out / "demo.rrd"
+    print(f"to see it in a browser: .uv/bin/uv run tauguard replay --web {recording}")
+    print(f"in rerun's own window:  .uv/bin/uv run rerun {recording}")
 
 
 def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
