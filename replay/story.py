@@ -111,7 +111,8 @@ def collision_table(
     found = detection.alarms if detection is not None else ()
     rows = sorted(trace.truth.collisions, key=lambda c: c.onset)
     seen = sum(alarm_of(c, found) is not None for c in rows)
-    lines = [f"## {len(rows)} collisions" + (f", {seen} detected" if detection else ""), ""]
+    many = "collision" if len(rows) == 1 else "collisions"
+    lines = [f"## {len(rows)} {many}" + (f", {seen} detected" if detection else ""), ""]
     if not rows:
         return lines
     said = {one.alarm.start: one.summary for one in explained}
@@ -137,7 +138,8 @@ def alarms(detection: Detection | None, explained: Sequence[Explained] = ()) -> 
     """Markdown list of the alarms of a recording without truth."""
     if detection is None:
         return []
-    lines = [f"## {len(detection.alarms)} alarms", ""]
+    count = len(detection.alarms)
+    lines = [f"## {count} alarm{'' if count == 1 else 's'}", ""]
     said = {one.alarm.start: f": {one.summary}" for one in explained}
     lines += [
         f"- {a.start:.3f} s to {a.end:.3f} s{said.get(a.start, '')}"

@@ -203,6 +203,15 @@ def test_a_collision_whose_alarm_came_before_the_touch_says_so():
     )
 
 
+def test_an_alarm_milliseconds_before_the_touch_reads_earlier():
+    trace, detection = arm.make(hits=3)
+    touch = trace.truth.collisions[0].onset  # 0.667 s
+    said = dataclasses.replace(detection, alarms=(Alarm(touch - 1e-3, touch + 0.1),))
+    missed = next(events_of(match_detection(said, trace), 1.0))
+    assert f"{touch:.2f}" == f"{touch - 1e-3:.2f}"
+    assert missed.note == f"an alarm was up from {touch - 1e-3:.3f} s on"
+
+
 @pytest.mark.parametrize("name", ["thesis.txt", "episode-00000.rrd"])
 def test_a_folder_of_other_things_is_not_written_into(tmp_path, name):
     (tmp_path / name).write_text("keep")

@@ -64,13 +64,19 @@ def events_of(matching: Matching, late: float) -> Iterator[Event]:
             kind = "missed" if delay is None else "late" if delay > late else ""
             if kind == wanted:
                 up = [alarm for alarm in matching.false_alarms if _covers(alarm, c)]
-                note = f"an alarm was up from {up[0].start:.2f} s on" if up else ""
+                note = f"an alarm was up from {_before(up[0], c)} s on" if up else ""
                 span = detection_window(c)
                 yield Event(kind, c.onset, span, c.kind, c.link, c.peak_tau, delay, note)
     for alarm in matching.false_alarms:
         hit = [c for c in matching.collisions if _covers(alarm, c)]
         note = f"still up at the {hit[0].kind} of {hit[0].onset:.2f} s" if hit else ""
         yield Event("false alarm", alarm.start, (alarm.start, alarm.end), note=note)
+
+
+def _before(alarm: Alarm, collision: Collision) -> str:
+    """The alarm's start [s], so that it reads earlier than the touch."""
+    text = f"{alarm.start:.2f}"
+    return text if text != f"{collision.onset:.2f}" else f"{alarm.start:.3f}"
 
 
 def _covers(alarm: Alarm, collision: Collision) -> bool:
@@ -166,10 +172,12 @@ class EventFolder:
 
         opens = escape(command_to_open(self._folder))
         how = (
-            f"<p>{self.counts}. Each file shows {LENGTH:.0f} s of a recording, from {BEFORE} s "
-            f"before the event on; at most {MOST} of a kind are kept. The links open the files in "
-            f"the browser while <code>{opens}</code> runs; <code>rerun FILE</code> opens one "
-            "without.</p>" + definitions(self._late, self._alarm) + OFFLINE
+            f"<p>{self.counts}. Each file shows up to {LENGTH:.0f} s of a recording, from "
+            f"{BEFORE} s before the event on; at most {MOST} of a kind are kept. The links open "
+            f"the files in the browser while <code>{opens}</code> runs; "
+            "<code>rerun FILE</code> opens one without.</p>"
+            + definitions(self._late, self._alarm)
+            + OFFLINE
         )
         sections = {
             kind.capitalize(): events_html([r for r in self._rows if r["kind"] == kind])
