@@ -1,6 +1,7 @@
 """The command line as a user meets it: help, one-line errors, and the whole way."""
 
 import json
+import re
 import resource
 import subprocess
 import sys
@@ -48,7 +49,11 @@ def test_every_command_explains_itself(name, capsys):
     with pytest.raises(SystemExit) as stop:
         run(name, "--help")
     assert stop.value.code == 0
-    assert f"tauguard {name}" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert f"tauguard {name}" in shown
+    plain = " ".join(shown.replace("│", " ").split())
+    assert not re.search(r"\(default: [^)]*\)\.? \(default:", plain)
+    assert "(default: None)" not in plain
 
 
 def test_unknown_commands_and_studies_name_what_there_is(capsys):

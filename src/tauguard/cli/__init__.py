@@ -73,11 +73,14 @@ def main(argv: Sequence[str] | None = None) -> None:
     module = importlib.import_module(f"tauguard.cli.{name.replace('-', '_')}")
     for flag, kind in module.command.__annotations__.items():
         given = f"--{flag.replace('_', '-')}"
-        if str(kind).startswith("tuple") and args.count(given) > 1:  # the last would win
+        if "tuple[" in str(kind) and args.count(given) > 1:  # the last would win
             fail(f"{name}: {given} is given twice; several values follow one flag: {given} A B")
 
     import tyro
 
+    from tauguard.cli.help_text import tidy
+
+    tidy(module.command)
     try:
         tyro.cli(module.command, args=args[1:], prog=f"tauguard {name}")
     except BrokenPipeError:

@@ -48,6 +48,11 @@ def command(
 
     load_arm(robot)  # an unknown one is named before anything is simulated
     plan = demo_plan(seed, robot)
+    print(
+        f"simulates {plan.seconds / 60:.0f} minutes of motion, trains a detector and judges it: "
+        "one to three minutes",
+        flush=True,
+    )
     training = list(simulate_all(plan.train, workers, "simulate training"))
     judged = list(simulate_all([*plan.judge_struck, *plan.judge_free], workers, "simulate test"))
     simulated = time.perf_counter()

@@ -28,7 +28,7 @@ class Plain:
     """seconds from the beginning that you vouch for; a collision in them raises the thresholds so
     that others like it are missed later"""
     joints: tuple[int, ...] = ()
-    """whose residuals are looked at, counted from 1 (default: the first four)"""
+    """whose residuals are looked at, counted from 1; if none are named, the first four"""
     gains: tuple[float, ...] = ()
     """N m per ampere, one a joint (known for the preset ur10e)"""
     viscous: tuple[float, ...] = ()

@@ -1,0 +1,30 @@
+"""How a command's ``--help`` shows its arguments."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from typing import Annotated, Any, get_type_hints
+
+import tyro
+
+#: An argument of a docstring: its name, and its text with the lines that go on.
+ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
+
+
+def tidy(command: Callable[..., Any]) -> None:
+    """Break an argument's text where the terminal needs it, and name its default once.
+
+    tyro's own note of the default is left out where it is nothing, or where the text has one.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    texts = dict(ARGUMENT.findall(inspect.getdoc(command) or ""))
+    for name, parameter in inspect.signature(command).parameters.items():
+        text = " ".join(texts.get(name, "").split())
+        if not text:
+            continue
+        said = parameter.default in (None, ()) or "(default:" in text
+        shown = tyro.conf.arg(help=text, help_behavior_hint="" if said else None)
+        hints[name] = Annotated[hints[name], shown]
+    command.__annotations__ = hints
