@@ -1,5 +1,6 @@
 """The command line as a user meets it: help, one-line errors, and the whole way."""
 
+import dataclasses
 import json
 import re
 import resource
@@ -7,10 +8,12 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from tauguard.cli import COMMANDS, main
-from tauguard.cli.evaluate import name_of
+from tauguard.cli.evaluate import evaluated, name_of
+from tauguard.traces import Detection, Trace, Truth
 
 
 def run(*args: str) -> None:
@@ -107,6 +110,32 @@ def test_simulate_train_evaluate(tmp_path, capsys):
 def test_an_episode_of_a_dataset_has_the_name_that_inspect_takes():
     assert name_of(SimpleNamespace(meta={"episode": "test/3"}), 7) == "test/3"
     assert name_of(SimpleNamespace(meta={}), 0) == "0"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"joint_names": ("a", "b")}, "^second.mcap is of joints a, b, the model of j1, j2"),
+        ({"t": np.arange(50) / 100}, "^second.mcap"),
+    ],
+)
+def test_a_recording_that_does_not_fit_is_named_by_its_file(change, said):
+    t, still = np.arange(50) / 1000, np.zeros((50, 2))
+    first = Trace(("j1", "j2"), t, still, still, still, truth=quiet(t), meta={"log": "first.mcap"})
+    second = dataclasses.replace(first, meta={"log": "second.mcap"}, **change)
+    robot = SimpleNamespace(joint_names=("j1", "j2"))
+    detector = SimpleNamespace(arm=SimpleNamespace(robot=robot), dt=1e-3)
+    none = np.zeros(50)
+    detection = Detection("none", t, still, none, 1.0, none > 0, ())
+    alarm = SimpleNamespace(detector=detector, settle=0.0, detect=lambda trace: detection)
+    with pytest.raises(ValueError, match=said):
+        evaluated(alarm, [first, second], None)
+
+
+def quiet(t):
+    """The truth of a recording in which nothing is touched."""
+    zero, point = np.zeros((len(t), 2)), np.zeros((len(t), 3))
+    return Truth(zero, zero[:, 0], (), zero[:, 0], np.zeros(len(t), int), point, point)
 
 
 def test_a_model_file_that_was_not_named_is_not_replaced(tmp_path, capsys, monkeypatch):

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from tauguard.cli.events import EventFolder
     from tauguard.detectors import CollisionAlarm, Matching
+    from tauguard.detectors.evaluation.recordings import JudgedRecording
     from tauguard.traces import Trace
 
 
@@ -84,15 +85,37 @@ def evaluated(
 ) -> tuple[list[Matching], dict[str, Any]]:
     """Alarms matched with the truth, and all figures; what went wrong is kept by ``wrong``."""
     from tauguard.detectors import diagnosis_figures, figures
-    from tauguard.detectors.evaluation.recordings import judged_recordings
 
     matchings, said = [], []
-    for number, one in enumerate(judged_recordings(alarm, recordings)):
+    for name, one in _judged(alarm, recordings):
         matchings.append(one.matching)
         said += one.diagnoses(alarm)
         if wrong is not None:
-            wrong.add(name_of(one.trace, number), one.matching, (one.trace, one.detection))
+            wrong.add(name, one.matching, (one.trace, one.detection))
     return matchings, {**figures(matchings), "diagnosis": diagnosis_figures(said)}
+
+
+def _judged(
+    alarm: CollisionAlarm, recordings: Iterable[Trace]
+) -> Iterator[tuple[str, JudgedRecording]]:
+    """Recordings with their names, which an error gives in place of a number."""
+    from tauguard.detectors.evaluation.recordings import judged_recordings
+
+    names: list[str] = []
+
+    def named() -> Iterator[Trace]:
+        for number, trace in enumerate(recordings):
+            names.append(name_of(trace, number))
+            yield trace
+
+    try:
+        for one in judged_recordings(alarm, named()):
+            yield names[-1], one
+    except ValueError as error:
+        counted = f"recording {len(names)}"
+        if not names or not str(error).startswith(counted):
+            raise
+        raise ValueError(names[-1] + str(error).removeprefix(counted)) from None
 
 
 def name_of(trace: Trace, number: int) -> str:
