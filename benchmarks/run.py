@@ -63,7 +63,7 @@ def run_study(
 
 def _no_study(name: str) -> str:
     """What to type instead."""
-    near = difflib.get_close_matches(name, STUDIES, n=1)
+    near = difflib.get_close_matches(name, STUDIES, n=1, cutoff=0.75)
     if near:
         return f"no study {name!r}: did you mean {near[0]}? (`tauguard bench list` has all)"
     return f"no study {name!r}: there are {', '.join(STUDIES) or 'none yet'}"
