@@ -78,6 +78,14 @@ def test_bad_input_is_one_line(capsys, tmp_path):
     assert "simulate" in fails(capsys, "simulate", "--out", str(tmp_path / "file"))
 
 
+def test_what_replay_cannot_show_is_said(capsys, tmp_path):
+    (tmp_path / "demo.rrd").touch()
+    folder, file = str(tmp_path), str(tmp_path / "demo.rrd")
+    assert "a folder; --web shows it" in fails(capsys, "replay", folder)
+    assert "a recording already; --web shows it" in fails(capsys, "replay", file)
+    assert f"name one of its recordings ({file})" in fails(capsys, "replay", "--web", folder)
+
+
 def test_simulate_train_evaluate(tmp_path, capsys):
     struck, free = tmp_path / "all", tmp_path / "all" / "free"
     common = ("--workers", "1", "--payloads-g", "0", "1000", "--speeds", "30")

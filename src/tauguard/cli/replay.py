@@ -28,7 +28,8 @@ def command(
     `report`.
 
     Args:
-        path: an MCAP file written by tauguard; with --web also an .rrd file or a folder of them.
+        path: an MCAP file written by tauguard; with --web also an .rrd file or a folder of them,
+            with --open also an .rrd file.
         out: the recording (default: PATH with the ending .rrd).
         robot: MJCF or URDF file of the robot (default: the one attached to PATH).
         whole: keep what comes before the first detection.
@@ -37,7 +38,10 @@ def command(
         port: with --web, of the page (default: a free one).
     """
     shown = path
-    if not (web and (path.is_dir() or path.suffix == ".rrd")):
+    if not web and (path.is_dir() or (path.suffix == ".rrd" and not open)):
+        kind = "a folder" if path.is_dir() else "a recording already"
+        raise ValueError(f"{path}: {kind}; --web shows it in a browser")
+    if not (path.is_dir() or path.suffix == ".rrd"):
         shown = recorded(path, out, robot, whole)
     if web:
         serve(shown, port)
@@ -66,8 +70,10 @@ def serve(shown: Path, port: int) -> None:
         raise FileNotFoundError(f"{shown}: no such file or folder")
     folder = shown if shown.is_dir() else shown.parent
     if shown.is_dir() and not (shown / "index.html").exists():
+        there = ", ".join(sorted(str(file) for file in shown.glob("*.rrd"))[:3])
+        own = f"name one of its recordings ({there}), or " if there else ""
         raise ValueError(
-            f"{shown}: no index.html in it; `tauguard evaluate --events {shown}` writes one"
+            f"{shown}: no index.html in it; {own}the folder of `tauguard evaluate --events FOLDER`"
         )
     with BrowserReplay(folder, port) as replay:
         address = f"{replay.address}/" + ("" if shown.is_dir() else f"open/{quote(shown.name)}")
