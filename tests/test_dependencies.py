@@ -57,7 +57,7 @@ def test_every_import_is_declared():
 @pytest.mark.parametrize("room", ["cloth", "rigid"])
 def test_the_page_of_a_light_room_runs_with_numpy_alone(room, tmp_path):
     page = (ROOT / "docs" / f"{room}.md").read_text()
-    assert "pip install --no-deps tauguard" in page
+    assert "pip install --no-deps ." in page
     blocks = re.findall(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
     command = [sys.executable, "-c", BLOCK + blocks[0]]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)

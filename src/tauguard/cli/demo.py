@@ -107,8 +107,8 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
     print(f"  the threshold: for {FALSE_ALARMS_PER_HOUR:.0f} false alarms per hour in training")
     print(f"\n{out}/: demo.mcap  demo.rrd  model.skops  summary.json  summary.png")
     recording = out / "demo.rrd"
-    print(f"to see it in a browser: .uv/bin/uv run tauguard replay --web {recording}")
-    print(f"in rerun's own window:  .uv/bin/uv run rerun {recording}")
+    print(f"to see it in a browser: .uv/bin/uv run --no-dev tauguard replay --web {recording}")
+    print(f"in rerun's own window:  .uv/bin/uv run --no-dev rerun {recording}")
 
 
 def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
