@@ -110,9 +110,12 @@ def collision_table(
     assert trace.truth is not None
     found = detection.alarms if detection is not None else ()
     rows = sorted(trace.truth.collisions, key=lambda c: c.onset)
-    seen = sum(alarm_of(c, found) is not None for c in rows)
+    detected = [alarm for alarm in (alarm_of(c, found) for c in rows) if alarm is not None]
+    false = len(found) - len({alarm.start for alarm in detected})
     many = "collision" if len(rows) == 1 else "collisions"
-    lines = [f"## {len(rows)} {many}" + (f", {seen} detected" if detection else ""), ""]
+    wrong = f", {false} false alarm{'s' if false > 1 else ''}" if false else ""
+    judged = f", {len(detected)} detected{wrong}" if detection else ""
+    lines = [f"## {len(rows)} {many}{judged}", ""]
     if not rows:
         return lines
     said = {one.alarm.start: one.summary for one in explained}

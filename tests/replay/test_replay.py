@@ -139,6 +139,9 @@ def test_the_page_tells_what_was_detected():
     text = page(trace, detection, about="Strike on link 3: missed")
     assert text.startswith("## Strike on link 3: missed")
     assert "2 collisions, 1 detected" in text
+    alarms = (*detection.alarms, Alarm(0.2, 0.3))
+    more = page(trace, dataclasses.replace(detection, alarms=alarms))
+    assert "2 collisions, 1 detected, 1 false alarm\n" in more
     assert "1 collision, 0 detected" in page(*arm.make(hits=1))
     assert "| 3.000 | strike | 3 | 20.0 | 12 ms |" in text
     assert "| 1.000 | strike | 3 | 20.0 | - |" in text
