@@ -82,6 +82,24 @@ def free_rows(trace: Trace, settle: float = 1.0, recover: float = 0.5) -> Bools:
     return np.asarray(free)
 
 
+def undisturbed_rows(traces: Sequence[Trace], settle: float) -> list[Bools]:
+    """Collision-free rows to learn free motion from, shape (T,) a trace.
+
+    A collision leaves an estimator that tracks the payload with wrong beliefs. What follows within
+    the time that it needs to settle is no free motion: one such second of a recording can be 80
+    times what all others leave. Where every row is so close to a collision, all count that are
+    outside of them.
+
+    Args:
+        traces: without truth all of a trace counts as free.
+        settle: of the estimator [s].
+    """
+    found = [free_rows(trace, settle, max(settle, 0.5)) for trace in traces]
+    if any(rows.any() for rows in found):
+        return found
+    return [free_rows(trace, settle) for trace in traces]
+
+
 @dataclass(frozen=True)
 class Matching:
     """What the alarms of one trace were worth."""

@@ -13,7 +13,7 @@ from tauguard.detectors.calibration.calibrate import calibrate
 from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.estimation.gains import DETECTION_GAIN, PLAIN_GAIN
-from tauguard.detectors.evaluation.events import free_rows
+from tauguard.detectors.evaluation.events import undisturbed_rows
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.frozen import Frozen
@@ -58,7 +58,7 @@ class FrontEndSettings:
         joints = tuple(j - 1 for j in self.joints if 1 <= j <= count)
         if not joints:
             raise ValueError(f"joints {self.joints}: expected some of 1 to {count}")
-        free = [np.flatnonzero(free_rows(trace, self.settle))[::THIN] for trace in traces]
+        free = [np.flatnonzero(rows)[::THIN] for rows in undisturbed_rows(traces, self.settle)]
         if not sum(len(rows) for rows in free):
             raise ValueError(
                 f"no collision-free motion after the first {self.settle:g} s of any trace"

@@ -11,7 +11,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.evaluation.events import free_rows
+from tauguard.detectors.evaluation.events import undisturbed_rows
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.scaling import Scaling
 from tauguard.traces.trace import Trace
@@ -61,6 +61,7 @@ class PerJoint(ABC, Generic[Fitted]):
         """
         front = self.front.fit(traces, arm)
         scaling = self.scaling(front)
-        free = [np.abs(front.scaled(t, scaling)[free_rows(t, front.settle)]) for t in traces]
+        rows = undisturbed_rows(traces, front.settle)
+        free = [np.abs(front.scaled(t, scaling)[r]) for t, r in zip(traces, rows, strict=True)]
         limits = np.maximum(np.quantile(np.concatenate(free), self.share, axis=0), 1e-9)
         return self.fitted(front, scaling, limits)

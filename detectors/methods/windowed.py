@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.evaluation.events import free_rows
+from tauguard.detectors.evaluation.events import undisturbed_rows
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.native_stream import NativeStream
@@ -111,7 +111,8 @@ class Windowed(ABC):
         near to collisions, and resolve what lies below them instead.
         """
         plain = front.scaling(self.units)
-        free = [np.abs(front.scaled(t, plain)[free_rows(t, front.settle)]) for t in traces]
+        rows = undisturbed_rows(traces, front.settle)
+        free = [np.abs(front.scaled(t, plain)[r]) for t, r in zip(traces, rows, strict=True)]
         most = np.quantile(np.concatenate(free), 1 - RARE, axis=0)
         return replace(plain, envelope=_widened(plain, np.maximum(most, 1.0)), compress=True)
 
@@ -128,10 +129,12 @@ class Windowed(ABC):
             Prepared(
                 front.scaled(trace, scaling),
                 target,
-                free_rows(trace, front.settle),
+                rows,
                 (target > FELT) & (trace.t >= trace.t[0] + front.settle),
             )
-            for trace, target in zip(traces, targets, strict=True)
+            for trace, target, rows in zip(
+                traces, targets, undisturbed_rows(traces, front.settle), strict=True
+            )
         ]
 
     def draw(
