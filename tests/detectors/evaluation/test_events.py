@@ -1,11 +1,18 @@
 """Output filter, alarms and their matching to collisions."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauguard.detectors.evaluation.events import collision_free, find_alarms, match
+from tauguard.detectors.evaluation.events import (
+    collision_free,
+    find_alarms,
+    match,
+    undisturbed_rows,
+)
 from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
 from tauguard.traces.trace import Alarm, Collision
 
@@ -112,3 +119,23 @@ def test_bad_input():
         confirmed([True], 0)
     with pytest.raises(ValueError, match="confirmation -1"):
         confirmation_samples(-1, 1e-3)
+
+
+def recorded(*collisions):
+    """Ten seconds at 10 Hz."""
+    return SimpleNamespace(t=np.arange(100) * 0.1, truth=SimpleNamespace(collisions=collisions))
+
+
+def test_what_an_estimator_still_believes_after_a_collision_is_no_free_motion():
+    struck, free = recorded(collision(2.0, 2.1), collision(4.0, 4.1)), recorded()
+    one, other = undisturbed_rows([struck, free], settle=3.0)
+    # A collision occupies half a second, and the estimator settles anew in three.
+    assert struck.t[one].tolist() == pytest.approx(np.arange(76, 100) * 0.1)
+    assert free.t[other].tolist() == pytest.approx(np.arange(30, 100) * 0.1)
+
+
+def test_recordings_that_hold_collisions_all_the_time_still_have_free_motion():
+    struck = recorded(*(collision(k + 0.1, k + 0.2) for k in range(1, 10, 2)))
+    (rows,) = undisturbed_rows([struck], settle=3.0)
+    assert rows.any()
+    assert not rows[(struck.t > 5.1) & (struck.t < 6.1)].any()
