@@ -9,14 +9,14 @@ projection onto the span of the picked ones.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import solve_triangular
 
 from tauguard.arrays import Array
 from tauguard.detectors.methods.svr_regressor import srq_kernel
 
-#: A vector whose distance from the span of the picked ones is below this share of its norm is not
+#: A vector whose squared distance from the span of the picked ones is below this is not
 #: picked: it would add nothing but rounding. Its norm is 1 in the SRQ kernel.
-DEPENDENT = 1e-10
+DEPENDENT = 1e-8
 
 
 def reduced_set(
@@ -58,6 +58,10 @@ def reduced_set(
         distance -= column**2
         columns[:, k] = column
         picked.append(best)
-    chosen = np.sort(np.array(picked, dtype=np.int64))
-    factor = cho_factor(kernel[np.ix_(chosen, chosen)])
-    return np.ascontiguousarray(vectors[chosen]), cho_solve(factor, values[chosen])
+    # The columns are the factor of the picked vectors' kernel matrix: another one could fail where
+    # vectors nearly depend on each other.
+    lower = columns[picked, : len(picked)]
+    new = solve_triangular(lower, values[picked], lower=True)
+    new = solve_triangular(lower, new, lower=True, trans="T")
+    order = np.argsort(picked)
+    return np.ascontiguousarray(vectors[np.array(picked)[order]]), new[order]

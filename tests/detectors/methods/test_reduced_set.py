@@ -36,6 +36,15 @@ def test_all_vectors_give_the_same_function_and_fewer_the_best_of_their_span(see
     assert all(b <= a + 1e-8 for a, b in itertools.pairwise(errors))
 
 
+def test_vectors_on_a_line_that_nearly_depend_on_each_other_are_no_error():
+    rng = np.random.default_rng(60502)
+    vectors, alpha = rng.normal(size=(36, 1)), rng.normal(size=36)
+    points = np.linspace(-3, 3, 50)[:, None]
+    few, beta = reduced_set(vectors, alpha, 1.5, 36)
+    truth = srq_kernel(points, vectors, 1.5) @ alpha
+    np.testing.assert_allclose(srq_kernel(points, few, 1.5) @ beta, truth, atol=1e-4)
+
+
 def test_vectors_that_are_there_twice_are_kept_once():
     rng = np.random.default_rng(0)
     vectors = rng.normal(size=(10, 3))
