@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.evaluation.events import undisturbed_rows
+from tauguard.detectors.evaluation.events import free_rows, undisturbed_rows
 from tauguard.detectors.features.envelope import Envelope
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, OnFrontEnd
 from tauguard.detectors.features.native_stream import NativeStream
@@ -129,12 +129,10 @@ class Windowed(ABC):
             Prepared(
                 front.scaled(trace, scaling),
                 target,
-                rows,
+                free_rows(trace, front.settle),
                 (target > FELT) & (trace.t >= trace.t[0] + front.settle),
             )
-            for trace, target, rows in zip(
-                traces, targets, undisturbed_rows(traces, front.settle), strict=True
-            )
+            for trace, target in zip(traces, targets, strict=True)
         ]
 
     def draw(
