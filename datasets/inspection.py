@@ -120,19 +120,19 @@ def _count(into: dict[str, Counter[str]], what: dict[str, Counter[str]]) -> None
 
 def leaks(configuration: Configuration, found: dict[str, SplitSummary]) -> list[str]:
     """What splits share that they must not: motion seeds, and what a split calls unseen."""
-    told = []
+    lines = []
     names = list(found)
     for i, a in enumerate(names):
         for b in names[i + 1 :]:
             if shared := found[a].seeds & found[b].seeds:
-                told.append(f"{a} and {b} share {len(shared)} motion seeds")
+                lines.append(f"{a} and {b} share {len(shared)} motion seeds")
     first = configuration.splits[0]
     for split in configuration.splits[1:]:
         for what in split.unseen:
             of_first = found[first.name].values.get(what, set())
             if shared := of_first & found[split.name].values.get(what, set()):
-                told.append(f"{split.name} shares {what} {sorted(shared)} with {first.name}")
-    return told
+                lines.append(f"{split.name} shares {what} {sorted(shared)} with {first.name}")
+    return lines
 
 
 def missing(folder: Path) -> list[str]:
@@ -161,16 +161,16 @@ def verified(folder: Path) -> list[tuple[str, str]]:
 
 def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
     """Classes of which there is not what was stated: planned otherwise, or achieved by far."""
-    told = []
+    lines = []
     for name, classes in stated.items():
         if {k: v for k, v in classes.items() if v} != dict(one.planned.get(name, {})):
-            told.append(f"{name}: planned other than stated")
+            lines.append(f"{name}: planned other than stated")
     for name in ACHIEVED:
         for value, wanted in stated[name].items():
             there = one.achieved.get(name, Counter())[value]
             if abs(there - wanted) > max(SLACK * wanted, SLACK_COUNT):
-                told.append(f"{name} {value}: {there} of {wanted} planned")
-    return told
+                lines.append(f"{name} {value}: {there} of {wanted} planned")
+    return lines
 
 
 def report(folder: Path) -> dict[str, Any]:

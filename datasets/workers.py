@@ -159,7 +159,7 @@ def _end_with_parent() -> None:
 
 def _receive(pipe: Connection, process: BaseProcess) -> Any:
     try:
-        result, error, told = pipe.recv()
+        result, error, trace = pipe.recv()
     except (EOFError, ConnectionError):
         process.join(1)  # its pipe is closed: it is about to end, and the command with it
         code = process.exitcode or 0
@@ -167,7 +167,7 @@ def _receive(pipe: Connection, process: BaseProcess) -> Any:
         raise WorkerDied(f"a worker process died ({how})") from None
     if error is not None:
         if not isinstance(error, ValueError | OSError):
-            error.add_note(told)
+            error.add_note(trace)
         raise error
     return result
 

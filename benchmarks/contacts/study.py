@@ -193,10 +193,10 @@ def _summary(rows: list[Row], quick: bool) -> list[Row]:
     for name in CHECKERS:
         mine = [r for r in rows if r["study"] == "scenes" and r["checker"] == name]
         for kind in ("recall", "steps_recall", "precision"):
-            told = [r for r in mine if r[kind]["n"]]
-            count = sum(round(r[kind]["value"] * r[kind]["n"]) for r in told)
-            runs = sum(r[kind]["n"] for r in told)
-            worst = min(told, key=lambda r: r[kind]["value"])
+            counted = [r for r in mine if r[kind]["n"]]
+            count = sum(round(r[kind]["value"] * r[kind]["n"]) for r in counted)
+            runs = sum(r[kind]["n"] for r in counted)
+            worst = min(counted, key=lambda r: r[kind]["value"])
             text = f"{count} of {runs}, lowest {worst[kind]['value']:.4f} in {worst['scene']}"
             bar = kind == "recall" and name != "mujoco"
             met = count == runs if bar else None

@@ -1,6 +1,6 @@
 """Whether a detector keeps the guarantee of its conformal calibration on fresh motion.
 
-Episodes of collision-free motion are drawn alike: speed, payload (never told), temperature and path
+Episodes of collision-free motion are drawn alike: speed, payload (not known), temperature and path
 at random. Some calibrate the threshold for a number of false alarms per hour, others are fresh. The
 guarantee is kept where the rate asked for lies inside or above the exact Poisson 95 % interval of
 the alarms counted. The same pool is then split anew, again and again: how many draws kept it.

@@ -3,7 +3,7 @@
 Four ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
 hypothesis (tauguard.detectors.diagnosis.diagnosis). ``exposed``: the same, where nothing can
 reach link 1, the shoulder on its base. ``usual``: the link of the last joint with a significant
-residual, and the damped least-squares force at the middle of that link. ``told``: as ``surface``,
+residual, and the damped least-squares force at the middle of that link. ``exact``: as ``surface``,
 but with the true external torque instead of the observer's estimate: what is wrong then is not the
 observer's fault, other contacts explain the same torques.
 """
@@ -51,14 +51,14 @@ if TYPE_CHECKING:
 DETECTOR, PER_HOUR = "moving-thresholds", 5.0
 #: Force that the damping of the usual way expects [N].
 EXPECTED = 100.0
-METHODS = ("surface", "exposed", "usual", "told")
+METHODS = ("surface", "exposed", "usual", "exact")
 #: Links that collisions of these plans are on, which ``exposed`` knows.
 EXPOSED = (2, 3, 4, 5, 6)
 
 _ALARMS = (
     "of the collisions that raised an alarm. surface: this project's; exposed: with link 1 out of "
     "reach; usual, the peer: last joint with a residual, damped least squares at the "
-    "middle of its link; told: surface with the true torque, what no observer can better. "
+    "middle of its link; exact: surface with the true torque, what no observer can better. "
 )
 #: What the columns of each table mean.
 NOTES = {
@@ -163,13 +163,13 @@ def judge(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Judged
         return Judged(*known, found, {}, {})
     assert event.trace.truth is not None
     exact = replace(after, residual=event.trace.truth.tau_ext[after.rows])
-    told = diagnoser.explain(event.alarm, exact)
+    informed = diagnoser.explain(event.alarm, exact)
     exposed = replace(diagnoser, surface=surface.only(EXPOSED)).explain(event.alarm, after)
     answers = {
         "surface": Answer(found.link, found.force, found.point),
         "exposed": Answer(exposed.link, exposed.force, exposed.point),
         "usual": usual(diagnoser, after, found),
-        "told": Answer(told.link, told.force, told.point),
+        "exact": Answer(informed.link, informed.force, informed.point),
     }
     truth = contact_at(event.trace, event.collision, found.time)
     errors = {n: ContactErrors.of(a.force, a.point, truth) for n, a in answers.items()}
@@ -292,14 +292,14 @@ def payload_rows(judged: Sequence[Judged]) -> list[Row]:
     for mass in (None, *sorted({abs(j.mass) for j in changes})):
         some = [j for j in changes if mass in (None, abs(j.mass))]
         found = [(j.diagnosis, j.mass) for j in some if j.diagnosis is not None]
-        told = [abs(d.signs.mass - m) for d, m in found if not d.collision]
+        masses = [abs(d.signs.mass - m) for d, m in found if not d.collision]
         rows.append(
             {
                 "study": "payload",
                 "payload_kg": mass or "all",
                 "alarm_raised": rate(len(found), len(some)),
                 "called_collision": rate(sum(d.collision for d, _ in found), len(found)),
-                "mass_error_g": 1000 * float(np.median(told)) if told else None,
+                "mass_error_g": 1000 * float(np.median(masses)) if masses else None,
             }
         )
     return rows

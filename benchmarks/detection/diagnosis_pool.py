@@ -19,7 +19,7 @@ from tauguard.traces import STRATA, Alarm, Collision, Trace
 END = 0.03
 #: A hand's push: half a sine of force that lasts so long [s].
 PUSH_SECONDS = (0.6, 1.4)
-#: Severity of pushes [N m], and payloads that are taken up and put down [g], neither ever told.
+#: Severity of pushes [N m], and payloads that are taken up and put down [g], unknown both.
 PUSH_STRATA, PICKED = STRATA[:4], (500.0, 1000.0, 2000.0, 3500.0)
 #: Times of one payload episode at which the load comes and goes [s].
 UP, DOWN, LONG = 4.0, 8.0, 10.0

@@ -27,7 +27,7 @@ from tauguard.traces import STRATA, Collision, Trace
 
 #: Percent of the joints' maximum speed that detectors are judged at.
 SPEEDS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
-#: Payloads of the judged motions, none of them a training payload, never told [g].
+#: Payloads of the judged motions, none of them a training payload, unknown to the detector [g].
 PAYLOADS = (0.0, 500.0, 1500.0, 2000.0, 3000.0, 3500.0)
 #: Contact force of a judged collision [N].
 FORCES = (20.0, 200.0)

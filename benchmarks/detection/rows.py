@@ -45,7 +45,7 @@ def spread(fleets: Sequence[Fleet]) -> Spread:
 
 
 def _threshold(values: Sequence[float]) -> Row:
-    """Of the levelled score (the network's first two: amperes): median over arms and range."""
+    """Of the normalised score (the network's first two: amperes): median over arms and range."""
     low, high = float(min(values)), float(max(values))
     return {"threshold": float(np.median(values)), "threshold_low": low, "threshold_high": high}
 

@@ -4,7 +4,7 @@ A fault of a second is put into logs that training has not seen; the same stretc
 the answers are held against. ``seen``: a reason is given while the fault lasts, or within 0.15 s
 after it. ``false alarms``: collisions said in or after the fault that the intact stretch does not
 have. ``found after``: alarms of the intact stretch, from the recovery on, that are there as well.
-``untold``: seconds of fault, from 20 ms on, in which the answer is "free". ``missed``: collisions
+``silent``: seconds of fault, from 20 ms on, in which the answer is "free". ``missed``: collisions
 within faults at which the answer stays "free", of those that the intact stretch finds.
 
 What is optimistic: the allowances of the position check (a velocity or time stamp one sample late)
@@ -47,7 +47,7 @@ PLAIN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "n
 NOTES = {
     "clean": "logs as they are: seconds at fault, each of them false, and alarms beside `detect`.",
     "faults": "a fault of 1 s at random moments and at collisions; delays in ms from its first "
-    "sample. untold_s: the answer is free. missed: collisions within faults with no answer but "
+    "sample. silent_s: the answer is free. missed: collisions within faults with no answer but "
     "free; of_struck: collisions that the same stretch without the fault finds there. found_after: "
     "share of its later collisions that are found after the recovery.",
     "loop": "microseconds from sample to answer, calls taken in turn on the longest log; Python "
@@ -99,7 +99,7 @@ class Tally:
     false: int = 0
     found: int = 0
     after: int = 0
-    untold: float = 0.0
+    silent: float = 0.0
     struck: int = 0  #: collisions within faults
     missed: int = 0  #: of them, with no answer but "free"
 
@@ -127,7 +127,7 @@ class Tally:
         self.after += len(late)
         self.found += sum(any(abs(t - u) < 0.1 for u in said) for t in late)
         gaps = {t for t in b.free if start + 0.02 < t < start + LASTS}  # a burst has one time
-        self.untold += len(gaps) * trace.dt
+        self.silent += len(gaps) * trace.dt
         within = [t for t in true if start + 0.02 < t < start + LASTS]
         self.struck += len(within)
         self.missed += sum(not any(t <= u <= t + MISSED for u in b.other) for t in within)
@@ -144,7 +144,7 @@ class Tally:
             "longest_ms": max(self.delays, default=None),
             "false_alarms": self.false,
             "found_after": rate(self.found, self.after),
-            "untold_s": self.untold,
+            "silent_s": self.silent,
             "of_s": self.moments * (LASTS - 0.02),
             "missed": self.missed,
             "of_struck": self.struck,

@@ -26,7 +26,7 @@ UNEXPLAINED, DOUBTFUL = 0.35, 0.1
 #: UR10e 4.3 and 4.6 with a load in one of seven, 2.4 with loads in two of eight, 1.2 without; 4.5
 #: where the others move single joints only. From the second on if much is unexplained as well.
 OUTLYING, OUTLYING_IN_DOUBT = 2.5, 1.5
-#: A told load is off by more than so many kg, and than this share of it, before it is refused: a
+#: A given load is off by more than so many kg, and than this share of it, before it is refused: a
 #: UR10e's torques show 2.2 kg of 2.6 kg, and 0.05 kg of none.
 WRONG_LOAD = (0.8, 0.3)
 #: Slower joints are not judged [rad/s]: static friction explains itself.
@@ -110,26 +110,26 @@ def outlier(held: Sequence[Array], least: float = OUTLYING) -> tuple[int, float]
 
 
 def check_loads(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording]) -> None:
-    """Refuse a load that was told and that the torques of its log do not show.
+    """Refuse a load that was given and that the torques of its log do not show.
 
     Args:
         arm: nominal numbers, and gains whose scale holds.
         names: of the logs.
-        recordings: with the loads told.
+        recordings: with the loads given.
 
     Raises:
-        ValueError: names the log, what was told and what its torques show.
+        ValueError: names the log, what was given and what its torques show.
     """
     for k, (name, recording) in enumerate(zip(names, recordings, strict=True)):
-        told = recording.load.mass if recording.load is not None else 0.0
-        if told == 0:
+        given = recording.load.mass if recording.load is not None else 0.0
+        if given == 0:
             continue
         open_ = [replace(r, load=None) if i == k else r for i, r in enumerate(recordings)]
         shown = float(identify(arm, open_).loads[k, 0])
-        if abs(shown - told) > max(WRONG_LOAD[0], WRONG_LOAD[1] * told):
+        if abs(shown - given) > max(WRONG_LOAD[0], WRONG_LOAD[1] * given):
             raise ValueError(
-                f"{name}: {told:g} kg were told, its torques show {shown:.1f} kg beside the other "
-                "logs: tell the load that was carried, in kg, or =unknown"
+                f"{name}: {given:g} kg were given, its torques show {shown:.1f} kg beside the "
+                "other logs: give the load that was carried, in kg, or =unknown"
             )
 
 

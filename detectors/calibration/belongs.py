@@ -78,7 +78,7 @@ def torque_per_ampere(arm: ArmModel, traces: Sequence[Trace]) -> float:
     """What the drives give over what the columns hold, root mean square [N m/A].
 
     Over all joints and samples, so the joints that carry the arm count, not a wrist joint whose
-    gain nothing fixes. 0.9 to 1.1 for joint torques told as currents, 4 to 16 for currents.
+    gain nothing fixes. 0.9 to 1.1 for joint torques given as currents, 4 to 16 for currents.
     """
     current = np.concatenate([trace.current for trace in traces])
     torque = current * arm.drive_gain
@@ -102,6 +102,6 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
         return
     raise ValueError(
         f"the logs show {has:.3g} N m against gravity (root mean square), the robot file's arm "
-        f"needs {need:.3g} N m: the file of another arm, gains that are wrong, or torques told as "
+        f"needs {need:.3g} N m: the file of another arm, gains that are wrong, or torques given as "
         "currents (--torque)"
     )

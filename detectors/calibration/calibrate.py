@@ -2,7 +2,7 @@
 
 The residual of the nominal observer is linear in the errors of the inertial numbers, in the weights
 of the friction columns, in the relative errors of the drive gains and in the payloads carried
-(four numbers a trace, not told). All pass through the same causal filter as in detection, so no
+(four numbers a trace, not known). All pass through the same causal filter as in detection, so no
 acceleration is needed. Priors fix what motion does not excite, and the scale: without them a free
 fit of the gains collapses to zero, so the priors count as strong as thousands of samples.
 """

@@ -63,7 +63,7 @@ class Beliefs:
     cancel each other beyond."""
     loaded: float = 0.3  #: of friction per load [1]
     saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
-    payload: float = 5.0  #: of a load that was not told [kg]
+    payload: float = 5.0  #: of a load that is not given [kg]
     moment: float = 0.5  #: of its first moment [kg m]
     spread: float = 0.2  #: of its inertia about the last link's origin [kg m^2]
     softness: float = 5.0  #: a sample counts 1/softness^2: model errors are not white
@@ -101,9 +101,9 @@ def _deviations(
     heaviest = np.diagonal(mass_matrix(robot, poses), axis1=1, axis2=2).max(axis=0)
     loads, means = [], []
     for recording in recordings:
-        load, told = recording.load, is_known(recording)
+        load, given = recording.load, is_known(recording)
         loads += [1e-6 if load is not None else beliefs.payload]
-        loads += [1e-6 if told else beliefs.moment] * 3
+        loads += [1e-6 if given else beliefs.moment] * 3
         nothing = load is not None and load.mass == 0
         loads += [1e-6 if nothing else beliefs.spread] * 6
         means.append(known_load(recording))
@@ -198,7 +198,7 @@ def _fit(
     for turn in range(rounds):
         if data is None or not held:
             data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
-        if turn and friction.modelled:  # loads that were not told are known by now
+        if turn and friction.modelled:  # loads that were not given are known by now
             data = [
                 d if is_known(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)
                 for d, r, load in zip(data, recordings, loads, strict=True)

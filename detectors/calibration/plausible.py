@@ -1,7 +1,7 @@
 """Whether a log's currents can be those of its motion: joints, signs, units and gains.
 
 Without a collision, what the drives give less friction is what the rigid arm needs. Friction that
-nobody told, a load and gains that are half right leave a part of it; currents in milliamperes, of
+is not given, a load and gains that are half right leave a part of it; currents in milliamperes, of
 other joints or with the other sign leave as much as there is.
 """
 

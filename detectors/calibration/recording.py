@@ -18,11 +18,11 @@ SHORTEST = 8.0
 
 @dataclass(frozen=True)
 class Load:
-    """What the arm carried, as far as it was told."""
+    """What the arm carried, as far as it is known."""
 
     mass: float = 0.0  #: [kg]
     centre: tuple[float, float, float] | None = None
-    """In the last link's frame [m]; None: not told, identified with the rest."""
+    """In the last link's frame [m]; None: not known, identified with the rest."""
 
     def __post_init__(self) -> None:
         """``ValueError`` for a mass below 0 or numbers that are not finite."""
@@ -83,7 +83,7 @@ def is_known(recording: Recording) -> bool:
 
 
 def known_load(recording: Recording) -> Array:
-    """Inertial numbers of the load as far as it was told, as in ``Identified.loads``, (10,)."""
+    """Inertial numbers of the load as far as it is known, as in ``Identified.loads``, (10,)."""
     load = recording.load or Load()
     x, y, z = load.centre or (0.0, 0.0, 0.0)
     spread = y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y

@@ -45,7 +45,7 @@ def filtered(
 ) -> Filtered:
     """Everything that the regression needs of a recording at these gains.
 
-    ``load`` is what it carries, shape (10,), for friction that depends on it (default: as told).
+    ``load`` is what it carries, shape (10,), for friction that depends on it (default: as given).
     """
     trace = recording.trace
     held = None

@@ -100,7 +100,7 @@ class AftermathOf:
         )
 
     def _payload_columns(self, rows: slice) -> Array:
-        """What a payload at the last link that nobody told adds to the residual."""
+        """What an unknown payload at the last link adds to the residual."""
         trace, n = self.trace, self.arm.robot.joints
         p, beta = momentum_regressor(
             self.arm.robot, trace.q[rows], trace.qd[rows], link=n - 1, count=PAYLOAD, threads=1

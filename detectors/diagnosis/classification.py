@@ -4,7 +4,7 @@ Three questions, each with a measure that has a physical meaning:
 
 * Does it last? An impact is over while a clamping, a push and a payload are still there: what the
   residual keeps at the end of the look, in the direction of its peak.
-* Is it a load? A payload that nobody told of pulls down at the flange: the share of the residual
+* Is it a load? An unknown payload pulls down at the flange: the share of the residual
   that one constant mass and first moment at the last link explain, over all joints and samples.
 * Does somebody mean it? A hand pushes more slowly than an arm runs into things (Golz et al. 2015,
   Kouris et al. 2018 use the spectrum), and a clamping always works against the arm's motion: the

@@ -1,4 +1,4 @@
-"""Faults of the samples themselves, told from collisions: see :mod:`.inputs`."""
+"""Faults of the samples themselves, as apart from collisions: see :mod:`.inputs`."""
 
 from tauguard.detectors.faults.inputs import FAULTS, FaultCheck, UsualInput
 

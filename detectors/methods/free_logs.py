@@ -1,4 +1,4 @@
-"""Logs told to be free of contacts, each judged by what the other logs show.
+"""Logs given as free of contacts, each judged by what the other logs show.
 
 A contact in such a log raises the bounds, and contacts like it are then missed. So every log is
 looked at under a calibration and bounds from the others. Its alarms are counted; a log that has far
@@ -40,7 +40,7 @@ TURNS = 12
 #: among free ones 1e-5.
 CHANCE = 0.01
 #: Median of a log's residual in motion over its bound, from which on it differs throughout, as with
-#: a load that was not told (1.1 and 0.6 on two simulated arms; up to 0.5 of three arms' free logs).
+#: a load that is not given (1.1 and 0.6 on two simulated arms; up to 0.5 of three arms' free logs).
 THROUGHOUT = 0.8
 #: Motion that is kept at least when logs are left out [s].
 KEPT = 20.0

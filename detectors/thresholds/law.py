@@ -3,7 +3,7 @@
 Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
 (:mod:`.speed_levels`), and the threshold is where the tail of their peaks has the rate of
 false alarms that is accepted (:mod:`.rates`), or the one that a calibration set guarantees
-(:mod:`.guarantee`). What the motion allows besides is told by :mod:`.expected_rate`.
+(:mod:`.guarantee`). What else the motion allows: :mod:`.expected_rate`.
 """
 
 from __future__ import annotations

@@ -178,7 +178,7 @@ def test_payloads_by_file_name_or_stem():
 
 
 def test_a_load_in_grams_is_refused():
-    with pytest.raises(ValueError, match="at most 100; loads are told in kg"):
+    with pytest.raises(ValueError, match="at most 100; loads are given in kg"):
         real_logs.loaded({"a.csv": record(0, 12.0)}, ("a=2600",))
 
 
@@ -308,7 +308,7 @@ def test_a_load_that_the_torques_do_not_show_is_refused(folder, tmp_path, capsys
     logs = [str(folder / f"log{seed}.csv") for seed in range(3)]
     given = [*flags(folder), "--gains", *GAINS, "--out", str(tmp_path / "false.xml")]
     error = fails(capsys, "calibrate", *logs, *given, "--payload", "log1=3")
-    assert "log1.csv: 3 kg were told, its torques show" in error
+    assert "log1.csv: 3 kg were given, its torques show" in error
     assert not (tmp_path / "false.xml").exists()
 
 

@@ -10,7 +10,7 @@ import tyro
 if TYPE_CHECKING:
     from tauguard.detectors.calibration.identification import Identified
 
-#: Geared joints give more torque per ampere over all [N m/A]; torques told as currents about 1.
+#: Geared joints give more torque per ampere over all [N m/A]; torques given as currents about 1.
 SMALL_GAIN = 2.0
 SOURCES = {
     "torques": "the logs' torques",
@@ -66,9 +66,9 @@ def command(
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
     traces, numbers = read_logs(logs, columns, robot, torque)
-    told = dict(zip(traces, loaded(traces, payload), strict=True))
+    known = dict(zip(traces, loaded(traces, payload), strict=True))
     traces = moving(traces)
-    recordings = [told[name] for name in traces]
+    recordings = [known[name] for name in traces]
     if not gains:
         check_named(robot, columns, list(traces.values()))
     arm, source = start(numbers, recordings, columns, gains, scale)

@@ -78,7 +78,7 @@ def command(
     for name, path in (("--json", json), ("--record", record), ("--rerun", shown)):
         if path is not None and not path.absolute().parent.is_dir():
             raise ValueError(f"{name} {path}: the folder {path.parent} does not exist")
-    alarm = told(load_model(model), model, payload, torque)
+    alarm = with_load(load_model(model), model, payload, torque)
     if alarm.inputs is None:
         raise ValueError(f"{model}: does not say what samples look like; train the detector anew")
     check_robot(robot, alarm.detector.arm.robot, model)
@@ -107,7 +107,9 @@ def command(
         write_json(json, result)
 
 
-def told(alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool) -> CollisionAlarm:
+def with_load(
+    alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool
+) -> CollisionAlarm:
     """The alarm of an arm with this load, if it was trained on such signals."""
     from tauguard.cli.real_logs import carried
     from tauguard.detectors.methods.free_motion import carrying

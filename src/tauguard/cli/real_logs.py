@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 #: A log that begins later than this is stamped by a clock [s].
 CLOCK = 1e6
-#: No load of an arm's is told heavier than this [kg]: it would be grams.
+#: No load of an arm is heavier than this [kg]: it would be grams.
 HEAVIEST = 100.0
 
 
@@ -177,7 +177,7 @@ def printed_from(begin: float) -> float:
 
 
 def loaded(traces: dict[str, Trace], payload: tuple[str, ...]) -> list[Recording]:
-    """Traces with their loads, each told as LOG=KG, LOG=KG,X,Y,Z or LOG=unknown.
+    """Traces with their loads, each given as LOG=KG, LOG=KG,X,Y,Z or LOG=unknown.
 
     Raises:
         ValueError: a payload that cannot be read or belongs to no log.
@@ -214,14 +214,14 @@ def _load(text: str, value: str, form: str = "LOG=KG, LOG=KG,X,Y,Z or LOG=unknow
     if parts[0] > HEAVIEST:
         raise ValueError(
             f"--payload {text}: {parts[0]:g} kg, expected at most {HEAVIEST:g}; "
-            "loads are told in kg"
+            "loads are given in kg"
         )
     centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
     return Load(parts[0], centre)
 
 
 def carried(text: str) -> Load:
-    """A load told to ``detect``.
+    """A load given to ``detect``.
 
     Raises:
         ValueError: not KG or KG,X,Y,Z.
@@ -244,7 +244,7 @@ def doubts(
         held: held-out residual of each [N m], (n,) each; empty: not known.
 
     Raises:
-        ValueError: so much is left that the logs cannot be the arm's as told.
+        ValueError: so much is left that the logs cannot be the arm's as given.
     """
     from tauguard.detectors.calibration.assessment import (
         OUTLYING,
@@ -272,13 +272,13 @@ def doubts(
             f"did {log} carry something (tell it with --payload {log}=KG or =unknown), or did "
             "something touch the arm (leave the log out)?"
         )
-    told = [
+    given = [
         f"{r.load.mass:g} kg in {n}"
         for n, r in zip(names, recordings, strict=True)
         if r.load is not None and r.load.mass > 0
     ]
-    if told and doubtful:
-        asked.append(f"loads told: {', '.join(told)}; are these right, and in kg?")
+    if given and doubtful:
+        asked.append(f"loads given: {', '.join(given)}; are these right, and in kg?")
     if refused:
         raise ValueError("; ".join([refused, *asked]))
     return [*notes, *asked]

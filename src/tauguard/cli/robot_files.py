@@ -61,8 +61,8 @@ def check_named(robot: Path, columns: str | None, traces: Sequence[Trace]) -> No
     """
     known = r"ur(?:3|5|10|16|20|30)e?"
     name = re.search(r'<(?:robot|mujoco)[^>]*?(?:name|model)="([^"]*)"', robot.read_text())
-    told = f"{name.group(1) if name else ''} {robot.stem}".lower()
-    arms = re.findall(rf"(?<![a-z0-9]){known}(?![a-z0-9])", told)
+    names = f"{name.group(1) if name else ''} {robot.stem}".lower()
+    arms = re.findall(rf"(?<![a-z0-9]){known}(?![a-z0-9])", names)
     presets = {str(trace.meta.get("columns") or columns) for trace in traces}
     others = sorted(p for p in presets if re.fullmatch(known, p) and arms and p not in arms)
     if others:

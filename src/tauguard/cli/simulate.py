@@ -67,12 +67,12 @@ def command(
         else free_episodes(first + seed, episodes, seconds, speeds, payloads_g, arm, robot=robot)
     )
     paths = write_dataset(planned, out, workers, checkers)
-    rows = [told(path, episode) for path, episode in zip(paths, planned, strict=True)]
+    rows = [described(path, episode) for path, episode in zip(paths, planned, strict=True)]
     if json is not None:
         write_json(json, {"name": "simulate", "seed": seed, "rows": rows})
 
 
-def told(path: Path, episode: Episode) -> dict[str, object]:
+def described(path: Path, episode: Episode) -> dict[str, object]:
     """What one recording holds, printed as a line and given for JSON."""
     from tauguard.traces import read_mcap
 
