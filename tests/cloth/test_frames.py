@@ -42,7 +42,7 @@ def test_two_frames_can_be_compared():
     assert_same(a, b)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(deadline=None, max_examples=30)
 @given(small_meshes())
 def test_any_small_mesh_has_the_collisions_of_all_pairs(mesh):
     """Lattice positions: touching, coplanar, degenerate faces and edges of no length abound."""

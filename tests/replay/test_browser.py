@@ -69,12 +69,13 @@ def test_a_browser_that_leaves_early_prints_nothing(tmp_path, capfd):
     (tmp_path / "large.rrd").write_bytes(bytes(50_000_000))
     with BrowserReplay(tmp_path) as running:
         host, port = running.address[7:].split(":")
+        before = threading.active_count()
         with socket.create_connection((host, int(port)), timeout=10) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             probe.sendall(b"GET /large.rrd HTTP/1.0\r\n\r\n")
             assert probe.recv(100).startswith(b"HTTP/1.0 200")
         end = time.monotonic() + 10
-        while threading.active_count() > 2 and time.monotonic() < end:
+        while threading.active_count() > before and time.monotonic() < end:
             time.sleep(0.05)
         assert answer(running, "/missing.rrd")[0].status == 404
     assert "Traceback" not in capfd.readouterr().err
