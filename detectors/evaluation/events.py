@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 MERGE_GAP = 0.5
 #: An alarm this long after the onset still detects the collision [s].
 WINDOW = 0.5
+#: What follows a collision so closely is not counted as collision-free [s].
+RECOVER = 0.5
 #: Length of a non-collision case [s].
 CASE_SECONDS = 2.0
 
@@ -67,7 +69,7 @@ def occupied(collision: Collision) -> Interval:
     return collision.onset, max(collision.end, detection_window(collision)[1])
 
 
-def free_rows(trace: Trace, settle: float = 1.0, recover: float = 0.5) -> Bools:
+def free_rows(trace: Trace, settle: float = 1.0, recover: float = RECOVER) -> Bools:
     """Rows outside all known collisions.
 
     Args:
@@ -94,7 +96,7 @@ def undisturbed_rows(traces: Sequence[Trace], settle: float) -> list[Bools]:
         traces: without truth all of a trace counts as free.
         settle: of the estimator [s].
     """
-    found = [free_rows(trace, settle, max(settle, 0.5)) for trace in traces]
+    found = [free_rows(trace, settle, max(settle, RECOVER)) for trace in traces]
     if any(rows.any() for rows in found):
         return found
     return [free_rows(trace, settle) for trace in traces]

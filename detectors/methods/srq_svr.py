@@ -51,10 +51,6 @@ class SrqSvr(Windowed):
         few = 0 < self.vectors < len(regressor.vectors)
         return regressor.reduced(self.vectors) if few else regressor
 
-    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
-        """The scaling before its factor is known."""
-        return self.compressed(traces, front)
-
     def scaling(
         self,
         traces: Sequence[Trace],

@@ -101,9 +101,9 @@ class Windowed(ABC):
         shape: WindowShape,
     ) -> Scaling:
         """How the residual is scaled."""
-        return self.compressed(traces, front)
+        return self.bare(traces, front)
 
-    def compressed(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
+    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """The residual in ``units`` envelopes, or more of a joint that free motion asks more of.
 
         The envelope is a deviation. Where collision-free motion leaves nearly nothing but at starts
