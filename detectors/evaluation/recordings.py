@@ -39,10 +39,11 @@ def judged_recordings(
     """Detect in each recording and match with its truth.
 
     Raises:
-        ValueError: no truth, another sample rate, or other joints; the recording's number is named.
+        ValueError: no truth, another sample rate, or other joints; the recording's number is named,
+            counted from 0.
     """
     own = alarm.detector.arm.robot.joint_names
-    for number, trace in enumerate(recordings, start=1):
+    for number, trace in enumerate(recordings):
         check_interval(f"recording {number}", trace, alarm.detector.dt)
         if trace.joint_names != own:
             raise ValueError(

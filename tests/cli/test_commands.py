@@ -86,6 +86,15 @@ def test_what_replay_cannot_show_is_said(capsys, tmp_path):
     assert f"name one of its recordings ({file})" in fails(capsys, "replay", "--web", folder)
 
 
+def test_replay_replaces_no_recording(capsys, tmp_path):
+    """A file that nobody named is not written over; with --out another one is."""
+    (tmp_path / "a.rrd").write_bytes(b"mine")
+    (tmp_path / "a.mcap").touch()
+    message = fails(capsys, "replay", str(tmp_path / "a.mcap"))
+    assert "a.rrd is there already: name the file to write with --out" in message
+    assert (tmp_path / "a.rrd").read_bytes() == b"mine"
+
+
 def test_simulate_train_evaluate(tmp_path, capsys):
     struck, free = tmp_path / "all", tmp_path / "all" / "free"
     common = ("--workers", "1", "--payloads-g", "0", "1000", "--speeds", "30")

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
+#: A number a joint; the help names no default for none.
+PerJoint = Annotated[tuple[float, ...], tyro.conf.arg(help_behavior_hint="")]
+
+
 @dataclasses.dataclass(frozen=True)
 class Plain:
     """Without --model: the momentum observer, and thresholds from the log's own beginning.
@@ -27,13 +31,13 @@ class Plain:
     quiet: float = 10.0
     """seconds from the beginning that you vouch for; a collision in them raises the thresholds so
     that others like it are missed later"""
-    joints: tuple[int, ...] = ()
+    joints: Annotated[tuple[int, ...], tyro.conf.arg(help_behavior_hint="")] = ()
     """whose residuals are looked at, counted from 1; if none are named, the first four"""
-    gains: tuple[float, ...] = ()
+    gains: PerJoint = ()
     """N m per ampere, one a joint (known for the preset ur10e)"""
-    viscous: tuple[float, ...] = ()
+    viscous: PerJoint = ()
     """friction in N m s/rad, one a joint"""
-    coulomb: tuple[float, ...] = ()
+    coulomb: PerJoint = ()
     """friction in N m, one a joint"""
     observer_gain: float = 20.0
     """rate of the momentum observer in 1/s"""

@@ -112,7 +112,7 @@ def _judged(
         for one in judged_recordings(alarm, named()):
             yield names[-1], one
     except ValueError as error:
-        counted = f"recording {len(names)}"
+        counted = f"recording {len(names) - 1}"
         if not names or not str(error).startswith(counted):
             raise
         raise ValueError(names[-1] + str(error).removeprefix(counted)) from None

@@ -30,10 +30,11 @@ def command(
     Args:
         path: an MCAP file written by tauguard; with --web also an .rrd file or a folder of them,
             with --open also an .rrd file.
-        out: the recording (default: PATH with the ending .rrd).
+        out: the recording (default: PATH with the ending .rrd, if there is none yet).
         robot: MJCF or URDF file of the robot (default: the one attached to PATH).
         whole: keep what comes before the first detection.
-        open: show it in the rerun viewer, which listens on 127.0.0.1 only.
+        open: show it in the rerun viewer, which listens on 127.0.0.1 only; a recording of that
+            name that is there already is shown as it is.
         web: serve it and rerun's web viewer on 127.0.0.1, until interrupted.
         port: with --web, of the page (default: a free one).
     """
@@ -42,7 +43,10 @@ def command(
         kind = "a folder" if path.is_dir() else "a recording already"
         raise ValueError(f"{path}: {kind}; --web shows it in a browser")
     if not (path.is_dir() or path.suffix == ".rrd"):
-        shown = recorded(path, out, robot, whole)
+        asked = out or robot or whole
+        there = path.with_suffix(".rrd")
+        known = (web or open) and not asked and there.exists()
+        shown = there if known else recorded(path, out, robot, whole)
     if web:
         serve(shown, port)
     elif open:
@@ -55,8 +59,14 @@ def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> P
     from tauguard.replay import write_rrd
     from tauguard.traces import read_mcap
 
+    usual = file.with_suffix(".rrd")
+    if out is None and usual.exists():
+        raise FileExistsError(
+            f"{usual} is there already: name the file to write with --out; "
+            f"`tauguard replay --web {usual}` shows that one"
+        )
     trace, detection = read_mcap(file)
-    out = out or file.with_suffix(".rrd")
+    out = out or usual
     write_rrd(out, trace, detection, robot, whole=whole)
     print(f"{out}  ({out.stat().st_size / 1e6:.1f} MB; show it with: rerun {out})")
     return out
