@@ -28,8 +28,8 @@ from tauguard.whole_file import write_whole
 
 #: The version changes with what a detector computes from the same content, too: a threshold of
 #: one version means something else in another. 2: the filter of `Unknowns.for_detection`; 3: scores
-#: of regressors are severities.
-FORMAT, VERSION = "tauguard model", 3
+#: of regressors are severities; 4: that filter learns less of a held contact.
+FORMAT, VERSION = "tauguard model", 4
 #: The kind of file that holds a trained detector with its threshold.
 ALARM = "collision-alarm"
 #: Versions that are written into a file.

@@ -44,7 +44,9 @@ class Unknowns:
     coulomb: float = 0.1  #: relative
     slow: float = 60.0  #: time constant of payload and friction errors [s]
     fast: float = 1.0  #: time constant of the offset [s]
-    clip: float = 3.0  #: an innovation z above this many standard deviations c counts c^2/z
+    clip: float = 3.0
+    """An innovation z above this many of its standard deviations c counts c^2/z. The deviation is
+    that of noise and beliefs, without ``lasting``."""
     every: float = 0.01  #: time between two corrections [s]
     lasting: float = 1.0
     """Corrections that an error of the model lasts for: the variance of a correction's noise is so

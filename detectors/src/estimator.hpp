@@ -10,7 +10,8 @@
 // deviation of 0 removes an unknown.
 //
 // An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is,
-// the less it says about the model, and the sooner it is a collision.
+// the less it says about the model, and the sooner it is a collision. The deviation is that of one
+// innovation; `lasting` is no part of it, or a held contact would be learned as a payload.
 //
 // Errors of the model last longer than the time between two corrections, each of which would take
 // them for news: the noise of a correction has `lasting` times its variance, or the filter soon
@@ -246,9 +247,11 @@ class Estimator {
       for (int a = 0; a < per_joint; ++a) sum += covariance_[b * m_ + first + a] * row_[first + a];
       gathered_[b] = sum;
     }
-    for (std::size_t b = 0; b < m_; ++b) variance += row_[b] * gathered_[b];
+    double believed = 0.0;
+    for (std::size_t b = 0; b < m_; ++b) believed += row_[b] * gathered_[b];
     double innovation = residual_[j] - expected(j);
-    const double limit = set_.clip * std::sqrt(variance);
+    const double limit = set_.clip * std::sqrt(variance / set_.lasting + believed);
+    variance += believed;
     if (std::fabs(innovation) > limit) innovation = limit * limit / innovation;
     for (std::size_t a = 0; a < m_; ++a) {
       const double k = gathered_[a] / variance;

@@ -114,9 +114,9 @@ def test_damaged_files_are_one_line(alarm, tmp_path):
         ([1], "not a model file of tauguard"),
         ({"format": "tauguard detector 1"}, "earlier format 'tauguard detector 1'; train"),
         ({"format": "tauguard ranking detector 2"}, "earlier format"),
-        ({"format": "tauguard model", "version": 9}, "version 9 of the format, expected 3"),
+        ({"format": "tauguard model", "version": 9}, "version 9 of the format, expected 4"),
         ({"format": "tauguard model", "version": 1}, "version 1 of the format, .* train the"),
-        ({"format": "tauguard model", "version": 3, "kind": "robot"}, "of the kind 'robot'"),
+        ({"format": "tauguard model", "version": 4, "kind": "robot"}, "of the kind 'robot'"),
     ],
 )
 def test_foreign_and_earlier_files_are_named(content, says, tmp_path):
