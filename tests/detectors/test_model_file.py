@@ -68,7 +68,7 @@ def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_to_trust(a
     assert (container["format"], container["kind"], container["version"]) == (
         "tauguard model",
         "collision-alarm",
-        3,
+        4,
     )
     assert set(container["made_with"]) == {"tauguard", "mujoco", "numpy", "scikit-learn"}
 

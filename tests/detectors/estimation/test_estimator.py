@@ -113,6 +113,23 @@ def test_an_error_that_lasts_is_not_taken_for_friction_that_changed(training, al
     assert worst[20.0] < 0.5 * worst[1.0]
 
 
+@pytest.mark.parametrize("joint", [0, 1, 2])
+def test_a_held_contact_is_not_learned(training, alarm, joint):
+    """Half a second of 30 deviations: most is still seen at its end, little stays behind."""
+    trace = next(t for t in training if not t.truth.collisions)
+    arm, t = alarm.detector.arm, trace.t - trace.t[0]
+    held = np.zeros_like(trace.current)
+    held[(t >= 4.0) & (t < 4.5), joint] = 30 * arm.noise[joint] / arm.drive_gain[joint]
+    estimator = Estimator(arm, unknowns=Unknowns.for_detection())
+    free, struck = (
+        estimator.run(trace.t, trace.q, trace.qd, c).unexplained / arm.noise
+        for c in (trace.current, trace.current + held)
+    )
+    seen = np.abs(struck - free)
+    assert seen[np.searchsorted(t, 4.49), joint] > 10
+    assert seen[np.searchsorted(t, 4.6)].max() < 2
+
+
 @pytest.mark.parametrize("wrong", [{"lasting": 0.5}, {"transition": -1.0}])
 def test_what_unknowns_may_be(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
