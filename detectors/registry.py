@@ -31,7 +31,7 @@ from tauguard.detectors.methods.forest import Forest
 from tauguard.detectors.methods.free_motion import FittedFreeMotion
 from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.methods.network import Network
-from tauguard.detectors.methods.one_class import OneClass
+from tauguard.detectors.methods.one_class import OneClass, Remoteness
 from tauguard.detectors.methods.residual_thresholds import (
     FittedThresholds,
     MovingThresholds,
@@ -80,6 +80,7 @@ FILE_TYPES: dict[str, type] = {
         LoadDeviation,
         Network,
         OneOutput,
+        Remoteness,
         RobotNumbers,
         Scaling,
         SensorNoise,

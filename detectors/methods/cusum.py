@@ -15,13 +15,13 @@ from tauguard.detectors.features.scaling import Scaling
 from tauguard.detectors.methods.per_joint import FittedPerJoint, PerJoint
 from tauguard.traces.trace import Trace
 
-#: The statistic is bounded to what this much time without a residual takes away again [s]: a long
-#: contact would otherwise leave an alarm that lasts longer than the contact.
+#: Once the statistic falls, it is at most what this much time without a residual takes away [s]: a
+#: long contact would otherwise leave an alarm that lasts longer than the contact.
 RECOVERY = 0.1
 
 
 def bounded_cusum(increments: ArrayLike, cap: ArrayLike, state: Array | None = None) -> Array:
-    """g_k = min(cap, max(0, g_{k-1} + x_k)) down the rows.
+    """g_k = max(0, g + x_k) down the rows, g = g_{k-1}, or min(cap, g_{k-1}) where x_k < 0.
 
     Args:
         increments: shape (T, c).
@@ -39,8 +39,8 @@ def bounded_cusum(increments: ArrayLike, cap: ArrayLike, state: Array | None = N
 class Cusum(PerJoint["FittedCusum"]):
     """Two-sided CUSUM of every joint's residual in units of its envelope; the largest counts.
 
-    The statistic grows by (|ratio| - drift) dt while the ratio keeps its sign, falls otherwise,
-    and stays between 0 and a bound; the score is in seconds times the drift. The residual of
+    The statistic grows by (|ratio| - drift) dt while the ratio keeps its sign. Otherwise it falls,
+    from a bound at most, down to 0; the score is in seconds times the drift. The residual of
     collision-free motion is not white (friction errors last), so the drift is the limit that such
     motion exceeds in one sample of a hundred, not the half of a shift that white noise would ask
     for.

@@ -1,7 +1,9 @@
 """A one-class detector: it learns what collision-free motion looks like, without a collision.
 
 The one-class support vector machine (Schoelkopf et al. 2001) with the SRQ kernel on the windows
-that the SVR uses. The score is how far a window lies outside of the training windows.
+that the SVR uses. The score is how far a window lies outside of the training windows: minus the
+logarithm of the machine's kernel sum, which orders windows as its decision function does. That
+function ends at 0 far from all training windows, where thresholds for few false alarms lie.
 """
 
 from __future__ import annotations
@@ -16,9 +18,25 @@ from sklearn.svm import OneClassSVM
 from tauguard.arrays import Array
 from tauguard.detectors.features.training import Prepared
 from tauguard.detectors.features.windows import WindowShape
+from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.methods.svr_regressor import srq_kernel
 from tauguard.detectors.methods.windowed import Windowed
+
+#: Of kernel sums, before the logarithm.
+LEAST = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Remoteness(Frozen):
+    """``-log`` of a kernel sum with weights of 0 or more, without bound far from its vectors."""
+
+    kernels: KernelMachine
+
+    def __call__(self, x: Array) -> Array:
+        """Values at the rows of x, shape (N, d) -> (N,)."""
+        found: Array = -np.log(np.maximum(self.kernels(x), LEAST))
+        return found
 
 
 @dataclass(frozen=True)
@@ -44,9 +62,10 @@ class OneClass(Windowed):
             x.append(shape.of(p.signal, rng.choice(rows, share, replace=False)))
         return np.concatenate(x), np.zeros(sum(map(len, x)))
 
-    def learn(self, x: Array, y: Array) -> KernelMachine:
-        """The negative of the machine's decision function, but for its constant."""
+    def learn(self, x: Array, y: Array) -> Remoteness:
+        """The machine's decision function, but for its constant, as a remoteness."""
         model = OneClassSVM(kernel="precomputed", nu=self.outside, cache_size=500)
         model.fit(srq_kernel(x, x, self.sigma))
         vectors = np.ascontiguousarray(x[model.support_])
-        return KernelMachine(vectors, np.ascontiguousarray(-model.dual_coef_[0]), 0.0, self.sigma)
+        weights = np.ascontiguousarray(model.dual_coef_[0])
+        return Remoteness(KernelMachine(vectors, weights, 0.0, self.sigma))

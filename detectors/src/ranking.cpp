@@ -16,7 +16,8 @@ namespace {
 
 using geometry::ThreadPool;
 
-// g = min(cap, max(0, g + x)) down the rows of x (T, c); `state` holds g before and after.
+// g = max(0, g + x) down the rows of x (T, c), from no more than `cap` on where x is below 0;
+// `state` holds g before and after.
 void bounded_cusum(In2 x, In1 cap, Out1 state, Out2 out) {
   const std::size_t columns = x.shape(1);
   require(cap.shape(0) == columns && state.shape(0) == columns && out.shape(0) == x.shape(0) &&
@@ -26,7 +27,8 @@ void bounded_cusum(In2 x, In1 cap, Out1 state, Out2 out) {
   for (std::size_t t = 0; t < x.shape(0); ++t)
     for (std::size_t c = 0; c < columns; ++c) {
       double& g = state.data()[c];
-      g = std::min(cap.data()[c], std::max(0.0, g + x.data()[t * columns + c]));
+      const double more = x.data()[t * columns + c];
+      g = std::max(0.0, (more < 0 ? std::min(g, cap.data()[c]) : g) + more);
       out.data()[t * columns + c] = g;
     }
 }

@@ -18,7 +18,8 @@ def test_it_is_the_recursion(x, cap):
     for column in range(x.shape[1]):
         g = 0.0
         for row in range(len(x)):
-            g = min(cap, max(0.0, g + x[row, column]))
+            before = min(g, cap) if x[row, column] < 0 else g
+            g = max(0.0, before + x[row, column])
             assert out[row, column] == g
 
 
@@ -27,6 +28,10 @@ def test_a_lasting_small_shift_passes_a_short_large_one():
     lasting[100:] = 0.2
     short[100:103] = 3.0
     assert bounded_cusum(lasting, np.inf).max() > bounded_cusum(short, np.inf).max()
+
+
+def test_while_a_deviation_lasts_nothing_bounds_it():
+    assert bounded_cusum(np.ones((500, 1)), 3.0)[-1, 0] == 500
 
 
 def test_it_recovers_from_a_long_contact_in_the_time_that_the_bound_gives():
