@@ -26,6 +26,7 @@ img { max-width: 100%; height: auto; min-width: 0; } figure { margin: 1rem 0; }
 figure img { width: 56rem; }
 .no { background: #fde3d3; } .yes { background: #e1f0fa; } .note { color: #444; }
 summary { cursor: pointer; padding: 0.3rem 0; } code { background: #f4f4f4; }
+td:last-child { min-width: 6em; }
 @media (max-width: 40rem) { th, td { padding: 0.2rem 0.3rem; } }
 @media print {
   body { font-size: 10pt; max-width: none; padding: 0; } table { font-size: 7.5pt; }

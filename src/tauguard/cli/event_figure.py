@@ -67,8 +67,9 @@ def _spread(axes: Any, detection: Detection) -> None:
     if not scores.size or scores.max() <= CROWDED * edge:
         return
     usual = max(2 * edge, float(np.quantile(np.abs(scores), 0.9)))
-    if usual > 0:
-        axes.set_yscale("symlog", linthresh=10 ** np.ceil(np.log10(usual)))
+    linear = 10 ** np.ceil(np.log10(usual)) if usual > 0 else np.inf
+    if scores.max() > linear:  # or a logarithmic axis would have no round number to name
+        axes.set_yscale("symlog", linthresh=linear)
 
 
 def _drawn(values: Array) -> Array:
