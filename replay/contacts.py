@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.replay.robot import Motion, bodies, quats_wxyz
-from tauguard.replay.rrd import COLOURS, TIMELINE, drawn, entity, log_pose, times
+from tauguard.replay.rrd import COLOURS, TIMELINE, drawn, entity, lay_out, log_pose, times
 
 #: Contacts of one checker: their times [s], shape (K,), points [m] and normals, shape (K, 3).
 Marks = tuple[Array, Array, Array]
@@ -68,8 +68,7 @@ def write_contacts_rrd(
         draft = Path(folder) / "draft.rrd"
         recording = rr.RecordingStream("tauguard_contacts", recording_id=path.stem)
         recording.save(draft)
-        # Before any data: a viewer plays until it has read that it is to wait.
-        recording.send_blueprint(_blueprint(_eye(marks or {}, positions, vertices)))
+        lay_out(recording, _blueprint(_eye(marks or {}, positions, vertices)))
         recording.log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         _log_bodies(recording, model, t, positions, rotations)
         if vertices is not None:

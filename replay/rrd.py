@@ -92,8 +92,7 @@ def write_rrd(
         shown = bodies(scene)
         frames = thin(trace.t, FRAME_RATE, MOST_FRAMES)
         moved = motion(scene, trace.joint_names, trace.q[frames])
-        # Before any data: a viewer plays until it has read that it is to wait.
-        recording.send_blueprint(blueprint(trace, detection, *seen(trace, shown, moved)))
+        lay_out(recording, blueprint(trace, detection, *seen(trace, shown, moved)))
         log_scene(recording, trace, frames, shown, moved)
         log_checked(recording, trace)
         log_explained(recording, trace, explained)
@@ -104,6 +103,15 @@ def write_rrd(
         recording.flush()
         recording.disconnect()
         os.replace(draft, path)
+
+
+def lay_out(recording: Any, layout: rrb.Blueprint) -> None:
+    """The layout, before any data: a viewer plays until it has read that it is to wait.
+
+    Without the flush a busy machine may write data first.
+    """
+    recording.send_blueprint(layout)
+    recording.flush()
 
 
 def thin(t: Array, rate: float, most: int) -> NDArray[np.int64]:
