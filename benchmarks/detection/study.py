@@ -69,11 +69,13 @@ NOTES = {
     "same experiment, not the same collisions. Sensitivities are of all from 4 N m up.",
     "mcnemar": "exact test on the same collisions: found by the first detector only, by the other.",
     "output": "Spearman's between a collision's torque and the highest output.",
-    "training_size": "at the third point, one speed and arm; few collisions, wide intervals.",
+    "training_size": "at a threshold for 0.5 false alarms an hour, one speed and arm; few "
+    "collisions, wide intervals.",
     "conditions": "what training did not have, at the third point, one speed and arm; nothing is "
     "learnt anew.",
     "robot": foreign.NOTE,
-    "sigma": "the length of the SRQ kernel, at the third point, one speed and arm.",
+    "sigma": "the length of the SRQ kernel, at a threshold for 0.5 false alarms an hour, one speed "
+    "and arm.",
     "sample_rate": "a kilohertz beside the rate of the arm in the dissertation.",
     "headline": "the best detector (one for all cells) and SVR-SRQ beside the dissertation's SVR. "
     "met: both rates of the best reach 0.98, and both of SVR-SRQ's the dissertation's.",

@@ -23,7 +23,7 @@ from tauguard.detectors.methods.kernel_machine import KernelMachine
 from tauguard.detectors.methods.svr_regressor import srq_kernel
 from tauguard.detectors.methods.windowed import Windowed
 
-#: Of kernel sums, before the logarithm.
+#: Smallest kernel sum: the logarithm stays finite.
 LEAST = 1e-300
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import re
 import resource
 import subprocess
@@ -87,11 +88,13 @@ def test_what_replay_cannot_show_is_said(capsys, tmp_path):
 
 
 def test_replay_replaces_no_recording(capsys, tmp_path):
-    """A file that nobody named is not written over; with --out another one is."""
+    """A file that nobody named is not written over, nor shown for a newer or a missing log."""
     (tmp_path / "a.rrd").write_bytes(b"mine")
     (tmp_path / "a.mcap").touch()
-    message = fails(capsys, "replay", str(tmp_path / "a.mcap"))
-    assert "a.rrd is there already: name the file to write with --out" in message
+    os.utime(tmp_path / "a.rrd", (1, 1))
+    for flags in ([], ["--web"]):
+        message = fails(capsys, "replay", str(tmp_path / "a.mcap"), *flags)
+        assert "a.rrd is there already: name the file to write with --out" in message
     assert (tmp_path / "a.rrd").read_bytes() == b"mine"
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
-#: A number a joint; the help names no default for none.
+#: One number per joint; the help does not print the empty default.
 PerJoint = Annotated[tuple[float, ...], tyro.conf.arg(help_behavior_hint="")]
 
 

@@ -25,7 +25,8 @@ def command(
     """Turn an MCAP recording into an .rrd that shows the arm moving beside its signals.
 
     With --web it is shown in a browser; so is an .rrd file, or the folder of `evaluate --events` or
-    `report`.
+    `report`. With --web or --open an .rrd of PATH's name that is newer than PATH is shown as it is,
+    unless --out, --robot or --whole asks for another.
 
     Args:
         path: an MCAP file written by tauguard; with --web also an .rrd file or a folder of them,
@@ -33,8 +34,7 @@ def command(
         out: the recording (default: PATH with the ending .rrd, if there is none yet).
         robot: MJCF or URDF file of the robot (default: the one attached to PATH).
         whole: keep what comes before the first detection.
-        open: show it in the rerun viewer, which listens on 127.0.0.1 only; a recording of that
-            name that is there already is shown as it is.
+        open: show it in the rerun viewer, which listens on 127.0.0.1 only.
         web: serve it and rerun's web viewer on 127.0.0.1, until interrupted.
         port: with --web, of the page (default: a free one).
     """
@@ -45,13 +45,21 @@ def command(
     if not (path.is_dir() or path.suffix == ".rrd"):
         asked = out or robot or whole
         there = path.with_suffix(".rrd")
-        known = (web or open) and not asked and there.exists()
-        shown = there if known else recorded(path, out, robot, whole)
+        fits = (web or open) and not asked and _fits(there, path)
+        if fits:
+            print(f"{there}: made from {path.name} before, shown as it is")
+        shown = there if fits else recorded(path, out, robot, whole)
     if web:
         serve(shown, port)
     elif open:
         viewer = Path(sys.executable).with_name("rerun")
         subprocess.run([viewer, "--bind", "127.0.0.1", shown], check=False)
+
+
+def _fits(recording: Path, file: Path) -> bool:
+    """Whether both are there and the recording is not older."""
+    both = recording.exists() and file.exists()
+    return both and recording.stat().st_mtime >= file.stat().st_mtime
 
 
 def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> Path:
@@ -60,6 +68,8 @@ def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> P
     from tauguard.traces import read_mcap
 
     usual = file.with_suffix(".rrd")
+    if not file.exists():
+        raise FileNotFoundError(f"{file}: no such file")
     if out is None and usual.exists():
         raise FileExistsError(
             f"{usual} is there already: name the file to write with --out; "
