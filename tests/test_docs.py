@@ -38,7 +38,7 @@ def test_links_lead_somewhere(page):
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_commands_exist(page):
     """What follows `tauguard` in shell blocks is a command, and its flags are its own."""
-    from tauguard.benchmarks import STUDIES
+    from studies import STUDIES
     from tauguard.cli import COMMANDS
 
     shell = "\n".join(re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL))

@@ -34,9 +34,8 @@ ALLOWED = {
     "datasets": {"envs", "contacts", "traces", "models", "detectors"},
     "replay": {"traces", "models"},
     "report": set(),
-    "benchmarks": PRODUCT | {"report", "hard_cases"},
     "hard_cases": PRODUCT,
-    "cli": PRODUCT | {"report", "benchmarks", "hard_cases"},
+    "cli": PRODUCT | {"report", "hard_cases"},
 }
 #: Modules at the top that every room may use: they use each other and no room.
 SHARED = {"arrays", "lazy", "strangers", "whole_file"}
@@ -79,10 +78,9 @@ def test_shared_modules_stand_on_no_room_and_nothing_else_stands_beside_them():
             assert not beside, f"{path.relative_to(ROOT)} imports {sorted(beside)}"
 
 
-def test_every_study_of_the_command_line_is_reached_through_its_one_command():
-    for path in FOLDERS["cli"].glob("*.py"):
-        if path.stem not in ("bench", "report"):
-            assert "benchmarks" not in rooms_imported(path), path.name
+def test_the_product_does_not_know_the_studies():
+    for path in (path for folder in FOLDERS.values() for path in folder.rglob("*.py")):
+        assert not re.search(r"^\s*(from|import) (studies|oracles)\b", path.read_text(), re.M), path
 
 
 @pytest.mark.parametrize("room", sorted(ALLOWED))

@@ -11,9 +11,9 @@ import time
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.trust import kills
-from tauguard.benchmarks.trust.formats import FORMATS
-from tauguard.benchmarks.trust.mutants import Reading, Worker
+from studies.trust import kills
+from studies.trust.formats import FORMATS
+from studies.trust.mutants import Reading, Worker
 from tauguard.cli import main
 from tauguard.datasets import read_log
 from tauguard.models.arm import load_arm
@@ -37,7 +37,7 @@ def test_mutants_end_in_a_right_answer_or_in_one_line(kind, mutants):
 
 
 def test_a_reader_that_dies_or_hangs_is_counted(monkeypatch):
-    import tauguard.benchmarks.trust.mutants as module
+    import studies.trust.mutants as module
 
     worker = Worker(("columns",))
     assert worker.tried("columns", (0,)).ok

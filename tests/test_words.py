@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PRIVATE = {"zoo", "wary", "doubt", "promise", "promised", "levelled", "levelling", "told"}
 #: Words that stood for several things; the table of CONTRIBUTING.md has one for each.
 SEVERAL = {"watch", "watched", "watcher", "watching"}
-ROOMS = ("benchmarks", "cloth", "contacts", "datasets", "detectors", "envs", "rigid", "traces")
+ROOMS = ("studies", "cloth", "contacts", "datasets", "detectors", "envs", "rigid", "traces")
 #: Where the one recording stands.
 RECORDING = "detectors/calibration/recording.py"
 

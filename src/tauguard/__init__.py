@@ -3,7 +3,7 @@
 The sub-packages are rooms of one house; import the one you need (``tauguard.cloth`` pulls in
 neither MuJoCo nor Pinocchio): ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
 ``detectors``, ``contacts``, ``envs``, ``datasets``, ``replay``, ``report``,
-``benchmarks``, ``hard_cases``.
+``hard_cases``.
 
 tauguard is a research tool, not a certified safety function.
 """

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.cloth.queries import Queries, solver
+from studies.cloth.queries import Queries, solver
 from tauguard.cloth import _mesh, edge_edge, vertex_face
 
 QUERIES = {"vf": vertex_face, "ee": edge_edge}

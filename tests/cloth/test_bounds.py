@@ -5,7 +5,7 @@ from time import process_time
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.cloth.adversarial import KINDS
+from studies.cloth.adversarial import KINDS
 from tauguard.cloth import MeshCCD, _mesh, edge_edge, vertex_face
 from tauguard.cloth.impacts import METHODS
 

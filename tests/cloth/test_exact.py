@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from tauguard.benchmarks.cloth.integers import first_contact
-from tauguard.benchmarks.cloth.queries import Queries, solver
+from studies.cloth.integers import first_contact
+from studies.cloth.queries import Queries, solver
 from tauguard.cloth import edge_edge, vertex_face
 
 QUERIES = {"vf": vertex_face, "ee": edge_edge}

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.benchmarks.rigid.cases import HARD, KINDS
-from tauguard.benchmarks.rigid.gap_truth import exact_gap, extent
+from studies.rigid.cases import HARD, KINDS
+from studies.rigid.gap_truth import exact_gap, extent
 from tauguard.rigid import Boxes, Capsules, Hulls, Polygons, Rounded, Spheres, Tetrahedra, distance
 from tauguard.rigid import overlap as overlap_of
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tauguard.benchmarks.rigid.cases import HARD, KINDS
+from studies.rigid.cases import HARD, KINDS
 from tauguard.rigid import Hulls, PlaneCache, Tetrahedra, overlap
 from tauguard.rigid.queries import native_overlap
 

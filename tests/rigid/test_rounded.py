@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from tauguard.benchmarks.rigid.cases import KINDS
-from tauguard.benchmarks.rigid.gap_truth import exactly_meet
+from studies.rigid.cases import KINDS
+from studies.rigid.gap_truth import exactly_meet
 from tauguard.rigid import (
     Boxes,
     Capsules,

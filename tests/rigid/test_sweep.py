@@ -5,8 +5,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tauguard.benchmarks.rigid.cases import HARD, KINDS
-from tauguard.benchmarks.rigid.truth import cross, dot, exact_toi, exact_vertices, float_bodies
+from studies.rigid.cases import HARD, KINDS
+from studies.rigid.truth import cross, dot, exact_toi, exact_vertices, float_bodies
 from tauguard.rigid import Boxes, Hulls, Tetrahedra, overlap, sweep
 from tauguard.rigid.queries import native_sweep
 

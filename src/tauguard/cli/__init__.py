@@ -14,6 +14,8 @@ import re
 import sys
 from collections.abc import Sequence
 
+from tauguard.cli.checkout import STUDY_COMMANDS, run_studies
+
 COMMANDS = {
     "demo": "simulate, strike, train, detect, and leave a recording to look at",
     "calibrate": "friction, inertia and drive gains of a real arm from collision-free logs",
@@ -68,9 +70,19 @@ def main(argv: Sequence[str] | None = None) -> None:
         near = difflib.get_close_matches(name, COMMANDS, n=1)
         hint = f"did you mean {near[0]}?" if near else f"commands: {', '.join(COMMANDS)}"
         fail(f"unknown command {name!r}: {hint}")
-    if any(OWN.fullmatch(arg) for arg in args[1:]):
+    if name in STUDY_COMMANDS:
+        try:
+            raise SystemExit(run_studies(name, args[1:] + ["--debug"] * debug))
+        except ValueError as error:
+            fail(f"{name}: {error}")
+    run_command(f"tauguard.cli.{name.replace('-', '_')}", name, args[1:], debug)
+
+
+def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
+    """Parse the flags of the function ``command`` in the module ``path`` and call it."""
+    if any(OWN.fullmatch(arg) for arg in args):
         sys.path.append(os.getcwd())  # last, so that nothing of this folder hides a library
-    module = importlib.import_module(f"tauguard.cli.{name.replace('-', '_')}")
+    module = importlib.import_module(path)
     for flag, kind in module.command.__annotations__.items():
         given = f"--{flag.replace('_', '-')}"
         if "tuple[" in str(kind) and args.count(given) > 1:  # the last would win
@@ -82,7 +94,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
     tidy(module.command)
     try:
-        tyro.cli(module.command, args=args[1:], prog=f"tauguard {name}")
+        tyro.cli(module.command, args=list(args), prog=f"tauguard {name}")
     except BrokenPipeError:
         sys.stderr.close()
     except KeyboardInterrupt as stop:

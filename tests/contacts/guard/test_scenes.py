@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tauguard.benchmarks.contacts.referee import Referee
+from studies.contacts.referee import Referee
 from tauguard.contacts import GuardedStepper
 from tauguard.contacts.guard.balance import sheets_of
 from tauguard.models.cloth import Cloth, add_cloth

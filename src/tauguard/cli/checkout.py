@@ -1,0 +1,42 @@
+"""``tauguard bench`` and ``tauguard report``: run by ``studies``, which only a checkout has."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import tauguard
+
+#: Commands that `python -m studies` runs.
+STUDY_COMMANDS = ("bench", "report")
+
+
+def run_studies(name: str, args: Sequence[str]) -> int:
+    """Run a command of ``studies`` in a process of its own and return its exit code.
+
+    Raises:
+        ValueError: there is no checkout: tauguard is installed without its sources.
+    """
+    root = checkout()
+    if root is None:
+        raise ValueError(
+            "the studies are in the source distribution, not in an installed package: "
+            "unpack `pip download --no-binary tauguard --no-deps tauguard` and run this there"
+        )
+    # Last on the path would be better, as the checkout's folders have generic names; -m needs it.
+    path = os.pathsep.join(
+        [str(root), str(root / "tests"), *filter(None, [os.environ.get("PYTHONPATH")])]
+    )
+    command = [sys.executable, "-m", "studies", name, *args]
+    return subprocess.run(command, env=os.environ | {"PYTHONPATH": path}, check=False).returncode
+
+
+def checkout() -> Path | None:
+    """The folder that holds ``studies``: of this package's sources, or the working folder."""
+    for root in (Path(tauguard.__file__).resolve().parents[2], Path.cwd()):
+        if (root / "studies" / "__main__.py").is_file():
+            return root
+    return None

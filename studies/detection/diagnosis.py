@@ -1,0 +1,357 @@
+"""After the alarm: which link, which force, where, and what kind of event, against the truth.
+
+Four ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
+hypothesis (tauguard.detectors.diagnosis.diagnosis). ``exposed``: the same, where nothing can
+reach link 1, the shoulder on its base. ``usual``: the link of the last joint with a significant
+residual, and the damped least-squares force at the middle of that link. ``exact``: as ``surface``,
+but with the true external torque instead of the observer's estimate: what is wrong then is not the
+observer's fault, other contacts explain the same torques.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from studies.detection.diagnosis_pool import (
+    Event,
+    payload_events,
+    push_events,
+    struck_events,
+)
+from studies.detection.fleet import CALIBRATE, TEST, Training, stream
+from studies.detection.pool import SPEEDS, free_pool
+from studies.detection.severity_rows import NOTE, severity_rows
+from studies.harness import measure
+from tauguard.arrays import Array
+from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
+from tauguard.detectors.calibration.nominal import nominal_design
+from tauguard.detectors.diagnosis.aftermath import Aftermath, AftermathOf
+from tauguard.detectors.diagnosis.classification import KINDS
+from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
+from tauguard.detectors.diagnosis.diagnosis_metrics import (
+    ContactErrors,
+    TrueSeverity,
+    contact_at,
+)
+from tauguard.envs import simulate
+from tauguard.models import LinkSurface, cura6, link_surface
+from tauguard.report import Row, rate
+from tauguard.report.charts import errorbars
+from tauguard.traces import STRATA, Collision, stratum
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+#: The detector whose alarms are explained, and its false alarms per hour.
+DETECTOR, PER_HOUR = "moving-thresholds", 5.0
+#: Force that the damping of the usual way expects [N].
+EXPECTED = 100.0
+METHODS = ("surface", "exposed", "usual", "exact")
+#: Links that collisions of these plans are on, which ``exposed`` knows.
+EXPOSED = (2, 3, 4, 5, 6)
+
+_ALARMS = (
+    "of the collisions that raised an alarm. surface: this project's; exposed: with link 1 out of "
+    "reach; usual, the peer: last joint with a residual, damped least squares at the "
+    "middle of its link; exact: surface with the true torque, what no observer can better. "
+)
+#: What the columns of each table mean.
+NOTES = {
+    "link": "rates " + _ALARMS + "Missed collisions are not in it.",
+    "link_confusion": "counts: a row a true link, a column what was said of it.",
+    "contact": "medians and 95th percentiles " + _ALARMS + "force_error_n: norm of the difference.",
+    "kind": "counts: a row a true kind, a column what was said of it. All are simulated, pushes "
+    "too: no person made one.",
+    "payload": "loads unknown to the detector, taken up and put down. mass_error_g: median, of "
+    "those not called a collision.",
+    "severity": NOTE,
+    "cost": "wall time of one alarm; aftermath_us is what the residual around it takes first.",
+}
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is simulated."""
+
+    arms: int
+    speeds: tuple[float, ...]
+    training: Training
+    calibration_hours: float  #: of each arm, for the threshold
+    per_stratum: int  #: collisions of a stratum at one speed
+    pushes: int  #: episodes of five pushes at one speed
+    payloads: int  #: episodes with one payload up and down at one speed
+
+
+FULL = Size(3, SPEEDS, Training(slices=3), 0.3, 13, 3, 8)
+QUICK = Size(1, (10.0, 60.0), Training(slices=1, free=6, free_seconds=20.0), 0.02, 2, 1, 2)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one method says of an event."""
+
+    link: int  #: 1-based, 0: none
+    force: Array  #: [N]
+    point: Array  #: [m]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What one event was, and what all methods say of it; nothing without an alarm.
+
+    Its trace is not kept: many would fill the memory.
+    """
+
+    kind: str
+    speed: float  #: percent
+    collision: Collision | None
+    mass: float  #: [kg]
+    diagnosis: Diagnosis | None
+    links: dict[str, int]  #: said by each method, 1-based, 0: none
+    errors: dict[str, ContactErrors]
+    severity: TrueSeverity | None = None
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """Rows of the studies that :data:`NOTES` names."""
+    size = QUICK if quick else FULL
+    # Arms and streams of seeds that nothing was tuned on.
+    arms = [31_000 + 100 * seed + k for k in range(size.arms)]
+    trained = {arm: trained_for(seed, arm, size) for arm in arms}
+    surface = link_surface(cura6.arm_xml())
+    judged: list[Judged] = []
+    sample: Event | None = None
+    for speed in size.speeds:
+        test = stream(seed, TEST, 5)
+        for events in (
+            struck_events(test, speed, trained, size.per_stratum),
+            push_events(test, speed, trained, size.pushes),
+            payload_events(test, speed, trained, size.payloads),
+        ):
+            for event in events:
+                judged.append(judge(event, trained[event.arm], surface))
+                sample = sample or (event if event.alarm is not None else None)
+    contacts = [j for j in judged if j.collision is not None]
+    rows = [*link_rows(contacts), *confusion_rows(contacts), *contact_rows(contacts)]
+    rows += [*sizes(contacts), *kind_rows(judged), *payload_rows(judged)]
+    assert sample is not None
+    return [*rows, cost_row(sample, trained[sample.arm], surface)]
+
+
+def trained_for(seed: int, arm: int, size: Size) -> CollisionAlarm:
+    """The detector of one arm, trained and thresholded on motion of its own."""
+    detector = make_detector(DETECTOR).fit(size.training.traces(seed, arm), nominal_design())
+    hours = size.calibration_hours / len(size.speeds)
+    pools = (free_pool(stream(seed, CALIBRATE, 5), s, (arm,), hours) for s in size.speeds)
+    return with_rate(detector, [simulate(e) for pool in pools for _, e in pool], PER_HOUR)
+
+
+def judge(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Judged:
+    """All methods' answers to one event."""
+    known = (event.kind, event.speed, event.collision, event.mass)
+    if event.alarm is None:
+        return Judged(*known, None, {}, {})
+    diagnoser = Diagnoser.of(trained.detector.arm, surface)
+    after = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace).at(event.alarm.start)
+    found = diagnoser.explain(event.alarm, after)
+    if event.collision is None:
+        return Judged(*known, found, {}, {})
+    assert event.trace.truth is not None
+    exact = replace(after, residual=event.trace.truth.tau_ext[after.rows])
+    informed = diagnoser.explain(event.alarm, exact)
+    exposed = replace(diagnoser, surface=surface.only(EXPOSED)).explain(event.alarm, after)
+    answers = {
+        "surface": Answer(found.link, found.force, found.point),
+        "exposed": Answer(exposed.link, exposed.force, exposed.point),
+        "usual": usual(diagnoser, after, found),
+        "exact": Answer(informed.link, informed.force, informed.point),
+    }
+    truth = contact_at(event.trace, event.collision, found.time)
+    errors = {n: ContactErrors.of(a.force, a.point, truth) for n, a in answers.items()}
+    true = TrueSeverity.of(event.trace, event.collision, found.until)
+    return Judged(*known, found, {n: a.link for n, a in answers.items()}, errors, true)
+
+
+def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
+    """Last significant joint; damped least-squares force at the middle of its link."""
+    robot, link = diagnoser.arm.robot, max(found.last_joint, 1) - 1
+    row = int(after.level.argmax())
+    poses = link_poses(robot, after.q[row])
+    rows = diagnoser.surface.link == link
+    middle = diagnoser.surface.point[rows].mean(axis=0)
+    point = poses.origin[link] + poses.rotation[link] @ middle
+    jacobian = point_jacobians(robot, poses, np.array([link]), point[None])[0]
+    columns = jacobian.T / after.envelope[row][:, None]
+    damped = columns.T @ columns + np.eye(3) / EXPECTED**2
+    force = np.linalg.solve(damped, columns.T @ (after.residual[row] / after.envelope[row]))
+    return Answer(found.last_joint, force, point)
+
+
+def groups(contacts: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
+    """All, by speed and by severity; only events that raised an alarm."""
+    known = [j for j in contacts if j.diagnosis is not None and j.kind != "push"]
+    speeds = sorted({j.speed for j in known})
+    named = [("all", known)]
+    named += [(f"{s:g} %", [j for j in known if j.speed == s]) for s in speeds]
+    for low, _ in STRATA:
+        name = stratum(low)
+        named.append((f"{name} N m", [j for j in known if stratum(_peak(j)) == name]))
+    named.append(("from 16 N m", [j for j in known if _peak(j) >= 16]))
+    pushes = [j for j in contacts if j.diagnosis is not None and j.kind == "push"]
+    return [(name, some) for name, some in [*named, ("pushes", pushes)] if some]
+
+
+def _peak(judged: Judged) -> float:
+    assert judged.collision is not None
+    return judged.collision.peak_tau
+
+
+def _link(judged: Judged) -> int:
+    assert judged.collision is not None
+    return judged.collision.link
+
+
+def link_rows(contacts: Sequence[Judged]) -> list[Row]:
+    """How often the link is right, and how often it or a neighbour is."""
+    rows = []
+    for group, some in groups(contacts):
+        for method in METHODS:
+            off = [abs(j.links[method] - _link(j)) for j in some]
+            rows.append(
+                {
+                    "study": "link",
+                    "group": group,
+                    "method": method,
+                    "link_right": rate(sum(o == 0 for o in off), len(off)),
+                    "link_or_neighbour": rate(sum(o <= 1 for o in off), len(off)),
+                }
+            )
+    return rows
+
+
+def confusion_rows(contacts: Sequence[Judged]) -> list[Row]:
+    """True link (a row) against the link said, for every method."""
+    known = [j for j in contacts if j.diagnosis is not None]
+    rows = []
+    for method in METHODS:
+        for link in sorted({_link(j) for j in known}):
+            said = [j.links[method] for j in known if _link(j) == link]
+            counts = {f"said_{k}": said.count(k) for k in range(1, 7)}
+            row = {"study": "link_confusion", "method": method, "link": link, **counts}
+            rows.append({**row, "said_none": said.count(0)})
+    return rows
+
+
+def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
+    """Errors of force and point at the time of the estimated force: median and p95."""
+    rows = []
+    for group, some in groups(contacts):
+        for method in METHODS:
+            own = [j.errors[method] for j in some]
+            errors = np.array([(e.true_force, e.force, e.direction, 100 * e.point) for e in own])
+            row: Row = {"study": "contact", "group": group, "method": method, "n": len(some)}
+            names = ("true_force_n", "force_error_n", "direction_deg", "point_cm")
+            for name, column in zip(names, errors.T, strict=True):
+                row[name] = float(np.median(column))
+                row[f"{name}_p95"] = float(np.percentile(column, 95))
+            rows.append(row)
+    return rows
+
+
+def sizes(contacts: Sequence[Judged]) -> list[Row]:
+    """What the intervals of impulse and peak force are worth."""
+    return severity_rows(
+        [
+            (j.kind, _link(j), j.diagnosis, j.severity)
+            for j in contacts
+            if j.diagnosis is not None and j.severity is not None
+        ]
+    )
+
+
+def kind_rows(judged: Sequence[Judged]) -> list[Row]:
+    """True kind (a row) against the kind said."""
+    rows = []
+    for kind in KINDS:
+        said = [j.diagnosis.kind for j in judged if j.diagnosis and j.kind == kind]
+        counts = {f"said_{other}": said.count(other) for other in KINDS}
+        right = rate(said.count(kind), len(said))
+        rows.append({"study": "kind", "kind": kind, **counts, "kind_right": right})
+    return rows
+
+
+def payload_rows(judged: Sequence[Judged]) -> list[Row]:
+    """Payload changes that raised an alarm, those then called a collision, and the mass found."""
+    rows = []
+    changes = [j for j in judged if j.kind == "payload"]
+    for mass in (None, *sorted({abs(j.mass) for j in changes})):
+        some = [j for j in changes if mass in (None, abs(j.mass))]
+        found = [(j.diagnosis, j.mass) for j in some if j.diagnosis is not None]
+        masses = [abs(d.signs.mass - m) for d, m in found if not d.collision]
+        rows.append(
+            {
+                "study": "payload",
+                "payload_kg": mass or "all",
+                "alarm_raised": rate(len(found), len(some)),
+                "called_collision": rate(sum(d.collision for d, _ in found), len(found)),
+                "mass_error_g": 1000 * float(np.median(masses)) if masses else None,
+            }
+        )
+    return rows
+
+
+def cost_row(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Row:
+    """Microseconds of a diagnosis, and of what must be computed before."""
+    alarm = event.alarm
+    assert alarm is not None
+    diagnoser = Diagnoser.of(trained.detector.arm, surface)
+    looked = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace)
+    after = looked.at(alarm.start)
+    times: dict[str, Any] = measure(
+        {
+            "diagnosis_us": lambda: diagnoser.explain(alarm, after),
+            "aftermath_us": lambda: looked.at(alarm.start),
+        },
+        repeats=15,
+    )
+    scaled = {n: {k: 1e6 * v for k, v in t.items()} for n, t in times.items()}
+    return {"study": "cost", "surface_points": len(surface.link), **scaled}
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Link accuracy and point error by severity, and both confusion tables."""
+    axes = figure.subplots(2, 2)
+    names = [f"{stratum(low)} N m" for low, _ in STRATA]
+    for method in METHODS:
+        own = {r["group"]: r for r in rows if r["study"] == "link" and r["method"] == method}
+        own_errors = {
+            r["group"]: r for r in rows if r["study"] == "contact" and r["method"] == method
+        }
+        at = [i for i, name in enumerate(names) if name in own]
+        rates = (own[names[i]]["link_right"] for i in at)
+        errorbars(axes[0, 0], at, rates, fmt="o-", label=method)
+        axes[0, 1].plot(at, [own_errors[names[i]]["point_cm"] for i in at], "o-", label=method)
+    for axis, label in ((axes[0, 0], "link right"), (axes[0, 1], "point error, median [cm]")):
+        axis.set_xticks(range(len(names)), names)
+        axis.set_ylabel(label)
+        axis.legend()
+    links = [r for r in rows if r["study"] == "link_confusion" and r["method"] == "surface"]
+    _table(axes[1, 0], links, "link", [f"said_{k}" for k in range(1, 7)])
+    kinds = [r for r in rows if r["study"] == "kind"]
+    _table(axes[1, 1], kinds, "kind", [f"said_{k}" for k in KINDS])
+
+
+def _table(axes: Any, rows: list[Row], name: str, columns: list[str]) -> None:
+    counts = np.array([[row[c] for c in columns] for row in rows])
+    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(share, cmap="YlGnBu", vmin=0, vmax=1, aspect="auto")
+    for (i, j), count in np.ndenumerate(counts):
+        axes.text(j, i, str(count), ha="center", color="white" if share[i, j] > 0.6 else "black")
+    axes.set_xticks(range(len(columns)), [c.removeprefix("said_") for c in columns])
+    axes.set_yticks(range(len(rows)), [str(row[name]) for row in rows])
+    axes.set(xlabel=f"{name} said", ylabel=f"true {name}")

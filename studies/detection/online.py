@@ -1,0 +1,300 @@
+"""What one sample costs: simulated and detected in batch, then online, method by method.
+
+The alarm runs sample by sample through :meth:`AlarmStream.step` on a motion with collisions that
+its detector was not trained on, for every method of the registry. scikit-learn's ``SVR.predict``
+gets the same windows as the kernel sum, one row a call; its kernel is precomputed and it is charged
+with the kernel row against the support vectors alone, in NumPy: less than its own callable kernels
+compute.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from studies.harness import measure
+from tauguard.arrays import Array
+from tauguard.report import Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tauguard.detectors import CollisionAlarm
+    from tauguard.detectors.methods.kernel_machine import KernelMachine
+    from tauguard.detectors.methods.svr_regressor import SrqSVR
+    from tauguard.traces import Trace
+
+
+#: Shares of the support vectors that are kept.
+SHARES = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75)
+#: A controller's period at 1 kHz, and what a sample may take of it at the median [us].
+PERIOD, GOAL = 1000.0, 100.0
+#: Methods of a quick run.
+QUICK = ("moving-thresholds", "residual-thresholds", "srq-svr")
+#: False alarms per hour that thresholds aim at.
+PER_HOUR = 10.0
+
+#: What the columns of each table mean.
+NOTES = {
+    "real time": "processor time of one core at 1 kHz [us a sample], of collision-free motion: "
+    "simulation, the plain observer, and the rest of the shipped detector (tracking, features, "
+    "400 support vectors, threshold). times: how many times real time all of it runs. peer: "
+    "MuJoCo's own rollout of the bare arm in the same run. difference_to_online: of the scores, "
+    "largest.",
+    "step": "wall time of one sample of the whole detector (observer, features, SVR), one thread "
+    "[us]; over_a_period: of its samples, those that took over 1 ms; difference_to_batch: of the "
+    "scores, largest.",
+    "kernel": "one window of the SVR alone: all support vectors, then ever fewer. The peer is "
+    "scikit-learn's predict with its kernel row by NumPy, less than its own callable kernels do. "
+    "error: of the output, beside all vectors. What fewer vectors cost in missed collisions is not "
+    "shown.",
+}
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is trained on and timed."""
+
+    slices: int  #: with collisions
+    free: int  #: collision-free
+    samples: int  #: timed
+    single: int  #: rows that scikit-learn predicts, one a call
+    seconds: float  #: of motion from scene to alarm
+    repeats: int  #: of it
+
+
+def motions(extent: Extent, seed: int) -> tuple[list[Trace], Trace]:
+    """Training traces of a simulated arm, and a motion with collisions that is not among them."""
+    from studies.detection.fleet import TRAINING_SPEEDS
+    from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
+    from tauguard.envs import simulate
+    from tauguard.models import Mismatch
+
+    arm = Mismatch(seed=500 + seed)
+    payloads = TRAINING_PAYLOADS[:: max(1, 15 // extent.slices)]
+    planned = struck_episodes(3 * seed, extent.slices, 5, TRAINING_SPEEDS, payloads, arm)
+    planned += free_episodes(3 * seed + 1, extent.free, 30.0, TRAINING_SPEEDS, payloads, arm)
+    unseen = struck_episodes(3 * seed + 2, 1, 8, (40.0,), (1500.0,), arm)
+    return [simulate(episode) for episode in planned], simulate(unseen[0])
+
+
+def timed(calls: Callable[[int], object], count: int) -> Array:
+    """Microseconds of ``calls(k)`` for every k below ``count``."""
+    spent = np.empty(count, dtype=np.int64)
+    for k in range(count):
+        begin = time.perf_counter_ns()
+        calls(k)
+        spent[k] = time.perf_counter_ns() - begin
+    return spent / 1e3
+
+
+def spread(spent: Array) -> Row:
+    """Median with its quartiles [us]."""
+    low, median, high = (float(x) for x in np.percentile(spent, (25, 50, 75)))
+    return {"median": median, "low": low, "high": high}
+
+
+def step_row(alarm: CollisionAlarm, trace: Trace, samples: int) -> Row:
+    """``step``: one sample through observer, payload estimate, method, threshold and filter."""
+    count = min(samples, len(trace.t))
+    score, dt = alarm.scores(trace)[:count], [None, *np.diff(trace.t[:count])]
+    rows = list(zip(trace.q[:count], trace.qd[:count], trace.current[:count], dt, strict=True))
+    timed_stream, kept_stream, grown_stream = (alarm.stream() for _ in range(3))
+    online = np.empty(count)
+
+    def kept(k: int) -> None:
+        kept_stream.step(*rows[k])
+        online[k] = kept_stream.score
+
+    spent = timed(lambda k: timed_stream.step(*rows[k]), count)[500:]
+    timed(kept, count)
+    return {
+        "study": "step",
+        "detector": alarm.detector.name,
+        "samples": count,
+        "us": spread(spent),
+        "us_p99": float(np.percentile(spent, 99)),
+        "us_max": float(spent.max()),
+        "over_a_period": int((spent > PERIOD).sum()),
+        "difference_to_batch": float(np.abs(online - score).max()),
+        "bytes_kept_a_call": allocated(lambda k: grown_stream.step(*rows[k]), count // 4),
+        "met": bool(np.median(spent) <= GOAL),
+    }
+
+
+def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int) -> Row:
+    """``real time``: what a sample costs from the scene to the alarm, one core."""
+    from dataclasses import replace
+
+    from threadpoolctl import threadpool_limits
+
+    from studies.simulation.study import rollout_call
+    from tauguard.datasets.plans import free_episodes
+    from tauguard.detectors import observe
+    from tauguard.envs import Simulation, simulate
+    from tauguard.models import Mismatch
+
+    (episode,) = free_episodes(3 * seed + 2, 1, seconds, (40.0,), (1500.0,), Mismatch(seed=500))
+    trace, arm = simulate(episode), alarm.detector.arm
+    tau = arm.drive_gain * trace.current
+    calls: dict[str, Callable[[], object]] = {
+        "simulation": lambda: simulate(episode),
+        "observer": lambda: observe(arm.robot, trace.t, trace.q, trace.qd, tau, threads=1),
+        "detection": lambda: alarm.detect(replace(trace)),  # a copy: estimates are kept by trace
+        "peer": rollout_call(Simulation(episode).motion),
+    }
+    with one_core(), threadpool_limits(1):
+        taken = measure(calls, repeats, time.process_time)
+        found = alarm.detect(replace(trace))
+    us = {k: {n: 1e6 * v / len(trace.t) for n, v in t.items()} for k, t in taken.items()}
+    rest = {n: us["detection"][n] - us["observer"]["median"] for n in ("median", "low", "high")}
+    total = us["simulation"]["median"] + us["detection"]["median"]
+    stream, count = alarm.stream(), min(5000, len(trace.t))
+    online = np.empty(count)
+    for k in range(count):
+        stream.step(trace.q[k], trace.qd[k], trace.current[k])
+        online[k] = stream.score
+    return {
+        "study": "real time",
+        "detector": alarm.detector.name,
+        "simulation_us": us["simulation"],
+        "observer_us": us["observer"],
+        "detector_us": rest,
+        "total_us": total,
+        "times": 1e3 / total,
+        "peer_us": us["peer"],
+        "difference_to_online": float(np.abs(online - found.score[:count]).max()),
+    }
+
+
+@contextlib.contextmanager
+def one_core() -> Iterator[None]:
+    """This process on one core, where the system lets it choose."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def allocated(call: Callable[[int], object], count: int) -> float:
+    """Bytes that Python and NumPy hold more of after ``count`` calls, per call."""
+    for k in range(min(200, count)):
+        call(k)
+    tracemalloc.start()
+    try:
+        before, _ = tracemalloc.get_traced_memory()
+        for k in range(count):
+            call(k)
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    return (after - before) / count
+
+
+def peer(regressor: SrqSVR) -> Callable[[Array], Array]:
+    """scikit-learn's own ``predict`` of the fitted SVR on one window, shape (1, size)."""
+    svr, vectors = regressor.svr_, regressor.machine_.vectors
+    row = np.zeros((1, svr.shape_fit_[0]))
+    columns, scale = svr.support_, 1 / regressor.sigma**2
+
+    def predict(window: Array) -> Array:
+        gap = vectors - window
+        row[0, columns] = (1 + scale * np.einsum("ij,ij->i", gap, gap)) ** -2.0
+        value: Array = svr.predict(row)
+        return value
+
+    return predict
+
+
+def kernel_rows(regressor: SrqSVR, windows: Array, single: int, seed: int) -> list[Row]:
+    """``kernel``: the full sum beside scikit-learn, then reduced sets: time against error."""
+    rng = np.random.default_rng([seed, 9])
+    own = np.ascontiguousarray(windows[rng.integers(len(windows), size=single)])
+    value = np.empty(single)
+    slices = [own[k : k + 1] for k in range(single)]
+    theirs, machine = peer(regressor), regressor.machine_
+    full, total = machine(windows), len(machine.vectors)
+    rows = []
+    for model in (machine, *(machine.reduced(max(1, round(s * total))) for s in SHARES)):
+        call = _one_window(model, slices)
+        timed(call, min(200, single))
+        ours = timed(call, single)
+        row: Row = {"study": "kernel", "support_vectors": len(model.vectors)}
+        row |= {"us": spread(ours), "us_p99": float(np.percentile(ours, 99))}
+        again = timed(lambda k: value.__setitem__(k, theirs(slices[k])[0]), single)
+        row |= {"sklearn_us": spread(again), "speedup": float(np.median(again) / np.median(ours))}
+        row["difference_to_sklearn"] = float(np.abs(model(own) - value).max())
+        error = np.abs(model(windows) - full)
+        row |= {"error_rms": float(np.sqrt(np.mean(error**2))), "error_max": float(error.max())}
+        rows.append(row)
+    return sorted(rows, key=lambda r: -int(r["support_vectors"]))
+
+
+def _one_window(model: KernelMachine, slices: list[Array]) -> Callable[[int], object]:
+    """The kernel sum at the k-th window, one thread."""
+    kernel, out = model.native, np.empty(1)
+    return lambda k: kernel.rows(slices[k], out, 1)
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """Rows ``real time`` (scene to alarm), ``step`` (methods), ``kernel`` (fewer vectors)."""
+    from tauguard.detectors import DETECTORS, SrqSvr, held_out, make_detector, train
+    from tauguard.detectors.calibration.nominal import nominal_design
+    from tauguard.detectors.methods.svr_regressor import SrqSVR
+
+    extent = Extent(3, 4, 8_000, 500, 10.0, 3) if quick else Extent(15, 20, 27_000, 5000, 60.0, 9)
+    traces, trace = motions(extent, seed)
+    arm = nominal_design()
+    rows: list[Row] = []
+    for name in QUICK if quick else DETECTORS:
+        alarm = train(make_detector(name), traces, arm, PER_HOUR)
+        if name == "srq-svr":
+            rows.append(real_time_row(alarm, seed, extent.seconds, extent.repeats))
+        rows.append(step_row(alarm, trace, extent.samples))
+    rows.sort(key=lambda row: row["study"] != "real time")
+    full: list[SrqSVR] = []
+
+    class Keeping(SrqSvr):
+        def learn(self, x: Array, y: Array) -> KernelMachine:
+            full.append(SrqSVR(self.sigma, self.C, self.epsilon).fit(x, y))
+            return full[-1].machine_
+
+    fitted = Keeping(vectors=0, windows=900 if quick else SrqSvr.windows).fit(
+        held_out(traces)[0], arm
+    )
+    signal = fitted.front.scaled(trace, fitted.scaling)
+    windows = fitted.shape.of(signal, np.arange(len(signal)))
+    return rows + kernel_rows(full[-1], windows, extent.single, seed)
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Microseconds and error over the number of support vectors."""
+    own = [r for r in rows if r["study"] == "kernel"]
+    count = [r["support_vectors"] for r in own]
+    left, right = figure.subplots(1, 2)
+    left.plot(count, [r["us"]["median"] for r in own], "o-", label="kernel sum, one window")
+    left.plot(count, [r["us_p99"] for r in own], ":", color="C0", label="99th percentile")
+    peers = [r["sklearn_us"]["median"] for r in own]
+    left.axhline(peers[0], color="black", ls="--", label="scikit-learn's predict, all vectors")
+    left.set(xlabel="support vectors", ylabel="microseconds a sample", yscale="log")
+    left.set_title("Time")
+    fewer = [r for r in own if r["error_max"] > 0]
+    for key, label in (("error_rms", "root mean square"), ("error_max", "largest")):
+        right.plot([r["us"]["median"] for r in fewer], [r[key] for r in fewer], "o-", label=label)
+    right.set(xlabel="microseconds a sample", ylabel="error of the SVR's output", yscale="log")
+    right.set_title("Speed against error of reduced sets")
+    for axis in (left, right):
+        axis.legend()
+        axis.grid(alpha=0.3)

@@ -1,0 +1,87 @@
+"""The arms of the fault study: a detector each, and logs that it was not trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from studies.real_arm.arms import ARMS, available, nominal, recordings
+from studies.small_detector import thinned, trained
+from tauguard.datasets.plans import free_episodes, struck_episodes
+from tauguard.detectors import CollisionAlarm
+from tauguard.detectors.faults import UsualInput
+from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
+from tauguard.envs import Episode, simulate
+from tauguard.models import Mismatch
+from tauguard.traces.trace import Trace
+
+#: Samples of a simulation that are kept [Hz].
+RATE = 500.0
+#: Of a real arm's collision-free logs every so many are left out of training.
+LEFT_OUT = 3
+
+
+@dataclass(frozen=True)
+class ArmLogs:
+    """A trained detector and logs that neither it nor its fault checks have seen."""
+
+    name: str
+    alarm: CollisionAlarm
+    logs: dict[str, Trace]
+    contacts: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    """Onset and end [s] of each contact of a log, where the truth is known."""
+
+    @cached_property
+    def alarms(self) -> dict[str, list[float]]:
+        """When alarms begin in each log, by its own clock [s]."""
+        return {
+            name: [float(alarm.start) for alarm in self.alarm.detect(trace).alarms]
+            for name, trace in self.logs.items()
+        }
+
+    @classmethod
+    def struck(cls, name: str, alarm: CollisionAlarm, episodes: Sequence[Episode]) -> ArmLogs:
+        """With simulated episodes as its logs."""
+        logs, contacts = {}, {}
+        for k, episode in enumerate(episodes):
+            trace = simulate(episode)
+            assert trace.truth is not None
+            logs[f"struck_{k}"] = thinned(trace, RATE)
+            contacts[f"struck_{k}"] = [(c.onset, c.end) for c in trace.truth.collisions]
+        return cls(name, alarm, logs, contacts)
+
+
+def arms(quick: bool, seed: int) -> Iterator[ArmLogs]:
+    """The simulated arm, then the real ones whose logs are there; quick: the simulated one."""
+    yield simulated(quick, seed)
+    if quick:
+        return
+    names = [arm.name for arm in available()]
+    for arm in ARMS:
+        if arm.name in names:
+            yield real(arm.name)
+
+
+def simulated(quick: bool, seed: int) -> ArmLogs:
+    """A CURA6 drawn by the seed, 500 Hz; logs with collisions and other loads."""
+    drawn = Mismatch(seed=1000 + seed)
+    speeds, loads = (20.0, 60.0), (0.0, 2000.0)
+    free = free_episodes(seed, 3 if quick else 8, 20.0 if quick else 40.0, speeds, loads, drawn)
+    struck = struck_episodes(500 + seed, 1 if quick else 4, 8, (40.0,), (0.0, 1000.0), drawn)
+    alarm = trained([simulate(episode) for episode in free], RATE, 5.0)
+    return ArmLogs.struck("simulated", alarm, struck)
+
+
+def real(name: str) -> ArmLogs:
+    """A real arm, trained on two thirds of its collision-free logs; the rest and contacts judge."""
+    arm = next(arm for arm in ARMS if arm.name == name)
+    free = recordings(arm, ("free",))
+    own = [log for k, log in enumerate(free) if k % LEFT_OUT]
+    training = [free[log] for log in own]
+    detector = FreeMotion().fit(training, nominal(arm))
+    usual = UsualInput.of([r.trace for r in training], detector.arm)
+    alarm = CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual)
+    others = recordings(arm, ("contact", "jointwise", "validation"))
+    logs = {log: r.trace for log, r in (free | others).items() if log not in own}
+    return ArmLogs(name, alarm, logs)

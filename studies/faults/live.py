@@ -1,0 +1,273 @@
+"""A log played by RTDE in real time and heard by a detector: losses, alarms, latency.
+
+The server and the listener of each rate are processes of their own, as ``tauguard play-ur`` and
+``tauguard listen`` are; all rates run at once. The alarms are held against those of the file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.small_detector import thinned, trained
+from tauguard.report import Row
+from tauguard.report import rate as share
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tauguard.datasets.live import Sample
+    from tauguard.detectors import CollisionAlarm
+    from tauguard.detectors.faults.monitor import Answer
+    from tauguard.traces import Trace
+
+
+#: Samples a second: of UR's CB and e-Series; blows in the log of a full and of a quick run.
+RATES, BLOWS = (125.0, 500.0), (195, 3)
+#: Training: collision-free seconds, speeds [%], and false alarms an hour that it aims at.
+SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
+#: Samples of which each stage is timed.
+TIMED = 4000
+#: The serving process starts, and counts what it sent, within this time [s].
+ANSWERS = 120.0
+#: Percentiles of the latency.
+LEVELS = ("median", "p99", "p99_9", "p99_99", "max")
+
+NOTES = {
+    "listen": "a simulated arm with blows, played in real time, all rates at once. events: "
+    "lines about the connection. alike: share of the alarms of `detect` on the file that begin at "
+    "the same sample. silent or late: stretches of fault that begin so, as other programs of the "
+    "machine ran. Times in us from the "
+    "packet's arrival to the answer.",
+    "stages": "one sample, us of this thread at the median and at p99.9, and what a call allocates "
+    "at most at a time and keeps, bytes. native: the work is C++; the rest is Python around it. "
+    "monitor does the work of the other three in one call; packet: RTDE bytes to arrays.",
+}
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """A row a rate, and one for each stage of a sample."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_inputs(folder, quick, seed)
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(len(RATES), context) as workers:
+            rows = list(workers.map(heard, [folder] * len(RATES), RATES))
+        return rows + stages(folder, RATES[-1])
+
+
+def write_inputs(folder: Path, quick: bool, seed: int) -> None:
+    """A log and a detector for each rate; the arm and its motions follow from the seed."""
+    from tauguard.datasets.plans import free_episodes, struck_episodes
+    from tauguard.detectors import save_model
+    from tauguard.envs import simulate
+    from tauguard.models import Mismatch
+    from tauguard.traces import write_mcap
+
+    drawn = Mismatch(seed=2000 + seed)
+    free = free_episodes(seed, EPISODES, SECONDS, SPEEDS, (0.0,), drawn)
+    training = [simulate(episode) for episode in free]
+    (struck,) = struck_episodes(700 + seed, 1, BLOWS[quick], (40.0,), (0.0,), drawn)
+    log = simulate(struck)
+    for rate in RATES:
+        write_mcap(folder / f"{rate:g}.mcap", thinned(log, rate))
+        save_model(trained(training, rate, PER_HOUR), folder / f"{rate:g}.skops")
+
+
+def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
+    """The detector and the log of a rate."""
+    from tauguard.datasets import read_log
+    from tauguard.detectors import load_model
+
+    return load_model(folder / f"{rate:g}.skops"), read_log(folder / f"{rate:g}.mcap").trace
+
+
+def serve(folder: Path, rate: float, pipe: Connection) -> None:
+    """Play the log: tell the port, and at the end how many packets were sent."""
+    from tauguard.datasets import read_log
+    from tauguard.datasets.live import UrServer
+    from tauguard.datasets.live.packets import Packets
+
+    with UrServer(Packets.of(read_log(folder / f"{rate:g}.mcap").trace), 0) as server:
+        pipe.send(server.port)
+        server.wait()
+        pipe.send(server.sent)
+
+
+@contextlib.contextmanager
+def served(folder: Path, rate: float) -> Iterator[Connection]:
+    """The pipe of a process that serves the log; it ends with the block, whatever happens there."""
+    context = multiprocessing.get_context("spawn")
+    mine, theirs = context.Pipe()
+    process = context.Process(target=serve, args=(folder, rate, theirs), daemon=True)
+    process.start()
+    theirs.close()  # so that its death ends the pipe
+    try:
+        yield mine
+    finally:
+        process.terminate()
+        process.join()
+        mine.close()
+
+
+def received(pipe: Connection) -> int:
+    """The next number from the serving process.
+
+    Raises:
+        RuntimeError: it ended, or sends nothing for ``ANSWERS`` seconds.
+    """
+    with contextlib.suppress(EOFError, OSError):
+        if pipe.poll(ANSWERS):
+            return int(pipe.recv())
+    raise RuntimeError("the process that plays the log says nothing")
+
+
+def heard(folder: Path, rate: float) -> Row:
+    """Listen to the played log."""
+    from tauguard.datasets.live import UrSource
+    from tauguard.datasets.live.listening import listen
+    from tauguard.detectors.faults.detection import detect_with_faults
+    from tauguard.detectors.faults.monitor import Monitor
+
+    alarm, trace = read_inputs(folder, rate)
+    assert alarm.inputs is not None
+    truth = detect_with_faults(alarm, trace).detection.alarm
+    answers: list[tuple[float, bool]] = []
+
+    def report(sample: Sample, answer: Answer) -> None:
+        answers.append((sample.t, answer.alarm))
+
+    with (
+        served(folder, rate) as pipe,
+        UrSource("127.0.0.1", received(pipe), rate, reconnect=0) as source,
+    ):
+        busy = time.process_time()
+        found = listen(source, Monitor(alarm, alarm.inputs), report=report)
+        busy = time.process_time() - busy
+        sent, events = received(pipe), len(source.events)
+    late = [s for s in found.spans.of("fault") if s.reason.startswith(("late", "silent"))]
+    return {
+        "study": "listen",
+        "rate [Hz]": rate,
+        "seconds": float(trace.t[-1] - trace.t[0]),
+        "sent": sent,
+        "heard": found.samples,
+        "lost": sent - found.samples,
+        "events": events,
+        "alarms": int(np.sum(np.diff([int(up) for _, up in answers], prepend=0) > 0)),
+        "alike": alike(trace.t.tolist(), truth, dict(answers)),
+        "silent or late": len(late),
+        **{f"{name} [us]": value for name, value in found.quantiles().items()},
+        "cpu [us]": 1e6 * busy / max(1, found.samples),
+    }
+
+
+def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool]) -> dict[str, Any]:
+    """Alarms of the file that begin at the same sample for the listener.
+
+    Args:
+        times: of the file's samples [s].
+        truth: whether its alarm is up, shape (T,).
+        said: the same of the listener by the time; alarms that begin beside a sample that was not
+            heard are not judged.
+    """
+    begins = [
+        k
+        for k in np.flatnonzero(np.diff(truth.astype(int), prepend=0) > 0).tolist()
+        if times[k] in said and (k == 0 or times[k - 1] in said)
+    ]
+    same = [said[times[k]] and not (k and said[times[k - 1]]) for k in begins]
+    return share(sum(same), len(begins))
+
+
+def stages(folder: Path, rate: float) -> list[Row]:
+    """What a sample costs, stage by stage, on the log's beginning."""
+    from tauguard.datasets.live import rtde
+    from tauguard.detectors.faults import FaultCheck
+    from tauguard.detectors.faults.monitor import Monitor
+    from tauguard.detectors.faults.torques import TorqueCheck
+
+    alarm, trace = read_inputs(folder, rate)
+    assert alarm.inputs is not None
+    usual, stream = alarm.inputs, alarm.stream()
+    check, monitor = FaultCheck(usual), Monitor(alarm, usual)
+    torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
+    recipe = rtde.Recipe(1, ("DOUBLE", "VECTOR6D", "VECTOR6D", "VECTOR6D"))
+    reader = rtde.PacketReader()
+    count = min(TIMED, len(trace.t))
+    t, rows = trace.t.tolist(), list(zip(trace.q, trace.qd, trace.current, strict=True))[:count]
+    sent = [recipe.pack([t[k], *np.concatenate(row)]) for k, row in enumerate(rows)]
+
+    def packet(k: int) -> None:
+        reader.feed(sent[k])
+        found = reader.next()
+        assert found is not None
+        rtde.read_doubles(found.payload)
+
+    calls: dict[str, tuple[str, Callable[[int], object]]] = {
+        "packet": ("NumPy", packet),
+        "fault check": ("yes", lambda k: check.step(t[k], *rows[k])),
+        "torque check": ("yes", lambda k: torques.step(*rows[k])),
+        "detector": ("yes", lambda k: stream.step(*rows[k])),
+        "monitor": ("these three in one call", lambda k: monitor.step(t[k], *rows[k])),
+    }
+    return [
+        {"study": "stages", "stage": name, "native": native, "samples": count}
+        | timed(call, count // 2)
+        | allocated(call, range(count // 2, count))
+        for name, (native, call) in calls.items()
+    ]
+
+
+def timed(call: Callable[[int], object], count: int) -> Row:
+    """Processor time of a call [us]."""
+    spent = np.empty(count, np.int64)
+    for k in range(count):
+        begin = time.thread_time_ns()
+        call(k)
+        spent[k] = time.thread_time_ns() - begin
+    median, tail = np.percentile(spent / 1e3, (50, 99.9))
+    return {"p50 [us]": float(median), "p99.9 [us]": float(tail)}
+
+
+def allocated(call: Callable[[int], object], numbers: range) -> Row:
+    """Bytes that Python and NumPy take during a call at the median, and keep of it."""
+    peaks = np.empty(len(numbers))
+    tracemalloc.start()
+    try:
+        begin, _ = tracemalloc.get_traced_memory()
+        for row, k in enumerate(numbers):
+            before, _ = tracemalloc.get_traced_memory()
+            tracemalloc.reset_peak()
+            call(k)
+            peaks[row] = tracemalloc.get_traced_memory()[1] - before
+        end, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    return {"taken [bytes]": float(np.median(peaks)), "kept [bytes]": (end - begin) / len(numbers)}
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Latency of each rate beside its period."""
+    axes = figure.subplots()
+    for k, row in enumerate(row for row in rows if row["study"] == "listen"):
+        # None: more than are told apart.
+        values = [float(row[f"{name} [us]"] or np.nan) / 1e3 for name in LEVELS]
+        label = f"{row['rate [Hz]']:g} Hz, {row['heard']:,} samples"
+        names = [name.replace("_", ".") for name in LEVELS]
+        axes.semilogy(names, values, "o-", color=f"C{k}", label=label)
+        period = 1e3 / float(row["rate [Hz]"])
+        axes.axhline(period, color=f"C{k}", linestyle=":", label=f"its period, {period:g} ms")
+    axes.set_ylabel("from packet to answer [ms]")
+    axes.legend(frameon=False)

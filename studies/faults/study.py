@@ -1,0 +1,280 @@
+"""Every fault in every arm's samples, at random moments: seen or not, how soon, at what cost.
+
+A fault of a second is put into logs that training has not seen; the same stretch without it is what
+the answers are held against. ``seen``: a reason is given while the fault lasts, or within 0.15 s
+after it. ``false alarms``: collisions said in or after the fault that the intact stretch does not
+have. ``found after``: alarms of the intact stretch, from the recovery on, that are there as well.
+``silent``: seconds of fault, from 20 ms on, in which the answer is "free". ``missed``: collisions
+within faults at which the answer stays "free", of those that the intact stretch finds.
+
+What is optimistic: the allowances of the position check (a velocity or time stamp one sample late)
+and the bounds on torque ratios were chosen on these logs of the real arms; the simulated arms are
+drawn by the seed, and nothing was chosen on them but that a load of training is no fault.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from tqdm import tqdm
+
+from studies.faults.arms import ArmLogs, arms
+from tauguard.arrays import Array
+from tauguard.datasets.live.lateness import Lateness
+from tauguard.datasets.live.packets import FAULTS, Fault, Packets
+from tauguard.detectors.faults.monitor import COLLISION, FREE, Monitor
+from tauguard.detectors.faults.spans import Spans
+from tauguard.report import Row, rate
+from tauguard.traces.trace import Trace
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+#: Moments of each fault, an arm, drawn at random and again at collisions: full run, quick one.
+MOMENTS = (8, 3)
+#: A collision within a fault is missed if the answer is "free" for so long after its alarm [s].
+MISSED = 0.15
+#: A fault lasts so long [s]; it is looked at for as long after the detector has settled again.
+LASTS, AFTER = 1.0, 2.5
+#: Faults that a single sample, or its neighbours, can show; the others need the arm's model.
+PLAIN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan", "late")
+NOTES = {
+    "clean": "logs as they are: seconds at fault, each of them false, and alarms beside `detect`.",
+    "faults": "a fault of 1 s at random moments and at collisions; delays in ms from its first "
+    "sample. silent_s: the answer is free. missed: collisions within faults with no answer but "
+    "free; of_struck: collisions that the same stretch without the fault finds there. found_after: "
+    "share of its later collisions that are found after the recovery.",
+    "loop": "microseconds from sample to answer, calls taken in turn on the longest log; Python "
+    "around native parts. Other programs of the machine are in the tail.",
+    "another arm": "one arm's samples given to another's model.",
+}
+
+
+@dataclass
+class Heard:
+    """The answers to a stretch of packets."""
+
+    spans: Spans = field(default_factory=Spans)
+    reasons: list[float] = field(default_factory=list)  #: when a reason was given [s of due]
+    free: list[float] = field(default_factory=list)  #: when the answer was "free"
+    other: list[float] = field(default_factory=list)  #: when it was another
+    starts: list[float] = field(default_factory=list)  #: of alarms
+
+
+def heard(tested: ArmLogs, packets: Packets) -> Heard:
+    """What the monitor says of packets, as ``listen`` counts it."""
+    assert tested.alarm.inputs is not None
+    monitor, out = Monitor(tested.alarm, tested.alarm.inputs), Heard()
+    lateness = Lateness(tested.alarm.inputs.dt)
+    up, last = False, float(packets.due[0])
+    rows = zip(packets.due, packets.t, packets.q, packets.qd, packets.current, strict=True)
+    for due, t, q, qd, current in rows:
+        if due - last > lateness.most:
+            out.reasons.append(last + lateness.most)
+            out.other += np.arange(last + lateness.most, due, lateness.most).tolist()
+        last = float(due)
+        answer = lateness.judge(monitor.step(float(t), q, qd, current), float(t), last)
+        out.spans.add(float(due), answer)
+        if answer.reason:
+            out.reasons.append(last)
+        (out.free if answer.state == FREE else out.other).append(last)
+        if answer.alarm and not up:
+            out.starts.append(last)
+        up = answer.alarm
+    return out
+
+
+@dataclass
+class Tally:
+    """One fault on one arm."""
+
+    moments: int = 0
+    delays: list[float] = field(default_factory=list)
+    false: int = 0
+    found: int = 0
+    after: int = 0
+    silent: float = 0.0
+    struck: int = 0  #: collisions within faults
+    missed: int = 0  #: of them, with no answer but "free"
+
+    def add(self, tested: ArmLogs, log: str, name: str, start: float) -> None:
+        """The fault at one moment, beside the same stretch without it."""
+        trace = tested.logs[log]
+        settle = tested.alarm.settle
+        whole = Packets.of(trace)
+        inside = (whole.due >= start - settle - 1.5) & (whole.due < start + LASTS + settle + AFTER)
+        intact = whole.rows(np.flatnonzero(inside))
+        begin = float(intact.due[0])
+        broken = Fault(name, start, LASTS).apply(whole)
+        keep = (broken.due >= begin) & (broken.due <= intact.due[-1])
+        a, b = heard(tested, intact), heard(tested, broken.rows(np.flatnonzero(keep)))
+        self.moments += 1
+        times = [t for t in b.reasons if start - 1e-9 <= t <= start + LASTS + 0.15]
+        self.delays += [1e3 * (times[0] - start)] if times else []
+        said = [s.start for s in b.spans.of(COLLISION)]
+        true = [s.start for s in a.spans.of(COLLISION)]
+        near = [(s.start, s.end) for s in a.spans.of(COLLISION)] + tested.contacts.get(log, [])
+        self.false += sum(
+            t >= start and not any(u - 0.3 <= t <= v + 0.3 for u, v in near) for t in said
+        )
+        late = [t for t in true if t > start + LASTS + settle + 0.2]
+        self.after += len(late)
+        self.found += sum(any(abs(t - u) < 0.1 for u in said) for t in late)
+        gaps = {t for t in b.free if start + 0.02 < t < start + LASTS}  # a burst has one time
+        self.silent += len(gaps) * trace.dt
+        within = [t for t in true if start + 0.02 < t < start + LASTS]
+        self.struck += len(within)
+        self.missed += sum(not any(t <= u <= t + MISSED for u in b.other) for t in within)
+
+    def row(self, arm: str, name: str) -> Row:
+        """For the table."""
+        return {
+            "study": "faults",
+            "arm": arm,
+            "fault": name,
+            "shows in": "samples" if name in PLAIN else "torques",
+            "seen": rate(len(self.delays), self.moments),
+            "median_ms": float(np.median(self.delays)) if self.delays else None,
+            "longest_ms": max(self.delays, default=None),
+            "false_alarms": self.false,
+            "found_after": rate(self.found, self.after),
+            "silent_s": self.silent,
+            "of_s": self.moments * (LASTS - 0.02),
+            "missed": self.missed,
+            "of_struck": self.struck,
+        }
+
+
+def run(quick: bool, seed: int) -> list[Row]:
+    """All rows."""
+    rng = np.random.default_rng([seed, 15])
+    rows: list[Row] = []
+    known: list[ArmLogs] = []
+    for tested in arms(quick, seed):
+        known.append(tested)
+        rows += loop(tested)
+        rows += [clean(tested, name, trace) for name, trace in tested.logs.items()]
+        for name in tqdm(FAULTS, desc=tested.name, disable=None, leave=False):
+            tally = Tally()
+            for log, start in moments(tested, rng, MOMENTS[quick]):
+                tally.add(tested, log, name, start)
+            rows.append(tally.row(tested.name, name))
+    rows.sort(key=lambda row: row["study"])
+    return rows + others(known)
+
+
+def moments(tested: ArmLogs, rng: np.random.Generator, count: int) -> list[tuple[str, float]]:
+    """Logs and starts in them: so many at random, in motion, and as many just before alarms."""
+    margin = tested.alarm.settle
+    starts, struck = {}, []
+    for name, trace in tested.logs.items():
+        since, whole = trace.t - trace.t[0], trace.t[-1] - trace.t[0]
+        fits = (since > margin + 1.5) & (since < whole - margin - LASTS - AFTER)
+        if (fits & moving(trace)).any():
+            starts[name] = since[fits & moving(trace)]
+        for alarm in tested.alarms[name]:
+            begin = alarm - float(trace.t[0]) - 0.5 * LASTS
+            struck += [(name, begin)] if fits[np.searchsorted(since, begin)] else []
+    if not starts:
+        return []
+    names = [str(name) for name in rng.choice(list(starts), count)]
+    drawn = [(name, float(rng.choice(starts[name]))) for name in names]
+    chosen = rng.permutation(len(struck))[:count]
+    return drawn + [struck[k] for k in chosen]
+
+
+def moving(trace: Trace) -> np.ndarray:
+    """Where some joint moves faster than 0.1 rad/s, shape (T,)."""
+    return np.asarray(np.abs(trace.qd).max(axis=1) > 0.1)
+
+
+def clean(tested: ArmLogs, name: str, trace: Trace) -> Row:
+    """A log without a fault."""
+    found = heard(tested, Packets.of(trace))
+    batch = tested.alarm.detect(trace).alarm
+    return {
+        "study": "clean",
+        "arm": tested.name,
+        "log": name,
+        "seconds": float(trace.t[-1] - trace.t[0]),
+        "false_fault_s": len(found.reasons) * trace.dt,
+        "alarms": len(found.starts),
+        "alarms_of_detect": int(np.sum(np.diff(batch.astype(int), prepend=0) > 0)),
+    }
+
+
+def loop(tested: ArmLogs) -> list[Row]:
+    """Microseconds from a sample to its answer: the monitor, and the alarm inside it alone."""
+    assert tested.alarm.inputs is not None
+    trace = max(tested.logs.values(), key=lambda one: len(one.t))
+    monitor, stream = Monitor(tested.alarm, tested.alarm.inputs), tested.alarm.stream()
+    calls: dict[str, Callable[[float, Array, Array, Array], object]] = {
+        "monitor": monitor.step,
+        "alarm alone": lambda _, q, qd, current: stream.step(q, qd, current),
+    }
+    times: dict[str, list[int]] = {name: [] for name in calls}
+    gc.disable()  # as `listen` does
+    try:
+        for row in zip(trace.t.tolist(), trace.q, trace.qd, trace.current, strict=True):
+            for name, call in calls.items():
+                began = time.perf_counter_ns()
+                call(*row)
+                times[name].append(time.perf_counter_ns() - began)
+    finally:
+        gc.enable()
+    return [
+        {
+            "study": "loop",
+            "arm": tested.name,
+            "call": name,
+            "samples": len(own),
+            "detector": tested.alarm.detector.name,
+        }
+        | {f"p{q}_us": float(np.percentile(own, q)) / 1e3 for q in (50, 99, 99.9, 99.99)}
+        for name, own in times.items()
+    ]
+
+
+def others(known: Sequence[ArmLogs]) -> list[Row]:
+    """One arm's samples to another's model, where the rates are alike to a quarter."""
+    rows: list[Row] = []
+    for model in known:
+        for source in known:
+            if model is source or abs(source.alarm.detector.dt / model.alarm.detector.dt - 1) > 0.2:
+                continue
+            first = []
+            for trace in source.logs.values():
+                reasons = heard(model, Packets.of(trace)).reasons
+                first.append(reasons[0] if reasons else np.nan)
+            seen = [t for t in first if np.isfinite(t)]
+            rows.append(
+                {
+                    "study": "another arm",
+                    "model": model.name,
+                    "samples": source.name,
+                    "seen": rate(len(seen), len(first)),
+                    "median_s": float(np.median(seen)) if seen else None,
+                }
+            )
+    return rows
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Delay of every fault, an arm a colour."""
+    own = [row for row in rows if row["study"] == "faults"]
+    names, axes = list(FAULTS), figure.add_subplot()
+    for k, arm in enumerate(dict.fromkeys(row["arm"] for row in own)):
+        part = [row for row in own if row["arm"] == arm and row["median_ms"] is not None]
+        y = [names.index(row["fault"]) + 0.2 * k for row in part]
+        axes.plot([max(row["median_ms"], 1) for row in part], y, "o", label=arm)
+    axes.axvline(20, color="grey", linestyle=":", label="20 ms")
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(names)), names)
+    axes.set_xlabel("median delay of what is seen [ms]")
+    axes.legend()
