@@ -22,9 +22,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from oracles.convex_bodies import HARD, KINDS
+from oracles.convex_impact import exact_toi
+from oracles.convex_overlap import truth
 from studies.harness import measure
-from studies.rigid.cases import HARD, KINDS
-from studies.rigid.truth import exact_toi, truth
 from tauguard.report import Row, rate
 from tauguard.rigid import Motion, PlaneCache, coal_peer
 from tauguard.rigid.queries import native_overlap, native_sweep, portable

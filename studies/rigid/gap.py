@@ -8,10 +8,10 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
+from oracles.convex_bodies import HARD, KINDS
+from oracles.convex_distance import exact_distance, extent
 from studies.harness import measure
-from studies.rigid.cases import HARD, KINDS
 from studies.rigid.convex import nanoseconds, take
-from studies.rigid.gap_truth import exact_gap, extent
 from tauguard.report import Row, rate
 from tauguard.rigid import coal_peer, distance
 from tauguard.rigid.queries import native_overlap
@@ -48,7 +48,7 @@ def gap_row(pair: str, outcome: str, a: Bodies, b: Bodies, exact: int) -> Row:
     hit = native_overlap(a, b, "exact")[0]
     ns = nanoseconds(measure({"ours": partial(distance, a, b)}, 3, process_time)["ours"], len(got))
     known = range(min(exact, len(got)))
-    truth = np.array([exact_gap(a, b, i) for i in known])
+    truth = np.array([exact_distance(a, b, i) for i in known])
     size = np.array([extent(a, b, i) for i in known])
     coal = coal_row(a, b, truth, size, hit)
     return {

@@ -1,11 +1,5 @@
 """Time of impact of convex bodies under linear and angular motion, beside advancement over coal.
 
-The truth is a bracket by subdivision that shares nothing with the code under test: the gap between
-two bodies along their separating axes is a lower bound of their distance, and a distance changes no
-faster than the bodies' points move; a piece of the step whose middle has a gap above speed times
-half its length is clear throughout, any other is halved, down to 2^-36 of the step. A touch between
-two samples cannot slip through.
-
 coal has no continuous query, and FCL's conservative advancement through its Python package answers
 contact at time 0 for every pair in most processes, so the peer here is the textbook one: step by
 the distance over the largest speed, the distance from coal.
@@ -21,16 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from oracles.convex_impact import AxisGap, bracket
 from studies.harness import measure
 from studies.rigid.convex import take
 from studies.rigid.mesh import scaled
-from studies.rigid.truth import float_bodies
 from tauguard.arrays import Array
 from tauguard.report import Row, rate
 from tauguard.rigid import Boxes, Motion, Tetrahedra, coal_peer, time_of_impact
 from tauguard.rigid.shapes import Bodies
 
-LEVELS = 36
 #: Distance at which the peer's advancement stops [m]: coal's own tolerance.
 STOP = 1e-6
 MOST_STEPS = 500
@@ -66,64 +59,6 @@ def pairs(rng: np.random.Generator, kind: str, n: int) -> tuple[Bodies, Bodies, 
         return Motion(pose, rng.uniform(-2, 2, (n, 3)), rng.uniform(-1.8, 1.8, (n, 3)))
 
     return body(), body(), motion(), motion()
-
-
-class Gap:
-    """The separating-axis gap of pairs at any time, in NumPy: a lower bound of their distance."""
-
-    def __init__(self, a: Bodies, b: Bodies, ma: Motion, mb: Motion) -> None:
-        """Rows of bodies in their own frames, and their motions."""
-        self.sides = [(*float_bodies(body, len(body)), m) for body, m in ((a, ma), (b, mb))]
-        self.parallel = [isinstance(body, Boxes) for body in (a, b)]
-        reach = [np.linalg.norm(v, axis=2).max(axis=1) for v, _, _ in self.sides]
-        turn = [np.linalg.norm(m.angular, axis=1) * r for r, m in zip(reach, (ma, mb), strict=True)]
-        #: Bound on the speed of any point of a relative to any of b. Shape (N,).
-        self.speed = np.linalg.norm(ma.linear - mb.linear, axis=1) + turn[0] + turn[1]
-
-    def __call__(self, row: NDArray[np.intp], t: Array) -> Array:
-        """Gap of pair ``row[i]`` at ``t[i]``; 0 or less where they touch. Shape (M,)."""
-        points, axes, edges = [], [], []
-        for (v, e, motion), parallel in zip(self.sides, self.parallel, strict=True):
-            turn = Rotation.from_rotvec(t[:, None] * motion.angular[row]).as_matrix()
-            pose = turn @ motion.pose_t0[row, :3, :3]
-            at = motion.pose_t0[row, :3, 3] + t[:, None] * motion.linear[row]
-            points.append(np.einsum("nij,nvj->nvi", pose, v[row]) + at[:, None])
-            moved = np.einsum("nij,nej->nei", pose, e[row])
-            edges.append(moved)
-            pick = [(0, 1), (0, 2), (1, 2)]
-            if not parallel:  # the faces at vertex 0 and the one across from it
-                pick += [(3, 4)]
-            axes.append(np.stack([np.cross(moved[:, i], moved[:, j]) for i, j in pick], axis=1))
-        crossed = np.cross(edges[0][:, :, None], edges[1][:, None]).reshape(len(row), -1, 3)
-        axis = np.concatenate([*axes, crossed], axis=1)
-        length = np.linalg.norm(axis, axis=2, keepdims=True)
-        axis = np.where(length > 1e-9, axis / np.maximum(length, 1e-300), 0.0)
-        pa, pb = (axis @ p.transpose(0, 2, 1) for p in points)
-        gap = np.maximum(pa.min(2) - pb.max(2), pb.min(2) - pa.max(2))
-        return np.asarray(np.where(length[:, :, 0] > 1e-9, gap, -np.inf).max(axis=1))
-
-
-def bracket(a: Bodies, b: Bodies, ma: Motion, mb: Motion) -> tuple[Array, Array]:
-    """The first contact lies in ``[early, touch]``; both inf where there is none.
-
-    Where the bodies come so close that 2^-36 of the step cannot tell, ``touch`` is inf and
-    ``early`` is finite.
-    """
-    gap = Gap(a, b, ma, mb)
-    row, begin, size = np.arange(len(a)), np.zeros(len(a)), 1.0
-    touch = np.where(gap(row, begin) <= 0, 0.0, np.inf)
-    early = touch.copy()
-    row, begin = row[touch > 0], begin[touch > 0]
-    for _ in range(LEVELS):
-        middle = begin + 0.5 * size
-        g = gap(row, middle)
-        np.minimum.at(touch, row[g <= 0], middle[g <= 0])
-        keep = (g <= 0.5 * size * gap.speed[row]) & (begin < touch[row])
-        row, begin = np.repeat(row[keep], 2), np.repeat(begin[keep], 2)
-        size *= 0.5
-        begin[1::2] += size
-    np.minimum.at(early, row, begin)
-    return early, touch
 
 
 def judged(early: Array, touch: Array, toi: Array) -> Row:
@@ -210,7 +145,7 @@ def advanced(
 ) -> tuple[Array, Array, NDArray[np.intp]]:
     """Times of contact (inf: none), seconds in coal's distance, and its calls, pair by pair."""
     shapes = [[geometry for geometry, _ in coal_peer.geometries(body)] for body in (a, b)]
-    speed = Gap(a, b, ma, mb).speed
+    speed = AxisGap(a, b, ma, mb).speed
     n = len(a)
     t, toi, seconds = np.zeros(n), np.full(n, np.inf), np.zeros(n)
     steps = np.zeros(n, dtype=np.intp)

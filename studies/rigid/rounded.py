@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from oracles.convex_distance import exact_distance, exactly_meet, extent
+from oracles.convex_overlap import exact_vertices
 from studies.harness import measure
 from studies.rigid.coal_motion import coal_shapes, in_motion
 from studies.rigid.convex import nanoseconds
 from studies.rigid.gap import worst
-from studies.rigid.gap_truth import exact_gap, exactly_meet, extent
-from studies.rigid.truth import exact_vertices
 from tauguard.arrays import Array
 from tauguard.report import Row, rate
 from tauguard.rigid import (
@@ -79,7 +79,7 @@ def static_row(rng: np.random.Generator, kinds: tuple[str, str], n: int, known: 
         time.process_time,
     )
     decided = range(known // 100 if any("boxes" in kind for kind in kinds) else known)
-    truth = np.array([exact_gap(a, b, i) for i in decided])
+    truth = np.array([exact_distance(a, b, i) for i in decided])
     size = np.array([extent(a, b, i) for i in decided])
     return {
         "study": "rounded",

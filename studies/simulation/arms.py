@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
-from studies.simulation.tool_error import tool_error
+from oracles.tool_error import tool_error
 from tauguard.arrays import Array
 from tauguard.envs import CollisionPlan, Episode, Simulation
 from tauguard.envs.sensing import listening

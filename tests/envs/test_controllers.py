@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from studies.simulation.tool_error import tool_error
+from oracles.tool_error import tool_error
 from tauguard.envs import random_motion
 from tauguard.envs.controllers import Admittance, ComputedTorque, GravityPD, OperationalSpace
 from tauguard.envs.simulate import workspace

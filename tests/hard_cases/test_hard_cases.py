@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from oracles.convex_overlap import cross, dot
 from studies.cloth.integers import first_contact
-from studies.rigid.truth import cross, dot
 from tauguard.cli import main
 from tauguard.hard_cases import adapters, load_cases, run
 from tauguard.hard_cases.case import Case

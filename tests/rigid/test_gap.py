@@ -1,20 +1,15 @@
 """Signed distance against rational arithmetic: right sign, right length, points that show it."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studies.rigid.cases import HARD, KINDS
-from studies.rigid.gap_truth import exact_gap, extent
+from oracles.convex_bodies import HARD, KINDS
+from oracles.convex_distance import exact_distance, extent
+from oracles.moving_bodies import as_hulls
 from tauguard.rigid import Boxes, Capsules, Hulls, Polygons, Rounded, Spheres, Tetrahedra, distance
 from tauguard.rigid import overlap as overlap_of
-
-sys.path.insert(0, str(Path(__file__).parent))
-from moving import as_hulls
 
 TOLERANCE = 3e-14
 
@@ -23,7 +18,7 @@ def check(a, b, rows=None):
     """Distances of the chosen rows against the truth, and points against distances, of all."""
     got = distance(a, b)
     for i in range(len(got.distance)) if rows is None else rows:
-        want, size = exact_gap(a, b, i), extent(a, b, i)
+        want, size = exact_distance(a, b, i), extent(a, b, i)
         assert abs(got.distance[i] - want) <= TOLERANCE * size, i
         assert np.sign(got.distance[i]) == np.sign(want), i
         between = got.point_b[i] - got.point_a[i]

@@ -1,18 +1,13 @@
 """Mesh overlap and contacts against all pairs, exact rationals, coal and analytic cases."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from oracles.triangle_meshes import cube, icosphere, random_poses, soup, transform, triangles_meet
 from tauguard.rigid import MeshTree, Motion, _rigid_mesh
-
-sys.path.insert(0, str(Path(__file__).parent))
-from meshes import cube, icosphere, random_poses, soup, transform, triangles_meet
 
 VOLUMES = ["aabb", "obb", "k_dop", "sphere"]
 

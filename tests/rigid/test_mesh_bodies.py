@@ -1,11 +1,9 @@
 """A mesh against convex bodies: the answers of all its triangles, formulas, refusals."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from oracles.moving_bodies import REST, as_hulls, corners_of, motions, placed, rounded
 from tauguard.rigid import (
     Hulls,
     MeshTree,
@@ -18,9 +16,6 @@ from tauguard.rigid import (
     time_of_impact,
 )
 from tauguard.rigid.rounded import parts
-
-sys.path.insert(0, str(Path(__file__).parent))
-from moving import REST, as_hulls, corners_of, motions, placed, rounded
 
 
 def soup(rng, n=40):

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studies.rigid.cases import HARD, KINDS
-from studies.rigid.truth import exact_hit, float_bodies, truth
+from oracles.convex_bodies import HARD, KINDS
+from oracles.convex_overlap import exact_hit, float_bodies, truth
 from tauguard.geometry import _geometry
 from tauguard.rigid import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra, _rigid, overlap
 from tauguard.rigid.queries import native_overlap, native_sweep, portable

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.rigid.cases import HARD, KINDS
+from oracles.convex_bodies import HARD, KINDS
 from tauguard.rigid import Hulls, PlaneCache, Tetrahedra, overlap
 from tauguard.rigid.queries import native_overlap
 

@@ -1,16 +1,14 @@
 """Overlap and time of impact of bodies with radii: rational arithmetic, formulas, bisection."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from studies.rigid.cases import KINDS
-from studies.rigid.gap_truth import exactly_meet
+from oracles.convex_bodies import KINDS
+from oracles.convex_distance import exactly_meet
+from oracles.moving_bodies import EYE, REST, corners_of, motions, placed, rounded
 from tauguard.rigid import (
     Boxes,
     Capsules,
@@ -25,9 +23,6 @@ from tauguard.rigid import (
     time_of_impact,
 )
 from tauguard.rigid.rounded import parts
-
-sys.path.insert(0, str(Path(__file__).parent))
-from moving import EYE, REST, corners_of, motions, placed, rounded
 
 BIG = 2.0**266
 

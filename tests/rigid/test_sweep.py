@@ -5,8 +5,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from studies.rigid.cases import HARD, KINDS
-from studies.rigid.truth import cross, dot, exact_toi, exact_vertices, float_bodies
+from oracles.convex_bodies import HARD, KINDS
+from oracles.convex_impact import exact_toi
+from oracles.convex_overlap import cross, dot, exact_vertices, float_bodies
 from tauguard.rigid import Boxes, Hulls, Tetrahedra, overlap, sweep
 from tauguard.rigid.queries import native_sweep
 

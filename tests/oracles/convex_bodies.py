@@ -1,4 +1,4 @@
-"""Bodies of the overlap study and tests: random ones and the hard cases, by name."""
+"""Pairs of convex bodies for tests and studies: random ones and hard cases, by name."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""The truth of distances and depths in rational arithmetic, by all features of both bodies."""
+"""The truth of signed distances of convex bodies: rational arithmetic over all features of both."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from math import isqrt, lcm
 
 import numpy as np
 
-from studies.rigid.truth import Vector, Vectors, cross, dot, exact_vertices, sub
+from oracles.convex_overlap import Vector, Vectors, cross, dot, exact_vertices, sub
 from tauguard.rigid.rounded import Solid, parts
 
 
@@ -21,7 +21,7 @@ def root(x: Fraction) -> float:
     return float(Fraction(isqrt((x.numerator << shift) // x.denominator), 1 << (shift // 2)))
 
 
-def exact_gap(a: Solid, b: Solid, i: int) -> float:
+def exact_distance(a: Solid, b: Solid, i: int) -> float:
     """The signed distance of row i, rounded once (twice where there are radii)."""
     pa, ea, pb, eb, scale = _in_integers(a, b, i)
     radii = _radii(a, b, i)
@@ -52,10 +52,11 @@ def _radii(a: Solid, b: Solid, i: int) -> Fraction:
 
 
 def squared_distance(pa: Vectors, pb: Vectors) -> Fraction:
-    """Least over the points of both hulls: of all faces of at most four differences in all.
+    """The least squared distance between points of both hulls.
 
-    A minimum has an affinely independent carrier, whose own nearest point it is; the other carriers
-    give points of the hulls too, no nearer ones.
+    The minimum lies on a simplex of at most four vertices of the Minkowski difference, and is the
+    point of that simplex nearest to the origin. All simplices are tried: the others give points of
+    the hulls too, none of them nearer.
     """
     y = list({sub(q, p) for p in pa for q in pb})
     best = Fraction(min(dot(v, v) for v in y))
@@ -68,7 +69,7 @@ def squared_distance(pa: Vectors, pb: Vectors) -> Fraction:
 
 
 def carried(y: tuple[Vector, ...]) -> Fraction | None:
-    """The squared distance of the affine hull where its nearest point lies inside the simplex."""
+    """Squared distance of a simplex from the origin, None if the nearest point is on its rim."""
     e = [sub(v, y[0]) for v in y[1:]]
     if len(e) == 1:
         det = dot(e[0], e[0])
@@ -99,7 +100,7 @@ def carried(y: tuple[Vector, ...]) -> Fraction | None:
 
 
 def squared_depth(pa: Vectors, ea: Vectors, pb: Vectors, eb: Vectors) -> Fraction:
-    """Least way out of each other, over all facet normals of the differences; 0 for flat ones."""
+    """The squared penetration depth, over the facet normals of the difference; 0 if it is flat."""
     edges = [e for e in ea + eb if any(e)]
     normals = [n for n in (cross(u, v) for u, v in combinations(edges, 2)) if any(n)]
     if not normals or not any(dot(normals[0], e) for e in edges):
@@ -107,15 +108,15 @@ def squared_depth(pa: Vectors, ea: Vectors, pb: Vectors, eb: Vectors) -> Fractio
     best: Fraction | None = None
     for n in normals:
         a, b = [dot(n, p) for p in pa], [dot(n, p) for p in pb]
-        way = min(max(a) - min(b), max(b) - min(a))
-        square = Fraction(way * way) / dot(n, n)
+        shift = min(max(a) - min(b), max(b) - min(a))
+        square = Fraction(shift * shift) / dot(n, n)
         best = square if best is None or square < best else best
     assert best is not None
     return best
 
 
 def extent(a: Solid, b: Solid, i: int) -> float:
-    """What an error is measured against: the pair's size and distance, radii included."""
+    """The size of the pair [m], radii included: errors are given as a fraction of it."""
     points = [*exact_vertices(parts(a)[0], i)[0], *exact_vertices(parts(b)[0], i)[0]]
     span = [float(max(p[k] for p in points) - min(p[k] for p in points)) for k in range(3)]
     return float(np.linalg.norm(span)) + float(_radii(a, b, i))

@@ -100,30 +100,6 @@ def exact_hit(a: Bodies, b: Bodies, i: int) -> bool:
     return True
 
 
-def exact_toi(a: Bodies, b: Bodies, displacement: NDArray[np.float64], i: int) -> Fraction | None:
-    """Exact time of impact of row i (b moves), None without one; bodies of full dimension only."""
-    pa, ea = exact_vertices(a, i)
-    pb, eb = exact_vertices(b, i)
-    d = tuple(Fraction(float(x)) for x in displacement[i])
-    enter, leave = Fraction(0), Fraction(1)
-    for u, v in combinations(ea + eb, 2):
-        axis = cross(u, v)
-        if not any(axis):
-            continue
-        low = min(dot(axis, p) for p in pa) - max(dot(axis, p) for p in pb)
-        high = max(dot(axis, p) for p in pa) - min(dot(axis, p) for p in pb)
-        speed = dot(axis, d)
-        if speed == 0:
-            if low > 0 or high < 0:
-                return None
-            continue
-        first, last = sorted((low / speed, high / speed))
-        enter, leave = max(enter, first), min(leave, last)
-        if enter > leave:
-            return None
-    return enter
-
-
 def float_bodies(bodies: Bodies, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Vertices (n, V, 3) and edge directions (n, E, 3) in floating point."""
     if isinstance(bodies, Tetrahedra):

@@ -11,19 +11,22 @@ import pinocchio as pin
 from tauguard.envs.controllers import OperationalSpace
 from tauguard.models import pin_model
 
-#: Actions a second; the goal, as seen from the tool at home [m]; the null space's pose is home and
-#: so much more in every joint [rad].
-RATE, OFFSET, REST = 500.0, (-0.03, 0.02, 0.02), 0.3
+#: Control rate [Hz].
+RATE = 500.0
+#: The goal relative to the tool at home [m].
+OFFSET = (-0.03, 0.02, 0.02)
+#: The controller's rest posture is home plus this angle in every joint [rad].
+REST = 0.3
 
 
 def tool_error(robot: str, ideal: bool, integral: float, seconds: float) -> float:
-    """Distance of the tool from a goal beside home, when it has had time to come to rest [mm].
+    """Distance of the tool from a goal near home after it has come to rest [mm], in MuJoCo.
 
     Args:
-        robot: name or file, of an arm of six joints or more: fewer cannot hold a whole pose.
+        robot: name or file of an arm of six joints or more (fewer cannot hold a pose).
         ideal: drives without friction, ripple and noise.
-        integral: of the controller [1/s^3].
-        seconds: from home on.
+        integral: integral gain of the controller [1/s^3].
+        seconds: simulated time, starting at home.
     """
     env: Any = gymnasium.make(
         "tauguard:tauguard/Reach-v0",

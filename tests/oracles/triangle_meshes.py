@@ -1,4 +1,4 @@
-"""Small meshes and the exact truth about triangles, for the tests of this room."""
+"""Small triangle meshes, and whether two triangles share a point, in rational arithmetic."""
 
 from fractions import Fraction
 from itertools import combinations

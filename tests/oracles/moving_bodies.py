@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from studies.rigid.truth import exact_vertices
+from oracles.convex_overlap import exact_vertices
 from tauguard.rigid import Boxes, Capsules, Hulls, Motion, Rounded, Spheres, Tetrahedra
 from tauguard.rigid.rounded import parts
 
