@@ -40,6 +40,7 @@ def test_commands_exist(page):
     """What follows `tauguard` in shell blocks is a command, and its flags are its own."""
     from studies import STUDIES
     from tauguard.cli import COMMANDS
+    from tauguard.cli.checkout import STUDY_COMMANDS
 
     shell = "\n".join(re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL))
     told = shell + "\n".join(re.findall(r"`(tauguard [^`]+)`", page.read_text()))
@@ -48,7 +49,8 @@ def test_commands_exist(page):
             assert rest.split()[0] in {"NAME", "list", "all", "--quick", *STUDIES}, rest
             continue
         assert command in COMMANDS, command
-        source = (ROOT / "src" / "tauguard" / "cli" / f"{command.replace('-', '_')}.py").read_text()
+        folder = ROOT / ("studies" if command in STUDY_COMMANDS else "src/tauguard/cli")
+        source = (folder / f"{command.replace('-', '_')}.py").read_text()
         for flag in re.findall(r"--([a-z-]+)", rest):
             assert re.search(rf"\b{flag.replace('-', '_')}:", source), f"{command} --{flag}"
 

@@ -21,6 +21,7 @@ PRODUCT = {
     "envs",
     "datasets",
     "replay",
+    "live",
 }
 ALLOWED = {
     "geometry": set(),
@@ -33,6 +34,7 @@ ALLOWED = {
     "envs": {"models", "contacts", "detectors", "traces"},
     "datasets": {"envs", "contacts", "traces", "models", "detectors"},
     "replay": {"traces", "models"},
+    "live": {"detectors", "traces"},
     "report": set(),
     "hard_cases": PRODUCT,
     "cli": PRODUCT | {"report", "hard_cases"},

@@ -1,9 +1,9 @@
 """tauguard: a cobot-safety simulation environment on MuJoCo.
 
-The sub-packages are rooms of one house; import the one you need (``tauguard.cloth`` pulls in
+Import the sub-package that you need (``tauguard.cloth`` pulls in
 neither MuJoCo nor Pinocchio): ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
-``detectors``, ``contacts``, ``envs``, ``datasets``, ``replay``, ``report``,
-``hard_cases``.
+``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``,
+``report``, ``hard_cases``.
 
 tauguard is a research tool, not a certified safety function.
 """

@@ -27,9 +27,9 @@ from tauguard.report import rate as share
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tauguard.datasets.live import Sample
     from tauguard.detectors import CollisionAlarm
     from tauguard.detectors.faults.monitor import Answer
+    from tauguard.live import Sample
     from tauguard.traces import Trace
 
 
@@ -96,8 +96,8 @@ def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
 def serve(folder: Path, rate: float, pipe: Connection) -> None:
     """Play the log: tell the port, and at the end how many packets were sent."""
     from tauguard.datasets import read_log
-    from tauguard.datasets.live import UrServer
-    from tauguard.datasets.live.packets import Packets
+    from tauguard.live import UrServer
+    from tauguard.live.packets import Packets
 
     with UrServer(Packets.of(read_log(folder / f"{rate:g}.mcap").trace), 0) as server:
         pipe.send(server.port)
@@ -135,10 +135,10 @@ def received(pipe: Connection) -> int:
 
 def heard(folder: Path, rate: float) -> Row:
     """Listen to the played log."""
-    from tauguard.datasets.live import UrSource
-    from tauguard.datasets.live.listening import listen
     from tauguard.detectors.faults.detection import detect_with_faults
     from tauguard.detectors.faults.monitor import Monitor
+    from tauguard.live import UrStream
+    from tauguard.live.session import listen
 
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None
@@ -150,7 +150,7 @@ def heard(folder: Path, rate: float) -> Row:
 
     with (
         served(folder, rate) as pipe,
-        UrSource("127.0.0.1", received(pipe), rate, reconnect=0) as source,
+        UrStream("127.0.0.1", received(pipe), rate, reconnect=0) as source,
     ):
         busy = time.process_time()
         found = listen(source, Monitor(alarm, alarm.inputs), report=report)
@@ -193,10 +193,10 @@ def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool])
 
 def stages(folder: Path, rate: float) -> list[Row]:
     """What a sample costs, stage by stage, on the log's beginning."""
-    from tauguard.datasets.live import rtde
     from tauguard.detectors.faults import FaultCheck
     from tauguard.detectors.faults.monitor import Monitor
     from tauguard.detectors.faults.torques import TorqueCheck
+    from tauguard.live import rtde
 
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None

@@ -25,10 +25,10 @@ from tqdm import tqdm
 
 from studies.faults.arms import ArmLogs, arms
 from tauguard.arrays import Array
-from tauguard.datasets.live.lateness import Lateness
-from tauguard.datasets.live.packets import FAULTS, Fault, Packets
 from tauguard.detectors.faults.monitor import COLLISION, FREE, Monitor
 from tauguard.detectors.faults.spans import Spans
+from tauguard.live.lateness import Lateness
+from tauguard.live.packets import FAULTS, Fault, Packets
 from tauguard.report import Row, rate
 from tauguard.traces.trace import Trace
 

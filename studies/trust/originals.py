@@ -147,7 +147,7 @@ def _write_mesh(path: Path) -> None:
 
 def _write_rtde(path: Path) -> None:
     """What a controller sends: the answers of the handshake, a text message, then data."""
-    from tauguard.datasets.live import rtde
+    from tauguard.live import rtde
 
     types = ("DOUBLE", "VECTOR6D", "VECTOR6D", "VECTOR6D")
     recipe, rng = rtde.Recipe(1, types), np.random.default_rng(0)

@@ -84,33 +84,33 @@ def mesh(path: Path) -> Any:
 
 def lines(path: Path) -> Any:
     """Samples of the standard input."""
-    from tauguard.datasets.live.lines import LineSource
-    from tauguard.datasets.live.sample import SourceClosed
+    from tauguard.live.lines import LineStream
+    from tauguard.live.stream import StreamClosed
 
     found = []
-    with open(path) as stream, LineSource(stream, JOINTS, 100.0) as source:
+    with open(path) as stream, LineStream(stream, JOINTS, 100.0) as source:
         try:
             while (sample := source.read(1.0)) is not None:
                 found.append([sample.t, *sample.q, *sample.qd, *sample.current])
-        except SourceClosed:
+        except StreamClosed:
             pass
     return found
 
 
 def rtde(path: Path) -> Any:
     """The bytes as a robot sends them, whatever it is asked."""
-    from tauguard.datasets.live import UrSource
-    from tauguard.datasets.live.sample import SourceClosed
+    from tauguard.live import UrStream
+    from tauguard.live.stream import StreamClosed
 
     found = []
     listener = socket.create_server(("127.0.0.1", 0))
     sender = threading.Thread(target=_send, args=(listener, path.read_bytes()), daemon=True)
     sender.start()
     try:
-        with UrSource("127.0.0.1", listener.getsockname()[1], 125.0, reconnect=0) as source:
+        with UrStream("127.0.0.1", listener.getsockname()[1], 125.0, reconnect=0) as source:
             while (sample := source.read(1.0)) is not None:
                 found.append([sample.t, *sample.q, *sample.qd, *sample.current])
-    except SourceClosed:
+    except StreamClosed:
         pass
     finally:
         sender.join()

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from tauguard.cli.listen import Terminal, check_source, report
-from tauguard.datasets.live import PlayedSource, SourceClosed, UrServer, UrSource
-from tauguard.datasets.live.listening import BINS, Heard, listen
-from tauguard.datasets.live.packets import Fault, Packets
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, RobotNumbers, make_detector, train
 from tauguard.detectors.faults.detection import detect_with_faults
 from tauguard.detectors.faults.monitor import Answer, Monitor
 from tauguard.envs import simulate
+from tauguard.live import PlayedStream, StreamClosed, UrServer, UrStream
+from tauguard.live.packets import Fault, Packets
+from tauguard.live.session import BINS, Session, listen
 from tauguard.models import Mismatch, cura6, cura6_drive, pin_model
 from tauguard.traces.trace import Trace
 
@@ -46,7 +46,7 @@ def struck():
     )
 
 
-class Handed(PlayedSource):
+class Handed(PlayedStream):
     """The samples of a log as fast as they are asked for."""
 
     def __init__(self, trace):
@@ -70,7 +70,7 @@ def test_the_same_alarms_as_on_the_file(alarm, struck):
 def test_over_rtde_nothing_is_lost(alarm, struck):
     with (
         UrServer(Packets.of(struck), 0) as server,
-        UrSource("127.0.0.1", server.port, 250.0, reconnect=0) as source,
+        UrStream("127.0.0.1", server.port, 250.0, reconnect=0) as source,
     ):
         check_source(source, alarm, "model")
         heard = listen(source, Monitor(alarm, alarm.inputs), keep=True)
@@ -107,7 +107,7 @@ def test_every_line_says_why(struck, capsys):
 
 
 def test_latencies_beyond_the_last_bin_are_not_given_a_number(capsys):
-    heard = Heard(("a",))
+    heard = Session(("a",))
     heard.samples, heard.slowest = 1000, 250_000_000
     heard.counts[[40, BINS]] = 995, 5
     found = heard.quantiles()
@@ -126,7 +126,7 @@ def test_a_silent_robot_is_a_fault(alarm, struck):
                 self._next += 1
                 threading.Event().wait(timeout)
                 return None
-            raise SourceClosed("gone")
+            raise StreamClosed("gone")
 
     heard = listen(Silent(struck), Monitor(alarm, alarm.inputs))
     assert [span.state for span in heard.spans.found if span.reason][-1] == "fault"
@@ -212,7 +212,7 @@ def test_another_robot_is_refused_before_anything_is_watched(alarm, joints, rate
     names = tuple(f"j{i}" for i in range(joints))
     still = Trace(names, t, *(np.zeros((len(t), joints)) for _ in range(3)))
     with pytest.raises(ValueError, match=said):
-        check_source(PlayedSource(still), alarm, "model")
+        check_source(PlayedStream(still), alarm, "model")
 
 
 def test_the_summary_is_json(alarm, struck):

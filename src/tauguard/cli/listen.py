@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tauguard.datasets.live import LiveSource, Sample
-    from tauguard.datasets.live.listening import Heard
     from tauguard.detectors import CollisionAlarm
     from tauguard.detectors.faults.monitor import Answer
+    from tauguard.live import RobotStream, Sample
+    from tauguard.live.session import Session
 
 #: Pictures a second in rerun.
 FRAMES = 30
@@ -62,10 +62,10 @@ def command(
         rerun: `view` opens the rerun viewer; FILE.rrd records what it would show.
     """
     from tauguard.cli.robot_files import check_robot
-    from tauguard.datasets.live.display import Behind
-    from tauguard.datasets.live.listening import listen
     from tauguard.detectors import load_model
     from tauguard.detectors.faults.monitor import Monitor
+    from tauguard.live.display import BackgroundDisplay
+    from tauguard.live.session import listen
 
     sources = (ur is not None, play is not None, stdin, ros is not None)
     if sum(sources) != 1:
@@ -86,9 +86,9 @@ def command(
         print(DISCLAIMER, flush=True)
         source = stack.enter_context(opened(ur, port, play, columns, stdin, ros, reconnect, alarm))
         check_source(source, alarm, model)
-        views = [stack.enter_context(Behind(Terminal(alarm.threshold).show))]
+        views = [stack.enter_context(BackgroundDisplay(Terminal(alarm.threshold).show))]
         if rerun is not None:
-            views.append(stack.enter_context(Behind(charts(robot, shown, alarm))))
+            views.append(stack.enter_context(BackgroundDisplay(charts(robot, shown, alarm))))
         monitor = Monitor(alarm, alarm.inputs)
 
         def show(sample: Sample, answer: Answer) -> None:
@@ -119,7 +119,7 @@ def with_load(
     return alarm if payload is None else carrying(alarm, carried(payload))
 
 
-def check_source(source: LiveSource, alarm: CollisionAlarm, model: Path) -> None:
+def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> None:
     """Refuse another number of joints or another rate than training's: ``ValueError``."""
     from tauguard.detectors.detector import same_rate
 
@@ -144,22 +144,22 @@ def opened(
     alarm: CollisionAlarm,
 ) -> Any:
     """The source that was asked for, connected."""
-    from tauguard.datasets.live import LineSource, PlayedSource, UrSource
     from tauguard.datasets.logs import read_log
+    from tauguard.live import LineStream, PlayedStream, UrStream
 
     names, dt = alarm.detector.arm.robot.joint_names, alarm.detector.dt
     if ur is not None:
-        return UrSource(ur, port, 1 / dt, reconnect)
+        return UrStream(ur, port, 1 / dt, reconnect)
     if play is not None:
         from tauguard.cli.real_logs import column_map, matched
 
-        return PlayedSource(matched(read_log(play, column_map(columns), names).trace, names))
+        return PlayedStream(matched(read_log(play, column_map(columns), names).trace, names))
     if ros is not None:
-        from tauguard.datasets.live.ros import RosSource
+        from tauguard.live.ros import RosStream
 
-        return RosSource(ros, names, 1 / dt)
+        return RosStream(ros, names, 1 / dt)
     assert stdin
-    return LineSource(sys.stdin, names, 1 / dt)
+    return LineStream(sys.stdin, names, 1 / dt)
 
 
 class Terminal:
@@ -229,7 +229,7 @@ def charts(
     return show
 
 
-def summary(heard: Heard, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:
+def summary(heard: Session, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:
     """The figures of a run, ready for JSON; events as `tauguard detect` writes them."""
     collisions = heard.spans.of("collision")
     faults = heard.spans.of("fault")
@@ -277,7 +277,7 @@ def _us(value: float | None) -> str:
     return "100,000 or more" if value is None else f"{value:,.0f}"
 
 
-def save(path: Path, heard: Heard, alarm: CollisionAlarm) -> None:
+def save(path: Path, heard: Session, alarm: CollisionAlarm) -> None:
     """What was heard, with alarms, as MCAP."""
     import numpy as np
 

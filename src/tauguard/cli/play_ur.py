@@ -27,9 +27,9 @@ def command(
         fault: NAME@SECONDS or NAME@SECONDS+DURATION, several if asked: frozen, stale, encoder,
             missing, late, repeated, rate, jump, bias, saturated, swapped, sign, nan.
     """
-    from tauguard.datasets.live.packets import Fault, Packets
-    from tauguard.datasets.live.ur_server import HOST, UrServer
     from tauguard.datasets.logs import read_log
+    from tauguard.live.packets import Fault, Packets
+    from tauguard.live.ur_server import HOST, UrServer
 
     faults = [Fault.parse(text) for text in fault]
     trace = read_log(log, columns).trace

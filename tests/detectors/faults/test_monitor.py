@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tauguard.datasets.live.packets import Fault, Packets
 from tauguard.detectors.faults.monitor import COLLISION, FAULT, Monitor
+from tauguard.live.packets import Fault, Packets
 
 #: Faults that the samples show by themselves. The others look like a contact: see docs/live.md.
 SEEN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan")

@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 from studies.small_detector import trained
 from studies.trust import endurance, generated, judges, readers
 from studies.trust.originals import WRITERS
-from tauguard.datasets.live import rtde
 from tauguard.datasets.plans import free_episodes
 from tauguard.envs import simulate
+from tauguard.live import rtde
 
 
 def test_a_stream_with_a_short_data_packet_ends_there_and_other_samples_are_wrong(tmp_path):

@@ -11,8 +11,8 @@ import time
 import numpy as np
 import pytest
 
-from tauguard.datasets.live import PlayedSource, SourceClosed, UrServer, UrSource, rtde
-from tauguard.datasets.live.packets import FAULTS, Fault, Packets
+from tauguard.live import PlayedStream, StreamClosed, UrServer, UrStream, rtde
+from tauguard.live.packets import FAULTS, Fault, Packets
 from tauguard.traces.trace import Trace
 
 
@@ -33,7 +33,7 @@ def read_all(source):
     try:
         while (sample := source.read(2.0)) is not None:
             samples.append(sample)
-    except SourceClosed:
+    except StreamClosed:
         pass
     return samples
 
@@ -66,7 +66,7 @@ def test_a_log_arrives_as_it_was_sent():
     trace = moving()
     with (
         UrServer(Packets.of(trace), 0) as server,
-        UrSource("127.0.0.1", server.port, reconnect=0) as source,
+        UrStream("127.0.0.1", server.port, reconnect=0) as source,
     ):
         assert source.rate == 125.0
         samples = read_all(source)
@@ -83,7 +83,7 @@ def test_a_slower_client_gets_every_fourth_sample():
     trace = moving(rate=500.0)
     with (
         UrServer(Packets.of(trace), 0) as server,
-        UrSource("127.0.0.1", server.port, rate=125.0, reconnect=0) as source,
+        UrStream("127.0.0.1", server.port, rate=125.0, reconnect=0) as source,
     ):
         samples = read_all(source)
     assert np.array_equal([s.t for s in samples], trace.t[::4])
@@ -93,7 +93,7 @@ def test_lost_packets_are_counted():
     packets = Fault("missing", 0.1, 0.08).apply(Packets.of(moving()))
     with (
         UrServer(packets, 0) as server,
-        UrSource("127.0.0.1", server.port, reconnect=0) as source,
+        UrStream("127.0.0.1", server.port, reconnect=0) as source,
     ):
         read_all(source)
         assert source.events == ["10 samples lost before 0.184 s"]
@@ -103,7 +103,7 @@ def test_a_broken_connection_is_opened_again():
     trace = moving(1.5)
     with (
         UrServer(Packets.of(trace), 0) as server,
-        UrSource("127.0.0.1", server.port, reconnect=5) as source,
+        UrStream("127.0.0.1", server.port, reconnect=5) as source,
     ):
         first = source.read(1.0)
         for client in server._clients:
@@ -120,7 +120,7 @@ def test_a_broken_connection_is_opened_again():
 def test_a_data_packet_of_another_size_is_no_lost_connection(reconnect):
     with (
         UrServer(Packets.of(moving(6.0)), 0) as server,
-        UrSource("127.0.0.1", server.port, reconnect=reconnect) as source,
+        UrStream("127.0.0.1", server.port, reconnect=reconnect) as source,
     ):
         assert source.read(1.0) is not None
         source._reader.feed(rtde.packet(rtde.DATA_PACKAGE, b"\x01short"))
@@ -131,7 +131,7 @@ def test_a_data_packet_of_another_size_is_no_lost_connection(reconnect):
             assert re.match(f"connection begun anew {said}, back after", source.events[0])
             assert source.read(1.0) is not None
         else:
-            with pytest.raises(SourceClosed, match=f"connection given up {said}"):
+            with pytest.raises(StreamClosed, match=f"connection given up {said}"):
                 read_on(source)
 
 
@@ -140,7 +140,7 @@ def test_another_version_is_refused_in_one_line():
         UrServer(Packets.of(moving()), 0, version=1) as server,
         pytest.raises(ConnectionError, match="refuses RTDE version 2") as error,
     ):
-        UrSource("127.0.0.1", server.port)
+        UrStream("127.0.0.1", server.port)
     assert "\n" not in str(error.value)
 
 
@@ -149,7 +149,7 @@ def test_nobody_there_is_said_at_once():
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     with pytest.raises(ConnectionError, match="does not answer"):
-        UrSource("127.0.0.1", port)
+        UrStream("127.0.0.1", port)
 
 
 def test_something_that_is_not_rtde_is_said():
@@ -163,18 +163,18 @@ def test_something_that_is_not_rtde_is_said():
 
     threading.Thread(target=babble, daemon=True).start()
     with pytest.raises(ConnectionError, match="does not speak RTDE"):
-        UrSource("127.0.0.1", listener.getsockname()[1])
+        UrStream("127.0.0.1", listener.getsockname()[1])
     listener.close()
 
 
 def test_a_played_trace_keeps_its_pace():
     trace = moving(0.2)
-    source = PlayedSource(trace)
+    source = PlayedStream(trace)
     began = time.monotonic()
     samples = read_all(source)
     assert time.monotonic() - began == pytest.approx(0.192, abs=0.05)
     assert np.array_equal([s.q for s in samples], trace.q)
-    with pytest.raises(SourceClosed):
+    with pytest.raises(StreamClosed):
         source.read(0.0)
 
 

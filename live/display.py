@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Self
 
-from tauguard.datasets.live.sample import Sample
 from tauguard.detectors.faults.monitor import Answer
+from tauguard.live.stream import Sample
 
 #: Answers that wait to be shown; further ones are dropped, changes of state last.
 WAITING = 1000
@@ -16,7 +16,7 @@ WAITING = 1000
 PATIENCE = 1.0
 
 
-class Behind:
+class BackgroundDisplay:
     """Shows answers in a thread of its own, and drops what that cannot keep up with.
 
     Attributes:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 
-from tauguard.datasets.live.sample import Closing, Sample, SourceClosed
+from tauguard.live.stream import Closing, Sample, StreamClosed
 from tauguard.traces.trace import Trace
 
 
-class PlayedSource(Closing):
+class PlayedStream(Closing):
     """A trace played as if it were happening now.
 
     Args:
@@ -39,11 +39,11 @@ class PlayedSource(Closing):
         """The next sample when its time has come, or None if that is after ``timeout`` seconds.
 
         Raises:
-            SourceClosed: the trace is over.
+            StreamClosed: the trace is over.
         """
         k, trace = self._next, self.trace
         if k >= len(trace.t):
-            raise SourceClosed("the log is over")
+            raise StreamClosed("the log is over")
         now = time.monotonic()
         if k == 0:
             self._began = now

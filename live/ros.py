@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.datasets.live.sample import Closing, Sample, SourceClosed
+from tauguard.live.stream import Closing, Sample, StreamClosed
 
 #: Samples that wait to be read; more are lost, and counted.
 WAITING = 1000
@@ -37,7 +37,7 @@ def sample_of(message: Any, names: Sequence[str], arrived: int) -> Sample:
     return Sample(stamp.sec + 1e-9 * stamp.nanosec, q, qd, effort, arrived)
 
 
-class RosSource(Closing):
+class RosStream(Closing):
     """Subscribes to one topic and publishes nothing.
 
     Args:
@@ -91,14 +91,14 @@ class RosSource(Closing):
         """The next sample, or None if none came within ``timeout`` seconds.
 
         Raises:
-            SourceClosed: ROS has been shut down.
+            StreamClosed: ROS has been shut down.
             ValueError: a message without the joints, velocities or efforts.
         """
         try:
             found = self._waiting.get(timeout=timeout)
         except queue.Empty:
             if not self._context.ok():
-                raise SourceClosed("ROS has been shut down") from None
+                raise StreamClosed("ROS has been shut down") from None
             return None
         if isinstance(found, ValueError):
             raise found

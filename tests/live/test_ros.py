@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tauguard.datasets.live.ros import RosSource, sample_of
+from tauguard.live.ros import RosStream, sample_of
 
 
 def message(**changed):
@@ -40,4 +40,4 @@ def test_a_message_that_lacks_something_is_named(changed, names, said):
 @pytest.mark.skipif(importlib.util.find_spec("rclpy") is not None, reason="ROS 2 is there")
 def test_without_ros_one_line_says_what_to_do():
     with pytest.raises(ValueError, match="source a ROS 2 installation first, or pipe"):
-        RosSource("/joint_states", ("a",), 500.0)
+        RosStream("/joint_states", ("a",), 500.0)

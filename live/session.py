@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.datasets.live.lateness import Lateness
-from tauguard.datasets.live.sample import LiveSource, Sample, SourceClosed
 from tauguard.detectors.faults.monitor import FAULT, Answer, Monitor
 from tauguard.detectors.faults.spans import Spans
+from tauguard.live.lateness import Lateness
+from tauguard.live.stream import RobotStream, Sample, StreamClosed
 from tauguard.traces.trace import Trace
 
 #: Latencies are counted in bins of a microsecond, so many; what takes longer is in one more.
@@ -21,7 +21,7 @@ BINS = 100_000
 
 
 @dataclass
-class Heard:
+class Session:
     """What was heard so far; its size does not grow with time unless samples are kept."""
 
     joint_names: tuple[str, ...]
@@ -92,12 +92,12 @@ class Heard:
 
 
 def listen(
-    source: LiveSource,
+    source: RobotStream,
     monitor: Monitor,
     seconds: float = np.inf,
     report: Callable[[Sample, Answer], None] | None = None,
     keep: bool = False,
-) -> Heard:
+) -> Session:
     """Ask the monitor about every sample until the source ends, the time is up, or Ctrl-C.
 
     Args:
@@ -105,9 +105,9 @@ def listen(
         monitor: made for its joints and rate.
         seconds: by this machine's clock.
         report: called after every answer; it must return at once (the latency does not count it).
-        keep: keep the samples, for :meth:`Heard.trace`.
+        keep: keep the samples, for :meth:`Session.trace`.
     """
-    heard, lateness = Heard(source.joint_names, keep), Lateness(1 / source.rate)
+    heard, lateness = Session(source.joint_names, keep), Lateness(1 / source.rate)
     end = time.monotonic() + seconds
     last, most = time.monotonic(), lateness.most
     collecting = gc.isenabled()
@@ -127,7 +127,7 @@ def listen(
             if report is not None:
                 report(sample, said)
         heard.ended = f"{seconds:g} s are over"
-    except SourceClosed as closed:
+    except StreamClosed as closed:
         heard.ended = str(closed)
     except KeyboardInterrupt:
         heard.ended = "ended by hand"

@@ -8,10 +8,18 @@ import time
 
 import numpy as np
 
-from tauguard.datasets.columns import UR_JOINTS
-from tauguard.datasets.live import rtde
-from tauguard.datasets.live.sample import Closing, Sample, SourceClosed
+from tauguard.live import rtde
+from tauguard.live.stream import Closing, Sample, StreamClosed
 
+#: Joints of every UR arm by the names of UR's own ROS driver, as ``datasets.columns`` has them.
+UR_JOINTS = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
 #: What is asked of the controller, and the types that it has to answer.
 VARIABLES = {
     "timestamp": "DOUBLE",
@@ -26,7 +34,7 @@ E_SERIES = 5
 MOST_EVENTS = 1000
 
 
-class UrSource(Closing):
+class UrStream(Closing):
     """Joint positions, velocities and currents of a UR arm.
 
     Args:
@@ -71,7 +79,7 @@ class UrSource(Closing):
         A broken connection is opened again for ``reconnect`` seconds, and ``events`` says so.
 
         Raises:
-            SourceClosed: the connection broke and could not be opened again.
+            StreamClosed: the connection broke and could not be opened again.
         """
         deadline = time.monotonic() + timeout
         while True:
@@ -193,7 +201,7 @@ class UrSource(Closing):
             self._note(f"{what} ({error}), back after {time.monotonic() - began:.1f} s")
             return
         what = "connection lost" if lost else "connection given up"
-        raise SourceClosed(f"{self.host}:{self.port}: {what} ({error})")
+        raise StreamClosed(f"{self.host}:{self.port}: {what} ({error})")
 
     def _sample(self, payload: bytes) -> Sample:
         arrived = time.monotonic_ns()

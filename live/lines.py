@@ -9,13 +9,13 @@ from typing import TextIO
 
 import numpy as np
 
-from tauguard.datasets.live.sample import Closing, Sample, SourceClosed
+from tauguard.live.stream import Closing, Sample, StreamClosed
 
 #: Bytes of the longest line.
 LONGEST = 1 << 16
 
 
-class LineSource(Closing):
+class LineStream(Closing):
     """One sample a line: the time, then all q, all qd and all currents, separated by commas.
 
     Args:
@@ -46,7 +46,7 @@ class LineSource(Closing):
         """The sample of the next line, or None if none came within ``timeout`` seconds.
 
         Raises:
-            SourceClosed: the stream has ended.
+            StreamClosed: the stream has ended.
             ValueError: a line with another number of columns, or with something else than numbers.
         """
         deadline = time.monotonic() + timeout
@@ -55,7 +55,7 @@ class LineSource(Closing):
                 return None
             data = self._file.buffer.raw.read(65536)  # type: ignore[attr-defined]
             if not data:
-                raise SourceClosed("the input has ended")
+                raise StreamClosed("the input has ended")
             self._pending += data
             if len(self._pending) > LONGEST and b"\n" not in self._pending:
                 raise ValueError(

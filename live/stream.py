@@ -9,7 +9,7 @@ from typing import Protocol, Self
 from tauguard.arrays import Array
 
 
-class SourceClosed(Exception):
+class StreamClosed(Exception):
     """The source has ended: the log is over, or the robot closed the connection for good."""
 
 
@@ -24,7 +24,7 @@ class Sample:
     arrived: int  #: this machine's monotonic clock when the packet was whole [ns]
 
 
-class LiveSource(Protocol):
+class RobotStream(Protocol):
     """A robot that is read and never commanded.
 
     Another robot is one class with these members; see ``docs/live.md``.
@@ -46,7 +46,7 @@ class LiveSource(Protocol):
         """The next sample, or None if none came within ``timeout`` seconds.
 
         Raises:
-            SourceClosed: there will be no more.
+            StreamClosed: there will be no more.
         """
 
     def close(self) -> None:

@@ -5,9 +5,9 @@ import time
 
 import numpy as np
 
-from tauguard.datasets.live import Sample
-from tauguard.datasets.live.display import Behind
 from tauguard.detectors.faults.monitor import Answer
+from tauguard.live import Sample
+from tauguard.live.display import BackgroundDisplay
 
 
 def given(k, state="free"):
@@ -17,7 +17,7 @@ def given(k, state="free"):
 
 def test_everything_is_shown_in_order_when_there_is_time():
     seen = []
-    with Behind(lambda sample, answer: seen.append(sample.t)) as view:
+    with BackgroundDisplay(lambda sample, answer: seen.append(sample.t)) as view:
         for k in range(50):
             view.put(*given(k))
     assert seen == list(range(50))
@@ -31,7 +31,7 @@ def test_a_terminal_that_hangs_holds_up_nothing_and_what_is_dropped_is_counted()
         hangs.wait()
         seen.append(answer.state)
 
-    with Behind(show, waiting=10) as view:
+    with BackgroundDisplay(show, waiting=10) as view:
         began = time.monotonic()
         for k in range(1000):
             view.put(*given(k))

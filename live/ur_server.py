@@ -15,9 +15,9 @@ import time
 
 import numpy as np
 
-from tauguard.datasets.live import rtde
-from tauguard.datasets.live.packets import Packets
-from tauguard.datasets.live.sample import Closing
+from tauguard.live import rtde
+from tauguard.live.packets import Packets
+from tauguard.live.stream import Closing
 
 HOST = "127.0.0.1"
 #: Output variables, their types, and the field of :class:`Packets` that they come from ("" : 0).

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tauguard.datasets.live.lateness import Lateness, late_answer, most_behind
-from tauguard.datasets.live.packets import Fault, Packets
 from tauguard.detectors.faults.monitor import COLLISION, FAULT, FREE, Answer
+from tauguard.live.lateness import Lateness, late_answer, most_behind
+from tauguard.live.packets import Fault, Packets
 from tauguard.traces import Trace
 
 DT = 2e-3
