@@ -1,11 +1,10 @@
 """The wrappers in one place."""
 
-from tauguard.envs.budget import CostBudget, CostStep
-from tauguard.envs.camera import CameraObservation
-from tauguard.envs.detecting import DetectorObservation
-from tauguard.envs.reactions import REACTIONS, TRIGGERS, Reaction
-from tauguard.envs.recording import RecordMcap
-from tauguard.envs.separation import SpeedAndSeparation
+from tauguard.envs.adapters.budget import CostBudget, CostStep
+from tauguard.envs.adapters.observations import CameraObservation, DetectorObservation
+from tauguard.envs.adapters.reactions import REACTIONS, TRIGGERS, Reaction
+from tauguard.envs.adapters.recording import RecordMcap
+from tauguard.envs.adapters.separation import SpeedAndSeparation
 
 __all__ = [
     "REACTIONS",

@@ -39,6 +39,8 @@ ALLOWED = {
     "hard_cases": PRODUCT,
     "cli": PRODUCT | {"report", "hard_cases"},
 }
+#: The packages inside envs, and what each may use of the others; plant.py is common to them.
+ENVS = {"episodes": set(), "gym": {"episodes"}, "adapters": {"gym", "episodes"}}
 #: Modules at the top that every room may use: they use each other and no room.
 SHARED = {"arrays", "lazy", "strangers", "whole_file"}
 #: The front door: what it does stands in the rooms.
@@ -66,6 +68,14 @@ def test_imports_point_one_way(room):
     for path in FOLDERS[room].rglob("*.py"):
         backward = (rooms_imported(path) & ALLOWED.keys()) - ALLOWED[room] - {room}
         assert not backward, f"{path.relative_to(ROOT)} imports {sorted(backward)}"
+
+
+@pytest.mark.parametrize("part", sorted(ENVS))
+def test_imports_inside_envs_point_one_way(part):
+    for path in (ROOT / "envs" / part).rglob("*.py"):
+        named = set(re.findall(r"tauguard\.envs\.(\w+)", path.read_text()))
+        backward = (named & ENVS.keys()) - ENVS[part] - {part}
+        assert not backward, f"{path.relative_to(ROOT)} names {sorted(backward)}"
 
 
 def test_shared_modules_stand_on_no_room_and_nothing_else_stands_beside_them():

@@ -21,7 +21,7 @@ def register_environments() -> None:
         if name not in registry:
             register(
                 id=name,
-                entry_point=f"tauguard.envs.{module}:{prefix}Env",
-                vector_entry_point=f"tauguard.envs.{module}:{prefix}VectorEnv",
+                entry_point=f"tauguard.envs.gym.{module}:{prefix}Env",
+                vector_entry_point=f"tauguard.envs.gym.{module}:{prefix}VectorEnv",
                 max_episode_steps=steps,
             )

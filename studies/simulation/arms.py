@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from oracles.tool_error import tool_error
 from tauguard.arrays import Array
 from tauguard.envs import CollisionPlan, Episode, Simulation
-from tauguard.envs.sensing import listening
-from tauguard.envs.settings import CONTROLS, Settings
-from tauguard.envs.world import World, build_world
+from tauguard.envs.gym.sensing import listening
+from tauguard.envs.gym.settings import CONTROLS, Settings
+from tauguard.envs.gym.world import World, build_world
 from tauguard.report import Row
 from tauguard.traces import Trace
 

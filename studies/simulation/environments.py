@@ -16,9 +16,9 @@ from mujoco.batch import Batch
 from studies.harness import measure
 from studies.simulation.reactions import reactions, trained_detector
 from tauguard.contacts import registered
-from tauguard.envs.base import ArmEnv
-from tauguard.envs.cell import DIVERGED
-from tauguard.envs.reactions import REACTIONS
+from tauguard.envs.adapters.reactions import REACTIONS
+from tauguard.envs.gym.base import ArmEnv
+from tauguard.envs.gym.cell import DIVERGED
 from tauguard.models import body_region
 from tauguard.report import Row
 

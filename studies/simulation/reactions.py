@@ -11,8 +11,8 @@ import numpy as np
 from tauguard.datasets import demo_plan, simulate_all
 from tauguard.detectors import CollisionAlarm, make_detector, train
 from tauguard.detectors.calibration.nominal import nominal_arm
-from tauguard.envs.react import ReactEnv
-from tauguard.envs.reactions import REACTIONS, Reaction
+from tauguard.envs.adapters.reactions import REACTIONS, Reaction
+from tauguard.envs.gym.react import ReactEnv
 from tauguard.models import body_region
 from tauguard.report import Row, rate
 

@@ -12,7 +12,7 @@ from mujoco import rollout
 from studies.harness import measure
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import Motion, SimulationLoop, random_motion
-from tauguard.envs.simulate import workspace
+from tauguard.envs.episodes.simulate import workspace
 from tauguard.models import (
     BodyProxy,
     Clamp,

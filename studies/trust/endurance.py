@@ -22,7 +22,7 @@ from tauguard.report import Row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tauguard.envs.base import ArmEnv
+    from tauguard.envs.gym.base import ArmEnv
 
 
 #: Simulated hours and resets of a full and of a quick run; rows of the table in each.

@@ -7,7 +7,7 @@ import pytest
 from oracles.tool_error import tool_error
 from tauguard.envs import random_motion
 from tauguard.envs.controllers import Admittance, ComputedTorque, GravityPD, OperationalSpace
-from tauguard.envs.simulate import workspace
+from tauguard.envs.episodes.simulate import workspace
 from tauguard.models import SceneSpec, compose, pin_model
 from tests.models.arms import random_arm
 

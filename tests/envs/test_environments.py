@@ -15,9 +15,9 @@ from gymnasium.utils.env_checker import check_env
 
 import tauguard
 from tauguard.environments import ENVIRONMENTS
-from tauguard.envs.cell import FIGURES
-from tauguard.envs.reach import ReachEnv
-from tauguard.envs.settings import CONTROLS
+from tauguard.envs.gym.cell import FIGURES
+from tauguard.envs.gym.reach import ReachEnv
+from tauguard.envs.gym.settings import CONTROLS
 from tauguard.models import BodyProxy
 
 REACH = "tauguard:tauguard/Reach-v0"

@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tauguard.envs.settings import CONTROLS
+from tauguard.envs.gym.settings import CONTROLS
 from tauguard.models import Robot
 from tests.models.arms import random_arm
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tauguard.envs import Gains, SimulationDiverged, SimulationLoop, random_motion
+from tauguard.envs.episodes.simulate import workspace
 from tauguard.envs.plant import make_plant
-from tauguard.envs.simulate import workspace
 from tauguard.models import SceneSpec, compose, cura6_drive
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.envs.motions import Workspace, point_to_point, random_motion
+from tauguard.envs.episodes.motions import Workspace, point_to_point, random_motion
 
 SPACE = Workspace(
     low=-np.ones(6),

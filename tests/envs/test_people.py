@@ -9,7 +9,7 @@ import pytest
 from gymnasium.vector import SyncVectorEnv
 
 from tauguard.environments import ENVIRONMENTS
-from tauguard.envs.people import draw_script
+from tauguard.envs.gym.people import draw_script
 from tauguard.models import Person
 from tauguard.models.person import SEGMENTS
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import SyncVectorEnv
 
-from tauguard.envs.randomization import PARAMETERS, Choice, Normal, Uniform
+from tauguard.envs.gym.randomization import PARAMETERS, Choice, Normal, Uniform
 
 REACH = "tauguard:tauguard/Reach-v0"
 ALL = {

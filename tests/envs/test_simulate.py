@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.envs import CollisionPlan, Episode, PayloadPick, Simulation, labels, simulate
+from tauguard.envs import CollisionPlan, Episode, PayloadPick, Simulation, simulate
+from tauguard.envs.episodes import labels
+from tauguard.envs.episodes.poses import Poses
 from tauguard.envs.plant import untimed
-from tauguard.envs.poses import Poses
 from tauguard.models import Mismatch, SceneSpec, compose
 from tauguard.traces import STRATA
 

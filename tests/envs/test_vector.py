@@ -6,7 +6,7 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from tauguard.environments import ENVIRONMENTS
-from tauguard.envs.vector import VectorArmEnv
+from tauguard.envs.gym.vector import VectorArmEnv
 
 COPIES = 3
 

@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from tauguard.envs.sensing import ObserverListener
+from tauguard.envs.gym.sensing import ObserverListener
 from tauguard.envs.wrappers import (
     REACTIONS,
     DetectorObservation,

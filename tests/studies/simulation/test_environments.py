@@ -32,7 +32,7 @@ def rows():
 
 def test_a_row_a_checker_and_a_reaction(rows):
     from tauguard.contacts import registered
-    from tauguard.envs.reactions import REACTIONS
+    from tauguard.envs.adapters.reactions import REACTIONS
 
     whats = [row["what"] for row in rows if row["study"] == "step"]
     assert all(f"checker {name}" in whats for name in registered())

@@ -1,0 +1,1 @@
+"""What stands between an environment and its user: wrappers, and other libraries' interfaces."""

@@ -1,0 +1,81 @@
+"""Costs as libraries of constrained reinforcement learning expect them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+from gymnasium.utils import RecordConstructorArgs
+
+from tauguard.arrays import Array
+from tauguard.envs.gym.base import arm_env
+from tauguard.envs.gym.settings import positive
+
+
+class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+    """Ends an episode once its costs exceed a budget.
+
+    ``info["cost_left"]`` is what is left of it, below 0 at the end; ``info["cost_sum"]`` and
+    ``info["cost"]`` are the environment's own.
+    """
+
+    def __init__(self, env: gymnasium.Env[Array, Array], limit: float) -> None:
+        """Set the budget.
+
+        Args:
+            env: an environment of tauguard.
+            limit: the sum of ``info["cost"]`` that an episode may reach [N]; 0 allows none.
+
+        Raises:
+            ValueError: below 0 or not finite.
+        """
+        RecordConstructorArgs.__init__(self, limit=limit)
+        gymnasium.Wrapper.__init__(self, env)
+        arm_env(env)
+        if limit != 0:
+            positive("limit", limit)
+        self._limit = float(limit)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode with the whole budget."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        return observation, info | {"cost_left": self._limit}
+
+    def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+        """Act; terminated where the budget is spent."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        left = self._limit - info["cost_sum"]
+        return observation, reward, terminated or left < 0, truncated, info | {"cost_left": left}
+
+
+class CostStep(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+    """``step`` returns six values with the cost third, as Safety-Gymnasium's do.
+
+    observation, reward, cost, terminated, truncated, info: what OmniSafe, SafePO and others read.
+    ``scale`` makes the cost a number near 1, as their default budgets expect.
+    """
+
+    def __init__(self, env: gymnasium.Env[Array, Array], scale: float = 1.0) -> None:
+        """Choose the unit.
+
+        Args:
+            env: an environment whose ``info`` has a cost.
+            scale: [1/N] the cost is multiplied by this.
+
+        Raises:
+            ValueError: a scale that is not above 0.
+        """
+        RecordConstructorArgs.__init__(self, scale=scale)
+        gymnasium.Wrapper.__init__(self, env)
+        positive("scale", scale)
+        self._scale = float(scale)
+
+    def step(  # type: ignore[override]
+        self, action: Array
+    ) -> tuple[Array, Any, float, bool, bool, dict[str, Any]]:
+        """Act."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        cost = self._scale * float(info["cost"])
+        return observation, reward, cost, terminated, truncated, info

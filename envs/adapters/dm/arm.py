@@ -1,0 +1,159 @@
+"""The arm as a ``dm_control.composer`` entity, to be attached to any arena."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+from dm_control import composer, mjcf
+from dm_control.composer.observation import observable
+
+from tauguard.arrays import Array
+from tauguard.models import load_arm
+from tauguard.models.mjcf import xml_text
+
+#: Elements that a frame can hold and that have a place of their own.
+_PLACED = ("body", "geom", "site", "camera", "light", "inertial", "joint")
+
+
+class ArmEntity(composer.Entity):  # type: ignore[misc]
+    """A serial arm with one torque motor a joint.
+
+    Its observables are ``joint_positions`` [rad], ``joint_velocities`` [rad/s] and
+    ``joint_torques`` (what the motors apply, N m), each of shape (n,).
+    """
+
+    def _build(self, arm: str = "cura6", name: str | None = None) -> None:
+        """Build from ``arm``: ``cura6``, or an MJCF or URDF file with one serial arm.
+
+        Raises:
+            ValueError: not an arm, see :func:`tauguard.models.load_arm`.
+            FileNotFoundError: no such file.
+        """
+        source = load_arm(arm)
+        source.spec.compile()
+        self._root = mjcf.from_xml_string(without_frames(xml_text(source.spec)))
+        self._root.model = name or "arm"
+        self._joints = [self._root.find("joint", joint) for joint in source.joints]
+        self.home: np.ndarray = source.home
+        for joint, limit in zip(self._joints, source.torque_limit, strict=True):
+            bounded = {"ctrlrange": [-limit, limit]} if np.isfinite(limit) else {}
+            self._root.actuator.add("motor", name=joint.name, joint=joint, **bounded)
+        self._flange = self._root.find("site", source.flange().name)
+
+    def _build_observables(self) -> composer.Observables:
+        return ArmObservables(self)
+
+    def initialize_episode(self, physics: mjcf.Physics, random_state: Any) -> None:
+        """Put the arm into its home pose, at rest."""
+        del random_state
+        physics.bind(self._joints).qpos = self.home
+        physics.bind(self._joints).qvel = 0.0
+
+    @property
+    def mjcf_model(self) -> mjcf.RootElement:
+        """The arm's MJCF."""
+        return self._root
+
+    @property
+    def joints(self) -> list[mjcf.Element]:
+        """Base to tip."""
+        return self._joints
+
+    @property
+    def actuators(self) -> list[mjcf.Element]:
+        """The motors, in the order of :attr:`joints`; their control is a torque [N m]."""
+        return list(self._root.find_all("actuator"))
+
+    @property
+    def flange(self) -> mjcf.Element | None:
+        """The tool flange's site; ``None`` where the file names none."""
+        return self._flange
+
+
+class ArmObservables(composer.Observables):  # type: ignore[misc]
+    """What is seen of an :class:`ArmEntity`."""
+
+    @composer.observable  # type: ignore[untyped-decorator]
+    def joint_positions(self) -> observable.MJCFFeature:
+        """Joint positions [rad]."""
+        return observable.MJCFFeature("qpos", self._entity.joints)
+
+    @composer.observable  # type: ignore[untyped-decorator]
+    def joint_velocities(self) -> observable.MJCFFeature:
+        """Joint velocities [rad/s]."""
+        return observable.MJCFFeature("qvel", self._entity.joints)
+
+    @composer.observable  # type: ignore[untyped-decorator]
+    def joint_torques(self) -> observable.MJCFFeature:
+        """Torque of the motors [N m]."""
+        return observable.MJCFFeature("qfrc_actuator", self._entity.joints)
+
+
+def without_frames(xml: str) -> str:
+    """The same MJCF, every frame's pose given to what it holds.
+
+    Args:
+        xml: text that MuJoCo has written: orientations are quaternions.
+
+    Raises:
+        ValueError: something in a frame is oriented in another way than by a quaternion.
+    """
+    root = ElementTree.fromstring(xml)
+    world = root.find("worldbody")
+    if world is not None:
+        _flatten(world)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _flatten(parent: ElementTree.Element) -> None:
+    for child in list(parent):
+        _flatten(child)
+        if child.tag != "frame":
+            continue
+        at = list(parent).index(child)
+        parent.remove(child)
+        pos, quat = _pose(child)
+        for offset, part in enumerate(list(child)):
+            _place(part, pos, quat)
+            parent.insert(at + offset, part)
+
+
+def _pose(element: ElementTree.Element) -> tuple[Array, Array]:
+    for way in ("euler", "axisangle", "xyaxes", "zaxis"):
+        if element.get(way) is not None:
+            raise ValueError(f"<{element.tag} {way}>: expected a quaternion inside a frame")
+    pos = np.array(element.get("pos", "0 0 0").split(), dtype=float)
+    quat = np.array(element.get("quat", "1 0 0 0").split(), dtype=float)
+    return pos, quat / np.linalg.norm(quat)
+
+
+def _place(part: ElementTree.Element, pos: Array, quat: Array) -> None:
+    """Give ``part`` the frame's pose on top of its own."""
+    if part.tag not in _PLACED:
+        return
+    if part.get("fromto") is not None:
+        ends = np.array(part.attrib["fromto"].split(), dtype=float).reshape(2, 3)
+        part.set("fromto", _text(np.concatenate([_moved(end, pos, quat) for end in ends])))
+        return
+    own, turn = _pose(part)
+    whole = np.zeros(4)
+    mujoco.mju_mulQuat(whole, quat, turn)
+    part.set("pos", _text(_moved(own, pos, quat)))
+    if part.tag == "joint":
+        axis = np.array(part.get("axis", "0 0 1").split(), dtype=float)
+        part.set("axis", _text(_moved(axis, np.zeros(3), quat)))
+    elif part.tag != "light":
+        part.set("quat", _text(whole))
+
+
+def _moved(point: Array, pos: Array, quat: Array) -> Array:
+    out = np.zeros(3)
+    mujoco.mju_rotVecQuat(out, point, quat)
+    return out + pos
+
+
+def _text(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)

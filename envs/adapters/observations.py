@@ -1,0 +1,153 @@
+"""Wrappers that add to the observation: a camera beside the arm, and a detector in the loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
+
+from tauguard.arrays import Array
+from tauguard.envs.gym.base import arm_env
+from tauguard.envs.gym.rendering import Camera
+from tauguard.envs.gym.settings import DETECTORS, one_of
+
+Pictures = dict[str, Any]
+
+#: Bound of the residual in the observation [N m].
+RESIDUAL_BOUND = 1e4
+#: Depths beyond this read as this [m].
+FARTHEST = 10.0
+MODES = ("rgb", "depth", "rgbd")
+
+
+class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """The observation becomes a dictionary of ``state``, ``rgb`` and ``depth``.
+
+    | key | shape | type | unit |
+    |---|---|---|---|
+    | state | of the environment | float64 | as its table says |
+    | rgb | (height, width, 3) | uint8 | |
+    | depth | (height, width, 1) | float32 | m along the optical axis, at most 10 |
+
+    Needs an OpenGL that MuJoCo finds (``MUJOCO_GL=egl`` without a display). The pixels depend on
+    the renderer: they are the same bits on one machine only.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Any, Any],
+        mode: str = "rgbd",
+        height: int = 64,
+        width: int = 64,
+    ) -> None:
+        """Open the camera.
+
+        Args:
+            env: an environment of tauguard.
+            mode: "rgb", "depth" or "rgbd".
+            height: of the pictures [px].
+            width: of the pictures [px].
+
+        Raises:
+            ValueError: an unknown mode or no pixels.
+            RuntimeError: there is nothing to draw with; the message says what would help.
+        """
+        RecordConstructorArgs.__init__(self, mode=mode, height=height, width=width)
+        gymnasium.Wrapper.__init__(self, env)
+        one_of("mode", mode, MODES)
+        if min(height, width) < 1:
+            raise ValueError(f"height {height}, width {width}: expected 1 or more pixels")
+        self._arm = arm_env(env)
+        self._shape, self._mode = (height, width), mode
+        self._camera = Camera(self._arm.world, self._arm.cell.datas[0], height, width)
+        state = env.observation_space
+        parts: dict[str, spaces.Space[Any]] = {"state": state}
+        if mode != "depth":
+            parts["rgb"] = spaces.Box(0, 255, (height, width, 3), np.uint8)
+        if mode != "rgb":
+            parts["depth"] = spaces.Box(0.0, FARTHEST, (height, width, 1), np.float32)
+        self.observation_space = spaces.Dict(parts)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Pictures, dict[str, Any]]:
+        """Begin an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._seen(observation), info
+
+    def step(self, action: Array) -> tuple[Pictures, Any, bool, bool, dict[str, Any]]:
+        """Act."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return self._seen(observation), reward, terminated, truncated, info
+
+    def close(self) -> None:
+        """Close the camera."""
+        self._camera.close()
+        super().close()
+
+    def _seen(self, observation: Array) -> Pictures:
+        seen: Pictures = {"state": observation}
+        target = self._arm.cell.target[0]
+        if self._mode != "depth":
+            seen["rgb"] = self._camera.colours(target)
+        if self._mode != "rgb":
+            depth = np.clip(self._camera.depths(target), 0.0, FARTHEST)
+            seen["depth"] = depth[..., None].astype(np.float32)
+        return seen
+
+
+class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+    """Appends the detector's residual [N m], shape (n,), and its alarm (0 or 1).
+
+    ``info["residual"]`` and ``info["alarm"]`` are the detector's, too.
+    """
+
+    def __init__(self, env: gymnasium.Env[Array, Array], detector: Any = None) -> None:
+        """Put the detector into the loop.
+
+        Args:
+            env: an environment of tauguard.
+            detector: a name, a model file or an object as of the keyword ``detector``; ``None``
+                takes the environment's own.
+
+        Raises:
+            ValueError: no detector, or one that does not fit.
+        """
+        RecordConstructorArgs.__init__(self, detector=detector)
+        gymnasium.Wrapper.__init__(self, env)
+        inner = arm_env(env)
+        if detector is not None:
+            inner.cell.attach(detector)
+        elif inner.world.settings.detector is None:
+            raise ValueError(
+                "detector: the environment has none; give one to the wrapper or to make: "
+                f"{', '.join(DETECTORS)}, or the path of a trained detector"
+            )
+        n = len(inner.world.scene.joint_names)
+        box = env.observation_space
+        assert isinstance(box, spaces.Box)
+        bound = np.append(np.full(n, RESIDUAL_BOUND), 1.0)
+        self.observation_space = spaces.Box(
+            np.concatenate([box.low, np.append(-bound[:-1], 0.0)]),
+            np.concatenate([box.high, bound]),
+            dtype=np.float64,
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._joined(observation, info), info
+
+    def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+        """Act."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return self._joined(observation, info), reward, terminated, truncated, info
+
+    def _joined(self, observation: Array, info: dict[str, Any]) -> Array:
+        residual = np.clip(info["residual"], -RESIDUAL_BOUND, RESIDUAL_BOUND)
+        return np.concatenate([observation, residual, [float(info["alarm"])]])

@@ -1,0 +1,180 @@
+"""What an arm does once a collision is known: a wrapper that acts in the policy's place."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.utils import RecordConstructorArgs
+
+from tauguard.arrays import Array
+from tauguard.envs.gym.base import ArmEnv, arm_env
+from tauguard.envs.gym.cell import BRAKE, FREE, LIMP, VELOCITY
+from tauguard.envs.gym.settings import one_of
+
+#: The reactions, by name.
+REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
+#: What starts one: the detector's alarm, or the contact itself (which no real robot knows).
+TRIGGERS = ("alarm", "contact")
+#: Brakes hold this long after the power is cut [s] (assumed; data sheets say 10 to 50 ms).
+BRAKE_DELAY = 0.02
+#: A retraction follows the way back at this share of the speed it came with, and for this long [s]
+#: beyond where it was when the reaction began.
+RETRACT_SPEED, RETRACT_TIME = 0.5, 0.3
+#: The admittance's virtual inertia in units of the joint's own, and its time constant [s].
+ADMITTANCE_INERTIA, ADMITTANCE_TIME = 0.5, 0.1
+
+
+class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+    """Lets the policy act until the trigger; from then on the reaction does, to the episode's end.
+
+    * ``continue``: nothing happens.
+    * ``stop0``: category 0 of IEC 60204-1: power off at once, brakes after :data:`BRAKE_DELAY`.
+    * ``stop1``: category 1: the drives stop the arm along its path, then power off and brakes.
+      The deceleration is the arm's own limit, which is gentler than a brake: the peak force comes
+      within 50 ms of the touch and is higher than with ``stop0``. It is that of ``stop2`` and
+      ``retract`` too, which begin in the same way.
+    * ``stop2``: category 2: the drives stop the arm and hold it.
+    * ``retract``: stop as in category 2, go back the way the arm came and beyond where it was at
+      the trigger, hold.
+    * ``admittance``: the arm yields to the residual beyond the detector's thresholds (to the true
+      external torque where the trigger is the contact): ``M dv/dt = tau - D v`` in every joint.
+
+    ``info["reacting"]`` says whether it has begun.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Array, Array],
+        reaction: str = "stop2",
+        trigger: str = "alarm",
+        deceleration: float | None = None,
+    ) -> None:
+        """Choose the reaction.
+
+        Args:
+            env: an environment of tauguard; with trigger "alarm" it needs a detector.
+            reaction: one of :data:`REACTIONS`.
+            trigger: one of :data:`TRIGGERS`.
+            deceleration: of every joint [rad/s^2] (default: the arm's own limits).
+
+        Raises:
+            ValueError: no such reaction or trigger, or no detector to wait for.
+        """
+        RecordConstructorArgs.__init__(
+            self, reaction=reaction, trigger=trigger, deceleration=deceleration
+        )
+        gymnasium.Wrapper.__init__(self, env)
+        one_of("reaction", reaction, REACTIONS)
+        one_of("trigger", trigger, TRIGGERS)
+        self._arm: ArmEnv = arm_env(env)
+        if trigger == "alarm" and self._arm.cell.sensing is None:
+            raise ValueError("trigger 'alarm': the environment has no detector; use detector=")
+        self.reaction, self.trigger = reaction, trigger
+        world = self._arm.world
+        n = len(world.scene.joint_names)
+        own = world.scene.facts.max_acceleration
+        self._deceleration = np.resize(own if deceleration is None else deceleration, n)
+        self._period = 1 / world.settings.control_rate
+        # Critically damped gains: kp = w^2 M and kd = 2 w M.
+        self._inertia = world.gains.kd**2 / (4 * world.gains.kp)
+        self._dead = self._dead_zone()
+        self._retract_steps = round(RETRACT_TIME / self._period)
+        self._past: deque[Array] = deque(maxlen=round(2.0 / self._period))
+        self._forget()
+
+    def _dead_zone(self) -> Array:
+        """What the residual may be without contact [N m]; nothing where it is the truth."""
+        sensing = self._arm.cell.sensing
+        if not sensing or self.trigger != "alarm":
+            return np.zeros(len(self._deceleration))
+        return sensing[0].bounds
+
+    def _forget(self) -> None:
+        self._since: float | None = None
+        self._speed = np.zeros(len(self._deceleration))
+        self._tau = self._measured = np.zeros(len(self._deceleration))
+        self._returning: list[Array] | None = None
+        self._past.clear()
+        self._arm.cell.plants[0].override(FREE, self._speed)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode."""
+        self._forget()
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._look(info)
+        return observation, info | {"reacting": self._since is not None}
+
+    def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+        """Act, or react."""
+        if self._since is not None and self.reaction != "continue":
+            kind, speed = self._react()
+            self._arm.cell.plants[0].override(kind, speed)
+            self._since += self._period
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._look(info)
+        info["reacting"] = self._since is not None
+        return observation, reward, terminated, truncated, info
+
+    def _look(self, info: dict[str, Any]) -> None:
+        """Remember where the arm has been, and see whether the reaction must begin."""
+        n = len(self._deceleration)
+        observation = self._arm.cell.observation[0]
+        self._past.append(observation[:n].copy())
+        self._measured = observation[n : 2 * n].copy()
+        if self._since is None and (info["alarm"] if self.trigger == "alarm" else info["force"]):
+            self._since = 0.0
+            self._speed = self._measured
+        self._tau = info["residual"] if self.trigger == "alarm" else info["tau_ext"]
+
+    def _react(self) -> tuple[int, Array]:
+        """What replaces the next action: native code and joint velocities [rad/s]."""
+        assert self._since is not None
+        if self.reaction == "stop0":
+            return (LIMP if self._since < BRAKE_DELAY - 1e-9 else BRAKE), self._speed
+        if self.reaction == "admittance":
+            step = self._period / ADMITTANCE_INERTIA
+            damping = ADMITTANCE_INERTIA / ADMITTANCE_TIME
+            push = np.sign(self._tau) * np.maximum(np.abs(self._tau) - self._dead, 0)
+            push = push / self._inertia
+            # Implicit in the damping: stable for any period.
+            self._speed = (self._speed + step * push) / (1 + step * damping)
+            return VELOCITY, self._speed
+        stopped = self._slow_down()
+        if self.reaction == "stop1" and stopped:
+            return BRAKE, self._speed
+        if self.reaction == "retract" and stopped:
+            return VELOCITY, self._back()
+        return VELOCITY, self._speed
+
+    def _slow_down(self) -> bool:
+        """All joints together, so that the arm stays on its path; whether it stands.
+
+        Where the person has already slowed the arm down, the stop goes on from that speed: a ramp
+        by the clock alone would push.
+        """
+        squared = float(self._speed @ self._speed)
+        if squared > 0:
+            share = float(self._measured @ self._speed) / squared
+            self._speed = self._speed * min(max(share, 0.0), 1.0)
+        fastest = (np.abs(self._speed) / self._deceleration).max()
+        if fastest <= self._period:
+            self._speed = np.zeros_like(self._speed)
+            return True
+        self._speed = self._speed * (1 - self._period / fastest)
+        return False
+
+    def _back(self) -> Array:
+        """Velocity along the remembered way, backwards; zero once the time is over."""
+        if self._returning is None:
+            rows, each = np.array(self._past), round(1 / RETRACT_SPEED)
+            assert self._since is not None
+            gone = each * round(self._since / self._period)  # back to where the reaction began
+            speeds = -np.diff(rows, axis=0)[::-1] / (each * self._period)
+            back = np.repeat(speeds, each, axis=0)[: gone + self._retract_steps]
+            self._returning = list(back)
+        return self._returning.pop(0) if self._returning else np.zeros_like(self._speed)

@@ -1,0 +1,149 @@
+"""Speed and separation monitoring: the arm stops before a person can be reached."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+from gymnasium.utils import RecordConstructorArgs
+
+from tauguard.arrays import Array
+from tauguard.envs.gym.base import ArmEnv, arm_env
+from tauguard.envs.gym.cell import FREE, VELOCITY
+from tauguard.envs.gym.settings import positive
+
+#: Distances beyond this are not looked at [m].
+FAR = 3.0
+
+
+class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
+    """Stops the arm (category 2) while a body region is nearer than the protective distance.
+
+    ``S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z`` (ISO 13855 as ISO 10218-2 uses it):
+    v_h the region's approach speed, v_r the speed of the nearest point of the arm, T_r the reaction
+    time, T_s the stopping time from the present speed. The arm moves on once the separation
+    exceeds S by ``hysteresis``.
+
+    ``info`` gets ``separation`` [m] (at most :data:`FAR`), ``protective_distance`` [m] and
+    ``stopped``.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Array, Array],
+        approach_speed: float = 1.6,
+        reaction_time: float = 0.1,
+        intrusion: float = 0.1,
+        uncertainty: float = 0.05,
+        hysteresis: float = 0.05,
+    ) -> None:
+        """Set the terms.
+
+        Args:
+            env: an environment of tauguard with body regions.
+            approach_speed: v_h [m/s]; 1.6 is the standard's for a person whose speed is not
+                measured.
+            reaction_time: T_r of sensor and controller [s].
+            intrusion: C, how far a body part reaches before it is sensed [m].
+            uncertainty: Z, of both positions [m].
+            hysteresis: above the protective distance before the arm moves on [m].
+
+        Raises:
+            ValueError: a number below 0, or an environment without body regions.
+        """
+        RecordConstructorArgs.__init__(
+            self,
+            approach_speed=approach_speed,
+            reaction_time=reaction_time,
+            intrusion=intrusion,
+            uncertainty=uncertainty,
+            hysteresis=hysteresis,
+        )
+        gymnasium.Wrapper.__init__(self, env)
+        positive("approach_speed", approach_speed)
+        for name in ("reaction_time", "intrusion", "uncertainty", "hysteresis"):
+            value = locals()[name]
+            if not (np.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} {value}: expected 0 or more")
+        self._arm: ArmEnv = arm_env(env)
+        world = self._arm.world
+        if not world.regions:
+            raise ValueError("no body regions to keep away from: make the environment with some")
+        self._terms = (approach_speed, reaction_time, intrusion + uncertainty, hysteresis)
+        model = world.scene.model
+        self._geoms = [
+            g
+            for g in range(model.ngeom)
+            if model.geom_bodyid[g] in set(world.scene.link_bodies.tolist())
+            and (model.geom_contype[g] or model.geom_conaffinity[g])
+        ]
+        self._targets = [int(model.body_geomadr[r.body]) for r in world.regions]
+        own = world.scene.facts.max_acceleration
+        self._deceleration = np.resize(own, len(world.scene.joint_names))
+        self._stopped = False
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode."""
+        self._stopped = False
+        observation, info = self.env.reset(seed=seed, options=options)
+        return observation, info | self._judge()
+
+    def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
+        """Act, or stand."""
+        still = np.zeros(len(self._deceleration))
+        self._arm.cell.plants[0].override(VELOCITY if self._stopped else FREE, still)
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return observation, reward, terminated, truncated, info | self._judge()
+
+    def _judge(self) -> dict[str, Any]:
+        nearest, needed, inside = FAR, 0.0, False
+        for target in self._targets:
+            for geom in self._geoms:
+                distance, speed = self._pair(geom, target)
+                protective = self._protective(speed)
+                margin = self._terms[3] if self._stopped else 0.0
+                inside |= distance < min(protective + margin, FAR)
+                if distance < nearest:
+                    nearest, needed = distance, protective
+        self._stopped = inside
+        return {"separation": nearest, "protective_distance": needed, "stopped": inside}
+
+    def _pair(self, geom: int, target: int) -> tuple[float, float]:
+        """Distance of an arm's geom from a region [m], and the arm's speed at that point [m/s]."""
+        model, data = self._arm.cell.model(0), self._arm.cell.datas[0]
+        ends = np.zeros(6)
+        distance = mujoco.mj_geomDistance(model, data, geom, target, FAR, ends)
+        if distance >= FAR:
+            return FAR, 0.0
+        return float(distance), self._speed(int(model.geom_bodyid[geom]), ends[:3])
+
+    def _speed(self, body: int, point: Array) -> float:
+        """Of a point of a link [m/s], from the joints' axes as they are now."""
+        world, data = self._arm.world, self._arm.cell.datas[0]
+        model, total = world.scene.model, np.zeros(3)
+        for joint, dof, link in zip(
+            world.ids(), world.scene.dof_adr, world.scene.link_bodies, strict=True
+        ):
+            if link > body or not _same_arm(model, int(link), body):
+                continue
+            axis, rate = data.xaxis[joint], data.qvel[dof]
+            slide = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
+            total += rate * (axis if slide else np.cross(axis, point - data.xanchor[joint]))
+        return float(np.linalg.norm(total))
+
+    def _protective(self, speed: float) -> float:
+        approach, reaction, fixed, _ = self._terms
+        data, dofs = self._arm.cell.datas[0], self._arm.world.scene.dof_adr
+        stopping = float((np.abs(data.qvel[dofs]) / self._deceleration).max())
+        return approach * (reaction + stopping) + speed * (reaction + stopping / 2) + fixed
+
+
+def _same_arm(model: mujoco.MjModel, link: int, body: int) -> bool:
+    """Whether ``body`` is carried by ``link``."""
+    while body > link:
+        body = int(model.body_parentid[body])
+    return body == link

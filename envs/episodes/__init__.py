@@ -1,0 +1,1 @@
+"""The episode generator: motions, injected collisions, the simulation loop, and their truth."""

@@ -1,0 +1,272 @@
+"""How a planned collision is carried out: where it strikes, and what the loop must do for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.arrays import Array
+from tauguard.envs.episodes.episode import CollisionPlan
+from tauguard.envs.episodes.motions import Motion
+from tauguard.envs.episodes.poses import Poses, cross
+from tauguard.models import Scene
+
+#: A clamp needs a link that moves at least this fast [m/s] to run into it.
+CLAMP_SPEED = 0.005
+#: Shortest and longest way of the link's surface past the sample of a clamp [m].
+CLAMP_TRAVEL = (0.002, 0.06)
+#: A clamp stands for its duration and this long [s].
+CLAMP_HOLD = 0.1
+#: A motion is looked at in strides of this length [s], with this many rays at each.
+STRIDE, CASTS = 0.02, 8
+#: An obstacle is in place this long before it touches [s].
+LEAD = 0.15
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where an obstacle meets a link: a point of its surface and the way towards it."""
+
+    row: int  #: sample of the motion
+    body: int  #: MuJoCo body of the link
+    point: Array  #: on the surface, world frame [m]
+    direction: Array  #: unit vector of the push on the link, world frame
+    velocity: Array  #: of the surface point [m/s]
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A link and the arm's joints at some rows of the motion; the link for a while longer."""
+
+    rows: list[int]  #: R of them
+    body: int  #: MuJoCo body of the link
+    position: Array  #: of the link's origin [m], shape (R or more, 3)
+    rotation: Array  #: of the link, shape (R or more, 3, 3)
+    anchor: Array  #: on the joints' axes [m], shape (R, n, 3)
+    axis: Array  #: of the joints, shape (R, n, 3)
+    speed: Array  #: of the link's origin [m/s], shape (R, 3)
+    spin: Array  #: of the link [rad/s], shape (R, 3)
+
+    def velocity(self, number: int, points: Array) -> Array:
+        """Of points of the link, shape (..., 3), at the ``number``-th row [m/s]."""
+        arm = points - self.position[number]
+        return np.asarray(self.speed[number] + cross(self.spin[number], arm))
+
+
+class Aim:
+    """Finds surface points of a scene's links by ray casting along a motion."""
+
+    def __init__(self, scene: Scene, motion: Motion) -> None:
+        """For the scene's collision geometry and the motion's references."""
+        self._scene, self._motion = scene, motion
+        self._data, self._poses = mujoco.MjData(scene.model), Poses(scene)
+        self._dt = float(motion.t[1] - motion.t[0])
+        self._stride = max(1, round(STRIDE / self._dt))
+        model = scene.model
+        links = np.isin(model.geom_bodyid, scene.link_bodies)
+        solid = links & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+        self._groups = np.zeros(6, dtype=np.uint8)
+        self._groups[model.geom_group[solid]] = 1
+        self._geoms = [
+            np.flatnonzero(solid & (model.geom_bodyid == body)).tolist()
+            for body in scene.link_bodies
+        ]
+        self._still = np.abs(motion.qd).max(axis=1) <= 1e-9
+
+    def find(self, plan: CollisionPlan, rng: np.random.Generator, last: int) -> Target | None:
+        """A target for ``plan`` at the first sample that offers one, up to sample ``last``."""
+        first = round(plan.time / self._dt)
+        way = self._way(plan, range(first, max(first + 1, last), self._stride))
+        usable = self._quick_enough(plan, way)
+        for number, row in enumerate(way.rows):
+            if plan.at_rest and not self._still[row]:
+                continue
+            if not usable[number]:
+                self._draw(plan, rng, CASTS)
+                continue
+            target = self._cast(plan, way, number, rng)
+            if target is not None:
+                return target
+        return None
+
+    def _way(self, plan: CollisionPlan, rows: range) -> _Way:
+        body = int(self._scene.link_bodies[plan.link - 1])
+        longer = self._standing(plan) if plan.kind == "clamp" else 1
+        stops = slice(rows.start, rows[-1] + longer, self._stride)
+        position, rotation = self._poses.body(self._motion.q[stops], body)
+        at = np.array(rows)
+        anchor, axis = self._poses.joints(self._motion.q[at])
+        speed, spin = np.zeros((len(at), 3)), np.zeros((len(at), 3))
+        for joint in self._poses.moving[plan.link - 1]:
+            turn = self._motion.qd[at, joint, None] * axis[:, joint]
+            if self._poses.sliding[joint]:
+                speed += turn
+            else:
+                spin += turn
+                speed += cross(turn, position[: len(at)] - anchor[:, joint])
+        return _Way(list(rows), body, position, rotation, anchor, axis, speed, spin)
+
+    def _quick_enough(self, plan: CollisionPlan, way: _Way) -> NDArray[np.bool_]:
+        """At which rows some point that :meth:`_inside` gives may be quick enough for a clamp.
+
+        Speed is convex along a line, so that the ends of the line in each geom have the largest.
+        """
+        if plan.kind != "clamp":
+            return np.ones(len(way.rows), dtype=bool)
+        model, count = self._scene.model, len(way.rows)
+        fastest = np.zeros(count)
+        for geom in self._geoms[plan.link - 1]:
+            turned = np.zeros(9)
+            mujoco.mju_quat2Mat(turned, model.geom_quat[geom])
+            for end in (-0.8, 0.8):
+                local = model.geom_pos[geom] + end * model.geom_size[geom, 1] * turned[2::3]
+                speed = way.speed + cross(way.spin, way.rotation[:count] @ local)
+                fastest = np.maximum(fastest, np.linalg.norm(speed, axis=1))
+        return fastest > 0.999 * CLAMP_SPEED
+
+    def _draw(
+        self, plan: CollisionPlan, rng: np.random.Generator, count: int
+    ) -> tuple[list[int], Array, Array]:
+        """What ``count`` casts need: geoms, places along their axes, pushes (none for clamps)."""
+        own, size = self._geoms[plan.link - 1], self._scene.model.geom_size
+        if plan.kind == "clamp" and len(own) == 1:  # nothing is drawn to choose one of one
+            reach = float(size[own[0], 1]) * 0.8
+            return own * count, rng.uniform(-reach, reach, count), np.zeros((count, 3))
+        geoms, places, pushes = [], np.empty(count), np.zeros((count, 3))
+        for k in range(count):
+            geom = own[int(rng.integers(len(own)))]
+            reach = float(size[geom, 1]) * 0.8
+            geoms.append(geom)
+            places[k] = rng.uniform(-reach, reach)
+            if plan.kind != "clamp":
+                pushes[k] = rng.normal(size=3)
+        return geoms, places, pushes
+
+    def _cast(
+        self, plan: CollisionPlan, way: _Way, number: int, rng: np.random.Generator
+    ) -> Target | None:
+        """The first target of :data:`CASTS` rays at a row; only what it took is drawn."""
+        data = self._data
+        data.qpos[self._scene.qpos_adr] = self._motion.q[way.rows[number]]
+        mujoco.mj_kinematics(self._scene.model, data)
+        before = rng.bit_generator.state
+        geoms, places, pushes = self._draw(plan, rng, CASTS)
+        inside = data.geom_xpos[geoms] + data.geom_xmat[geoms][:, 2::3] * places[:, None]
+        if plan.kind == "clamp":
+            pushes = -way.velocity(number, inside)
+        size = np.sqrt((pushes**2).sum(axis=1))
+        quick = size >= (CLAMP_SPEED if plan.kind == "clamp" else 0.0)
+        pushes /= np.where(size > 0, size, 1.0)[:, None]
+        points, hit = self._hits(way.body, inside, pushes, quick)
+        if plan.kind == "clamp":
+            hit &= self._stops_soon(plan, way, number, points, pushes)
+        for taken in np.flatnonzero(hit):
+            point, push = points[taken], pushes[taken]
+            if self._reaches(plan, way, number, point, push):
+                rng.bit_generator.state = before
+                self._draw(plan, rng, int(taken) + 1)
+                speed = way.velocity(number, point)
+                return Target(way.rows[number], way.body, point, push, speed)
+        return None
+
+    def _hits(
+        self, body: int, inside: Array, pushes: Array, wanted: NDArray[np.bool_]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Where rays towards points in a body meet it, and whether they do so before another."""
+        model, geom, normal = self._scene.model, np.full(1, -1, dtype=np.int32), np.zeros(3)
+        origins, distances = inside - 2.0 * pushes, np.zeros(len(inside))
+        hit = wanted.copy()
+        for k in np.flatnonzero(wanted):
+            distances[k] = mujoco.mj_ray(
+                model, self._data, origins[k], pushes[k], self._groups, 1, -1, geom, normal
+            )
+            hit[k] = distances[k] >= 0 and model.geom_bodyid[geom[0]] == body
+        return origins + distances[:, None] * pushes, hit
+
+    def _reaches(
+        self, plan: CollisionPlan, way: _Way, number: int, point: Array, push: Array
+    ) -> bool:
+        """Whether some force of the plan's range gives a torque of its severity here."""
+        if plan.severity is None or plan.force is None:
+            return True
+        levers = [0.0]
+        for joint in self._poses.moving[plan.link - 1]:
+            along = way.axis[number, joint]
+            arm = (
+                push
+                if self._poses.sliding[joint]
+                else cross(point - way.anchor[number, joint], push)
+            )
+            levers += [abs(float(along @ arm))] if joint < 4 else []
+        low, high = plan.severity
+        return low < max(levers) * plan.force[1] and max(levers) * plan.force[0] < high
+
+    def _standing(self, plan: CollisionPlan) -> int:
+        return round((plan.duration + CLAMP_HOLD) / self._dt)
+
+    def _stops_soon(
+        self, plan: CollisionPlan, way: _Way, number: int, points: Array, pushes: Array
+    ) -> NDArray[np.bool_]:
+        """Whether the surface goes on for a little way only: it presses and does not sweep."""
+        count = len(range(0, self._standing(plan), self._stride))
+        stand = slice(number, number + count)
+        position, rotation = way.position[stand], way.rotation[stand]
+        local = (points - position[0]) @ rotation[0]
+        # The way along -push of each point: rows x points.
+        turned = np.einsum("pi,tij,pj->tp", pushes, rotation, local)
+        along = turned + position @ pushes.T - (points * pushes).sum(axis=1)
+        reach = (-along).max(axis=0)
+        return np.asarray((reach >= CLAMP_TRAVEL[0]) & (reach <= CLAMP_TRAVEL[1]))
+
+
+def pulse_wrench(
+    target: Target, com: Array, force: float, duration: float, dt: float, rows: int, begin: int
+) -> Array:
+    """A half-sine force at the target's point as a wrench about ``com``.
+
+    Args:
+        target: where and which way.
+        com: centre of mass of the link while it is pushed, shape (rows, 3) [m].
+        force: peak [N].
+        duration: [s].
+        dt: [s].
+        rows: length of the table.
+        begin: its first pushed row.
+
+    Returns:
+        Force [N] and torque [N m], world frame, shape (rows, 6).
+    """
+    table = np.zeros((rows, 6))
+    steps = np.arange(rows) - begin
+    during = (steps > 0) & (steps * dt < duration)
+    size = np.where(during, np.sin(np.pi * np.clip(steps * dt / duration, 0, 1)), 0.0)
+    table[:, :3] = force * size[:, None] * target.direction
+    moved = target.point + np.outer(steps * dt, target.velocity)
+    table[:, 3:] = cross(moved - com, table[:, :3])
+    return table
+
+
+def launch(target: Target, speed: float, radius: float) -> tuple[Array, Array]:
+    """Start position and velocity of a striker that reaches the target after :data:`LEAD` seconds.
+
+    ``speed`` is relative to the struck point, along the push.
+    """
+    velocity = target.velocity + speed * target.direction
+    centre = target.point - radius * target.direction
+    return centre - LEAD * velocity, velocity
+
+
+def clamp_centre(target: Target, path: Array, depth: float, radius: float) -> Array:
+    """Centre of a fixed sphere into which the reference motion runs ``depth`` metres.
+
+    Args:
+        target: the surface point that meets the sphere.
+        path: of that point along the references while the clamp stands, shape (T, 3) [m].
+        depth: how far the references would go past the sphere's surface [m].
+        radius: of the sphere [m].
+    """
+    ahead = float((-(path - target.point) @ target.direction).max(initial=0.0))
+    return target.point - (ahead - depth + radius) * target.direction

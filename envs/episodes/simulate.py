@@ -1,0 +1,335 @@
+"""From an episode to a trace: compose, move, strike, record, label, measure."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.detectors import RobotNumbers, inverse_dynamics
+from tauguard.envs.episodes import labels
+from tauguard.envs.episodes.episode import CollisionPlan, Episode, PayloadPick
+from tauguard.envs.episodes.loop import AlongMotion, Rollout, SimulationLoop
+from tauguard.envs.episodes.motions import Workspace, random_motion
+from tauguard.envs.episodes.poses import Poses
+from tauguard.envs.episodes.striking import Striking, Window
+from tauguard.models import (
+    Clamp,
+    Drive,
+    Scene,
+    SceneSpec,
+    Striker,
+    compose,
+    cura6,
+    pin_model,
+    set_payload,
+    without_losses,
+)
+from tauguard.traces import CheckedContacts, Trace, Truth
+
+if TYPE_CHECKING:
+    from tauguard.contacts import Checker
+
+
+#: Poses are drawn this far around the CURA6-like arm's home [rad].
+OWN_SPREAD = (1.6, 0.55, 0.7, 1.0, 1.0, 1.5)
+#: The Coulomb part of the compensation rises over this speed [rad/s], as in the native servo.
+FRICTION_SMOOTHING = 0.02
+#: Links stay this high above the floor and this far from the base's axis [m].
+CLEARANCE = (0.15, 0.22)
+
+
+def workspace(scene: Scene) -> Workspace:
+    """Where the arm works: a box around its home pose, free of self-collision and of the floor."""
+    model, data, facts = scene.model, mujoco.MjData(scene.model), scene.facts
+    own = facts.name in cura6.NAMES
+    spread = np.array(OWN_SPREAD) if own else facts.spread
+    ids = [int(model.joint(name).id) for name in scene.joint_names]
+    limited = model.jnt_limited[ids].astype(bool)[:, None]
+    limits = np.where(limited, model.jnt_range[ids], [-np.inf, np.inf])
+    links = [int(b) for b in scene.link_bodies[2:]]
+
+    def clearance(q: Array) -> tuple[float, float]:
+        data.qpos[scene.qpos_adr] = q
+        mujoco.mj_kinematics(model, data)
+        low = min((float(data.xpos[b][2]) for b in links), default=np.inf)
+        near = min((float(np.hypot(*data.xpos[b][:2])) for b in links[1:]), default=np.inf)
+        return low, near
+
+    # An arm whose home is itself nearer to the floor or its base than that may come half as near.
+    at_home = (np.inf, np.inf) if own else clearance(facts.home)
+    least = [min(*pair) for pair in zip(CLEARANCE, np.multiply(at_home, 0.5), strict=True)]
+
+    def allowed(q: Array) -> bool:
+        low, near = clearance(q)
+        return bool(low > least[0] and near > least[1])
+
+    return Workspace(
+        low=np.maximum(facts.home - spread, limits[:, 0]),
+        high=np.minimum(facts.home + spread, limits[:, 1]),
+        max_speed=facts.max_speed,
+        max_acceleration=facts.max_acceleration,
+        allowed=allowed,
+    )
+
+
+def scene_for(episode: Episode, visuals: bool = True) -> Scene:
+    """The scene that an episode needs, and nothing else; ``visuals`` as for ``compose``."""
+    kinds = {plan.kind for plan in episode.collisions}
+    carries = episode.payload_g > 0 or any(pick.payload_g > 0 for pick in episode.picks)
+    scene = compose(
+        SceneSpec(
+            timestep=episode.timestep,
+            arm=episode.arm,
+            mismatch=episode.mismatch,
+            payload=carries,
+            striker=Striker() if "strike" in kinds else None,
+            clamp=Clamp() if "clamp" in kinds else None,
+            labels=bool(kinds & {"strike", "clamp"}),
+        ),
+        visuals,
+    )
+    if not can_touch(scene.model):
+        scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    drive = scene.drive
+    if episode.ideal_drive:
+        return without_losses(scene)
+    if episode.temperature is not None and drive.friction is not None:
+        drive = replace(drive, friction=replace(drive.friction, temperature=episode.temperature))
+    return replace(scene, drive=drive)
+
+
+def can_touch(model: mujoco.MjModel) -> bool:
+    """Whether any two geoms of the scene may be in contact."""
+    makes, takes = model.geom_contype[:, None], model.geom_conaffinity
+    return bool(model.npair or model.nflex or (makes & takes).any())
+
+
+class Simulation:
+    """An episode while it runs."""
+
+    def __init__(
+        self,
+        episode: Episode,
+        nominal: Drive | None = None,
+        checkers: Sequence[str | Checker] = (),
+        without: Sequence[str] = (),
+    ) -> None:
+        """Compose the scene, plan the motion and the feed-forward torques.
+
+        Args:
+            episode: what to simulate.
+            nominal: what the controller believes about the drive (default: the arm's nominal one).
+            checkers: contact checkers whose answers go into the trace.
+            without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.
+        """
+        self._checkers = [_known(c) for c in checkers]
+        self.episode, self._without = episode, tuple(without)
+        self.scene = scene_for(episode, visuals=bool(checkers))
+        self.scene = replace(self.scene, drive=self.scene.drive.without(*without))
+        self.nominal = (nominal or self.scene.facts.nominal).without(*without)
+        streams = np.random.SeedSequence(episode.seed).spawn(3)
+        motion_rng, aim_rng, self._sensor_rng = map(np.random.default_rng, streams)
+        self.motion = random_motion(
+            motion_rng,
+            workspace(self.scene),
+            episode.seconds,
+            episode.speed,
+            episode.timestep,
+        )
+        self.robot = RobotNumbers.from_pin(pin_model(self.scene.arm_model))
+        needed = inverse_dynamics(self.robot, self.motion.q, self.motion.qd, self.motion.qdd)
+        self._feed_forward = needed + self._known_friction()
+        self.loop = SimulationLoop(self.scene, self.nominal)
+        self.loop.reset(self.motion.q[0])
+        self._rollout = self.loop.room_for(len(self.motion.t))
+        self._follow = AlongMotion(self.loop, self.motion, self._feed_forward, self._rollout)
+        self.striking = Striking(self.scene, self._follow, aim_rng)
+        self._payload = 0.0
+        self._windows: list[Window] = []
+
+    def run(self) -> Trace:
+        """Simulate the whole episode."""
+        payload = np.full(len(self.motion.t), self.episode.payload_g / 1000)
+        row, injected = 0, []
+        jobs: list[CollisionPlan | PayloadPick] = [*self.episode.collisions, *self.episode.picks]
+        jobs.sort(key=lambda item: item.time)
+        self._carry(self.episode.payload_g)
+        for index, job in enumerate(jobs):
+            stop = len(payload) if index + 1 == len(jobs) else self._row(jobs[index + 1].time)
+            start = max(row, self._row(job.time))
+            if isinstance(job, CollisionPlan):
+                start, window = self.striking.carry_out(job, row, start, stop)
+                if window is not None:
+                    injected.append((window.begin * self.episode.timestep, job.kind))
+                    self._windows.append(window)
+                    start = window.begin + len(window.rollout.q)
+            else:
+                self._follow(row, start)
+                self._carry(job.payload_g)
+                payload[start:] = job.payload_g / 1000
+            row = start
+        self._follow(row, len(payload))
+        return self._trace(self._rollout, payload, injected)
+
+    def _known_friction(self) -> Array:
+        """What the servo adds to make up for the friction that it knows of [N m], (T, n)."""
+        friction, share = self.nominal.friction, self.scene.facts.compensation
+        if friction is None or share == 0:
+            return np.zeros_like(self.motion.qd)
+        qd = self.motion.qd
+        level = friction.coulomb * np.tanh(qd / FRICTION_SMOOTHING)
+        return np.asarray(share * (level + friction.viscous * qd))
+
+    def _row(self, time: float) -> int:
+        return round(time / self.episode.timestep)
+
+    def _carry(self, grams: float) -> None:
+        if self.scene.payload_body >= 0 and grams / 1000 != self._payload:
+            set_payload(self.loop.model, self.loop.data, self.scene.payload_body, grams / 1000)
+            self._payload = grams / 1000
+
+    def _contacts(self, rollout: Rollout) -> tuple[CheckedContacts, ...]:
+        if not self._checkers:
+            return ()
+        from tauguard.envs.episodes.checking import checked
+
+        return checked(self.scene, self.motion.t, rollout, self._checkers)
+
+    def _trace(self, rollout: Rollout, payload: Array, injected: list[tuple[float, str]]) -> Trace:
+        scene, episode, motion = self.scene, self.episode, self.motion
+        wrenches = labels.Wrenches.from_contacts(rollout.contact)
+        if not rollout.contact.shape[1]:  # links are listed where something pushes one
+            links = len(scene.link_bodies) if self._windows else 0
+            wrenches = labels.Wrenches.empty(len(motion.t), links)
+        for window in self._windows:
+            rows = slice(window.begin, window.begin + len(window.rollout.q))
+            wrenches.force[rows] = window.wrenches.force
+            wrenches.torque[rows] = window.wrenches.torque
+            wrenches.point[rows] = window.wrenches.point
+        tau_ext = labels.external_torque(Poses(scene), rollout.q, wrenches)
+        truth = _truth(motion.t, scene, rollout, wrenches, tau_ext, payload, injected)
+        sensors = scene.drive.sensors
+        q, qd, current = rollout.q, rollout.qd, rollout.current
+        if sensors is not None:
+            q, qd, current = sensors.measure(self._sensor_rng, q, qd, current)
+        return Trace(
+            joint_names=tuple(scene.joint_names),
+            t=motion.t,
+            q=q,
+            qd=qd,
+            current=current,
+            q_des=motion.q,
+            qd_des=motion.qd,
+            qdd_des=motion.qdd,
+            truth=truth,
+            contacts=self._contacts(rollout),
+            meta={
+                "seed": str(episode.seed),
+                "config_sha256": episode.config_hash,
+                "model_sha256": hashlib.sha256(scene.xml.encode()).hexdigest(),
+                "tauguard": importlib.metadata.version("tauguard"),
+                "mujoco": mujoco.__version__,
+                **({} if episode.arm == "cura6" else {"arm": episode.arm}),
+                **({"without": ",".join(self._without)} if self._without else {}),
+            },
+            attachments={
+                "scene.xml": scene.xml,
+                **scene.nominal_texts,
+                "episode.json": episode.to_json(),
+            },
+        )
+
+
+def _truth(
+    t: Array,
+    scene: Scene,
+    rollout: Rollout,
+    wrenches: labels.Wrenches,
+    tau_ext: Array,
+    payload: Array,
+    injected: list[tuple[float, str]],
+) -> Truth:
+    force, where, link = np.zeros(len(t)), np.full((len(t), 3), np.nan), np.zeros(len(t), np.int64)
+    vector, rows = np.zeros((len(t), 3)), wrenches.rows()
+    if len(rows):
+        pushed = wrenches.force[rows]
+        size = np.linalg.norm(pushed, axis=2)
+        strongest = size.argmax(axis=1)
+        touched = size.max(axis=1) > 0
+        force[rows] = np.linalg.norm(pushed.sum(axis=1), axis=1)
+        link[rows[touched]] = strongest[touched] + 1
+        where[rows[touched]] = wrenches.point[rows[touched], strongest[touched]]
+        vector[rows[touched]] = pushed[touched, strongest[touched]]
+    return Truth(
+        tau_ext=tau_ext,
+        contact_force=force,
+        collisions=labels.collisions(t, wrenches, tau_ext, injected),
+        payload=payload,
+        contact_link=link,
+        contact_point=where,
+        contact_vector=vector,
+        obstacle_names=tuple(scene.obstacle_names),
+        obstacle_poses=_matrices(rollout.poses),
+    )
+
+
+def _matrices(poses: Array) -> Array:
+    """Positions and quaternions (wxyz), shape (T, k, 7), as homogeneous matrices (T, k, 4, 4)."""
+    w, x, y, z = np.moveaxis(poses[..., 3:], -1, 0)
+    out = np.zeros((*poses.shape[:2], 4, 4))
+    out[..., 0, 0], out[..., 0, 1], out[..., 0, 2] = (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+    )
+    out[..., 1, 0], out[..., 1, 1], out[..., 1, 2] = (
+        2 * (x * y + w * z),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - w * x),
+    )
+    out[..., 2, 0], out[..., 2, 1], out[..., 2, 2] = (
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        1 - 2 * (x * x + y * y),
+    )
+    out[..., :3, 3] = poses[..., :3]
+    out[..., 3, 3] = 1
+    return out
+
+
+def simulate(
+    episode: Episode,
+    nominal: Drive | None = None,
+    checkers: Sequence[str | Checker] = (),
+    without: Sequence[str] = (),
+) -> Trace:
+    """Simulate ``episode``: the same arguments give the same bytes.
+
+    Args:
+        episode: what to simulate.
+        nominal: what the controller believes about the drive (default: the arm's nominal one).
+        checkers: contact checkers, by name or made, whose answers go into ``Trace.contacts``; they
+            change nothing else.
+        without: parts of the drives to leave out, see :data:`tauguard.models.drive.PARTS`.
+
+    Raises:
+        SimulationDiverged: the simulation left every sensible range.
+        ValueError: an unknown checker or part.
+    """
+    return Simulation(episode, nominal, checkers, without).run()
+
+
+def _known(name: str | Checker) -> str | Checker:
+    """``name``, or ``ValueError`` before anything is simulated."""
+    from tauguard.contacts import registered  # and its room, which takes long to import
+
+    if isinstance(name, str) and name not in registered():
+        raise ValueError(f"checker {name!r}: there are {', '.join(registered())}")
+    return name

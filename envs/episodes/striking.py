@@ -1,0 +1,217 @@
+"""Carrying a planned collision out: find a target, search the strength, run the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.envs.episodes import labels
+from tauguard.envs.episodes.episode import CollisionPlan
+from tauguard.envs.episodes.injection import (
+    CLAMP_HOLD,
+    LEAD,
+    Aim,
+    Target,
+    clamp_centre,
+    launch,
+    pulse_wrench,
+)
+from tauguard.envs.episodes.loop import AlongMotion, Rollout
+from tauguard.envs.episodes.poses import Poses, cross
+from tauguard.models import Scene
+
+#: Out of everybody's way: where an obstacle waits [m].
+PARKED = np.array([0.0, 0.0, 50.0])
+#: Targets to try for one collision, and strengths to try on each.
+TARGETS, TRIES = 16, 10
+#: A person is not pushed harder in a collision worth detecting: such a target is given up [N].
+FORCE_LIMIT = 400.0
+#: An obstacle that touches the arm sooner than this after it was put there stood in its way [s].
+CLEAR = 0.01
+#: A clamp's strength counts from this far in front of the arm's deepest reach [m]: its depth is
+#: the strength less this, and may be negative where another part of the link reaches further.
+CLAMP_OFFSET = 0.03
+#: First guesses: strike speed [m/s], clamp depth from the offset [m], pulse force [N].
+STRENGTH = {"strike": 0.5, "clamp": CLAMP_OFFSET, "pulse": 80.0}
+#: What an obstacle or a person can do: strikes [m/s], clamps [m], pulses [N].
+STRENGTH_RANGE = {"strike": (0.02, 6.0), "clamp": (0.005, 0.1), "pulse": (1.0, 1500.0)}
+#: Largest factor between two tries of a strength.
+STRENGTH_FACTOR = {"strike": 10.0, "clamp": 1.3, "pulse": 10.0}
+
+
+@dataclass(frozen=True)
+class Window:
+    """One injected collision as it was carried out."""
+
+    begin: int  #: first row
+    rollout: Rollout
+    wrenches: labels.Wrenches
+    peak_tau: float  #: [N m]
+    peak_force: float  #: [N]
+
+
+class Striking:
+    """Carries the planned collisions of one simulation out."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        follow: AlongMotion,
+        rng: np.random.Generator,
+    ) -> None:
+        """For one scene and its motion; ``rng`` draws where and which way it is struck.
+
+        It knows nothing of the simulation that it serves: a cycle of references would keep each
+        one's megabytes of native memory until Python next looks for cycles, hundreds later.
+        """
+        motion = follow.motion
+        self._scene, self._motion, self._loop, self._follow = scene, motion, follow.loop, follow
+        self._rng = rng
+        self._aim, self._poses = Aim(scene, motion), Poses(scene)
+        self._dt = float(scene.model.opt.timestep)
+
+    def _row(self, time: float) -> int:
+        return round(time / self._dt)
+
+    def carry_out(
+        self, plan: CollisionPlan, row: int, start: int, stop: int
+    ) -> tuple[int, Window | None]:
+        """Runs from ``row`` up to the collision's window and carries the collision out there.
+
+        Returns:
+            The row reached before the window, and the window; none where no target fitted.
+        """
+        lead = 0 if plan.kind == "pulse" else self._row(LEAD)
+        tail = self._row(0.3 if plan.kind == "strike" else plan.duration + CLAMP_HOLD)
+        late = replace(plan, time=max(plan.time, (row + lead) * self._dt))
+        at = row
+        for attempt in range(TARGETS):
+            late = self._relaxed(late, attempt)
+            target = self._aim.find(late, self._rng, stop - tail)
+            if target is None or target.row + tail > stop or target.row - lead < at:
+                continue
+            begin = target.row - lead
+            self._follow(at, begin)
+            at = begin
+            saved = self._loop.save()
+            window = self._search(late, target, begin, target.row + tail)
+            if window is not None:
+                return begin, window
+            self._loop.restore(saved)
+        self._follow(at, max(at, start))
+        return max(at, start), None
+
+    def _relaxed(self, plan: CollisionPlan, attempt: int) -> CollisionPlan:
+        """The plan as asked at first, then without what the motion may not offer.
+
+        A dwell may be missing, and a link may not move towards where a clamp could stand.
+        """
+        if attempt < TARGETS // 4:
+            return plan
+        if plan.kind != "clamp":
+            return replace(plan, at_rest=False)
+        links = len(self._scene.link_bodies)
+        return replace(plan, link=int(self._rng.integers(2, links + 1)))
+
+    def _search(self, plan: CollisionPlan, target: Target, begin: int, end: int) -> Window | None:
+        """Repeats the window until the achieved peak torque lies in the plan's stratum.
+
+        The strength is scaled by what was achieved until the stratum is bracketed, then bisected
+        (geometrically). ``None`` where it cannot be reached from this target.
+        """
+        strength = plan.strength or STRENGTH[plan.kind]
+        below, above = STRENGTH_RANGE[plan.kind]
+        saved = self._loop.save()
+        bracket: list[float | None] = [None, None]
+        for _ in range(TRIES):
+            self._loop.restore(saved)
+            window = self._attempt(plan, target, strength, begin, end)
+            if window is None or window.peak_force > FORCE_LIMIT:
+                return None
+            if plan.severity is None or plan.severity[0] <= window.peak_tau < plan.severity[1]:
+                low, high = plan.force or (0.0, FORCE_LIMIT)
+                return window if low <= window.peak_force <= high else None
+            bracket[int(window.peak_tau >= plan.severity[1])] = strength
+            if bracket[0] is not None and bracket[1] is not None:
+                wanted = float(np.sqrt(bracket[0] * bracket[1]))
+            else:
+                goal = float(np.sqrt(plan.severity[0] * plan.severity[1]))
+                most = STRENGTH_FACTOR[plan.kind]
+                wanted = strength * float(
+                    np.clip(goal / max(window.peak_tau, 1e-3), 1 / most, most)
+                )
+            if not below <= wanted <= above:
+                return None
+            strength = wanted
+        return None
+
+    def _attempt(
+        self, plan: CollisionPlan, target: Target, strength: float, begin: int, end: int
+    ) -> Window | None:
+        """The window with this strength; ``None`` where the obstacle touched too early."""
+        dt = self._dt
+        rows = end - begin
+        wrench, body = None, -1
+        if plan.kind == "pulse":
+            com = self._poses.points(self._motion.q[begin:end], target.body)
+            wrench = pulse_wrench(target, com, strength, plan.duration, dt, rows, 0)
+            body = target.body
+        elif plan.kind == "strike":
+            self._launch(target, strength)
+        else:
+            self._place_clamp(target, strength - CLAMP_OFFSET, end)
+        rollout = self._follow(begin, end, wrench, body)
+        self._park(plan.kind)
+        wrenches = (
+            self._pulse_truth(wrench, target, rollout, dt)
+            if wrench is not None
+            else labels.Wrenches.from_contacts(rollout.contact)
+        )
+        if plan.kind != "pulse" and (wrenches.force[: self._row(CLEAR)] != 0).any():
+            return None
+        tau = labels.external_torque(self._poses, rollout.q, wrenches)
+        peak_tau = float(np.abs(tau[:, :4]).max(initial=0.0))
+        peak_force = float(np.linalg.norm(wrenches.force, axis=2).max(initial=0.0))
+        return Window(begin, rollout, wrenches, peak_tau, peak_force)
+
+    def _launch(self, target: Target, speed: float) -> None:
+        model, data = self._scene.model, self._loop.data
+        body = model.body("striker")
+        position, velocity = launch(target, speed, float(model.geom_size[body.geomadr[0], 0]))
+        joint = model.joint(int(body.jntadr[0]))
+        data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = [*position, 1, 0, 0, 0]
+        data.qvel[joint.dofadr[0] : joint.dofadr[0] + 6] = [*velocity, 0, 0, 0]
+
+    def _place_clamp(self, target: Target, depth: float, end: int) -> None:
+        model = self._scene.model
+        body = model.body("clamp")
+        references = self._motion.q[target.row : end]
+        path = self._poses.points(references, target.body, target.point)
+        radius = float(model.geom_size[int(body.geomadr[0]), 0])
+        self._loop.data.mocap_pos[body.mocapid[0]] = clamp_centre(target, path, depth, radius)
+
+    def _park(self, kind: str) -> None:
+        model, data = self._scene.model, self._loop.data
+        if kind == "strike":
+            joint = model.joint(int(model.body("striker").jntadr[0]))
+            data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = [*PARKED, 1, 0, 0, 0]
+            data.qvel[joint.dofadr[0] : joint.dofadr[0] + 6] = 0
+        elif kind == "clamp":
+            data.mocap_pos[model.body("clamp").mocapid[0]] = -PARKED
+
+    def _pulse_truth(
+        self, wrench: Array, target: Target, rollout: Rollout, dt: float
+    ) -> labels.Wrenches:
+        """The wrench that acted, told about the pushed point instead of the centre of mass."""
+        rows = len(wrench)
+        found = labels.Wrenches.empty(rows, len(self._scene.link_bodies))
+        link = int(np.flatnonzero(np.asarray(self._scene.link_bodies) == target.body)[0])
+        force = wrench[:, :3]
+        point = target.point + np.outer(np.arange(rows) * dt, target.velocity)
+        com = self._poses.points(rollout.q, target.body)
+        found.force[:, link] = force
+        found.torque[:, link] = wrench[:, 3:] - cross(point - com, force)
+        found.point[:, link] = point
+        return found

@@ -1,0 +1,350 @@
+"""What every environment shares: the step, the information beside it, seeing, and errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from tauguard.arrays import Array
+from tauguard.envs.gym.cell import (
+    COST,
+    DISTANCE,
+    DIVERGED,
+    FORCE,
+    LINK,
+    ONSET,
+    ONSET_TIME,
+    RATIO,
+    REGION,
+    REGION_FORCE,
+    TIME,
+    Cell,
+)
+from tauguard.envs.gym.randomization import check_options
+from tauguard.envs.gym.rendering import Picture
+from tauguard.envs.gym.settings import Settings, one_of
+from tauguard.envs.gym.world import World, build_world, crossing, opposite, region_pressure
+from tauguard.models import BodyProxy, Person, Scene
+
+#: Why a diverged episode ended.
+DIVERGED_REASON = (
+    "diverged: a position is not finite or a speed beyond 1000; a smaller timestep would hold"
+)
+RENDER_MODES = ("rgb_array", "human")
+
+
+class Task:
+    """What is to be done in a cell: where an episode starts and what a step is worth."""
+
+    #: Keywords that differ from those of :class:`tauguard.envs.gym.settings.Settings`.
+    defaults: ClassVar[dict[str, Any]] = {}
+    #: How many arms the scene has.
+    arms: ClassVar[int] = 1
+    #: Keywords of the task itself, with their defaults.
+    options: ClassVar[dict[str, Any]] = {}
+
+    def __init__(self, cell: Cell, **options: Any) -> None:
+        """Keep the cell."""
+        self.cell = cell
+        #: What :meth:`score` remembers from one step to the next, a number a copy.
+        self.memory = np.zeros(cell.rows)
+
+    @classmethod
+    def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
+        """Where a body region goes that was asked for by name."""
+        return crossing(region, bare, reach)
+
+    @classmethod
+    def person(cls, bare: Scene, reach: float) -> Person:
+        """Where "person" stands."""
+        return opposite(bare, reach)
+
+    def start(self, i: int, rng: np.random.Generator) -> None:
+        """Begin an episode of copy ``i``; the last thing it does is :meth:`Cell.start`."""
+        raise NotImplementedError
+
+    def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
+        """Reward, whether the task is over, success, and what to remember of a step.
+
+        Args:
+            figure: the columns of :data:`tauguard.envs.gym.cell.FIGURES`: of one copy or arrays
+                of all: the same arithmetic gives the same bits.
+            memory: what the last step, or :meth:`start`, left.
+        """
+        raise NotImplementedError
+
+    def after(self, i: int, rng: np.random.Generator) -> None:
+        """What follows a success of copy ``i``, before its observation is shown."""
+
+    def get_state(self) -> Any:
+        """What the task remembers beside :attr:`memory`."""
+        return None
+
+    def set_state(self, state: Any) -> None:
+        """Go back to what :meth:`get_state` gave."""
+
+
+class ArmEnv(gymnasium.Env[Array, Array]):
+    """One arm scene as a Gymnasium environment; subclasses name their task.
+
+    The keywords are those of :class:`tauguard.envs.gym.settings.Settings` and of the task.
+
+    Every ``info`` has the same keys and shapes: ``time`` [s], ``distance`` to the target [m],
+    ``success``, ``force`` (peak on a link [N]), ``cost`` (peak force on body regions beyond their
+    limits [N]), ``cost_sum`` (of the episode [N]), ``pressure`` (peak mean pressure [N/cm^2], where
+    the keyword ``contact_area`` says the area; else it is 0), ``limit_ratio`` (peak force over the
+    region's transient limit, or its quasi-static one after 0.5 s of contact or where the region
+    cannot move), ``region`` (of that ratio, 1-based, 0 for none; names in :attr:`regions`),
+    ``tau_ext`` [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the detector (what is wrong
+    with its samples, "" for nothing; see ``docs/live.md``), ``onset`` (a collision began in this
+    step), ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
+    0: none), ``tau_ext_peak`` (by joint, of the largest size [N m]), ``alarm_delay`` of the latest
+    collision [s] (-1: no alarm, or none yet), and ``reason``, why an episode was cut short (""
+    where it was not). Peaks are over the physics steps of the action.
+
+    Of each of the k body regions in :attr:`regions`, at its peak: ``region_force`` [N],
+    ``region_pressure`` [N/cm^2], ``region_point`` [m] and ``region_direction`` of the force on the
+    person, shapes (k,), (k,), (k, 3), (k, 3), zero where nothing touched; without ``contact_area``
+    the pressure is an estimate, see :func:`tauguard.envs.gym.world.region_pressure`. With checkers,
+    ``contacts`` has the pairs that each reported.
+
+    The limits follow ISO 10218-2:2025; not every value could be confirmed from an open source:
+    ``unwrapped.regions`` says which were not. A simulated force replaces no measurement.
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # noqa: RUF012
+    task_type: ClassVar[type[Task]] = Task
+
+    def __init__(self, render_mode: str | None = None, **keywords: Any) -> None:
+        """Compile the scene.
+
+        Args:
+            render_mode: "rgb_array", "human" or None.
+            **keywords: see :class:`tauguard.envs.gym.settings.Settings`.
+
+        Raises:
+            ValueError: an unknown keyword or a value that cannot be; the message says what would
+                work.
+            FileNotFoundError: no such robot file.
+        """
+        if render_mode is not None:
+            one_of("render_mode", render_mode, RENDER_MODES)
+        self.render_mode, self._keywords = render_mode, dict(keywords)
+        self.world, self.cell, self.task = build(self.task_type, keywords, 1)
+        self.metadata = frame_rate(self.world)
+        self.action_space, self.observation_space = make_spaces(self.cell)
+        self._shape, self._area = self.action_space.shape, self.world.settings.contact_area
+        #: The only copy's rows, views.
+        self._seen, self._figure = self.cell.observation[0], self.cell.figure[0]
+        self._tau_ext, self._residual = self.cell.tau_ext[0], self.cell.residual[0]
+        self._picture: Picture | None = None
+        self._begun = False
+
+    @property
+    def scene(self) -> Scene:
+        """What is simulated: the compiled model, joint names, home pose, the arm's MJCF."""
+        return self.world.scene
+
+    @property
+    def model(self) -> Any:
+        """The compiled ``mujoco.MjModel``."""
+        return self.cell.model(0)
+
+    @property
+    def data(self) -> Any:
+        """The ``mujoco.MjData`` that is stepped; to look at, not to write to."""
+        return self.cell.datas[0]
+
+    @property
+    def drawn(self) -> dict[str, Array]:
+        """What the keyword ``randomize`` gave this episode, by name."""
+        return dict(self.cell.drawn[0])
+
+    @property
+    def regions(self) -> tuple[Any, ...]:
+        """The body regions in the scene: names, limits, and which values are unconfirmed."""
+        return self.world.regions
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode.
+
+        Args:
+            seed: of everything that is random.
+            options: values for this episode of what the keyword ``randomize`` names, instead of a
+                draw.
+
+        Raises:
+            ValueError: ``options`` that the keyword ``randomize`` does not name, or values that
+                cannot be.
+        """
+        check_options(options or {}, self.world.settings.randomize or {})
+        super().reset(seed=seed)
+        self.cell.draw(0, self.np_random, options or {})
+        self.task.start(0, self.np_random)
+        self.cell.cost_sum[0] = 0.0
+        self._begun = True
+        if self.render_mode == "human":
+            self.render()
+        return self._seen.copy(), self._info(self._figure.tolist(), False)
+
+    def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Act for one control step; entries beyond [-1, 1] count as -1 and 1.
+
+        Raises:
+            ValueError: an action of another shape, or with entries that are not finite.
+        """
+        if not self._begun:
+            raise gymnasium.error.ResetNeeded("call reset before step")
+        cell, task = self.cell, self.task
+        values = np.ascontiguousarray(action, dtype=np.float64)
+        if values.shape != self._shape:
+            raise ValueError(
+                f"action: shape {values.shape}, expected {self._shape}: "
+                f"{', '.join(entry.name for entry in cell.actions)}"
+            )
+        cell.step(0, values, self.np_random)
+        figure = self._figure.tolist()
+        reward, over, success, task.memory[0] = task.score(figure, task.memory.item(0))
+        diverged = figure[DIVERGED] != 0
+        info = self._info(figure, success)
+        if success and not diverged:
+            task.after(0, self.np_random)
+        if self.render_mode == "human":
+            self.render()
+        return self._seen.copy(), float(reward), over and not diverged, diverged, info
+
+    def get_state(self) -> dict[str, Any]:
+        """Everything that the next steps depend on, for :meth:`set_state`; plain arrays."""
+        return self.cell.get_state(0) | {
+            "memory": np.array(self.task.memory),
+            "task": self.task.get_state(),
+            "rng": self.np_random.bit_generator.state,
+            "begun": self._begun,
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go back to what :meth:`get_state` gave: the same actions give the same bits again.
+
+        Raises:
+            ValueError: a state of another environment.
+        """
+        self.cell.set_state(0, state)
+        self.task.memory[:] = state["memory"]
+        self.task.set_state(state["task"])
+        self.np_random.bit_generator.state = state["rng"]
+        self._begun = state["begun"]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """How it was made and where it is; the window stays behind."""
+        return {
+            "made": (self.render_mode, self._keywords),
+            "spec": self.spec,
+            "state": self.get_state(),
+        }
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Make it anew and go there."""
+        mode, keywords = saved["made"]
+        type(self).__init__(self, mode, **keywords)
+        self.spec = saved["spec"]
+        self.set_state(saved["state"])
+
+    def _info(self, figure: list[float], success: bool) -> dict[str, Any]:
+        cell, area = self.cell, self._area
+        info = {
+            "time": figure[TIME],
+            "distance": figure[DISTANCE],
+            "success": success,
+            "force": figure[FORCE],
+            "cost": figure[COST],
+            "cost_sum": cell.cost_sum.item(0),
+            "pressure": figure[REGION_FORCE] / area if area else 0.0,
+            "limit_ratio": figure[RATIO],
+            "region": int(figure[REGION]),
+            "tau_ext": self._tau_ext.copy(),
+            "residual": self._residual.copy(),
+            "alarm": cell.alarm.item(0),
+            "onset": bool(figure[ONSET]),
+            "onset_time": figure[ONSET_TIME],
+            "link": int(figure[LINK]),
+            "fault": cell.faults()[0],
+            "tau_ext_peak": cell.tau_peak[0].copy(),
+            "alarm_delay": cell.alarm_delay.item(0),
+            "reason": DIVERGED_REASON if figure[DIVERGED] else "",
+        } | touches(cell, 0)
+        if cell.checks:
+            info["contacts"] = cell.contacts[0].copy()
+        return info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (480, 640, 3) in ``rgb_array`` mode; in ``human`` mode the window follows."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render_mode was not given to make: nothing to render")
+            return None
+        if self._picture is None:
+            self._picture = Picture(self.world, self.cell.datas[0], self.render_mode)
+        return self._picture.show(self.cell.target[0])
+
+    def close(self) -> None:
+        """Close the window or the renderer."""
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None
+
+
+def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
+    """The arm environment inside ``env``.
+
+    Raises:
+        ValueError: there is none.
+    """
+    inner = env.unwrapped
+    if not isinstance(inner, ArmEnv):
+        raise ValueError(f"{inner}: expected an environment of tauguard, such as tauguard/Reach-v0")
+    return inner
+
+
+def build(task_type: type[Task], keywords: dict[str, Any], rows: int) -> tuple[World, Cell, Task]:
+    """World, cell and task of an environment with these keywords."""
+    own = {name: keywords.pop(name, value) for name, value in task_type.options.items()}
+    try:
+        settings = Settings.from_keywords(task_type.defaults, keywords)
+    except ValueError as error:
+        if own and str(error).startswith("keyword "):
+            raise ValueError(f"{error}, {', '.join(own)}") from None
+        raise
+    world = build_world(settings, task_type.arms, task_type.proxy, task_type.person)
+    cell = Cell(world, rows)
+    return world, cell, task_type(cell, **own)
+
+
+def touches(cell: Cell, rows: int | slice) -> dict[str, Array]:
+    """What each body region felt in one copy, or in all, at its peak."""
+    peak = cell.peak[rows].copy()
+    return {
+        "region_force": peak[..., 0],
+        "region_pressure": region_pressure(cell.world, peak[..., 0]),
+        "region_point": peak[..., 1:4],
+        "region_direction": peak[..., 4:7],
+    }
+
+
+def frame_rate(world: World) -> dict[str, Any]:
+    """The metadata of an environment: a picture shows one action."""
+    rate = max(1, round(world.settings.control_rate))
+    return {"render_modes": list(RENDER_MODES), "render_fps": rate}
+
+
+def make_spaces(cell: Cell) -> tuple[Any, Any]:
+    """Of one environment's actions and observations."""
+    low = np.array([entry.low for entry in cell.observations])
+    high = np.array([entry.high for entry in cell.observations])
+    action = spaces.Box(-1.0, 1.0, (len(cell.actions),), np.float32)
+    return action, spaces.Box(low, high, dtype=np.float64)

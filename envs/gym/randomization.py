@@ -1,0 +1,277 @@
+"""What may differ from episode to episode: distributions, and how a draw changes one copy."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.models import Drive, Person, Scene
+from tauguard.models.obstacles import pair_weights
+from tauguard.models.payload import load_body
+from tauguard.models.person import SEGMENTS
+
+if TYPE_CHECKING:
+    from tauguard.envs.gym.world import World
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Around ``mean``, never outside ``low`` to ``high``."""
+
+    mean: float
+    deviation: float
+    low: float = -np.inf
+    high: float = np.inf
+
+    def draw(self, rng: np.random.Generator, size: int) -> Array:
+        """``size`` values."""
+        return np.clip(rng.normal(self.mean, self.deviation, size), self.low, self.high)
+
+    def ends(self) -> tuple[float, float]:
+        """Least and largest value."""
+        return self.low, self.high
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Between ``low`` and ``high``; a pair of numbers means this."""
+
+    low: float
+    high: float
+
+    def draw(self, rng: np.random.Generator, size: int) -> Array:
+        """``size`` values."""
+        return rng.uniform(self.low, self.high, size)
+
+    def ends(self) -> tuple[float, float]:
+        """Least and largest value."""
+        return self.low, self.high
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of some values."""
+
+    values: tuple[float, ...]
+
+    def draw(self, rng: np.random.Generator, size: int) -> Array:
+        """``size`` values."""
+        return rng.choice(np.array(self.values, dtype=np.float64), size)
+
+    def ends(self) -> tuple[float, float]:
+        """Least and largest value."""
+        return min(self.values), max(self.values)
+
+
+Distribution = Normal | Uniform | Choice
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Something that can be drawn: what it means and which values it can have."""
+
+    meaning: str
+    low: float
+    high: float
+    each: bool = False  #: one draw a joint or link
+
+
+PARAMETERS = {
+    "mass": Parameter("of each link over its nominal mass, inertia with it", 0.1, 10.0, True),
+    "gain": Parameter("of each drive over what the controller believes", 0.1, 10.0, True),
+    "friction": Parameter("of each joint over its nominal friction", 0.0, 10.0, True),
+    "temperature": Parameter("of the joints [degC]", -20.0, 100.0),
+    "noise": Parameter("of the sensors over their nominal noise", 0.0, 100.0),
+    "payload_g": Parameter("carried [g]", 0.0, 1e6),
+    "stature": Parameter("of the person [m]", 1.0, 2.3),
+    "hand_speed": Parameter("of the person's reaches [m/s]", 0.01, 5.0),
+    "walk_speed": Parameter("of the person's walks [m/s]", 0.01, 5.0),
+    "reaction_time": Parameter("of the person [s]", 0.0, 10.0),
+}
+_OF_PERSON = ("stature", "hand_speed", "walk_speed", "reaction_time")
+
+
+def distributions(given: Mapping[str, Any]) -> dict[str, Distribution]:
+    """The keyword ``randomize``, checked.
+
+    Raises:
+        ValueError: an unknown name, or values that cannot be; the message says what would work.
+    """
+    if not isinstance(given, Mapping):
+        raise ValueError(
+            f"randomize: a {type(given).__name__}; expected a dict such as {{'mass': (0.9, 1.1)}}"
+        )
+    found: dict[str, Distribution] = {}
+    for name, value in given.items():
+        if name not in PARAMETERS:
+            raise ValueError(f"randomize: {name!r}; expected some of {', '.join(PARAMETERS)}")
+        spread = _distribution(name, value)
+        _in_range(f"randomize: {name}", name, np.array(spread.ends()))
+        found[name] = spread
+    return found
+
+
+def _distribution(name: str, value: Any) -> Distribution:
+    if isinstance(value, Normal | Uniform | Choice):
+        spread: Distribution = value
+    else:
+        pair = _numbers(value)
+        if len(pair) not in (1, 2):
+            raise ValueError(
+                f"randomize: {name} {value!r}; expected a number, (low, high), or a Uniform, "
+                "Normal or Choice of tauguard.envs.gym.randomization"
+            )
+        spread = Uniform(float(pair[0]), float(pair[-1]))
+    parameter = PARAMETERS[name]
+    if isinstance(spread, Normal):
+        spread = replace(
+            spread, low=max(spread.low, parameter.low), high=min(spread.high, parameter.high)
+        )
+    low, high = spread.ends()
+    if not low <= high:
+        raise ValueError(f"randomize: {name} from {low} to {high}; expected low up to high")
+    return spread
+
+
+def _numbers(value: Any) -> Array:
+    """One or several numbers; none where it is something else."""
+    try:
+        row = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        return np.zeros(0)
+    return row if row.ndim == 1 else np.zeros(0)
+
+
+def _in_range(where: str, name: str, values: Array) -> None:
+    low, high = PARAMETERS[name].low, PARAMETERS[name].high
+    if not (np.isfinite(values) & (values >= low) & (values <= high)).all():
+        raise ValueError(f"{where} {values.tolist()}: expected {low:g} to {high:g}")
+
+
+def check_names(names: Iterable[str], person: Person | None, checkers: tuple[str, ...]) -> None:
+    """Whether the scene has what is drawn.
+
+    Raises:
+        ValueError: it has not; the message names the first.
+    """
+    for name in names:
+        if name in _OF_PERSON and person is None:
+            raise ValueError(f"randomize: {name!r} without a person; add obstacles=('person',)")
+        if name == "stature" and checkers:
+            raise ValueError("randomize: 'stature' with checkers: they know one size of the person")
+
+
+def check_options(given: Mapping[str, Any], known: Mapping[str, Distribution]) -> None:
+    """Whether ``reset(options=...)`` can be: names of ``randomize``, values in their range.
+
+    Raises:
+        ValueError: an unknown name or a value that cannot be.
+    """
+    for name, value in given.items():
+        if name not in known:
+            hint = f"expected some of {', '.join(known)}" if known else "there are none"
+            if name in PARAMETERS:
+                hint += f"; name it in randomize= first, such as randomize={{{name!r}: (1, 1)}}"
+            raise ValueError(f"options: unknown {name!r}; {hint}")
+        numbers = _numbers(value)
+        if not len(numbers):
+            raise ValueError(f"options: {name} {value!r}; expected a number, or one a joint")
+        _in_range(f"options: {name}", name, numbers)
+
+
+def draw(
+    known: Mapping[str, Distribution],
+    world: World,
+    rng: np.random.Generator,
+    stated: Mapping[str, Any],
+) -> dict[str, Array]:
+    """One episode's values; what is stated replaces a draw, which is made all the same."""
+    n, found = len(world.scene.joint_names), {}
+    for name, spread in known.items():
+        size = n if PARAMETERS[name].each else 1
+        values = spread.draw(rng, size)
+        if name in stated:
+            own = _numbers(stated[name])
+            if len(own) not in (1, size):
+                raise ValueError(f"options: {name}: {len(own)} values; expected 1 or {size}")
+            values = np.resize(own, size)
+        found[name] = values
+    return found
+
+
+@dataclass
+class Variant:
+    """What one copy simulates instead of the world's own."""
+
+    model: mujoco.MjModel
+    drive: Drive
+    person: Person | None
+
+
+def vary(world: World, model: mujoco.MjModel, drawn: Mapping[str, Array]) -> Variant:
+    """Put drawn values into ``model``, a copy of the world's that belongs to one copy alone."""
+    base = world.scene.model
+    _weigh(world.scene, base, model, drawn)
+    person = world.person
+    if person is not None:
+        own: dict[str, Any] = {name: float(drawn[name][0]) for name in _OF_PERSON if name in drawn}
+        person = replace(person, **own)
+        _resize(model, person)
+    return Variant(model, _drive(world.scene.drive, drawn), person)
+
+
+def _weigh(
+    scene: Scene, base: mujoco.MjModel, model: mujoco.MjModel, drawn: Mapping[str, Array]
+) -> None:
+    """Masses of links and payload; contact pairs keep the stiffness that they say."""
+    if "mass" not in drawn and "payload_g" not in drawn:
+        return
+    scale = drawn.get("mass", np.ones(len(scene.link_bodies)))
+    bodies = scene.link_bodies
+    model.body_mass[bodies] = base.body_mass[bodies] * scale
+    model.body_inertia[bodies] = base.body_inertia[bodies] * scale[:, None]
+    if "payload_g" in drawn:
+        load_body(model, scene.payload_body, float(drawn["payload_g"][0]) / 1000)
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    direct = base.pair_solref[:, 0] < 0
+    ratio = pair_weights(model)[direct] / pair_weights(base)[direct]
+    model.pair_solref[direct] = base.pair_solref[direct] * ratio[:, None]
+
+
+def _resize(model: mujoco.MjModel, person: Person) -> None:
+    for segment in SEGMENTS:
+        geom = model.geom(f"person_{segment.name}").id
+        radius, half = segment.radius * person.stature, segment.half * person.stature
+        model.geom_size[geom, :2] = radius, half
+        model.geom_rbound[geom] = radius + half
+        model.geom_aabb[geom, 3:] = radius, radius, radius + half
+
+
+def _drive(drive: Drive, drawn: Mapping[str, Array]) -> Drive:
+    friction, sensors = drive.friction, drive.sensors
+    if friction is not None and "friction" in drawn:
+        scale = drawn["friction"]
+        names = ("coulomb", "static", "viscous")
+        friction = replace(friction, **{name: getattr(friction, name) * scale for name in names})
+    if friction is not None and "temperature" in drawn:
+        friction = replace(friction, temperature=float(drawn["temperature"][0]))
+    if sensors is not None and "noise" in drawn:
+        loud = float(drawn["noise"][0])
+        sensors = replace(
+            sensors,
+            current_noise=sensors.current_noise * loud,
+            velocity_noise=sensors.velocity_noise * loud,
+        )
+    gain = drive.gain * drawn["gain"] if "gain" in drawn else drive.gain
+    return replace(drive, gain=gain, friction=friction, sensors=sensors)
+
+
+def own_model(world: World) -> mujoco.MjModel:
+    """A copy of the world's model that one copy may change."""
+    return copy.copy(world.scene.model)

@@ -1,0 +1,257 @@
+"""Pictures of an environment; nothing of it is imported before the first one."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.envs.gym.world import World
+
+#: Of a picture [px].
+HEIGHT, WIDTH = 480, 640
+#: Groups that are shown: bodies and obstacles, and the arm's visual shapes; not its collision ones.
+SHOWN = (0, 1, 2)
+#: Lights, and what is seen where nothing is.
+AMBIENT, DIFFUSE, SKY = 0.35, 0.4, ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90))
+#: The floor that is drawn, not simulated: half extents and grid [m], height [m] and colour.
+FLOOR, FLOOR_HEIGHT, FLOOR_COLOUR = (8.0, 8.0, 1.0), -0.001, (0.80, 0.82, 0.85, 1.0)
+#: What an arm stands on where people stand lower: half its extents [m] and colour.
+PEDESTAL, PEDESTAL_COLOUR = (0.25, 0.3), (0.62, 0.64, 0.67, 1.0)
+#: The lamp that throws the shadows: where it stands [m], shining down, and how bright.
+LAMP, LAMP_COLOUR = (0.0, 0.0, 3.0), 0.35
+#: Shadows fall this far from the middle of the scene [m].
+SHADOW_REACH = 3.0
+#: Radius [m] and colour of the ball that marks a target.
+MARK, MARK_COLOUR = 0.03, (0.1, 0.8, 0.3, 0.7)
+
+
+def _need_display() -> None:
+    """A window on Linux without a display would end the process."""
+    if sys.platform == "linux" and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise RuntimeError(
+            "render_mode 'human' needs a display and there is none; use 'rgb_array' with "
+            "MUJOCO_GL=egl, or `tauguard watch`"
+        )
+
+
+def _staged(world: World) -> mujoco.MjModel:
+    """The scene with floor, sky and lamp, which are drawn and not simulated."""
+    spec = mujoco.MjSpec.from_string(world.scene.xml)
+    bright, blue = SKY
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=blue,
+        rgb2=bright,
+        width=256,
+        height=256,
+    )
+    person = world.person
+    floor = FLOOR_HEIGHT if person is None else person.floor
+    _draw(spec, mujoco.mjtGeom.mjGEOM_PLANE, FLOOR, [0, 0, floor], FLOOR_COLOUR)
+    if floor < FLOOR_HEIGHT:
+        height = (FLOOR_HEIGHT - floor) / 2
+        for base in _bases(world):
+            place = [base[0], base[1], FLOOR_HEIGHT - height]
+            _draw(spec, mujoco.mjtGeom.mjGEOM_BOX, [*PEDESTAL, height], place, PEDESTAL_COLOUR)
+    spec.worldbody.add_light(
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=LAMP,
+        dir=[0, 0, -1],
+        diffuse=[LAMP_COLOUR] * 3,
+        castshadow=True,
+    )
+    return spec.compile()
+
+
+def _draw(
+    spec: mujoco.MjSpec, kind: Any, size: Sequence[float], place: Sequence[float], rgba: Any
+) -> None:
+    """A shape that only shows."""
+    spec.worldbody.add_geom(type=kind, size=size, pos=place, rgba=rgba, contype=0, conaffinity=0)
+
+
+def _bases(world: World) -> list[NDArray[np.float64]]:
+    """Where the arms stand [m]."""
+    model = world.scene.model
+    return [model.body_pos[model.body_rootid[body]] for _, body, _ in world.tools]
+
+
+class Stage:
+    """The scene as it is shown, and its own state, which follows the simulated one."""
+
+    def __init__(self, world: World, data: mujoco.MjData) -> None:
+        """Set the lights and place the camera."""
+        self._world, self._data = world, data
+        self.model = _staged(world)
+        self.drawn = mujoco.MjData(self.model)
+        vis = self.model.vis
+        vis.quality.offsamples = 8
+        vis.quality.shadowsize = 2048
+        vis.map.shadowclip = SHADOW_REACH / self.model.stat.extent
+        vis.headlight.ambient[:] = AMBIENT
+        vis.headlight.diffuse[:] = DIFFUSE
+
+    def look(self, camera: Any) -> None:
+        """From beside the first arm's front; two arms from the side, so that neither hides one."""
+        world, reach = self._world, self._world.reach
+        if world.person is not None:
+            places = np.array([*_bases(world), [*world.person.position, 0.0]])
+            x, y = places[:, :2].mean(axis=0)
+            camera.lookat[:] = (x, y, world.person.floor + 0.5 * world.person.stature)
+            camera.distance, camera.azimuth, camera.elevation = 2.9, 130.0, -12.0
+        elif world.arms == 1:
+            camera.lookat[:] = (0.35 * reach, 0.0, 0.4 * reach)
+            camera.distance, camera.azimuth, camera.elevation = 1.9 * reach, 140.0, -20.0
+        else:
+            base = self.model.body_pos[self.model.body_rootid[world.tools[-1][1]]]
+            camera.lookat[:] = (base[0] / 2, base[1] / 2, 0.35 * reach)
+            camera.distance, camera.azimuth, camera.elevation = 2.4 * reach, 100.0, -20.0
+
+    def follow(self) -> None:
+        """Take over the simulated state."""
+        model, drawn = self.model, self.drawn
+        for name in ("qpos", "qvel", "mocap_pos", "mocap_quat"):
+            getattr(drawn, name)[:] = getattr(self._data, name)
+        drawn.time = self._data.time
+        for place in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex):
+            place(model, drawn)
+
+    def mark(self, scene: Any, targets: NDArray[np.float64]) -> None:
+        """A ball at each target."""
+        for target in targets:
+            if scene.ngeom >= scene.maxgeom:
+                return
+            mujoco.mjv_initGeom(
+                scene.geoms[scene.ngeom],
+                mujoco.mjtGeom.mjGEOM_SPHERE,
+                np.full(3, MARK),
+                np.array(target),
+                np.eye(3).ravel(),
+                np.array(MARK_COLOUR, dtype=np.float32),
+            )
+            scene.ngeom += 1
+
+
+class Camera(Stage):
+    """An off-screen camera on one copy of a world."""
+
+    def __init__(
+        self, world: World, data: mujoco.MjData, height: int = HEIGHT, width: int = WIDTH
+    ) -> None:
+        """Open it.
+
+        Raises:
+            RuntimeError: there is nothing to draw with; the message says what would help.
+        """
+        super().__init__(world, data)
+        size = self.model.vis.global_
+        size.offwidth, size.offheight = max(size.offwidth, width), max(size.offheight, height)
+        self._camera = mujoco.MjvCamera()
+        self.look(self._camera)
+        self._options = mujoco.MjvOption()
+        self._options.geomgroup[:] = [int(group in SHOWN) for group in range(6)]
+        with _no_picture():
+            self._renderer = mujoco.Renderer(self.model, height, width)
+
+    def colours(self, targets: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """The state and a ball at each target, shape (arms, 3): a picture (height, width, 3)."""
+        pixels: NDArray[np.uint8] = self._render(targets)
+        return pixels
+
+    def depths(self, targets: NDArray[np.float64]) -> NDArray[np.float32]:
+        """How far everything is along the optical axis [m], shape (height, width)."""
+        self._renderer.enable_depth_rendering()
+        try:
+            depth: NDArray[np.float32] = self._render(targets)
+        finally:
+            self._renderer.disable_depth_rendering()
+        return depth
+
+    def _render(self, targets: NDArray[np.float64]) -> Any:
+        self.follow()
+        self._renderer.update_scene(self.drawn, self._camera, self._options)
+        self.mark(self._renderer.scene, targets)
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Close the renderer."""
+        self._renderer.close()
+
+
+class Window(Stage):
+    """A window on one copy of a world."""
+
+    def __init__(self, world: World, data: mujoco.MjData) -> None:
+        """Open it.
+
+        Raises:
+            RuntimeError: there is nothing to draw with; the message says what would help.
+        """
+        super().__init__(world, data)
+        _need_display()
+        with _no_picture():
+            from mujoco import viewer
+
+            self._window: Any = viewer.launch_passive(
+                self.model, self.drawn, show_left_ui=False, show_right_ui=False
+            )
+            self.look(self._window.cam)
+
+    def show(self, targets: NDArray[np.float64]) -> None:
+        """Draw the state and a ball at each target, shape (arms, 3)."""
+        with self._window.lock():
+            self.follow()
+            scene = self._window.user_scn
+            scene.ngeom = 0
+            self.mark(scene, targets)
+        self._window.sync()
+
+    def close(self) -> None:
+        """Close the window."""
+        self._window.close()
+
+
+class Picture:
+    """What ``render`` shows: a picture, or a window that follows."""
+
+    def __init__(self, world: World, data: mujoco.MjData, mode: str) -> None:
+        """Open it.
+
+        Raises:
+            RuntimeError: there is nothing to draw with; the message says what would help.
+        """
+        self._view = Window(world, data) if mode == "human" else Camera(world, data)
+
+    def show(self, targets: NDArray[np.float64]) -> NDArray[np.uint8] | None:
+        """Draw the state and a ball at each target, shape (arms, 3)."""
+        if isinstance(self._view, Camera):
+            return self._view.colours(targets)
+        self._view.show(targets)
+        return None
+
+    def close(self) -> None:
+        """Close window or renderer."""
+        self._view.close()
+
+
+@contextmanager
+def _no_picture() -> Iterator[None]:
+    """Whatever keeps OpenGL from starting becomes one line that says what would help."""
+    try:
+        yield
+    except Exception as error:
+        raise RuntimeError(
+            f"no picture: {error}; without a display use render_mode='rgb_array' and set "
+            "MUJOCO_GL=egl (or osmesa) before Python starts"
+        ) from error

@@ -1,0 +1,371 @@
+"""A detector in the loop of an environment: it sees what the sensors measure, sample by sample."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+
+from tauguard.arrays import Array, Bools
+from tauguard.detectors import (
+    CollisionAlarm,
+    Estimator,
+    MomentumObserver,
+    RobotNumbers,
+    Unknowns,
+)
+from tauguard.detectors.detector import same_rate
+from tauguard.detectors.estimation.gains import ENVIRONMENT_GAIN, PLAIN_GAIN
+from tauguard.detectors.faults.monitor import Monitor
+from tauguard.envs.gym.actions import observation_table
+from tauguard.envs.gym.settings import DETECTORS
+from tauguard.envs.gym.world import World
+from tauguard.models import Drive, pin_model
+
+#: The plain detector's thresholds: times the breakaway friction, plus a share of the torque limit.
+FRICTION_SHARE, TORQUE_SHARE = 1.5, 0.03
+#: An arm without torque limits gets this threshold [N m].
+PLAIN_THRESHOLD = 5.0
+#: A trained detector's residual may be so many standard deviations without contact.
+SIGMAS = 3.0
+#: Slope of the nominal friction around standstill [rad/s].
+STANDSTILL = 0.05
+#: A joint this near to an end of its range, or beyond it, may feel its stop [rad].
+MARGIN = 0.005
+#: The residual has forgotten a stop after so many of the observer's time constants.
+FORGOTTEN = 15.0
+
+
+class Listener(Protocol):
+    """A detector in one copy of an environment; it begins anew when it is made."""
+
+    @property
+    def name(self) -> str:
+        """The detector's name."""
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with the samples of the last :meth:`steps`, "" for nothing."""
+
+    @property
+    def settle(self) -> float:
+        """Seconds after a reset without an alarm."""
+
+    @property
+    def bounds(self) -> Array:
+        """What the residual may be without contact [N m], shape (n,)."""
+
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
+        """Samples of shape (T, n) in turn: residuals (T, n) [N m] and alarms (T,)."""
+        ...
+
+    def get_state(self) -> Any:
+        """What it remembers, for :meth:`set_state`."""
+        ...
+
+    def set_state(self, state: Any) -> None:
+        """Go back to what :meth:`get_state` gave."""
+
+
+class JointEnds:
+    """Takes the torque of the joints' stops out of residuals, sample by sample.
+
+    A stop acts on its own joint alone. From the sample that nears an end until the observer has
+    forgotten, that joint's residual counts as zero: a collision that it alone would show is not
+    seen meanwhile.
+    """
+
+    def __init__(self, ranges: Array, dt: float, gain: float) -> None:
+        """For one arm.
+
+        Args:
+            ranges: of the joints [rad], infinite where free, shape (n, 2).
+            dt: of the samples [s].
+            gain: of the observer [1/s].
+        """
+        self._low, self._high = ranges[:, 0] + MARGIN, ranges[:, 1] - MARGIN
+        self._hold = round(FORGOTTEN / (gain * dt))
+        #: Samples that each joint's residual still counts as zero, shape (n,).
+        self.left = np.zeros(len(ranges), dtype=np.int64)
+
+    def clear(self, q: Array, residuals: Array) -> None:
+        """Samples in turn: positions (T, n) [rad]; residuals (T, n) are changed in place."""
+        near = (q < self._low) | (q > self._high)
+        if not (near.any() or self.left.any()):
+            return
+        for row in range(len(q)):
+            self.left = np.where(near[row], self._hold, np.maximum(self.left - 1, 0))
+            residuals[row, self.left > 0] = 0.0
+
+
+class ObserverListener:
+    """The momentum observer with fixed thresholds: nothing is trained, so any arm can have it.
+
+    Friction is compensated by its nominal Coulomb and viscous part; what static friction may hide
+    decides the threshold. A trained detector is several times as sensitive.
+    """
+
+    name, settle, fault = "observer", 0.0, ""
+
+    def __init__(
+        self,
+        robot: RobotNumbers,
+        drive: Drive,
+        dt: float,
+        gain: float = ENVIRONMENT_GAIN,
+        ranges: Array | None = None,
+    ) -> None:
+        """Take the nominal numbers.
+
+        Args:
+            robot: nominal rigid body.
+            drive: nominal drive.
+            dt: of the samples [s].
+            gain: of the observer [1/s].
+            ranges: of the joints [rad], (n, 2): a joint at an end of its range feels its stop.
+        """
+        free = np.tile([-np.inf, np.inf], (robot.joints, 1))
+        self._ends = JointEnds(free if ranges is None else ranges, dt, gain)
+        self._observer, self._drive = MomentumObserver(robot, gain, dt), drive
+        limit = np.where(np.isfinite(drive.torque_limit), drive.torque_limit, np.nan)
+        share = TORQUE_SHARE * limit
+        if drive.friction is not None:
+            share = share + FRICTION_SHARE * drive.friction.static
+        self.bounds: Array = np.where(np.isfinite(share), share, PLAIN_THRESHOLD)
+
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
+        """An alarm is up where a residual exceeds its bound."""
+        tau = self._drive.gain * current
+        friction = self._drive.friction
+        if friction is not None:
+            tau = tau - friction.coulomb * np.tanh(qd / STANDSTILL) - friction.viscous * qd
+        residuals, step = np.empty_like(q), self._observer.step
+        for row in range(len(q)):
+            step(q[row], qd[row], tau[row], out=residuals[row])
+        self._ends.clear(q, residuals)
+        return residuals, np.any(np.abs(residuals) > self.bounds, axis=1)
+
+    def get_state(self) -> Any:
+        """See :class:`Listener`."""
+        return self._observer.get_state(), self._ends.left.copy()
+
+    def set_state(self, state: Any) -> None:
+        """See :class:`Listener`."""
+        self._observer.set_state(state[0])
+        self._ends.left = state[1].copy()
+
+
+class AlarmListener:
+    """A trained detector with its threshold; the residual is the plain observer's."""
+
+    def __init__(self, alarm: CollisionAlarm) -> None:
+        """Begin anew."""
+        arm = alarm.detector.arm
+        self.name, self.settle = alarm.detector.name, alarm.settle
+        self.bounds: Array = SIGMAS * np.asarray(arm.noise)
+        self._step = self._monitored(alarm)
+        self._observer = Estimator(arm, PLAIN_GAIN, alarm.detector.dt, Unknowns.none())
+        self._last = np.zeros(arm.robot.joints)
+        self.fault = ""
+
+    def _monitored(self, alarm: CollisionAlarm) -> Callable[[Array, Array, Array], bool]:
+        """The alarm at one sample; a model that knows its samples names their faults."""
+        if alarm.inputs is None:
+            return alarm.stream().step
+        monitor, times = Monitor(alarm, alarm.inputs), itertools.count()
+
+        def step(q: Array, qd: Array, current: Array) -> bool:
+            answer = monitor.step(next(times) * alarm.detector.dt, q, qd, current)
+            self.fault = answer.reason
+            return answer.alarm
+
+        return step
+
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
+        """See :class:`Listener`; a residual stays where a sample is not finite."""
+        residuals, alarms = np.empty_like(q), np.zeros(len(q), dtype=np.bool_)
+        spare, faults = np.empty((2, q.shape[1])), ""
+        for row in range(len(q)):
+            sample = (q[row], qd[row], current[row])
+            alarms[row] = self._step(*sample)
+            faults = faults or self.fault
+            residuals[row] = self._last
+            if not self.fault or np.isfinite(sample).all():
+                self._observer.step(*sample, (residuals[row], *spare))
+            self._last = residuals[row]
+        self.fault = faults
+        return residuals, alarms
+
+    def get_state(self) -> Any:
+        """See :class:`Listener`.
+
+        Raises:
+            ValueError: always; a trained detector's stream cannot be stored.
+        """
+        raise ValueError(
+            f"detector {self.name}: a trained detector cannot go into a snapshot; expected "
+            f"{', '.join(DETECTORS)} or None"
+        )
+
+    def set_state(self, state: Any) -> None:
+        """See :meth:`get_state`."""
+        self.get_state()
+
+
+class PerArm:
+    """One listener an arm, for scenes with several; joints of the arms follow one another."""
+
+    def __init__(self, parts: Sequence[Listener]) -> None:
+        """Take one of each arm, in order."""
+        self._parts = parts
+        self.name, self.settle = parts[0].name, max(part.settle for part in parts)
+        self.fault = ""
+        self.bounds: Array = np.concatenate([part.bounds for part in parts])
+
+    def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
+        """See :class:`Listener`."""
+        n = q.shape[1] // len(self._parts)
+        found = [
+            part.steps(*(np.ascontiguousarray(x[:, k * n : k * n + n]) for x in (q, qd, current)))
+            for k, part in enumerate(self._parts)
+        ]
+        residuals, alarms = zip(*found, strict=True)
+        self.fault = next((part.fault for part in self._parts if part.fault), "")
+        return np.concatenate(residuals, axis=1), np.any(alarms, axis=0)
+
+    def get_state(self) -> Any:
+        """See :class:`Listener`."""
+        return [part.get_state() for part in self._parts]
+
+    def set_state(self, state: Any) -> None:
+        """See :class:`Listener`."""
+        for part, own in zip(self._parts, state, strict=True):
+            part.set_state(own)
+
+
+def listening(world: World, wanted: object) -> Callable[[], Listener] | None:
+    """What makes a detector for each copy of ``world``: by name, of a model file, or trained.
+
+    Raises:
+        ValueError: nothing that can detect, or a model file of another arm.
+    """
+    if wanted is None:
+        return None
+    if isinstance(wanted, str) and wanted in DETECTORS:
+        n, dt, arms = len(world.scene.facts.joints), world.settings.timestep, _arms(world)
+        ranges = [world.joint_range[k * n : (k + 1) * n] for k in range(world.arms)]
+
+        def observers() -> Listener:
+            parts = [
+                ObserverListener(*arm, dt, ranges=r) for arm, r in zip(arms, ranges, strict=True)
+            ]
+            return parts[0] if len(parts) == 1 else PerArm(parts)
+
+        return observers
+    if isinstance(wanted, str):
+        try:
+            wanted = CollisionAlarm.load(wanted)
+        except ValueError as error:
+            raise ValueError(f"detector {error}") from None
+    if not isinstance(wanted, CollisionAlarm):
+        raise ValueError(
+            f"detector: a {type(wanted).__name__}; expected {', '.join(DETECTORS)}, the path of a "
+            "trained detector, or a tauguard.detectors.CollisionAlarm"
+        )
+    return partial(AlarmListener, _fitting(world, wanted))
+
+
+def _fitting(world: World, alarm: CollisionAlarm) -> CollisionAlarm:
+    """The alarm, if it is of an arm and a sample rate like the world's."""
+    joints, own = alarm.detector.arm.robot.joints, len(world.scene.joint_names)
+    if joints != own:
+        raise ValueError(
+            f"detector: trained on {joints} joints, the scene has {own}; train one on this arm"
+        )
+    if not same_rate(world.settings.timestep, alarm.detector.dt):
+        raise ValueError(
+            f"detector: works at {1e3 * alarm.detector.dt:g} ms a sample, the scene's time step is "
+            f"{1e3 * world.settings.timestep:g} ms; train one at this rate"
+        )
+    return alarm
+
+
+def _arms(world: World) -> list[tuple[RobotNumbers, Drive]]:
+    """Nominal numbers of each arm; the second one looks the other way, which gravity cannot see."""
+    robot = RobotNumbers.from_pin(pin_model(world.scene.arm_model))
+    drive = world.scene.facts.nominal
+    if world.settings.ideal_drive:
+        drive = replace(drive, friction=None)
+    return [(robot, drive)] * world.arms
+
+
+class Sensing:
+    """The sensors of one copy of a world, and the detector that listens to them.
+
+    Attributes:
+        measured: q, qd and current at every physics step of the last action, (substeps, n) each.
+        residuals: of the detector [N m], shape (substeps, n).
+        alarms: shape (substeps,).
+        sensors: what measures; None: without errors.
+    """
+
+    def __init__(self, world: World, make: Callable[[], Listener] | None) -> None:
+        """Keep the parts; ``make`` gives a fresh detector, ``None``: there is none."""
+        self.sensors = world.scene.drive.sensors
+        self._gain = world.nominal.gain
+        self._make = make
+        self.detector = make() if make else None
+        table = observation_table(world)
+        self._low = np.array([entry.low for entry in table])
+        self._high = np.array([entry.high for entry in table])
+        self._none = np.zeros(len(world.scene.joint_names))
+        steps = world.settings.substeps
+        self.residuals = np.zeros((steps, len(self._none)))
+        self.alarms = np.zeros(steps, dtype=np.bool_)
+        self.measured = (self.residuals, self.residuals, self.residuals)
+
+    def reset(self) -> None:
+        """A new episode."""
+        self.detector = self._make() if self._make else None
+
+    @property
+    def settle(self) -> float:
+        """The detector is silent for this long after a reset [s]."""
+        return self.detector.settle if self.detector else 0.0
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with what the sensors measured in the last action, "" for nothing."""
+        return self.detector.fault if self.detector else ""
+
+    @property
+    def bounds(self) -> Array:
+        """What the residual may be without contact [N m], shape (n,)."""
+        return self.detector.bounds if self.detector else self._none
+
+    def measure(
+        self, rng: np.random.Generator, q: Array, qd: Array, current: Array
+    ) -> tuple[Array, Array, Array]:
+        """What the sensors say of true signals, shape (substeps, n) each."""
+        self.measured = (
+            (q, qd, current) if self.sensors is None else self.sensors.measure(rng, q, qd, current)
+        )
+        return self.measured
+
+    def detect(self, q: Array, qd: Array, current: Array) -> tuple[Array, bool]:
+        """Residual at the last sample [N m], and whether the alarm was up at any."""
+        if self.detector is None:
+            return self._none, False
+        self.residuals[:], self.alarms[:] = self.detector.steps(q, qd, current)
+        return self.residuals[-1], bool(self.alarms.any())
+
+    def show(self, observation: Array, q: Array, qd: Array, current: Array) -> None:
+        """Put the last measured sample into an observation."""
+        n = q.shape[1]
+        observation[:n], observation[n : 2 * n] = q[-1], qd[-1]
+        observation[2 * n : 3 * n] = self._gain * current[-1]
+        np.clip(observation, self._low, self._high, out=observation)

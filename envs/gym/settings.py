@@ -1,0 +1,124 @@
+"""What can be chosen about an environment by keyword, checked."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from tauguard.envs.gym.randomization import distributions
+from tauguard.models import BODY_REGIONS, BodyProxy, Cloth, Mismatch, Person, Robot, Table
+from tauguard.models.scene import INTEGRATORS
+
+#: Control modes, in the native order; their units stand in :mod:`tauguard.envs.gym.actions`.
+CONTROLS = ("current", "torque", "joint_velocity", "joint_position", "cartesian")
+#: Detectors that need no file.
+DETECTORS = ("observer",)
+#: The obstacle that is a whole person.
+PERSON = "person"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The keywords of every environment; a scene compiles only what they ask for."""
+
+    control: str = "joint_velocity"  #: one of :data:`CONTROLS`
+    control_rate: float = 100.0  #: actions a second [Hz]
+    timestep: float = 1e-3  #: of the physics [s]
+    integrator: str = "implicitfast"  #: of the physics
+    robot: str | Robot = "cura6"  #: or a name, a file or a robot, see ``tauguard robot``
+    payload_g: float = 0.0  #: carried, not told to controller and observer [g]
+    mismatch: Mismatch | int | None = None  #: simulated against nominal arm; a number is a seed
+    obstacles: tuple[str | BodyProxy | Person, ...] = ()  #: "person", body regions, or such by hand
+    table: Table | None = None  #: a board that the arm can touch
+    cloth: Cloth | None = None  #: a hanging cloth
+    detector: Any = None  #: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``
+    checkers: tuple[str, ...] = ()  #: contact checkers that watch every physics step
+    labels: bool = True  #: contact sensors: without them force, cost and tau_ext stay 0
+    noise: bool = False  #: observe measured instead of true positions, velocities and currents
+    ideal_drive: bool = False  #: no friction, ripple, lag or sensor errors
+    max_speed: float | None = None  #: of every joint [rad/s]; default: the arm's own, else 2
+    randomize: Mapping[str, Any] | None = None  #: drawn each episode: see ``envs.randomization``
+    contact_area: float | None = None  #: of the robot's striking surface [cm^2], where known
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the one that is wrong and what would work."""
+        one_of("control", self.control, CONTROLS)
+        one_of("integrator", self.integrator, tuple(INTEGRATORS))
+        for name in ("timestep", "control_rate"):
+            positive(name, getattr(self, name))
+        for name in ("max_speed", "contact_area"):
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name))
+        steps = 1 / (self.control_rate * self.timestep)
+        if round(steps) < 1 or abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"control_rate {self.control_rate} Hz at a timestep of {self.timestep} s: "
+                f"{steps:g} physics steps an action; expected a whole number, 1 or more"
+            )
+        if not (np.isfinite(self.payload_g) and self.payload_g >= 0):
+            raise ValueError(f"payload_g {self.payload_g}: expected 0 or more grams")
+        if isinstance(self.mismatch, int):
+            object.__setattr__(self, "mismatch", Mismatch(seed=self.mismatch))
+        if not (self.mismatch is None or isinstance(self.mismatch, Mismatch)):
+            raise ValueError(f"mismatch {self.mismatch!r}: expected a Mismatch, a seed, or None")
+        for name in ("obstacles", "checkers"):
+            value = getattr(self, name)
+            one = isinstance(value, str | BodyProxy | Person)
+            object.__setattr__(self, name, (value,) if one else tuple(value))
+        _check_obstacles(self.obstacles)
+        object.__setattr__(self, "randomize", distributions(self.randomize or {}))
+        if isinstance(self.detector, os.PathLike):
+            object.__setattr__(self, "detector", os.fspath(self.detector))
+        named = isinstance(self.detector, str) and self.detector not in DETECTORS
+        if named and not os.path.isfile(self.detector):
+            raise ValueError(
+                f"detector {self.detector!r}: no such model file; expected "
+                f"{', '.join(DETECTORS)}, the path of a trained detector, or None"
+            )
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps an action."""
+        return round(1 / (self.control_rate * self.timestep))
+
+    @classmethod
+    def from_keywords(cls, defaults: Mapping[str, Any], given: Mapping[str, Any]) -> Settings:
+        """An environment's own defaults with the user's keywords over them.
+
+        Raises:
+            ValueError: a keyword that does not exist; the message lists those that do.
+        """
+        known = [field.name for field in fields(cls)]
+        for name in given:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, n=1)
+                hint = f"did you mean {near[0]}? " if near else ""
+                raise ValueError(f"keyword {name!r}: {hint}expected one of {', '.join(known)}")
+        return cls(**{**defaults, **given})
+
+
+def _check_obstacles(obstacles: tuple[Any, ...]) -> None:
+    known = (PERSON, *BODY_REGIONS)
+    for item in obstacles:
+        if not isinstance(item, BodyProxy | Person) and item not in known:
+            raise ValueError(f"obstacles: {item!r}; expected some of {', '.join(known)}")
+    people = [item for item in obstacles if item == PERSON or isinstance(item, Person)]
+    if len(people) > 1:
+        raise ValueError(f"obstacles: {len(people)} persons; expected at most one")
+
+
+def one_of(name: str, value: object, known: tuple[str, ...]) -> None:
+    """``value`` is one of ``known``, or ``ValueError`` that lists them."""
+    if value not in known:
+        raise ValueError(f"{name} {value!r}: expected one of {', '.join(known)}")
+
+
+def positive(name: str, value: float) -> None:
+    """``value`` is finite and above 0, or ``ValueError``."""
+    if not (np.isfinite(value) and value > 0):
+        raise ValueError(f"{name} {value}: expected a finite number above 0")

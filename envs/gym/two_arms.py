@@ -1,0 +1,70 @@
+"""TwoArms-v0: two arms over one table, in one another's way."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+from tauguard.envs.gym.base import ArmEnv
+from tauguard.envs.gym.reach import Reach
+from tauguard.envs.gym.two_arms_scene import PLACE
+from tauguard.envs.gym.vector import VectorArmEnv
+from tauguard.models import Person, Scene, Table
+
+#: A person's distance from the line between the arms, in units of the reach.
+BESIDE = 0.75
+#: Between the arms, low enough to work above.
+BOARD = Table(position=(0.55, 0.0, 0.05), half_extents=(0.3, 0.6, 0.02))
+
+
+class TwoArms(Reach):
+    """Reach with both tools at once; a success needs both at their targets."""
+
+    arms: ClassVar[int] = 2
+    defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "table": BOARD}
+
+    @classmethod
+    def person(cls, bare: Scene, reach: float) -> Person:
+        """Beside the table, looking at it."""
+        x = PLACE[0] / 2
+        return Person(position=(x, -max(BESIDE * reach, 0.6)), facing=np.pi / 2)
+
+
+class TwoArmsEnv(ArmEnv):
+    """Bring two tools to two places at once, without the arms touching.
+
+    The second, nominal arm of the same kind stands opposite, 1.1 m away. Joints and actions of the
+    first arm come first. ``info["force"]`` and ``tau_ext`` are those of contacts with the other
+    arm, the table and whatever ``obstacles`` adds; links count on through the second arm.
+
+    ## Actions (joint velocity, the default; 2 n joints)
+
+    | index | name | range | meaning of 1 |
+    |---|---|---|---|
+    | 0 .. n-1 | velocity of joint i of the first arm | -1 to 1 | its largest speed [rad/s] |
+    | n .. 2n-1 | velocity of joint i of the second arm | -1 to 1 | its largest speed [rad/s] |
+
+    Other control modes as in Reach-v0, for one arm after the other ("cartesian": 6 numbers each).
+
+    ## Observations (6 n + 12 numbers)
+
+    | index | name | range | unit |
+    |---|---|---|---|
+    | 0 .. 2n-1 | positions of the joints | their ranges and 0.5 beyond | rad |
+    | 2n .. 4n-1 | velocities of the joints | -100 to 100 | rad/s |
+    | 4n .. 6n-1 | motor torques, nominal gain times current | 1.5 times limit | N m |
+    | 6n .. 6n+5 | positions of both tools | -100 to 100 | m |
+    | 6n+6 .. 6n+11 | targets less tools | -100 to 100 | m |
+
+    The reward is how much less far the farther tool is from its target [m], and 1 when both are
+    within 3 cm; then come the next targets.
+    """
+
+    task_type = TwoArms
+
+
+class TwoArmsVectorEnv(VectorArmEnv):
+    """Many TwoArms-v0 at once; see :class:`TwoArmsEnv`."""
+
+    task_type = TwoArms

@@ -1,0 +1,247 @@
+"""Many copies of an environment at once, on threads; every copy as if it were alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike
+
+from tauguard.arrays import Array, Bools
+from tauguard.envs.gym.base import (
+    DIVERGED_REASON,
+    RENDER_MODES,
+    Task,
+    build,
+    frame_rate,
+    make_spaces,
+    touches,
+)
+from tauguard.envs.gym.cell import (
+    COST,
+    DISTANCE,
+    DIVERGED,
+    FORCE,
+    LINK,
+    ONSET,
+    ONSET_TIME,
+    RATIO,
+    REGION,
+    REGION_FORCE,
+    TIME,
+)
+from tauguard.envs.gym.randomization import check_options
+from tauguard.envs.gym.rendering import Picture
+from tauguard.envs.gym.settings import one_of
+
+
+class VectorArmEnv(VectorEnv[Array, Array, Array]):
+    """``num_envs`` copies of an :class:`tauguard.envs.gym.base.ArmEnv`, stepped on a thread pool.
+
+    Bit for bit what the single environments give, for any number of threads. The scene is compiled
+    once and shared. Finished copies begin anew at the next step (``AutoresetMode.NEXT_STEP``) or
+    in the same one (``SAME_STEP``), as ``autoreset_mode`` says.
+    """
+
+    task_type: ClassVar[type[Task]] = Task
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = None,
+        threads: int = 0,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        **keywords: Any,
+    ) -> None:
+        """Compile the scene once.
+
+        Args:
+            num_envs: how many copies.
+            max_episode_steps: an episode is truncated after so many actions.
+            threads: 0 takes all processors; the result does not depend on it.
+            autoreset_mode: "NextStep", "SameStep" or "Disabled".
+            render_mode: as of the single environment; the first copy is shown.
+            **keywords: as of the single environment.
+        """
+        if num_envs < 1:
+            raise ValueError(f"num_envs {num_envs}: expected 1 or more")
+        if threads < 0:
+            raise ValueError(f"threads {threads}: expected 0 (all processors) or more")
+        if render_mode is not None:
+            one_of("render_mode", render_mode, RENDER_MODES)
+        self.num_envs, self.render_mode, self._threads = num_envs, render_mode, threads
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.world, self.cell, self.task = build(self.task_type, keywords, num_envs)
+        self.metadata = frame_rate(self.world) | {"autoreset_mode": self.autoreset_mode}
+        self.single_action_space, self.single_observation_space = make_spaces(self.cell)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._limit = max_episode_steps
+        self._elapsed = np.zeros(num_envs, dtype=np.int64)
+        self._over = np.zeros(num_envs, dtype=np.bool_)
+        self._rngs: list[np.random.Generator] = [seeding.np_random(None)[0]] * num_envs
+        self._seeded = False
+        self._picture: Picture | None = None
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin all episodes, or those that ``options["reset_mask"]`` chooses.
+
+        Args:
+            seed: of copy i: ``seed + i``, or entry i of a list.
+            options: ``reset_mask``, a bool array of shape (num_envs,), and values for these
+                episodes of what the keyword ``randomize`` names.
+        """
+        stated = {key: value for key, value in (options or {}).items() if key != "reset_mask"}
+        try:
+            check_options(stated, self.world.settings.randomize or {})
+        except ValueError as error:
+            raise ValueError(f"{error}; reset_mask always works") from None
+        if isinstance(seed, list):
+            seeds = seed
+        else:
+            seeds = [None if seed is None else seed + i for i in range(self.num_envs)]
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed: {len(seeds)} entries, expected {self.num_envs}")
+        for i, one in enumerate(seeds):
+            if one is not None or not self._seeded:
+                self._rngs[i] = seeding.np_random(one)[0]
+        self._seeded = True
+        mask = self._chosen((options or {}).get("reset_mask"))
+        for k in np.flatnonzero(mask):
+            self._begin(int(k), stated)
+        return self.cell.observation.copy(), self._infos(np.zeros_like(mask), mask)
+
+    def _chosen(self, mask: Any) -> Bools:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        if not (isinstance(mask, np.ndarray) and mask.shape == (self.num_envs,)):
+            raise ValueError(f"reset_mask: expected a bool array of shape ({self.num_envs},)")
+        return mask.astype(np.bool_)
+
+    def _begin(self, i: int, stated: Mapping[str, Any] = MappingProxyType({})) -> None:
+        self.cell.draw(i, self._rngs[i], stated)
+        self.task.start(i, self._rngs[i])
+        self.cell.cost_sum[i] = 0.0
+        self._elapsed[i], self._over[i] = 0, False
+
+    def step(  # type: ignore[override]
+        self, actions: ArrayLike
+    ) -> tuple[Array, Array, Bools, Bools, dict[str, Any]]:
+        """Act in every copy.
+
+        Raises:
+            ValueError: actions of another shape, or with entries that are not finite.
+        """
+        cell = self.cell
+        values = np.ascontiguousarray(actions, dtype=np.float64)
+        if values.shape != self.action_space.shape:
+            raise ValueError(
+                f"actions: shape {values.shape}, expected {self.action_space.shape}: a row a copy"
+            )
+        if not self._seeded:
+            raise gymnasium.error.ResetNeeded("call reset before step")
+        going = ~self._over
+        if self._over.any() and self.autoreset_mode is AutoresetMode.DISABLED:
+            raise gymnasium.error.ResetNeeded(
+                f"copies {np.flatnonzero(self._over)} are over: reset them with a reset_mask"
+            )
+        cell.step_all(values, going, self._rngs, self._threads)
+        task, figure = self.task, list(cell.figure.T)
+        rewards, overs, successes, task.memory[:] = task.score(figure, task.memory.copy())
+        diverged = figure[DIVERGED] != 0
+        self._elapsed += going
+        late = self._elapsed >= self._limit if self._limit else np.zeros_like(diverged)
+        terminated = overs & ~diverged & going
+        truncated = (diverged | late) & going
+        rewards = np.where(going, rewards, 0.0)
+        fresh = np.flatnonzero(~going)
+        for i in fresh:
+            self._begin(int(i))
+        infos = self._infos(successes & going, np.ones_like(going))
+        for i in np.flatnonzero(successes & going & ~diverged):
+            self.task.after(int(i), self._rngs[i])
+        self._over = terminated | truncated
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
+            infos = self._restart(infos)
+        if self.render_mode == "human":
+            self.render()
+        return cell.observation.copy(), rewards, terminated, truncated, infos
+
+    def _restart(self, infos: dict[str, Any]) -> dict[str, Any]:
+        """SAME_STEP: the finished copies begin anew; what they ended with goes into ``final_``."""
+        done = self._over.copy()
+        observations = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(done):
+            observations[i] = self.cell.observation[i].copy()
+        final = {key: value.copy() for key, value in infos.items()}
+        for key in [k for k in final if not k.startswith("_")]:
+            final[key][~done] = np.zeros_like(final[key][~done])
+            final[f"_{key}"] = done.copy()
+        for i in np.flatnonzero(done):
+            self._begin(int(i))
+        fresh = self._infos(np.zeros_like(done), done)
+        for key in [k for k in infos if not k.startswith("_")]:
+            infos[key][done] = fresh[key][done]
+        return {
+            "final_obs": observations,
+            "_final_obs": done,
+            "final_info": final,
+            "_final_info": done.copy(),
+        } | infos
+
+    def _infos(self, success: Bools, mask: Bools) -> dict[str, Any]:
+        cell, area = self.cell, self.world.settings.contact_area
+        figure = self.cell.figure.T.copy()  # a row a figure: no view of what the next step writes
+        reason = np.full(self.num_envs, "", dtype=object)
+        reason[figure[DIVERGED] != 0] = DIVERGED_REASON
+        infos: dict[str, Any] = {
+            "time": figure[TIME],
+            "distance": figure[DISTANCE],
+            "success": success.copy(),
+            "force": figure[FORCE],
+            "cost": figure[COST],
+            "cost_sum": cell.cost_sum.copy(),
+            "pressure": figure[REGION_FORCE] / area if area else np.zeros(self.num_envs),
+            "limit_ratio": figure[RATIO],
+            "region": figure[REGION].astype(np.int64),
+            "tau_ext": cell.tau_ext.copy(),
+            "residual": cell.residual.copy(),
+            "alarm": cell.alarm.copy(),
+            "onset": figure[ONSET] != 0,
+            "onset_time": figure[ONSET_TIME],
+            "link": figure[LINK].astype(np.int64),
+            "fault": np.array(cell.faults(), dtype=object),
+            "tau_ext_peak": cell.tau_peak.copy(),
+            "alarm_delay": cell.alarm_delay.copy(),
+            "reason": reason,
+        } | touches(cell, slice(None))
+        if cell.checks:
+            infos["contacts"] = cell.contacts.copy()
+        for key in list(infos):
+            infos[f"_{key}"] = mask.copy()
+        return infos
+
+    def render(self) -> Any:
+        """Pictures of the first copy, one a call."""
+        if self.render_mode is None:
+            return None
+        if self._picture is None:
+            self._picture = Picture(self.world, self.cell.datas[0], self.render_mode)
+        picture = self._picture.show(self.cell.target[0])
+        return None if picture is None else (picture,)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the picture."""
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None

@@ -1,0 +1,323 @@
+"""The compiled side of an environment: its scene and what a controller knows about the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.arrays import Array
+from tauguard.envs.gym.randomization import check_names
+from tauguard.envs.gym.settings import PERSON, Settings
+from tauguard.envs.gym.two_arms_scene import add_second_arm, both_drives
+from tauguard.envs.plant import Gains
+from tauguard.models import (
+    BodyProxy,
+    Drive,
+    Mismatch,
+    Person,
+    Scene,
+    SceneSpec,
+    compose,
+    set_payload,
+    without_losses,
+)
+from tauguard.models.person import PersonPart
+
+#: A tool pose to reach lies at least this high and this far from the base's axis [m].
+LOWEST, NEAREST = 0.12, 0.2
+#: Where the body regions cross: position and direction in units of the arm's reach, span [reach].
+LINES = {
+    "hand": ((0.55, 0.0, 0.40), (0.0, 1.0, 0.0)),
+    "lower_arm": ((0.70, 0.10, 0.30), (1.0, 0.0, 0.0)),
+    "upper_arm": ((0.75, -0.10, 0.45), (1.0, 0.3, 0.0)),
+    "chest": ((0.95, 0.0, 0.45), (0.2, 1.0, 0.0)),
+}
+#: Any other region's.
+OTHER_LINE = ((0.85, 0.0, 0.50), (0.0, 1.0, 0.0))
+#: A region turns back this far from the middle of its line, in units of the reach.
+SPAN = 0.6
+#: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
+#: a torso at less.
+HAND_SPEED, BODY_SPEED = 0.8, 0.3
+#: A person's hips are this far from the arm [reach], at least so far [m].
+OPPOSITE, NEAREST_PERSON = 0.9, 0.6
+
+
+@dataclass(frozen=True)
+class RegionInfo:
+    """A body region in the scene."""
+
+    name: str
+    body: int
+    joint: int  #: -1: held in place
+    quasi_static: float  #: limit [N]
+    transient: float  #: limit [N]; 0: no blow is allowed
+    mocap: int  #: of the frame that a person moves; -1: not of a person
+    held: bool  #: cannot move away: its limit is the quasi-static one
+    stiffness: float  #: of its contact [N/m]
+    radius: float  #: [m]
+    span: float  #: [m]
+    speed: float  #: [m/s]
+    unconfirmed: tuple[str, ...]  #: values that no open source confirmed
+
+
+@dataclass(frozen=True)
+class World:
+    """A scene, and what the controller and the observation need to know about it."""
+
+    settings: Settings
+    scene: Scene  #: without the shapes that only show
+    nominal: Drive  #: what the controller believes about the drive
+    gains: Gains
+    nominal_mass: Array  #: of the links [kg], shape (n,)
+    nominal_com: Array  #: in the links' frames [m], shape (n, 3)
+    joint_range: Array  #: [rad], infinite where free, shape (n, 2)
+    torque_limit: Array  #: [N m], shape (n,)
+    max_speed: Array  #: [rad/s], shape (n,)
+    tools: tuple[tuple[int, int, int], ...]  #: an arm: site or -1, body, index of its first joint
+    regions: tuple[RegionInfo, ...]
+    person: Person | None
+    reach: float  #: from the first joint to the tool at most [m]
+
+    @property
+    def arms(self) -> int:
+        """How many arms there are."""
+        return len(self.tools)
+
+    def shown(self) -> mujoco.MjModel:
+        """The scene with the shapes that only show; bodies, joints and flexes have the same ids."""
+        return mujoco.MjModel.from_xml_string(self.scene.xml)
+
+    def ids(self) -> NDArray[np.int64]:
+        """MuJoCo ids of the arm's joints, shape (n,)."""
+        return np.array([self.scene.model.joint(name).id for name in self.scene.joint_names])
+
+
+Placing = Callable[[str, Scene, float], BodyProxy]
+Standing = Callable[[Scene, float], Person]
+
+
+def build_world(
+    settings: Settings,
+    arms: int = 1,
+    placing: Placing | None = None,
+    standing: Standing | None = None,
+) -> World:
+    """Compile what ``settings`` ask for, and nothing else.
+
+    Args:
+        settings: what is wanted.
+        arms: 1 or 2.
+        placing: where a body region goes that was asked for by name (default: :func:`crossing`),
+            from its name, the bare arm's scene and the arm's reach [m].
+        standing: where "person" stands (default: :func:`opposite`), from the same.
+
+    Raises:
+        ValueError, FileNotFoundError: a robot that cannot be used.
+    """
+    spec = SceneSpec(
+        timestep=settings.timestep,
+        integrator=settings.integrator,
+        mismatch=settings.mismatch if isinstance(settings.mismatch, Mismatch) else None,
+        payload=settings.payload_g > 0 or "payload_g" in (settings.randomize or {}),
+        labels=settings.labels,
+        region_labels=settings.labels,
+        arm=settings.robot,
+        table=settings.table,
+        cloth=settings.cloth,
+    )
+    bare = compose(
+        replace(spec, payload=False, labels=False, region_labels=False, cloth=None, mismatch=None),
+        visuals=False,
+    )
+    reach = arm_reach(bare)
+    proxies, person = _people(settings, bare, reach, placing or crossing, standing or opposite)
+    check_names(settings.randomize or {}, person, settings.checkers)
+    scene = compose(replace(spec, proxies=proxies, person=person), visuals=False)
+    if arms == 2:
+        scene = add_second_arm(scene)
+    if settings.ideal_drive:
+        scene = without_losses(scene)
+    if settings.payload_g > 0:
+        data = mujoco.MjData(scene.model)
+        set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
+    # A diverged state must stay visible instead of starting again at the origin by itself.
+    scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return _known(settings, scene, bare, reach, arms)
+
+
+def _people(
+    settings: Settings, bare: Scene, reach: float, placing: Placing, standing: Standing
+) -> tuple[tuple[BodyProxy, ...], Person | None]:
+    """The body regions and the person that were asked for, placed."""
+    proxies: list[BodyProxy] = []
+    person = None
+    for item in settings.obstacles:
+        if isinstance(item, Person):
+            person = item
+        elif item == PERSON:
+            person = standing(bare, reach)
+        else:
+            proxies.append(item if isinstance(item, BodyProxy) else placing(item, bare, reach))
+    return tuple(proxies), person
+
+
+def _known(settings: Settings, scene: Scene, bare: Scene, reach: float, arms: int) -> World:
+    model = scene.model
+    joints = [model.joint(name).id for name in scene.joint_names]
+    limited = model.jnt_limited[joints].astype(bool)[:, None]
+    nominal = nominal_drive(settings, bare)
+    gains = Gains.for_scene(bare)
+    own = bare.facts.max_speed
+    speed = own if settings.max_speed is None else np.full(len(own), settings.max_speed)
+    # A gripper that moves is rigid in what the controller believes.
+    rigid = bare.arm_model if bare.facts.gripper else bare.model
+    bodies = [rigid.body(bare.model.body(int(b)).name).id for b in bare.link_bodies]
+    return World(
+        settings=settings,
+        scene=scene,
+        nominal=nominal if arms == 1 else both_drives(nominal),
+        gains=Gains(np.tile(gains.kp, arms), np.tile(gains.kd, arms)),
+        nominal_mass=np.tile(rigid.body_mass[bodies], arms),
+        nominal_com=np.tile(rigid.body_ipos[bodies], (arms, 1)),
+        joint_range=np.where(limited, model.jnt_range[joints], [-np.inf, np.inf]),
+        torque_limit=np.tile(nominal.torque_limit, arms),
+        max_speed=np.tile(speed, arms),
+        tools=find_tools(scene, arms),
+        regions=_regions(scene, reach),
+        person=scene.spec.person,
+        reach=reach,
+    )
+
+
+def nominal_drive(settings: Settings, bare: Scene) -> Drive:
+    """What the controller believes: the arm's nominal drive, with all friction that is known."""
+    return bare.facts.drive if settings.ideal_drive else bare.facts.nominal
+
+
+def crossing(region: str, bare: Scene, reach: float) -> BodyProxy:
+    """A body region on its line through the workspace."""
+    position, direction = LINES.get(region, OTHER_LINE)
+    x, y, z = (reach * c for c in position)
+    return BodyProxy(region, position=(x, y, z), direction=direction)
+
+
+def opposite(bare: Scene, reach: float) -> Person:
+    """A person at work opposite the arm, within its reach."""
+    return Person(position=(max(OPPOSITE * reach, NEAREST_PERSON), 0.0))
+
+
+def _regions(scene: Scene, reach: float) -> tuple[RegionInfo, ...]:
+    """The proxies, then the person's."""
+    spec = scene.spec
+    person = () if spec.person is None else spec.person.parts()
+    return (
+        *(_region(scene, proxy, reach) for proxy in spec.proxies),
+        *(_segment(scene, part) for part in person),
+    )
+
+
+def _segment(scene: Scene, part: PersonPart) -> RegionInfo:
+    limits = part.limits
+    return RegionInfo(
+        name=part.name,
+        body=int(scene.model.body(part.name).id),
+        joint=-1,
+        quasi_static=limits.quasi_static_force,
+        transient=limits.transient_force,
+        mocap=int(scene.model.body(f"{part.name}_motion").mocapid[0]),
+        held=part.held,
+        stiffness=limits.stiffness,
+        radius=part.radius,
+        span=0.0,
+        speed=0.0,
+        unconfirmed=limits.unconfirmed,
+    )
+
+
+def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
+    limits = proxy.limits
+    slow = limits.mass > 5
+    return RegionInfo(
+        name=proxy.region,
+        body=int(scene.model.body(proxy.region).id),
+        joint=-1 if proxy.clamped else int(scene.model.joint(proxy.region).id),
+        quasi_static=limits.quasi_static_force,
+        transient=limits.transient_force,
+        mocap=-1,
+        held=proxy.clamped,
+        stiffness=limits.stiffness,
+        radius=proxy.radius,
+        span=SPAN * reach,
+        speed=BODY_SPEED if slow else HAND_SPEED,
+        unconfirmed=limits.unconfirmed,
+    )
+
+
+def region_pressure(world: World, force: Array) -> Array:
+    """Mean pressure on each body region [N/cm^2] under forces of shape (..., k) [N].
+
+    Over the setting ``contact_area`` where it is stated. Else over the circle that a flat surface
+    makes with a round region at the depth that its stiffness allows, area = pi radius F / k
+    (Hertz' geometry): an estimate, and a low one, since a robot's edge presses harder.
+    """
+    if world.settings.contact_area is not None:
+        return force / world.settings.contact_area
+    least = np.array([r.stiffness / (np.pi * r.radius) for r in world.regions]) / 1e4
+    return np.where(force > 0, least, 0.0)
+
+
+def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:
+    """The tool of each arm: the flange's site where its file has one, else the last link."""
+    model, each = scene.model, len(scene.joint_names) // arms
+    found = []
+    for a in range(arms):
+        body = int(scene.link_bodies[(a + 1) * each - 1])
+        names = (scene.facts.tool,)
+        sites = [s for s in range(model.nsite) if _carried(model, int(model.site_bodyid[s]), body)]
+        named = [s for s in sites if model.site(s).name.removeprefix("arm2_") in names]
+        found.append((named[0] if named else -1, body, a * each))
+    return tuple(found)
+
+
+def _carried(model: mujoco.MjModel, body: int, by: int) -> bool:
+    """Whether ``body`` is ``by`` or something that it carries."""
+    while body > by:
+        body = int(model.body_parentid[body])
+    return body == by
+
+
+def tool_position(world: World, data: mujoco.MjData, arm: int = 0) -> Array:
+    """Where a tool is [m], shape (3,); kinematics must be up to date."""
+    site, body, _ = world.tools[arm]
+    return np.array(data.site_xpos[site] if site >= 0 else data.xpos[body])
+
+
+def arm_reach(scene: Scene) -> float:
+    """Largest distance from the first joint to the last link over 200 fixed random poses [m]."""
+    model, data = scene.model, mujoco.MjData(scene.model)
+    rng = np.random.default_rng(0)
+    low, high = pose_box(scene)
+    first = scene.model.joint(scene.joint_names[0]).id
+    best = 0.0
+    for _ in range(200):
+        data.qpos[scene.qpos_adr] = rng.uniform(low, high)
+        mujoco.mj_kinematics(model, data)
+        way = data.xpos[scene.link_bodies[-1]] - data.xanchor[first]
+        best = max(best, float(np.linalg.norm(way)))
+    return best
+
+
+def pose_box(scene: Scene) -> tuple[Array, Array]:
+    """Poses to draw from: around home, within the joints' ranges [rad], shapes (n,)."""
+    model = scene.model
+    joints = [model.joint(name).id for name in scene.joint_names]
+    spread = np.resize(scene.facts.spread, len(joints))
+    limited = model.jnt_limited[joints].astype(bool)
+    low = np.where(limited, model.jnt_range[joints, 0], -np.inf)
+    high = np.where(limited, model.jnt_range[joints, 1], np.inf)
+    return np.maximum(low, scene.home - spread), np.minimum(high, scene.home + spread)
