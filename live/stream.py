@@ -27,7 +27,7 @@ class Sample:
 class RobotStream(Protocol):
     """A robot that is read and never commanded.
 
-    Another robot is one class with these members; see ``docs/live.md``.
+    Another robot is one class with these members; see ``docs/howto/live.md``.
     """
 
     @property

@@ -101,7 +101,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     region's transient limit, or its quasi-static one after 0.5 s of contact or where the region
     cannot move), ``region`` (of that ratio, 1-based, 0 for none; names in :attr:`regions`),
     ``tau_ext`` [N m], ``residual`` [N m], ``alarm`` and ``fault`` of the detector (what is wrong
-    with its samples, "" for nothing; see ``docs/live.md``), ``onset`` (a collision began in this
+    with its samples, "" for nothing), ``onset`` (a collision began in this
     step), ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
     0: none), ``tau_ext_peak`` (by joint, of the largest size [N m]), ``alarm_delay`` of the latest
     collision [s] (-1: no alarm, or none yet), and ``reason``, why an episode was cut short (""

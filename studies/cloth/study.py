@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 UNSET = (
     "TAUGUARD_DATA is not set: no recorded scenes, no listed collisions, no public queries "
-    "(docs/cloth.md says where they come from)"
+    "(docs/notes/2026-11-23-cloth.md says where they come from)"
 )
 THERE = "TAUGUARD_DATA: scenes and query sets are there"
 QUICK = "TAUGUARD_DATA: query sets are there; recorded scenes are left to a full run"
@@ -152,7 +152,8 @@ def recorded() -> Path | None:
         more = f" and {len(lacks) - 3} more" if len(lacks) > 3 else ""
         raise ValueError(
             f"TAUGUARD_DATA: {folder} lacks files in {', '.join(lacks[:3])}{more}; "
-            "docs/cloth.md says where they come from; unset, the bench runs without them"
+            "docs/notes/2026-11-23-cloth.md says where they come from; "
+            "unset, the bench runs without them"
         )
     return Path(named)
 

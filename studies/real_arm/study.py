@@ -19,8 +19,8 @@ the bound in motion as a regression (its margin 1.25 to 2.2, its least value 0.4
 share of the inertial torque (eight settings), the baseline at rest (0.2 to 0.7 s, or a band, in
 five settings), the rule after an alarm (ten settings), the time until a slow joint is at rest (0.05
 to 0.2 s), the confirmation (30 and 40 ms), and the friction level (with and without the load).
-Pushes without a sensor were read off the residual. docs/real_arms.md lists what was compared since
-then for standing arms. A fresh arm does a little worse.
+Pushes without a sensor were read off the residual. docs/notes/2026-11-23-real-arms.md lists what
+was compared since then for standing arms. A fresh arm does a little worse.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from tauguard.hard_cases.case import Case
 from tauguard.hard_cases.verdicts import by_library, verdicts
 
 CASES = load_cases()
-#: Where a scene's answer is MuJoCo's, whose contacts and dry friction yield: docs/hard_cases.md.
+#: Where a scene's answer is MuJoCo's, whose contacts and dry friction yield.
 SOFT = {"mass_ratio_1e4", "friction_holds", "joint_limit_at_speed"}
 
 

@@ -8,7 +8,7 @@ import pytest
 from tauguard.detectors.faults.monitor import COLLISION, FAULT, Monitor
 from tauguard.live.packets import Fault, Packets
 
-#: Faults that the samples show by themselves. The others look like a contact: see docs/live.md.
+#: Faults that the samples show by themselves. Others look like a contact.
 SEEN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan")
 
 
