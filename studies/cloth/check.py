@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from oracles.mesh_contact import HALVINGS, first_contact
 from studies.cloth.certificate import certify
-from studies.cloth.integers import HALVINGS, first_contact
 from studies.cloth.peer import load_ipctk
 from studies.cloth.queries import HARD_SETS, load_hard, solver
 from tauguard.report import Row

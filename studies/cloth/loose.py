@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from oracles.point_contact import point_edge_time, point_point_time
 from studies.cloth.peer import load_ipctk
-from studies.cloth.rational import point_edge_time, point_point_time
 from studies.cloth.scaling import bound, scaled, scenes, step_at
 from studies.harness import measure
 from tauguard.arrays import Array

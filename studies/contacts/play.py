@@ -12,8 +12,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from oracles.energy import EnergyGain
+from oracles.tunnelling import Tunnelling
 from studies.contacts.draws import Thrown, scenes
-from studies.contacts.referee import Referee
 from tauguard.contacts import GuardedStepper
 from tauguard.contacts.scenes.impacts import MODES
 
@@ -130,17 +131,21 @@ def unwarned() -> Iterator[None]:
 def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> Played:
     """Play ``scene`` to its end: ``method`` is ``guarded`` or one of MuJoCo's modes."""
     model, data = scene.start(timestep, MODES.get(method, 0), stiff)
-    referee = Referee(model, data, scene.given)
+    tunnelling, energy = Tunnelling(model, data), EnergyGain(model, data, scene.given)
     guard = GuardedStepper(model, data) if method == "guarded" else None
     every = max(1, round(LOOK / timestep))
     steps = round(scene.seconds / timestep) + 1
     spent, begin, calls, exhausted, arrested, touched = 0.0, 0.0, 0, False, False, False
     change, added = 0.0, 0.0
 
+    def observe() -> None:
+        energy.observe(data)
+        tunnelling.observe(data)
+
     def each() -> None:
         nonlocal begin
         paused = time.thread_time()
-        referee.look()
+        observe()
         begin += time.thread_time() - paused
 
     for k in range(steps):
@@ -158,23 +163,23 @@ def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> 
             touched |= report.steps > 1
         spent += time.thread_time() - begin
         if report is not None and report.balance is not None and not model.nu:
-            change += float(np.diff(report.balance.energy.sum(axis=1))[0]) / referee.unit
+            change += float(np.diff(report.balance.energy.sum(axis=1))[0]) / energy.unit
             added = max(added, change)
         if k % every == every - 1 or k == steps - 1:
-            referee.look()
-            if not np.isfinite(referee.energy):
+            observe()
+            if not np.isfinite(energy.most):
                 break
     velocity = np.zeros(6)
     mujoco.mj_objectVelocity(
         model, data, mujoco.mjtObj.mjOBJ_GEOM, model.geom(scene.geom).id, velocity, 0
     )
-    held = not referee.passed
+    held = not tunnelling.pairs and bool(np.isfinite(energy.most))
     return Played(
         held,
         exhausted,
         arrested,
         touched,
-        float(referee.energy),
+        float(energy.most),
         spent,
         calls / steps,
         velocity[3:].tolist(),

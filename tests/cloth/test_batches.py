@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from studies.cloth.queries import Queries, solver
 from tauguard.cloth import _mesh, edge_edge, vertex_face
+from tests.cloth.solve import solve, solve_each
 
 QUERIES = {"vf": vertex_face, "ee": edge_edge}
 FIELDS = ("hit", "toi", "point", "normal", "weights")
@@ -72,9 +72,7 @@ def test_queries_apart_on_an_axis_are_left_out_and_no_others(kind):
     a, b = (x[:, :, :1], x[:, :, 1:]) if kind == "vf" else (x[:, :, :2], x[:, :, 2:])
     above, below = ((lo.min(axis=2) > hi.max(axis=2)).all(axis=1) for lo, hi in ((a, b), (b, a)))
     apart = (above | below).any(axis=1)
-    start, end = (np.ascontiguousarray(x[:, i]).reshape(-1, 3) for i in (0, 1))
-    rows = np.arange(4 * len(x), dtype=np.int32).reshape(-1, 4)
-    ours, exact = (solver(Queries(kind == "vf", start, end, rows), m)() for m in ("ab2pf", "exact"))
+    ours, exact = (solve_each(kind == "vf", x, method) for method in ("ab2pf", "exact"))
     assert ours.counts["axes"] == apart.sum() > 1_000
     assert np.array_equal(ours.hit, exact.hit)
     assert not exact.hit[apart].any()
@@ -100,7 +98,6 @@ def test_long_lists_on_shared_positions_are_answered_alike(kind, scene, fastest_
     if scene == "wide":
         x[:, 0] = 1e200
     rows = rng.permuted(np.tile(np.arange(300, dtype=np.int32), (6_000, 1)), axis=1)[:, :4].copy()
-    call = solver(Queries(kind == "vf", x[0], x[1], rows), "ab2pf")
     plain = QUERIES[kind](x[0, rows], x[1, rows])
     assert plain.hit.any()
     assert not plain.hit.all()
@@ -108,7 +105,7 @@ def test_long_lists_on_shared_positions_are_answered_alike(kind, scene, fastest_
     for name in ("portable", "avx2", ""):
         if not _mesh.force_batch_kernels(name) and name:
             continue
-        ours = call()
+        ours = solve(kind == "vf", x[0], x[1], rows)
         counts.append(ours.counts)
         assert np.array_equal(ours.hit, plain.hit)
         assert ours.toi[ours.hit].tobytes() == plain.toi[plain.hit].tobytes()

@@ -5,33 +5,26 @@ from time import process_time
 import numpy as np
 import pytest
 
-from studies.cloth.adversarial import KINDS
-from tauguard.cloth import MeshCCD, _mesh, edge_edge, vertex_face
+from oracles.adversarial_queries import KINDS
+from tauguard.cloth import MeshCCD, edge_edge, vertex_face
 from tauguard.cloth.impacts import METHODS
+from tests.cloth.solve import solve_each
 
 QUERIES = {"vf": vertex_face, "ee": edge_edge}
 # Of time, a query: 41 cuts in three at most, or 4001 in two.
 INTERVALS, INTERVALS_WITH_DISTANCE = 1 + 3 * 41, 1 + 2 * 4_001
 
 
-def counts(kind, x, distance=0.0):
-    n = len(x)
-    start, end = (np.ascontiguousarray(x[:, i]).reshape(-1, 3) for i in (0, 1))
-    rows = np.arange(4 * n, dtype=np.int32).reshape(-1, 4)
-    out = [np.empty((n, k)) for k in (3, 3, 4)]
-    hit, toi = np.zeros(n, dtype=np.uint8), np.empty(n)
-    return _mesh.solve(kind == "vf", start, end, rows, METHODS["ab2pf"], distance, hit, toi, *out)
-
-
 @pytest.mark.parametrize("kind", QUERIES)
 @pytest.mark.parametrize("name", KINDS)
 def test_a_query_is_cut_into_so_many_intervals_at_most(kind, name):
     x = KINDS[name](np.random.default_rng(0), 300, kind == "vf")
-    found = counts(kind, x)
+    found = solve_each(kind == "vf", x).counts
     assert found["intervals"] <= INTERVALS * found["resolved"]
     assert found["exact"] <= len(x)  # each is decided exactly once at most
     for one in x[:20]:
-        assert counts(kind, one[None], 0.1)["intervals"] <= INTERVALS_WITH_DISTANCE
+        few = solve_each(kind == "vf", one[None], distance=0.1).counts
+        assert few["intervals"] <= INTERVALS_WITH_DISTANCE
 
 
 @pytest.mark.parametrize("kind", QUERIES)

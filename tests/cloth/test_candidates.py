@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from oracles import all_pairs
 from tauguard.cloth import VOLUMES, Groups, MeshCCD, _mesh, edge_edge, vertex_face
-from tests.cloth import brute_force
 
 KINDS = sorted(set(VOLUMES.values()))
 
@@ -43,10 +43,10 @@ def check_against_all_pairs(ccd, x_t0, x_t1, kind, min_distance=0.0):
     both = np.concatenate([x_t0, x_t1])
     size = np.abs(both).max(initial=0.0)
     extent = np.ptp(both, axis=0).max(initial=0.0)
-    vf, vf_rows, ee, ee_rows = brute_force.queries(ccd.faces)
+    vf, vf_rows, ee, ee_rows = all_pairs.queries(ccd.faces)
     found_vf, found_ee = ccd.candidates(x_t0, x_t1, min_distance)
     for found, pairs, rows, split in ((found_vf, vf, vf_rows, 1), (found_ee, ee, ee_rows, 2)):
-        gaps = brute_force.gap(x_t0, x_t1, rows, split, *kind) if len(rows) else np.zeros(0)
+        gaps = all_pairs.axis_distance(x_t0, x_t1, rows, split, *kind) if len(rows) else np.zeros(0)
         must = pairs[gaps <= min_distance - 1e-14 * size]
         may = pairs[gaps <= min_distance * (1 + 1e-5) + 1e-14 * size + 4e-6 * extent]
         assert as_set(must) <= as_set(found) <= as_set(may)
@@ -59,7 +59,7 @@ def check_against_all_pairs(ccd, x_t0, x_t1, kind, min_distance=0.0):
 def test_folded_sheet_equals_all_pairs(kind, min_distance):
     faces, x_t0, x_t1 = sheet(7, np.random.default_rng(0))
     ccd = MeshCCD(faces, volume=name_of(kind))
-    assert np.array_equal(ccd.edges, brute_force.edges_of(faces))
+    assert np.array_equal(ccd.edges, all_pairs.edges_of(faces))
     check_against_all_pairs(ccd, x_t0, x_t1, kind, min_distance)
 
 

@@ -1,4 +1,6 @@
-"""ab2pf and exact against integer arithmetic of another make, on random and adversarial queries."""
+"""ab2pf and exact beside exact integers that share no code with them."""
+
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -6,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from studies.cloth.integers import first_contact
-from studies.cloth.queries import Queries, solver
+from oracles.adversarial_queries import KINDS
+from oracles.mesh_contact import first_contact, judge
 from tauguard.cloth import edge_edge, vertex_face
+from tests.cloth.solve import solve_each
 
 QUERIES = {"vf": vertex_face, "ee": edge_edge}
 
@@ -25,12 +28,6 @@ apart = hnp.arrays(
     elements=st.tuples(st.integers(-3, 3), st.integers(-70, 5)).map(lambda m: m[0] * 2.0 ** m[1]),
 )
 thirds = lattice.map(lambda x: x / 3)  # rounded: nearly degenerate, not quite
-
-
-def answered(kind, x, method):
-    start, end = (np.ascontiguousarray(x[:, i]).reshape(-1, 3) for i in (0, 1))
-    rows = np.arange(4 * len(x), dtype=np.int32).reshape(-1, 4)
-    return solver(Queries(kind == "vf", start, end, rows), method)()
 
 
 def assert_right(kind, x):
@@ -74,7 +71,7 @@ def test_integers_of_fixed_width_decide_most_and_as_those_of_any_width(kind):
     x[2000:] = rng.integers(-2, 3, size=(1000, 2, 4, 3)) / 3
     x[::10] *= 10.0 ** rng.integers(-9, 9, size=(300, 1, 1, 3))  # an axis each
     x[5::10] *= 10.0 ** rng.integers(-40, 1, size=(300, 2, 4, 3))  # a coordinate each
-    ours, exact = (answered(kind, x, method) for method in ("ab2pf", "exact"))
+    ours, exact = (solve_each(kind == "vf", x, method) for method in ("ab2pf", "exact"))
     assert np.array_equal(ours.hit, exact.hit)
     early = exact.toi[exact.hit] - ours.toi[exact.hit]
     assert early.min() >= 0
@@ -113,3 +110,61 @@ def test_scaling_changes_nothing(kind, exponent):
     largest = np.full((1, 2, 4, 3), np.finfo(float).max)
     largest[0, 0, 0] *= -1
     assert QUERIES[kind](largest[:, 0], largest[:, 1]).hit[0]
+
+
+@pytest.mark.parametrize("kind", QUERIES)
+@pytest.mark.parametrize("name", KINDS)
+def test_adversarial_queries(name, kind):
+    x = KINDS[name](np.random.default_rng(3), 100, kind == "vf")
+    found = judge(x, kind == "vf", QUERIES[kind](x[:, 0], x[:, 1]).toi)
+    assert (found.misses, found.false_hits, found.late) == (0, 0, 0)
+    assert found.early_most <= 1e-9
+
+
+def test_integers_find_the_closed_form():
+    face = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    start, end = np.array([[0.25, 0.25, 1], *face]), np.array([[0.25, 0.25, 0], *face])
+    assert first_contact(start, end, True) == (1, 1)
+    end[0, 2] = -3
+    assert first_contact(start, end, True) == (Fraction(1, 4), Fraction(1, 4))
+    # At x = t the face has the height t^2, the vertex 1 - 2 t: sqrt(2) - 1.
+    start[0], end[0], end[2] = (0, 0.25, 1), (1, 0.25, -1), (1, 0, 1)
+    low, high = first_contact(start, end, True)
+    assert (low + 1) ** 2 < 2 < (high + 1) ** 2
+    assert high - low == Fraction(1, 2**64)
+    edges = np.array([[0.0, 0, 1], [1, 0, 1], [0.25, -1, 0], [0.25, 1, 0]])
+    moved = edges.copy()
+    moved[2:, 2] = 3.0
+    low, high = first_contact(edges, moved, False)
+    assert low < Fraction(1, 3) < high
+    moved[2:, 0] = 2.0  # 0.25 + 1.75 t is still within the other edge at t = 1/3
+    assert first_contact(edges, moved, False) == (low, high)
+    moved[2:, 0] = 3.0  # 0.25 + 2.75 t is not
+    assert first_contact(edges, moved, False) is None
+
+
+def test_integers_count_every_wrong_answer():
+    x = np.random.default_rng(0).normal(size=(900, 2, 4, 3))
+    times = [first_contact(*each, False) for each in x]
+    toi = np.array([np.inf if time is None else float(time[0]) - 1e-12 for time in times])
+    found = judge(x, False, toi)
+    hits = np.flatnonzero(np.isfinite(toi))
+    assert np.array_equal(np.flatnonzero(found.hit), hits)
+    assert len(hits) > 100
+    assert (found.misses, found.false_hits, found.late) == (0, 0, 0)
+    assert 0.9e-12 < found.early_most < 1.1e-12
+    toi[hits[:3]] = np.inf
+    toi[hits[3:8]] += 2e-12
+    toi[np.flatnonzero(np.isinf(toi))[-2:]] = 0.5
+    found = judge(x, False, toi)
+    assert (found.misses, found.false_hits, found.late) == (3, 2, 5)
+
+
+def test_integers_order_a_time_between_the_bounds_exactly():
+    """No double equals the root 1/3: its lower neighbour is early, its upper neighbour late."""
+    start = np.array([[0.25, 0.25, 1], [0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    end = start.copy()
+    end[0, 2] = -2.0
+    third = 1 / 3  # rounded down
+    x, toi = np.stack([[start, end]] * 2), np.array([third, np.nextafter(third, 1)])
+    assert judge(x, True, toi).late == 1

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from oracles import all_pairs
+from oracles.recorded_collisions import load_frame
 from tauguard.cloth import MeshCCD, edge_edge, vertex_face
 from tauguard.cloth.impacts import METHODS
 from tauguard.cloth.scenes import SCENES
-from tests.cloth import brute_force
 from tests.cloth.test_candidates import as_set, sheet, small_meshes
 from tests.cloth.test_topology import split_face, tear
-from tests.cloth.truth import load_scene
 
 FIELDS = ("hit", "toi", "point", "normal", "weights")
 
 
-def all_pairs(faces, x_t0, x_t1, method="ab2pf", min_distance=0.0):
+def one_by_one(faces, x_t0, x_t1, method="ab2pf", min_distance=0.0):
     """Every query of the mesh, without a broad phase."""
-    vf, vf_rows, ee, ee_rows = brute_force.queries(faces)
+    vf, vf_rows, ee, ee_rows = all_pairs.queries(faces)
     vf_hit = vertex_face(x_t0[vf_rows], x_t1[vf_rows], method=method, min_distance=min_distance).hit
     ee_hit = edge_edge(x_t0[ee_rows], x_t1[ee_rows], method=method, min_distance=min_distance).hit
     return vf[vf_hit], ee[ee_hit]
@@ -48,7 +48,7 @@ def test_any_small_mesh_has_the_collisions_of_all_pairs(mesh):
     """Lattice positions: touching, coplanar, degenerate faces and edges of no length abound."""
     faces, x_t0, x_t1 = mesh
     frame = MeshCCD(faces).find(x_t0, x_t1)
-    vf, ee = all_pairs(faces, x_t0, x_t1)
+    vf, ee = one_by_one(faces, x_t0, x_t1)
     assert as_set(frame.vf) == as_set(vf)
     assert as_set(frame.ee) == as_set(ee)
 
@@ -59,7 +59,7 @@ def test_folded_sheet_has_the_collisions_of_all_pairs(volume, offset):
     faces, x_t0, x_t1 = sheet(8, np.random.default_rng(0))
     x_t0, x_t1 = x_t0 + offset, x_t1 + offset
     frame = MeshCCD(faces, volume=volume).find(x_t0, x_t1)
-    vf, ee = all_pairs(faces, x_t0, x_t1)
+    vf, ee = one_by_one(faces, x_t0, x_t1)
     assert len(vf) > 5
     assert len(ee) > 5
     assert np.array_equal(frame.vf, vf)
@@ -90,17 +90,17 @@ def test_min_distance_finds_what_comes_close(distance):
     faces, x_t0, x_t1 = sheet(8, np.random.default_rng(2))
     frame = MeshCCD(faces).find(x_t0, x_t1, min_distance=distance)
     touching = MeshCCD(faces).find(x_t0, x_t1)
-    vf, ee = all_pairs(faces, x_t0, x_t1, "ab2pf", distance)
+    vf, ee = one_by_one(faces, x_t0, x_t1, "ab2pf", distance)
     assert as_set(touching.vf) < as_set(frame.vf)
     # The query is conservative: what all pairs find and the volumes rule out is further away.
     assert as_set(frame.vf) <= as_set(vf)
     assert as_set(frame.ee) <= as_set(ee)
-    _, vf_rows, _, ee_rows = brute_force.queries(faces)
+    _, vf_rows, _, ee_rows = all_pairs.queries(faces)
     for found, pairs, rows, split in (
-        (frame.vf, brute_force.queries(faces)[0], vf_rows, 1),
-        (frame.ee, brute_force.queries(faces)[2], ee_rows, 2),
+        (frame.vf, all_pairs.queries(faces)[0], vf_rows, 1),
+        (frame.ee, all_pairs.queries(faces)[2], ee_rows, 2),
     ):
-        near = brute_force.gap(x_t0, x_t1, rows, split, 26, True) <= distance
+        near = all_pairs.axis_distance(x_t0, x_t1, rows, split, 26, True) <= distance
         hits = as_set(vf if split == 1 else ee)
         assert as_set(pairs[near]) & hits <= as_set(found)
 
@@ -184,7 +184,7 @@ def test_nothing_to_find():
 @pytest.mark.data
 @pytest.mark.parametrize("name", ["cloth-funnel", "cloth-ball"])
 def test_real_frames_have_exactly_the_listed_collisions(data_dir, name):
-    scene = load_scene(data_dir, name)
+    scene = load_frame(data_dir, name)
     frame = MeshCCD(scene.faces).find(scene.x_t0, scene.x_t1)
     assert np.array_equal(frame.vf, scene.hits[0])
     assert np.array_equal(frame.ee, scene.hits[1])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from studies.cloth.rational import point_edge_time, point_point_time
+from oracles.point_contact import point_edge_time, point_point_time
 from tauguard.cloth import Groups, MeshCCD, edge_edge, point_edge, point_point, vertex_face
 from tauguard.cloth.scenes.recorded import read_mesh
 

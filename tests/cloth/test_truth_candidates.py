@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
+from oracles.recorded_collisions import keys, load_frame
 from tauguard.cloth import MeshCCD
-from tests.cloth.truth import keys, load_scene
 
 
 @pytest.mark.data
 @pytest.mark.parametrize("volume", ["aabb", "k_dop18", "moving_k_dop14", "moving_k_dop26"])
 @pytest.mark.parametrize("name", ["cloth-funnel", "cloth-ball"])
 def test_no_collision_is_lost(data_dir, name, volume):
-    scene = load_scene(data_dir, name)
+    scene = load_frame(data_dir, name)
     ccd = MeshCCD(scene.faces, volume=volume)
     assert np.array_equal(ccd.edges, scene.edges)
     for found, hits in zip(ccd.candidates(scene.x_t0, scene.x_t1), scene.hits, strict=True):

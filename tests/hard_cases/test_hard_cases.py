@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from oracles.convex_overlap import cross, dot
-from studies.cloth.integers import first_contact
+from oracles.mesh_contact import first_contact
 from tauguard.cli import main
 from tauguard.hard_cases import adapters, load_cases, run
 from tauguard.hard_cases.case import Case

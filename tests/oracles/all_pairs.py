@@ -1,8 +1,16 @@
-"""The broad phase by its definition: all pairs of features, nothing shared with the package."""
+"""Which pairs of features may touch? Every pair, tried one by one; the broad phase's definition."""
+
+from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-AXES = {
+Index = NDArray[np.int64]
+
+#: Axes of the k-DOPs by k.
+AXES: dict[int, list[tuple[int, int, int]]] = {
     6: [(1, 0, 0), (0, 1, 0), (0, 0, 1)],
     14: [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1)],
 }
@@ -11,14 +19,14 @@ AXES[18] = [*AXES[16], (0, 1, -1)]
 AXES[26] = [*AXES[18], *AXES[14][3:]]
 
 
-def edges_of(faces):
-    """The unique pairs of vertices of the faces, sorted."""
+def edges_of(faces: ArrayLike) -> Index:
+    """Unique pairs of vertices (E, 2) of the faces (F, 3), sorted."""
     faces = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
     pairs = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     return np.unique(pairs, axis=0)
 
 
-def queries(faces):
+def queries(faces: ArrayLike) -> tuple[Index, Index, Index, Index]:
     """All (vertex, face) and (edge, edge) that share no vertex, and their four vertices a row."""
     faces = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
     edges = edges_of(faces)
@@ -35,8 +43,10 @@ def queries(faces):
     return vf, vf_rows, ee, ee_rows
 
 
-def gap(x_t0, x_t1, rows, split, k, moving):
-    """How far apart the two volumes of each row are along their best axis (< 0: they overlap)."""
+def axis_distance(
+    x_t0: NDArray[Any], x_t1: NDArray[Any], rows: Index, split: int, k: int, moving: bool
+) -> NDArray[np.float64]:
+    """Distance of the two k-DOPs of each row along their best axis; below 0 where they overlap."""
     best = np.full(len(rows), -np.inf)
     for axis in np.asarray(AXES[k], dtype=float):
         p = np.stack([(x_t0 @ axis)[rows], (x_t1 @ axis)[rows]], axis=1) / np.linalg.norm(axis)

@@ -1,4 +1,4 @@
-"""Point-edge and point-point contact of doubles in rational arithmetic, from the definition."""
+"""When do a moving point and edge, or two points, first touch? Decided in rational arithmetic."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""Contact in exact integer arithmetic: slow, plain, and by another road than the package's own.
+"""When do a moving vertex and face, or two edges, first touch? Decided in exact integers.
 
-Positions become integers by a power of two. The roots of the coplanarity cubic are isolated by
-Descartes' rule in Bernstein form and halving (Vincent; Collins & Akritas 1976); signs at a root are
-found by halving on, and by a greatest common divisor where they are zero. Where all four points
-share a plane throughout, contact begins where a corner passes a line through two others.
+Slow, and written without the package's code. Positions become integers by a power of two. The
+roots of the coplanarity cubic are isolated by Descartes' rule in Bernstein form and halving
+(Vincent; Collins & Akritas 1976). Signs at a root are found by further halving, and by a greatest
+common divisor where they are zero. Where all four points share a plane throughout, contact begins
+where a corner passes a line through two others.
 
 Polynomials are lists of integers, ascending, without leading zeros.
 """
@@ -15,34 +16,37 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cache
 from math import comb, gcd, lcm
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 Polynomial = list[int]
 Vector = list[Polynomial]
 
-#: Halvings of [0, 1] that end the search, unless told otherwise.
+#: Default number of halvings of [0, 1] after which the search ends.
 HALVINGS = 64
 
 
 def first_contact(
     x_t0: Any, x_t1: Any, vertex: bool, halvings: int = HALVINGS
 ) -> tuple[Fraction, Fraction] | None:
-    """The first time of contact between two bounds, equal where it is found exactly.
+    """Lower and upper bound on the first time of contact; equal where the time is found exactly.
 
     Args:
         x_t0: Positions (4, 3) at the start of the step; rows as in ``tauguard.cloth``. Finite.
         x_t1: The same at its end.
         vertex: Vertex against face, else edge against edge.
-        halvings: The bounds lie 2^-halvings apart, at most.
+        halvings: The bounds are at most 2^-halvings apart.
 
     Returns:
         ``None`` where the features stay apart.
     """
     x = _moving(x_t0, x_t1)
     p, q, r = (
-        (_gap(x, 0, 1), _gap(x, 2, 1), _gap(x, 3, 1))
+        (_difference(x, 0, 1), _difference(x, 2, 1), _difference(x, 3, 1))
         if vertex
-        else (_gap(x, 2, 0), _gap(x, 1, 0), _gap(x, 3, 2))
+        else (_difference(x, 2, 0), _difference(x, 1, 0), _difference(x, 3, 2))
     )
     volume = _dot(p, _cross(q, r))
     times = list(_roots(volume)) if volume else list(_events(x, vertex))
@@ -56,6 +60,55 @@ def first_contact(
     return None if best is None else (best.low, best.high)
 
 
+class Verdict(NamedTuple):
+    """Errors of given times of impact."""
+
+    hit: NDArray[np.bool_]  #: whether each query has a contact, shape (N,)
+    misses: int
+    false_hits: int
+    late: int  #: times after the first contact
+    early_most: float  #: largest error of a time that is not late, as a fraction of the step
+
+
+def judge(x: NDArray[np.float64], vertex: bool, toi: NDArray[np.float64]) -> Verdict:
+    """Compare times of impact with the exact ones.
+
+    Args:
+        x: Positions (N, 2, 4, 3) at both ends of the step.
+        vertex: Vertex against face, else edge against edge.
+        toi: Times (N,) in [0, 1] to judge; inf where no contact was reported.
+    """
+    times = [first_contact(start, end, vertex) for start, end in x]
+    hit = np.array([time is not None for time in times], dtype=bool)
+    reported = np.isfinite(toi)
+    early = [
+        _earliness(x[i], vertex, float(toi[i]), time)
+        for i, time in enumerate(times)
+        if time is not None and reported[i]
+    ]
+    return Verdict(
+        hit,
+        misses=int((hit & ~reported).sum()),
+        false_hits=int((reported & ~hit).sum()),
+        late=sum(error < 0 for error in early),
+        early_most=float(max(early, default=0)),
+    )
+
+
+def _earliness(
+    x: NDArray[np.float64], vertex: bool, toi: float, bounds: tuple[Fraction, Fraction]
+) -> Fraction:
+    """Exact first time minus ``toi``; below 0 where ``toi`` is late."""
+    reported, halvings = Fraction(toi), HALVINGS
+    low, high = bounds
+    while low < reported <= high and low < high:
+        halvings *= 2
+        closer = first_contact(x[0], x[1], vertex, halvings)
+        assert closer is not None
+        low, high = closer
+    return low - reported if reported <= low else high - reported
+
+
 def _moving(x_t0: Any, x_t1: Any) -> list[Vector]:
     cells = [float(c).as_integer_ratio() for x in (x_t0, x_t1) for row in x for c in row]
     scale = max(d for _, d in cells)
@@ -64,20 +117,21 @@ def _moving(x_t0: Any, x_t1: Any) -> list[Vector]:
     return [[_trim([a, b - a]) for a, b in pairs[3 * i : 3 * i + 3]] for i in range(4)]
 
 
-def _gap(x: list[Vector], i: int, j: int) -> Vector:
+def _difference(x: list[Vector], i: int, j: int) -> Vector:
     return [_sub(a, b) for a, b in zip(x[i], x[j], strict=True)]
 
 
 def _events(x: list[Vector], vertex: bool) -> Iterator[Root]:
-    """Times at which contact may begin where all share a plane throughout.
+    """Times at which contact may begin if all four points stay in one plane.
 
-    The differences of the features' points fill the hull of ``corners``; the origin enters it
-    through a side, or, along a line, through a corner.
+    The differences of the two features' points fill the hull of ``corners``. Contact begins when
+    the origin enters this hull through a side or, if the hull is a line, through a corner.
     """
     yield Root(0, 0, None)
     corners = [(0, 1), (0, 2), (0, 3)] if vertex else [(2, 0), (3, 0), (3, 1), (2, 1)]
-    gaps = [_gap(x, i, j) for i, j in corners]
-    for before, here, after in zip(gaps[-1:] + gaps, gaps, gaps[1:] + gaps[:1], strict=False):
+    differences = [_difference(x, i, j) for i, j in corners]
+    last, following = differences[-1:] + differences, differences[1:] + differences[:1]
+    for before, here, after in zip(last, differences, following, strict=False):
         behind, ahead = ([c for c in _cross(here, other) if c] for other in (before, after))
         along = [] if behind or ahead else [c for c in here if c]
         for polynomial in ahead[:1] or along[:1]:
@@ -85,7 +139,10 @@ def _events(x: list[Vector], vertex: bool) -> Iterator[Root]:
 
 
 def _touches(root: Root, p: Vector, q: Vector, r: Vector, vertex: bool) -> bool:
-    """Contact at a time of coplanarity, by barycentric weights, else between collinear points."""
+    """Whether the features touch at a time of coplanarity.
+
+    Barycentric weights decide, or, if the plane is undefined, pairs of collinear points.
+    """
     n = _cross(q, r)
     whole = _dot(n, n)
     if root.sign(whole) != 0:
@@ -108,17 +165,17 @@ def _touches(root: Root, p: Vector, q: Vector, r: Vector, vertex: bool) -> bool:
 
 
 class Root:
-    """A time in [0, 1]: m / 2^k, or the only root in ((m, m + 1) / 2^k) of what ``form`` tells.
+    """A time in [0, 1]: exactly m / 2^k, or the only root of ``polynomial`` in ((m, m + 1) / 2^k).
 
-    ``form`` is the Bernstein form there of ``polynomial``, which has no double roots; both are
-    ``None`` for a time that is known.
+    ``coefficients`` are the Bernstein coefficients of ``polynomial`` on that interval. The
+    polynomial has no double roots. Both are ``None`` for a time that is known exactly.
     """
 
     def __init__(
-        self, k: int, m: int, form: list[int] | None, polynomial: Polynomial | None = None
+        self, k: int, m: int, coefficients: list[int] | None, polynomial: Polynomial | None = None
     ) -> None:
         """Keep the interval and the polynomial."""
-        self.k, self.m, self._form, self._polynomial = k, m, form, polynomial
+        self.k, self.m, self._coefficients, self._polynomial = k, m, coefficients, polynomial
 
     @property
     def low(self) -> Fraction:
@@ -128,46 +185,46 @@ class Root:
     @property
     def high(self) -> Fraction:
         """The upper bound, that itself where the time is known."""
-        return Fraction(self.m + (self._form is not None), 1 << self.k)
+        return Fraction(self.m + (self._coefficients is not None), 1 << self.k)
 
     def refine(self, k: int) -> None:
         """Halve until the bounds are 2^-k apart, or one."""
-        while self._form is not None and self.k < k:
+        while self._coefficients is not None and self.k < k:
             self._halve()
 
     def sign(self, g: Polynomial) -> int:
         """The sign that ``g`` has at this time."""
         if not g:
             return 0
-        tried, form = 0, _bernstein(g, self.k, self.m)
-        while self._form is not None:
-            if min(form) > 0 or max(form) < 0:
-                return _sign(form[0])
+        tried, coefficients = 0, _bernstein(g, self.k, self.m)
+        while self._coefficients is not None:
+            if min(coefficients) > 0 or max(coefficients) < 0:
+                return _sign(coefficients[0])
             if tried == 6 and self._shares(g):
                 return 0
             side = self._halve()
-            form = _halves(form)[max(side, 0)]
+            coefficients = _halves(coefficients)[max(side, 0)]
             tried += 1
-        # At a known time the form's first value is g's there, up to a positive factor.
+        # At an exactly known time the first coefficient is g's value, up to a positive factor.
         return _sign(_bernstein(g, self.k, self.m)[0])
 
     def _halve(self) -> int:
         """Take the half with the root: 0 or 1; the middle itself: -1."""
-        assert self._form is not None
-        halves = _halves(self._form)
+        assert self._coefficients is not None
+        halves = _halves(self._coefficients)
         middle = halves[1][0]
         self.k += 1
         if middle == 0:
-            self.m, self._form = 2 * self.m + 1, None
+            self.m, self._coefficients = 2 * self.m + 1, None
             return -1
-        side = int(_sign(self._form[0]) == _sign(middle))
-        self.m, self._form = 2 * self.m + side, halves[side]
+        side = int(_sign(self._coefficients[0]) == _sign(middle))
+        self.m, self._coefficients = 2 * self.m + side, halves[side]
         return side
 
     def _shares(self, g: Polynomial) -> bool:
         assert self._polynomial is not None
-        form = _bernstein(_common(self._polynomial, g), self.k, self.m)
-        return _sign(form[0]) * _sign(form[-1]) < 0
+        coefficients = _bernstein(_common(self._polynomial, g), self.k, self.m)
+        return _sign(coefficients[0]) * _sign(coefficients[-1]) < 0
 
 
 def _roots(p: Polynomial) -> Iterator[Root]:
@@ -179,13 +236,13 @@ def _roots(p: Polynomial) -> Iterator[Root]:
     yield from (Root(0, end, None) for end in (0, 1) if whole[-end] == 0)
     todo = [(0, 0, whole)]
     while todo:
-        k, m, form = todo.pop()
-        signs = [c > 0 for c in form if c]
+        k, m, coefficients = todo.pop()
+        signs = [c > 0 for c in coefficients if c]
         changes = sum(a != b for a, b in itertools.pairwise(signs))
-        if changes == 1 and form[0] and form[-1]:
-            yield Root(k, m, form, p)
+        if changes == 1 and coefficients[0] and coefficients[-1]:
+            yield Root(k, m, coefficients, p)
         elif changes:
-            left, right = _halves(form)
+            left, right = _halves(coefficients)
             if right[0] == 0:
                 yield Root(k + 1, 2 * m + 1, None)
             todo += [(k + 1, 2 * m, left), (k + 1, 2 * m + 1, right)]
@@ -213,11 +270,11 @@ def _bernstein(p: Polynomial, k: int, m: int) -> list[int]:
     return [sum(w * a for w, a in zip(row, c, strict=False)) for row in _to_bernstein(degree)]
 
 
-def _halves(form: Sequence[int]) -> tuple[list[int], list[int]]:
+def _halves(coefficients: Sequence[int]) -> tuple[list[int], list[int]]:
     """De Casteljau's, both up to one positive factor."""
-    degree = len(form) - 1
+    degree = len(coefficients) - 1
     left, right = [], []
-    row = list(form)
+    row = list(coefficients)
     for i in range(degree + 1):
         left.append(row[0] << degree - i)
         right.append(row[-1] << degree - i)
