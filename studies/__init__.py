@@ -100,20 +100,15 @@ STUDIES: dict[str, Study] = {
         "faults.live",
         "a log played by RTDE in real time and heard: losses, alarms, latency",
     ),
-    "mutants": Study(
-        "trust.mutants",
-        "damaged files of every format: an answer or one line, and no wrong answer",
-    ),
-    "kills": Study(
-        "trust.kills",
-        "runs that are killed, interrupted or out of disk: what is there afterwards",
-    ),
-    "endurance": Study(
-        "trust.endurance",
-        "ten simulated hours and 100,000 resets: memory, drift, latency",
-    ),
     "detection": Study(
         "detection.study",
         "the dissertation's experiment: detectors, speeds, operating points, false alarms",
     ),
+}
+
+#: What was a study and is a slow test now: its name there.
+SLOW_TESTS = {
+    "mutants": "damaged",
+    "kills": "'interrupted or generate'",
+    "endurance": "endurance",
 }

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from studies import STUDIES
+from studies import SLOW_TESTS, STUDIES
 from studies.harness import Incomplete
 from tauguard.report import Row, measured, table, write_json
 from tauguard.report.charts import STYLE
@@ -63,6 +63,10 @@ def run_study(
 
 def _no_study(name: str) -> str:
     """What to type instead."""
+    if name in SLOW_TESTS:
+        return (
+            f"{name} is a slow test now: run `pytest -m slow -k {SLOW_TESTS[name]}` in a checkout"
+        )
     near = difflib.get_close_matches(name, STUDIES, n=1, cutoff=0.75)
     if near:
         return f"no study {name!r}: did you mean {near[0]}? (`tauguard bench list` has all)"

@@ -15,6 +15,20 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 ROOT = Path(__file__).resolve().parents[1]
 
 
+def pytest_addoption(parser):
+    parser.addoption("--slow-seed", type=int, default=0, help="seed of the slow tests")
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Print what the slow tests counted."""
+    reports = [r for kind in ("passed", "failed") for r in terminalreporter.getreports(kind)]
+    for report in reports:
+        for name, found in getattr(report, "user_properties", ()):
+            if name == "counts":
+                figures = ", ".join(f"{key} {value}" for key, value in found.items())
+                terminalreporter.write_line(f"{report.nodeid.split('::')[-1]}: {figures}")
+
+
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """The folder of real data; a test that asks for it carries ``@pytest.mark.data``."""

@@ -11,11 +11,15 @@ import time
 import numpy as np
 import pytest
 
-from studies.trust import kills
-from studies.trust.formats import FORMATS
-from studies.trust.mutants import Reading, Worker
+from oracles import file_contents
+from slow import damaged, endurance, interrupted, readers
+from slow.damaged import Reading, Worker
+from slow.formats import FORMATS
+from slow.originals import WRITERS
+from slow.recordings import command as write_recordings
 from tauguard.cli import main
 from tauguard.datasets import read_log
+from tauguard.live import rtde
 from tauguard.models.arm import load_arm
 from tauguard.models.nominal import compiled
 from tauguard.strangers import read_json, read_text, reading
@@ -23,28 +27,26 @@ from tauguard.traces import read_mcap
 
 
 @pytest.fixture(scope="module")
-def mutants(tmp_path_factory):
+def damaged_files(tmp_path_factory):
     return Reading(tuple(FORMATS), tmp_path_factory.mktemp("originals"))
 
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("kind", FORMATS)
-def test_mutants_end_in_a_right_answer_or_in_one_line(kind, mutants):
-    # `tauguard bench mutants` tries ten thousand, in a process of limited memory.
+def test_mutants_end_in_a_right_answer_or_in_one_line(kind, damaged_files):
+    # `pytest -m slow -k damaged` tries ten thousand, in a process of limited memory.
     for number in range(20):
-        outcome = mutants.tried(kind, (7, number))
+        outcome = damaged_files.tried(kind, (7, number))
         assert outcome.ok, (number, outcome)
 
 
 def test_a_reader_that_dies_or_hangs_is_counted(monkeypatch):
-    import studies.trust.mutants as module
-
     worker = Worker(("columns",))
     assert worker.tried("columns", (0,)).ok
     os.kill(worker._process.pid, signal.SIGKILL)
     assert worker.tried("columns", (1,)).said == "crash"
     assert worker.tried("columns", (1,)).ok  # by another process
-    monkeypatch.setattr(module, "MOST_SECONDS", -4.0)  # a second in all
+    monkeypatch.setattr(damaged, "MOST_SECONDS", -4.0)  # a second in all
     os.kill(worker._process.pid, signal.SIGSTOP)
     assert worker.tried("columns", (2,)).said == "hang"
 
@@ -167,14 +169,14 @@ def test_a_robot_file_on_which_mujoco_would_crash_is_one_line(tmp_path, monkeypa
         compiled(str(robot))
 
 
-@pytest.mark.parametrize(("kind", "workers"), list(kills.TRIALS))
+@pytest.mark.parametrize(("kind", "workers"), list(interrupted.TRIALS))
 def test_what_is_written_is_whole_however_a_run_ends(kind, workers, truth, tmp_path):
-    # `tauguard bench kills` does it 520 times.
-    if kind == "full disk" and not kills.mounting():
+    # `pytest -m slow -k interrupted` does it 520 times.
+    if kind == "full disk" and not interrupted.mounting():
         pytest.skip("no small disk can be mounted here: only root can")
-    count = kills.Count()
+    count = interrupted.Count()
     (tmp_path / "truth").symlink_to(truth)
-    kills.trial(kind, workers, tmp_path, np.random.default_rng(workers), count)
+    interrupted.trial(kind, workers, tmp_path, np.random.default_rng(workers), count)
     bad = {name: n for name, n in count.found.items() if n and name not in ("finished", "late")}
     assert not bad, (kind, count)
     assert count.longest < 20  # a second or two on a machine that is not busy
@@ -183,7 +185,7 @@ def test_what_is_written_is_whole_however_a_run_ends(kind, workers, truth, tmp_p
 @pytest.fixture(scope="module")
 def truth(tmp_path_factory):
     folder = tmp_path_factory.mktemp("truth")
-    assert kills.command(folder, 1) == 0
+    assert write_recordings(folder, 1) == 0
     return folder
 
 
@@ -217,3 +219,28 @@ def test_columns_of_wrong_types_are_one_line(tmp_path):
         path.write_text(json.dumps(fields))
         with pytest.raises(ValueError, match=r"columns\.json: [^\n]*$"):
             read_log(tmp_path / "none.csv", column_map(str(path)))
+
+
+def test_a_stream_with_a_short_data_packet_ends_there_and_other_samples_are_wrong(tmp_path):
+    path = tmp_path / "a.rtde"
+    WRITERS["rtde"](path)
+    data = path.read_bytes()
+    size = 3 + 1 + 8 * 19
+    begin = len(data) - 10 * size  # of the 51st of its 60 packets
+    path.write_bytes(data[:begin] + rtde.packet(rtde.DATA_PACKAGE, b"\x01short") + data[begin:])
+    found = readers.rtde(path)
+    assert len(found) == 50
+    assert file_contents.as_rtde(path, found, None) == ""
+    assert file_contents.as_rtde(path, found[:-1], None) == "other samples"
+    assert (
+        file_contents.as_rtde(path, [*found[:-1], [0.5, *found[-1][1:]]], None) == "other samples"
+    )
+
+
+def test_an_environment_is_watched_for_a_few_resets_and_actions():
+    # `pytest -m slow -k endurance` does it for ten hours and 100,000 resets.
+    env = endurance.environment(endurance.detector(9, 3, 6.0, (40.0,)), 0)
+    for part in (endurance.reset(env, 4), endurance.moved(env, 0.0, 20)):
+        assert part["memory_mib"] > 10
+        assert part["wall_p50_us"] >= 0.5 * part["cpu_p50_us"] > 0
+    assert endurance.moved(env, 0.4, 20)["rms_residual"] > 0

@@ -90,7 +90,7 @@ def test_two_workers_killed_and_one_that_goes_on_give_the_same_bytes(tiny, tiny_
 
 
 def test_a_stopped_run_ends_at_once_with_one_line(tiny_toml, tmp_path):
-    # Ctrl-C, dead workers and full disks in number: `tauguard bench kills`, and its test.
+    # Ctrl-C, dead workers and full disks in number: `pytest -m slow -k interrupted`.
     folder, number = tmp_path / "stopped", signal.SIGTERM
     process = generate(tiny_toml, "--out", folder, "--workers", 2)
     wait_for(lambda: (folder / HEAD).exists())

@@ -1,4 +1,4 @@
-"""A small intact file of every format: what the mutants are made of."""
+"""Writes a small intact file of every format: damaged files are made from them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from studies.small_detector import bare_arm
 from tauguard.arrays import Array
 
 COLUMNS = {"t": 0, "q": [1, 2], "qd": [3, 4], "current": [5, 6], "repair": ["nan"]}
@@ -99,6 +98,7 @@ def _joint_state(time: float, q: Array, qd: Array) -> bytes:
 
 
 def _write_model(path: Path) -> None:
+    from slow.small_detector import bare_arm
     from tauguard.datasets import free_episodes
     from tauguard.detectors import CollisionAlarm, save_model
     from tauguard.detectors.methods.current_threshold import CurrentThreshold

@@ -1,7 +1,4 @@
-"""Cheap tasks that write recordings: what :mod:`studies.trust.kills` interrupts.
-
-Nothing heavy is imported here: workers start in a fraction of a second.
-"""
+"""Tasks that write recordings, to be interrupted. Light imports: workers start at once."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""Whether an answer is right: by the file's checksum, or by an own reading of the damaged bytes.
+"""The truth of what a reader returns: the intact file's content, or a second parser of the bytes.
 
-A judge takes the file, its answer and the intact file's; it returns what is wrong, "" if nothing.
+A judge takes the path, the answer, and the answer of the intact file; it returns what is wrong, or
+"" where the answer is right.
 """
 
 from __future__ import annotations
@@ -42,44 +43,44 @@ def _cells(path: Path) -> Array:
 
 def as_text(path: Path, found: Any, intact: Any) -> str:
     """The numbers of the text, read line by line."""
-    told = np.column_stack([np.asarray(part) for part in found])
-    return "" if np.array_equal(told, _cells(path)) else "other numbers than the text's"
+    wanted = np.column_stack([np.asarray(part) for part in found])
+    return "" if np.array_equal(wanted, _cells(path)) else "other numbers than the text's"
 
 
 def as_lines(path: Path, found: Any, intact: Any) -> str:
     """The numbers of the lines that end, read one by one."""
     text = path.read_bytes()
     lines = text.split(b"\n")[:-1]
-    told = [[float(cell) for cell in line.split(b",")] for line in lines]
-    return "" if repr(told) == repr([list(map(float, row)) for row in found]) else "other numbers"
+    wanted = [[float(cell) for cell in line.split(b",")] for line in lines]
+    return "" if repr(wanted) == repr([list(map(float, row)) for row in found]) else "other numbers"
 
 
 def as_json(path: Path, found: Any, intact: Any) -> str:
     """The values of the JSON."""
-    told = json.loads(path.read_text("utf-8-sig"))
+    wanted = json.loads(path.read_text("utf-8-sig"))
     same = all(
         (sorted(value) if name == "repair" else list(value) if isinstance(value, tuple) else value)
-        == (sorted(told[name]) if name == "repair" else told[name])
+        == (sorted(wanted[name]) if name == "repair" else wanted[name])
         for name, value in vars(found).items()
-        if name in told
+        if name in wanted
     )
-    right = isinstance(found.degrees, bool) and set(told) <= set(vars(found))
+    right = isinstance(found.degrees, bool) and set(wanted) <= set(vars(found))
     return "" if same and right else "other fields than the text's"
 
 
 def as_toml(path: Path, found: Any, intact: Any) -> str:
     """The values of the TOML."""
-    told = tomllib.loads(path.read_text())
-    names = [name for name in ("name", "seed", "rate", "episodes_per_shard") if name in told]
-    splits = [(s["name"], s["episodes"]) for s in told["splits"]]
-    same = all(getattr(found, name) == told[name] for name in names)
+    wanted = tomllib.loads(path.read_text())
+    names = [name for name in ("name", "seed", "rate", "episodes_per_shard") if name in wanted]
+    splits = [(s["name"], s["episodes"]) for s in wanted["splits"]]
+    same = all(getattr(found, name) == wanted[name] for name in names)
     return "" if same and splits == [(s.name, s.episodes) for s in found.splits] else "other values"
 
 
 def as_arm(path: Path, found: Any, intact: Any) -> str:
     """The arrays of the TOML."""
-    told = tomllib.loads(path.read_text())
-    for name, value in told.items():
+    wanted = tomllib.loads(path.read_text())
+    for name, value in wanted.items():
         own = getattr(found, name, None)
         if isinstance(value, list) and not np.array_equal(np.asarray(own), np.asarray(value)):
             return f"another {name} than the text's"
@@ -141,7 +142,7 @@ def as_ply(path: Path, found: Any, intact: Any) -> str:
 
 def as_rtde(path: Path, found: Any, intact: Any) -> str:
     """The samples of the data packets after the handshake, up to what is no packet."""
-    data, at, asked, told = path.read_bytes(), 0, list(b"VvOS"), []
+    data, at, asked, wanted = path.read_bytes(), 0, list(b"VvOS"), []
     while at + 3 <= len(data):
         size, kind = int.from_bytes(data[at : at + 2], "big"), data[at + 2]
         body = data[at + 3 : at + size]
@@ -153,8 +154,8 @@ def as_rtde(path: Path, found: Any, intact: Any) -> str:
         elif kind == ord("U"):
             if len(body) != 1 + 8 * 19 or body[0] != recipe(data):
                 break
-            told.append(np.frombuffer(body, ">f8", offset=1).tolist())
-    return "" if repr(told) == repr([list(map(float, row)) for row in found]) else "other samples"
+            wanted.append(np.frombuffer(body, ">f8", offset=1).tolist())
+    return "" if repr(wanted) == repr([list(map(float, row)) for row in found]) else "other samples"
 
 
 def recipe(data: bytes) -> int:

@@ -1,7 +1,7 @@
-"""Runs that are killed, interrupted, left by a worker or out of disk: what is there afterwards.
+"""Runs that end early: killed, interrupted, without a worker, or on a full disk.
 
-Every trial runs a command that writes recordings, ends it at a random moment, looks at the folder,
-and runs it again to the end.
+Every trial starts a command that writes recordings, ends it at a random moment, checks the folder,
+and runs the command again to the end.
 """
 
 from __future__ import annotations
@@ -17,60 +17,45 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
-from studies.trust.generated import kill_rows
-from studies.trust.lost_nodes import node_rows
-from studies.trust.tasks import FILES, command
-from tauguard.report import Row
+from slow.recordings import FILES, command
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: Within this time a command has ended [s], and after this one it hangs.
+#: A command that ends later than the first time is late, later than the second it hangs [s].
 AT_ONCE, HANGS = 5.0, 30.0
-#: Trials of each kind with each number of workers, in a full and in a quick run.
+#: Ways to end a run, each with a number of workers, and the trials of a full run.
 TRIALS = {
-    ("kill -9", 1): (100, 1),
-    ("kill -9", 2): (100, 1),
-    ("full disk", 1): (100, 1),
-    ("full disk", 2): (100, 1),
-    ("Ctrl-C", 1): (50, 1),
-    ("Ctrl-C", 2): (50, 1),
-    ("dead worker", 2): (20, 1),
-}
-
-NOTES = {
-    "kills": "trials: a run of eight recordings, ended at a random moment, then run again to the "
-    "end. half-written: files that are there and not whole. lost, doubled: after the second run. "
-    "parts: hidden files after what is not kill -9. hangs: not ended after 30 s, or a worker left. "
-    "late: ended after more than 5 s. wrong lines: more or less than one line, or a traceback. "
-    "finished: had ended before. ended: largest seconds from the event to the end.",
-    "generate": "tauguard generate killed (SIGKILL, the whole process group) at moments drawn at "
-    "random, then gone on with by one process; bytes beside those of a run that nobody killed.",
-    "cluster": "tauguard generate --ray on a new Ray cluster of two nodes on this machine; the "
-    "second is lost at a random moment after the first shard; bytes beside those of one process.",
+    ("kill -9", 1): 100,
+    ("kill -9", 2): 100,
+    ("full disk", 1): 100,
+    ("full disk", 2): 100,
+    ("Ctrl-C", 1): 50,
+    ("Ctrl-C", 2): 50,
+    ("dead worker", 2): 20,
 }
 
 
 @dataclass
 class Count:
-    """What was found in the trials of one kind."""
+    """Counts of the trials of one kind.
+
+    ``found`` counts files half-written after the first run; lost and doubled ones after the second;
+    hidden files left behind (parts); commands that hang or are late; error outputs that are not one
+    line; runs that had finished before they were ended.
+    """
 
     trials: int = 0
     found: dict[str, int] = field(default_factory=dict)
     longest: float = 0.0
 
     def add(self, name: str, number: int = 1) -> None:
-        """Count."""
+        """Add to a count."""
         self.found[name] = self.found.get(name, 0) + number
 
 
 class Run:
-    """The command as a process group of its own."""
+    """The command in a process group of its own."""
 
     def __init__(self, folder: Path, workers: int) -> None:
         """Start it."""
@@ -139,7 +124,7 @@ class Run:
             return []
 
     def close(self) -> None:
-        """End what is left of it."""
+        """End every process that is left."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)
         self.wait(self.gone)
@@ -147,7 +132,7 @@ class Run:
 
 
 def whole(folder: Path, truth: Path) -> tuple[int, int, int]:
-    """Files that are not whole, parts of files, and files that should not be there."""
+    """Numbers of damaged files, of hidden ones, and of files with unexpected names."""
     bad = parts = strange = 0
     for path in folder.iterdir():
         if path.name.startswith("."):
@@ -160,7 +145,7 @@ def whole(folder: Path, truth: Path) -> tuple[int, int, int]:
 
 
 def trial(kind: str, workers: int, base: Path, rng: np.random.Generator, count: Count) -> None:
-    """One run that is ended, and a second one."""
+    """End a run of this kind, then run the command again, and count what is wrong."""
     truth, folder = base / "truth", base / "disk"
     disk = contextlib.nullcontext(folder) if kind != "full disk" else small_disk(folder, truth, rng)
     folder.mkdir()
@@ -191,7 +176,7 @@ def trial(kind: str, workers: int, base: Path, rng: np.random.Generator, count: 
 def ended_by(
     kind: str, workers: int, run: Run, folder: Path, rng: np.random.Generator
 ) -> float | None:
-    """End the run at a random moment; seconds until nothing of it is left."""
+    """End the run at a random moment; seconds until all its processes have ended."""
     if kind == "full disk":  # it ends by itself, once nothing fits any more
         last = [time.monotonic(), 0.0]
 
@@ -223,7 +208,7 @@ def ended_by(
 
 
 def judged(kind: str, run: Run, folder: Path, truth: Path, count: Count) -> None:
-    """What the first run has left."""
+    """Check what the first run left."""
     bad, parts, strange = whole(folder, truth)
     count.add("half-written", bad + strange)
     if run.code == 0:
@@ -264,46 +249,3 @@ def small_disk(folder: Path, truth: Path, rng: np.random.Generator) -> Iterator[
 def enlarge(folder: Path) -> None:
     """Make room on a small disk."""
     subprocess.run(["mount", "-o", "remount,size=1g", str(folder)], check=True)
-
-
-def run(quick: bool, seed: int) -> list[Row]:
-    """A row a kind of end and number of workers."""
-    rows = []
-    disks = mounting()
-    with tempfile.TemporaryDirectory() as name:
-        base = Path(name)
-        (base / "truth").mkdir()
-        if command(base / "truth", 1) != 0:
-            raise OSError(f"{base}: the recordings cannot be written there")
-        for number, ((kind, workers), counts) in enumerate(TRIALS.items()):
-            count, rng = Count(), np.random.default_rng((seed, number))
-            name = f"{kind}, {workers} workers"
-            for _ in tqdm(range(counts[quick]), desc=name, disable=None, leave=False):
-                if kind != "full disk" or disks:
-                    trial(kind, workers, base, rng, count)
-            rows.append(row(kind, workers, count))
-    return rows + kill_rows(quick, seed) + node_rows(quick, seed)
-
-
-def row(kind: str, workers: int, count: Count) -> Row:
-    """The figures of one kind."""
-    names = ("half-written", "lost", "doubled", "parts", "hangs", "late", "wrong lines", "finished")
-    return {
-        "study": "kills",
-        "end": kind if count.trials else f"{kind}: not tried, no disk can be mounted here",
-        "workers": workers,
-        "trials": count.trials,
-        **{name: count.found.get(name, 0) for name in names},
-        "ended [s]": count.longest,
-    }
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """The longest time until the end, a bar a kind."""
-    axes = figure.subplots()
-    rows = [row for row in rows if row["study"] == "kills"]
-    names = [f"{row['end']}, workers: {row['workers']} (n = {row['trials']})" for row in rows]
-    axes.barh(names, [float(row["ended [s]"]) for row in rows])
-    axes.axvline(AT_ONCE, color="black", linewidth=0.8, label=f"asked: {AT_ONCE:g} s")
-    axes.legend(frameon=False, loc="lower right")
-    axes.set_xlabel("longest time from the event to the end of all processes [s]")

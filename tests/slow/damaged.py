@@ -1,7 +1,6 @@
-"""Damaged files of every format that tauguard reads: each ends in an answer or in one line.
+"""Damages files and reads them, in this process or in one of limited memory.
 
-A worker process of limited memory reads them, so that one that crashes it or never ends is counted
-and not the end of the study.
+A file that crashes its reader, or that never ends, is counted and ends only that process.
 """
 
 from __future__ import annotations
@@ -10,39 +9,25 @@ import multiprocessing
 import os
 import tempfile
 import time
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from studies.trust.formats import FORMATS, originals, place
-from tauguard.report import Row
+from slow.formats import FORMATS, originals, place
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: No small file may take longer to read [s], nor more memory beyond that of an idle reader [bytes].
+#: A small file may take this time to read [s], and this memory beyond an idle reader's [bytes].
 MOST_SECONDS, MOST_MEMORY = 10.0, 1 << 30
-#: Time in which a worker starts and reads the intact files [s].
+#: Time limit for a worker to start and read the intact files [s].
 STARTING = 300.0
-#: Files of a full and of a quick run.
-COUNT, QUICK = 10_000, 300
-
-NOTES = {
-    "mutants": "files: half with one bit, byte, digit or line changed, half with one to three "
-    "larger damages. read, refused: an answer, or one line. wrong: an answer that the judge calls "
-    "wrong. traceback: anything but one line. crash: the process ended. hang: over 10 s. Memory is "
-    "limited to 1 GiB beyond an idle reader's.",
-}
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one damaged file."""
+    """The outcome of one damaged file."""
 
     said: str  #: "read", "refused", "wrong", "traceback", "crash" or "hang"
     message: str
@@ -54,15 +39,15 @@ class Outcome:
         return self.said in ("read", "refused")
 
 
-#: What damage writes into a file.
+#: Bytes that are written into a file to damage it.
 BLOCKS = (
     *(b"9" * 400, b"[" * 5000, b"{" * 5000, b"<a>" * 5000, b'"', b"nan", b"-1e999", b"\x00"),
     *(b"\xff\xff\xff\xff\xff\xff\xff\x7f", b"null", b"../", b"1e160", b"-", b"1e100", b"true"),
 )
 
 
-def mutant(data: bytes, rng: np.random.Generator) -> bytes:
-    """The bytes with one small damage, or with one to three large ones."""
+def damage(data: bytes, rng: np.random.Generator) -> bytes:
+    """The bytes with one small change, or with one to three large ones."""
     if rng.random() < 0.5:
         return _slightly(data, rng)
     for _ in range(int(rng.integers(1, 4))):
@@ -80,7 +65,7 @@ def mutant(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def _slightly(data: bytes, rng: np.random.Generator) -> bytes:
-    """One bit, one byte, one digit or one line is another, gone or there twice."""
+    """Flip a bit, drop a byte, change a digit, or drop or repeat a line."""
     at, kind = int(rng.integers(len(data))), int(rng.integers(5))
     if kind == 0:
         return data[:at] + bytes([data[at] ^ 1 << int(rng.integers(8))]) + data[at + 1 :]
@@ -97,7 +82,7 @@ def _slightly(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 class Reading:
-    """Reads mutants of the formats in this process."""
+    """Reads damaged files of the formats in this process."""
 
     def __init__(self, kinds: Sequence[str], folder: Path) -> None:
         """Write the intact files and read them."""
@@ -108,11 +93,11 @@ class Reading:
             self._intact[kind] = FORMATS[kind].read(path)
             wrong = FORMATS[kind].judge(path, self._intact[kind], self._intact[kind])
             if wrong:
-                raise RuntimeError(f"the judge of {kind} errs on the intact file: {wrong}")
+                raise RuntimeError(f"the judge of {kind} rejects the intact file: {wrong}")
 
     def tried(self, kind: str, seed: Sequence[int]) -> Outcome:
-        """What becomes of the mutant of this seed."""
-        data = mutant(self._data[kind], np.random.default_rng(seed))
+        """Damage the intact file by this seed, read it and judge the answer."""
+        data = damage(self._data[kind], np.random.default_rng(seed))
         path = place(kind, self._files[kind].parent, data)
         said, message = "read", ""
         start = time.monotonic()
@@ -140,7 +125,7 @@ class Reading:
 
 
 def _work(pipe: Connection, kinds: Sequence[str], folder: str) -> None:
-    """Answer seeds with outcomes until the pipe ends."""
+    """Receive seeds and send outcomes until the pipe closes."""
     import resource
     import warnings
 
@@ -161,15 +146,15 @@ def _work(pipe: Connection, kinds: Sequence[str], folder: str) -> None:
 
 
 class Worker:
-    """A process that reads mutants; another takes its place when it dies or hangs."""
+    """A process that reads damaged files; it is replaced when it dies or hangs."""
 
     def __init__(self, kinds: Sequence[str]) -> None:
-        """Nothing runs yet."""
+        """No process runs yet: the first file starts one."""
         self._kinds = tuple(kinds)
         self._process: Any = None
 
     def tried(self, kind: str, seed: Sequence[int]) -> Outcome:
-        """What becomes of the mutant of this seed."""
+        """Damage the intact file by this seed, read it and judge the answer."""
         if self._process is None:
             self._start()
         begin = time.monotonic()
@@ -205,52 +190,3 @@ class Worker:
             self._pipe.close()
             self._folder.cleanup()
             self._process = None
-
-
-def outcomes(kinds: Sequence[str], count: int, seed: int) -> Iterator[tuple[str, Outcome]]:
-    """Kind and outcome of ``count`` mutants, the kinds in turn."""
-    worker = Worker(kinds)
-    try:
-        for number in range(count):
-            kind = kinds[number % len(kinds)]
-            yield kind, worker.tried(kind, (seed, number))
-    finally:
-        worker.close()
-
-
-def run(quick: bool, seed: int) -> list[Row]:
-    """A row a format, and one of all together."""
-    kinds = tuple(FORMATS)
-    found: dict[str, list[Outcome]] = {kind: [] for kind in kinds}
-    for kind, outcome in outcomes(kinds, QUICK if quick else COUNT, seed):
-        found[kind].append(outcome)
-        if not outcome.ok:
-            print(f"{kind} {len(found[kind])}: {outcome.said}: {outcome.message}", flush=True)
-    rows = [_row(kind, FORMATS[kind].judged_by, found[kind]) for kind in kinds]
-    return [*rows, _row("all", "", [one for many in found.values() for one in many])]
-
-
-def _row(kind: str, judged_by: str, found: Sequence[Outcome]) -> Row:
-    counts = Counter(outcome.said for outcome in found)
-    return {
-        "study": "mutants",
-        "format": kind,
-        "files": len(found),
-        **{said: counts[said] for said in ("read", "refused", "wrong", "traceback")},
-        **{said: counts[said] for said in ("crash", "hang")},
-        "slowest [s]": max(outcome.seconds for outcome in found),
-        "judged by": judged_by,
-    }
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """What became of the files, a bar a format."""
-    axes = figure.subplots()
-    shown = [row for row in rows if row["format"] != "all"]
-    left = np.zeros(len(shown))
-    for said in ("refused", "read", "wrong", "traceback", "crash", "hang"):
-        counts = np.array([row[said] / row["files"] for row in shown], dtype=float)
-        axes.barh([str(row["format"]) for row in shown], counts, left=left, label=said)
-        left += counts
-    axes.set_xlabel("share of the damaged files")
-    axes.legend(ncols=6, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)

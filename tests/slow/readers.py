@@ -1,4 +1,4 @@
-"""How a file of each format is read: through what a user calls, one function a format."""
+"""Reads a file of each format through the function that a user calls."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from studies.trust.originals import JOINTS
+from slow.originals import JOINTS
 from tauguard.arrays import Array
 
 
@@ -18,7 +18,7 @@ def signals(trace: Any) -> list[Array]:
 
 
 def csv(path: Path) -> Any:
-    """Measured signals of a table whose columns are told."""
+    """Measured signals of a table whose columns are given."""
     from tauguard.datasets import ColumnMap, read_log
 
     columns = ColumnMap(t=0, q=(1, 2), qd=(3, 4), current=(5, 6))
@@ -26,7 +26,7 @@ def csv(path: Path) -> Any:
 
 
 def log(path: Path) -> Any:
-    """Measured signals of a log whose form is found out."""
+    """Measured signals of a log whose format is detected."""
     from tauguard.datasets import read_log
 
     return signals(read_log(path).trace)
@@ -98,7 +98,7 @@ def lines(path: Path) -> Any:
 
 
 def rtde(path: Path) -> Any:
-    """The bytes as a robot sends them, whatever it is asked."""
+    """Samples from a server that sends these bytes, whatever it is asked."""
     from tauguard.live import UrStream
     from tauguard.live.stream import StreamClosed
 
@@ -119,7 +119,7 @@ def rtde(path: Path) -> Any:
 
 
 def _send(listener: socket.socket, data: bytes) -> None:
-    """Send everything to the first client, and hear it out."""
+    """Send everything to the first client, then read until it closes."""
     client, _ = listener.accept()
     with client, contextlib.suppress(OSError):
         client.settimeout(20.0)
@@ -130,7 +130,7 @@ def _send(listener: socket.socket, data: bytes) -> None:
 
 
 def dataset(path: Path) -> Any:
-    """The dataset whose shard, manifest or head ``path`` was put in place of."""
+    """The dataset in which the damaged file replaces a shard, a manifest or the head."""
     from tauguard.datasets.reader import read
 
     folder = path.parent / "dataset"

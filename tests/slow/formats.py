@@ -1,4 +1,4 @@
-"""Every format that tauguard reads: its intact file, its reader, and who judges an answer."""
+"""Every file format that tauguard reads: its intact file, its reader, and the judge of answers."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from studies.trust import judges, readers
-from studies.trust.originals import PLACES, WRITERS
+from oracles import file_contents as judges
+from slow import readers
+from slow.originals import PLACES, WRITERS
 
 
 @dataclass(frozen=True)
@@ -22,8 +23,8 @@ class Format:
 
 
 FORMATS: dict[str, Format] = {
-    "csv": Format("csv", readers.csv, judges.as_text, "an own reading of the text"),
-    "lines": Format("txt", readers.lines, judges.as_lines, "an own reading of the text"),
+    "csv": Format("csv", readers.csv, judges.as_text, "a second parser of the text"),
+    "lines": Format("txt", readers.lines, judges.as_lines, "a second parser of the text"),
     "recording": Format("mcap", readers.recording, judges.unchanged, "the intact file"),
     "joint states": Format("mcap", readers.log, judges.unchanged, "the intact file"),
     "columns": Format("json", readers.columns, judges.as_json, "the JSON values"),
@@ -36,9 +37,9 @@ FORMATS: dict[str, Format] = {
     "manifest": Format("jsonl", readers.dataset, judges.unchanged, "the intact dataset"),
     "head": Format("json", readers.dataset, judges.unchanged, "the intact dataset"),
     "dataset's arm": Format("xml", readers.dataset, judges.unchanged, "the intact dataset"),
-    "rtde": Format("rtde", readers.rtde, judges.as_rtde, "an own reading of the bytes"),
-    "obj": Format("obj", readers.mesh, judges.as_obj, "an own reading of the text"),
-    "ply": Format("ply", readers.mesh, judges.as_ply, "an own reading of the text"),
+    "rtde": Format("rtde", readers.rtde, judges.as_rtde, "a second parser of the bytes"),
+    "obj": Format("obj", readers.mesh, judges.as_obj, "a second parser of the text"),
+    "ply": Format("ply", readers.mesh, judges.as_ply, "a second parser of the text"),
 }
 
 

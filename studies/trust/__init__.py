@@ -1,1 +1,0 @@
-"""What keeps working when files, disks, processes and hours are bad."""
