@@ -31,10 +31,10 @@ def command(
             does not hold them of this build.
     """
     from studies import STUDIES
+    from studies import mistakes as recorded
     from studies.bound import bind
     from studies.collect import collect
     from studies.gaps import Gaps
-    from tauguard.cli import mistakes as recorded
     from tauguard.hard_cases import adapters, load_cases, run
     from tauguard.report import write_json
 

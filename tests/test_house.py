@@ -33,7 +33,7 @@ ALLOWED = {
     "contacts": {"cloth", "rigid", "models", "traces"},
     "envs": {"models", "contacts", "detectors", "traces"},
     "datasets": {"envs", "contacts", "traces", "models", "detectors"},
-    "replay": {"traces", "models"},
+    "replay": {"traces", "models", "detectors", "report"},
     "live": {"detectors", "traces"},
     "report": set(),
     "hard_cases": PRODUCT,

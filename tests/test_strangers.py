@@ -211,7 +211,7 @@ def test_simulate_with_workers_ends_at_once_and_a_rerun_gives_the_same_bytes(tmp
 
 
 def test_columns_of_wrong_types_are_one_line(tmp_path):
-    from tauguard.cli.real_logs import column_map
+    from tauguard.datasets.columns import column_map
 
     path = tmp_path / "columns.json"
     wrong = {"t": 1, "q": 3, "qd": None, "current": {}}

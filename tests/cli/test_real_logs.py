@@ -6,8 +6,9 @@ import json
 import numpy as np
 import pytest
 
-from tauguard.cli import main, real_logs
+from tauguard.cli import main
 from tauguard.cli.train import never_moved
+from tauguard.datasets import arm_logs, columns, real_arms
 from tauguard.datasets.drives import DRIVES, preset_drive
 from tauguard.detectors.calibration.arm_file import load_arm
 from tauguard.detectors.calibration.recording import Load
@@ -166,7 +167,7 @@ def test_logs_of_a_standing_arm_are_left_out_of_calibration(folder, tmp_path, ca
 
 def test_payloads_by_file_name_or_stem():
     traces = {"a.csv": record(0, 12.0), "b.x.csv": record(1, 12.0), "b.x.mcap": record(2, 12.0)}
-    found = real_logs.loaded(traces, ("a=2.6", "b.x.mcap=unknown"))
+    found = arm_logs.with_loads(traces, ("a=2.6", "b.x.mcap=unknown"))
     assert [r.load for r in found] == [Load(2.6), Load(), None]
     for text, said in (
         ("b.x=1", "two are called 'b.x'"),
@@ -174,12 +175,12 @@ def test_payloads_by_file_name_or_stem():
         ("a=1,2", "LOG=KG"),
     ):
         with pytest.raises(ValueError, match=said):
-            real_logs.loaded(traces, (text,))
+            arm_logs.with_loads(traces, (text,))
 
 
 def test_a_load_in_grams_is_refused():
     with pytest.raises(ValueError, match="at most 100; loads are given in kg"):
-        real_logs.loaded({"a.csv": record(0, 12.0)}, ("a=2600",))
+        arm_logs.with_loads({"a.csv": record(0, 12.0)}, ("a=2600",))
 
 
 def test_an_untold_load_names_its_log(folder, capsys):
@@ -192,7 +193,7 @@ def test_an_untold_load_names_its_log(folder, capsys):
         main(arguments)
     except SystemExit:
         line = capsys.readouterr().err
-    assert "did laden.csv carry something (tell it with --payload laden.csv=KG or =unknown)" in (
+    assert "did laden.csv carry something (then give --payload laden.csv=KG or =unknown)" in (
         line or capsys.readouterr().out
     )
     main([*arguments, "--payload", "laden=unknown"])
@@ -221,9 +222,9 @@ def test_maps_that_are_no_maps(tmp_path, fields, message):
     path = tmp_path / "map.json"
     path.write_text(json.dumps(fields))
     with pytest.raises(ValueError, match=message):
-        real_logs.column_map(str(path))
+        columns.column_map(str(path))
     with pytest.raises(ValueError, match="no such file; presets are ur10e"):
-        real_logs.column_map(str(tmp_path / "nosuch.json"))
+        columns.column_map(str(tmp_path / "nosuch.json"))
 
 
 def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
@@ -239,12 +240,12 @@ def test_a_log_s_own_preset_is_taken_and_different_ones_are_refused():
 
 
 def test_where_the_scale_comes_from_is_said(folder):
-    numbers = real_logs.robot_numbers(folder / "arm.xml")
-    recordings = real_logs.loaded({"a": record(0, 12.0)}, ())
-    assert real_logs.start(numbers, recordings, None, tuple(GAIN), "auto")[1] == "gains"
-    assert real_logs.start(numbers, recordings, None, (), "auto")[1] == "masses"
+    numbers, _ = real_arms.robot_numbers(folder / "arm.xml")
+    recordings = arm_logs.with_loads({"a": record(0, 12.0)}, ())
+    assert real_arms.initial_arm(numbers, recordings, None, tuple(GAIN), "auto")[1] == "gains"
+    assert real_arms.initial_arm(numbers, recordings, None, (), "auto")[1] == "masses"
     with pytest.raises(ValueError, match="6 numbers for 3 joints"):
-        real_logs.start(numbers, recordings, "ur10e", (), "auto")
+        real_arms.initial_arm(numbers, recordings, "ur10e", (), "auto")
     assert load_arm(folder / "arm.xml") is None
 
 

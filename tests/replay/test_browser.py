@@ -16,10 +16,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from tauguard.cli.events import EventFolder, events_of
 from tauguard.detectors import match_detection
 from tauguard.replay import write_rrd
 from tauguard.replay.browser import BrowserReplay
+from tauguard.replay.events import EventFolder, events_of
 from tauguard.traces import Alarm
 
 

@@ -7,9 +7,9 @@ from html import escape
 
 import pytest
 
-from studies import bound, collect, glance, panels
+from studies import bound, collect, glance, mistakes, panels
 from studies.gaps import Gaps
-from tauguard.cli import main, mistakes
+from tauguard.cli import main
 from tauguard.report import rate, versions
 
 

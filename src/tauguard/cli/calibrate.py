@@ -55,8 +55,9 @@ def command(
             may; a column map says so by its field "torque".
         json: write the figures here as JSON.
     """
-    from tauguard.cli.real_logs import doubts, loaded, moving, read_logs, start
-    from tauguard.cli.robot_files import check_named
+    from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.arm_logs import moving, read_logs, with_loads
+    from tauguard.datasets.real_arms import calibration_notes, check_named, initial_arm
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import check_loads, left_out
     from tauguard.detectors.calibration.belongs import check_signs, check_weight, torque_per_ampere
@@ -65,19 +66,21 @@ def command(
 
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
-    traces, numbers = read_logs(logs, columns, robot, torque)
-    known = dict(zip(traces, loaded(traces, payload), strict=True))
-    traces = moving(traces)
+    read = read_logs(logs, columns, robot, torque)
+    print_notes(read.notes)
+    known = dict(zip(read.traces, with_loads(read.traces, payload), strict=True))
+    traces, notes = moving(read.traces)
+    print_notes(notes)
     recordings = [known[name] for name in traces]
     if not gains:
         check_named(robot, columns, list(traces.values()))
-    arm, source = start(numbers, recordings, columns, gains, scale)
+    arm, source = initial_arm(read.numbers, recordings, columns, gains, scale)
     chosen = "gains" if source in ("preset", "torques") else source
     for name, trace in traces.items():
         check_signs(arm, name, trace)
     found = identify(arm, recordings, scale=chosen)
     if chosen == "gains":
-        check_weight(numbers, found.arm.robot, list(traces.values()))
+        check_weight(read.numbers, found.arm.robot, list(traces.values()))
         check_loads(arm, list(traces), recordings)
     elif (ratio := torque_per_ampere(found.arm, list(traces.values()))) < SMALL_GAIN:
         print(
@@ -85,8 +88,7 @@ def command(
             "they held joint torques: if they are in N m, say --torque"
         )
     held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
-    for note in doubts(found.arm, traces, recordings, held):
-        print(f"note: {note}")
+    print_notes(calibration_notes(found.arm, traces, recordings, held))
     target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=chosen, logs=list(traces))
     result = summary(list(traces), found, held, target) | {"scale": source}
@@ -114,7 +116,8 @@ def summary(names: list[str], found: Identified, held: list[Any], target: Path) 
 
 
 def report(result: dict[str, Any], found: Identified) -> None:
-    """The figures for a reader."""
+    """Print the figures."""
+    from tauguard.cli.help_text import print_notes
     from tauguard.report import table
 
     print(f"scale of the torques: from {SOURCES[result['scale']]}")
@@ -141,6 +144,5 @@ def report(result: dict[str, Any], found: Identified) -> None:
         held_out.append({"held out, rms": name, "predicted without its load": carried} | values)
     if held_out:
         print(table(held_out))
-    for note in found.notes:
-        print(f"note: {note}")
+    print_notes(found.notes)
     print(f"{result['robot']}: written")

@@ -38,10 +38,10 @@ def command(
     started = time.perf_counter()
     out.mkdir(parents=True, exist_ok=True)
 
-    from tauguard.cli.summary import draw
     from tauguard.datasets import demo_plan, simulate_all
     from tauguard.detectors import SrqSvr, match_detection, train
     from tauguard.detectors.calibration.nominal import nominal_arm
+    from tauguard.detectors.evaluation.metrics_page import draw
     from tauguard.envs import simulate
     from tauguard.models import load_arm
     from tauguard.report import write_json
@@ -101,7 +101,7 @@ def judged_figures(
 
 def closing(out: Path, summary: dict[str, Any]) -> None:
     """How well it did, and what lies where."""
-    from tauguard.cli.summary import text
+    from tauguard.detectors.evaluation.metrics_page import text
 
     print(text(summary))
     print(f"  the threshold: for {FALSE_ALARMS_PER_HOUR:.0f} false alarms per hour in training")

@@ -47,7 +47,7 @@ class Plain:
     """threshold over the largest residual of the quiet seconds"""
 
     def given(self) -> list[str]:
-        """Flags that are not as they are without being given."""
+        """Flags changed from their defaults."""
         names = [field.name for field in dataclasses.fields(self)]
         own = [name for name in names if getattr(self, name) != getattr(Plain(), name)]
         return [f"--{name.replace('_', '-')}" for name in own]
@@ -90,7 +90,8 @@ def command(
         out: folder for events.json, detect.mcap and detect.rrd.
         json: write the figures here as JSON.
     """
-    from tauguard.cli.real_logs import read_one
+    from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.arm_logs import read_one
     from tauguard.report import write_json
 
     if out is not None and out.exists() and not out.is_dir():
@@ -100,14 +101,15 @@ def command(
     if model is None and payload is not None:
         raise ValueError("--payload goes with --model only")
     causes: Sequence[dict[str, Any]] = ()
-    trace = read_one(log, columns, torque)
+    read = read_one(log, columns, torque)
+    print_notes(read.notes)
+    trace = read.trace
     if model is not None:
         trace, detector, found = watched(model, trace, payload, robot)
         causes, notes = explained(detector, trace, found, robot)
     else:
         trace, found, notes = plainly(log, trace, robot, columns, plain)
-    for note in (*found.notes, *notes):
-        print(f"note: {note}")
+    print_notes((*found.notes, *notes))
     result = summary(log, trace, found, causes)
     report(result)
     if json is not None:
@@ -120,15 +122,15 @@ def watched(
     model: Path, trace: Trace, payload: str | None, robot: Path
 ) -> tuple[Trace, Any, LogDetection]:
     """The log in the joints of a trained detector, the detector, and what it saw."""
-    from tauguard.cli.real_logs import carried, is_torque, matched
-    from tauguard.cli.robot_files import check_robot
+    from tauguard.datasets.arm_logs import matched, parse_load
+    from tauguard.datasets.real_arms import check_robot, is_torque
     from tauguard.detectors import load_model
     from tauguard.detectors.methods.free_motion import carrying
     from tauguard.detectors.thresholds.quiet_start import detect_with
 
     alarm = load_model(model)
     if payload is not None:
-        alarm = carrying(alarm, carried(payload))
+        alarm = carrying(alarm, parse_load(payload))
     arm = alarm.detector.arm
     check_robot(robot, arm.robot, model)
     trace = matched(trace, arm.robot.joint_names)
@@ -141,13 +143,16 @@ def plainly(
     log: Path, trace: Trace, robot: Path, columns: str | None, plain: Plain
 ) -> tuple[Trace, LogDetection, tuple[str, ...]]:
     """The log, what a detector that nobody trained saw in it, and where its numbers come from."""
-    from tauguard.cli.real_logs import matched, robot_numbers, watched_arm
+    from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.arm_logs import matched
+    from tauguard.datasets.real_arms import arm_of_log, robot_numbers
     from tauguard.detectors.calibration.plausible import drive_torque
     from tauguard.detectors.thresholds.quiet_start import detect_after_quiet
 
-    numbers = robot_numbers(robot, trace.joint_names)
+    numbers, held = robot_numbers(robot, trace.joint_names)
+    print_notes(held)
     trace = matched(trace, numbers.joint_names)
-    arm, source = watched_arm(
+    arm, source = arm_of_log(
         robot, columns, plain.gains, plain.viscous, plain.coulomb, trace, numbers
     )
     try:
@@ -262,8 +267,7 @@ def summary(
 
 def report(result: dict[str, Any]) -> None:
     """The figures for a reader."""
-    from tauguard.cli.real_logs import printed_from
-    from tauguard.cli.threshold_card import rate_text
+    from tauguard.detectors.evaluation.card_page import printed_from, rate_text
 
     pairs = zip(result["joints"], result["thresholds_nm"], strict=True)
     used = [f"{name} {value:.1f} N m" for name, value in pairs if value is not None]

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from tauguard.cli.events import EventFolder
     from tauguard.detectors import CollisionAlarm, Matching
     from tauguard.detectors.evaluation.recordings import JudgedRecording
+    from tauguard.replay.events import EventFolder
     from tauguard.traces import Trace
 
 
@@ -42,12 +42,12 @@ def command(
             --episode` takes.
         late: with --events, a collision found later than this is an event [s].
     """
-    from tauguard.cli.events import EventFolder, command_to_open
-    from tauguard.cli.summary import diagnosis_text, draw, text
     from tauguard.datasets.arm_splits import episodes_of_splits
     from tauguard.datasets.labelled import labelled
     from tauguard.detectors import load_model
+    from tauguard.detectors.evaluation.metrics_page import diagnosis_text, draw, text
     from tauguard.detectors.registry import make_detector
+    from tauguard.replay.events import EventFolder, command_to_open
     from tauguard.report import measured, write_json
 
     if (traces is None) == (data is None):

@@ -1,10 +1,10 @@
-"""How a command's ``--help`` shows its arguments."""
+"""Text that all commands print alike: arguments of ``--help``, notes."""
 
 from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, get_type_hints
 
 import tyro
@@ -28,3 +28,9 @@ def tidy(command: Callable[..., Any]) -> None:
         shown = tyro.conf.arg(help=text, help_behavior_hint="" if said else None)
         hints[name] = Annotated[hints[name], shown]
     command.__annotations__ = hints
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """One line for each note."""
+    for note in notes:
+        print(f"note: {note}")

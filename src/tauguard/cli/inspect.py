@@ -49,7 +49,7 @@ def command(
     report["damaged"] = dict(inspection.verified(folder)) if verify else None
     print(page(report))
     if figure is not None:
-        from tauguard.cli.inspection_figure import draw
+        from tauguard.datasets.inspection_figure import draw
 
         draw(figure, folder, report)
     if json is not None:

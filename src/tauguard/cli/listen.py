@@ -61,7 +61,7 @@ def command(
         record: write what was heard as MCAP here.
         rerun: `view` opens the rerun viewer; FILE.rrd records what it would show.
     """
-    from tauguard.cli.robot_files import check_robot
+    from tauguard.datasets.real_arms import check_robot
     from tauguard.detectors import load_model
     from tauguard.detectors.faults.monitor import Monitor
     from tauguard.live.display import BackgroundDisplay
@@ -111,12 +111,12 @@ def with_load(
     alarm: CollisionAlarm, model: Path, payload: str | None, torque: bool
 ) -> CollisionAlarm:
     """The alarm of an arm with this load, if it was trained on such signals."""
-    from tauguard.cli.real_logs import carried
+    from tauguard.datasets.arm_logs import parse_load
     from tauguard.detectors.methods.free_motion import carrying
 
     if torque and not (alarm.detector.arm.drive_gain == 1).all():
         raise ValueError(f"--torque: {model} was trained on currents")
-    return alarm if payload is None else carrying(alarm, carried(payload))
+    return alarm if payload is None else carrying(alarm, parse_load(payload))
 
 
 def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> None:
@@ -151,7 +151,8 @@ def opened(
     if ur is not None:
         return UrStream(ur, port, 1 / dt, reconnect)
     if play is not None:
-        from tauguard.cli.real_logs import column_map, matched
+        from tauguard.datasets.arm_logs import matched
+        from tauguard.datasets.columns import column_map
 
         return PlayedStream(matched(read_log(play, column_map(columns), names).trace, names))
     if ros is not None:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tauguard.detectors import CollisionAlarm, FreeScores
-    from tauguard.detectors.methods.free_logs import Sifted
+    from tauguard.detectors import ArmModel, CollisionAlarm, FreeScores
+    from tauguard.detectors.calibration.recording import Recording
+    from tauguard.detectors.methods.free_logs import JudgedLog, Sifted
     from tauguard.detectors.methods.free_motion import FittedFreeMotion
     from tauguard.traces import Trace
 
@@ -175,22 +176,28 @@ def free_motion(
     accept: tuple[str, ...] = (),
 ) -> None:
     """Train on logs in which nothing touched the arm, as far as that is known."""
-    from tauguard.cli.odd_logs import sifted_logs
-    from tauguard.cli.real_logs import doubts, is_torque, loaded, read_logs, start
-    from tauguard.cli.robot_files import check_named
+    from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.arm_logs import read_logs, with_loads
+    from tauguard.datasets.real_arms import (
+        calibration_notes,
+        check_named,
+        initial_arm,
+        is_torque,
+    )
     from tauguard.detectors import CollisionAlarm, save_model
     from tauguard.detectors.calibration.arm_file import load_arm
     from tauguard.detectors.calibration.belongs import check_signs, check_weight
     from tauguard.detectors.faults import UsualInput
     from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
 
-    traces, numbers = read_logs(free, columns, robot, torque)
-    recordings = loaded(traces, payload)
+    read = read_logs(free, columns, robot, torque)
+    print_notes(read.notes)
+    traces, recordings = read.traces, with_loads(read.traces, payload)
     arm = load_arm(robot)
     if arm is None and not gains:
         check_named(robot, columns, list(traces.values()))
     if arm is None or gains:
-        arm, _ = start(numbers, recordings, columns, gains, "gains")
+        arm, _ = initial_arm(read.numbers, recordings, columns, gains, "gains")
     elif is_torque(recordings[0].trace) and not (arm.drive_gain == 1).all():
         raise ValueError(f"{robot.name} was calibrated on currents, the logs hold torques")
     for name, trace in traces.items():
@@ -199,13 +206,75 @@ def free_motion(
     detector = FreeMotion().fit(recordings, arm)
     check_weight(arm.robot, detector.arm.robot, list(traces.values()))
     unmoved = never_moved(list(traces.values()))
-    for note in (*doubts(detector.arm, traces, recordings, ()), *unmoved):
-        print(f"note: {note}")
+    print_notes((*calibration_notes(detector.arm, traces, recordings, ()), *unmoved))
     usual = UsualInput.of(list(traces.values()), detector.arm)
     save_model(CollisionAlarm(detector, 1.0, CONFIRMATION, inputs=usual), model)
     logs = "1 log" if len(traces) == 1 else f"{len(traces)} logs"
     print(f"{model}: trained on {logs}, {detector.seconds:.0f} s")
     show_card(detector, list(traces.values()), sifted, card)
+
+
+def sifted_logs(
+    traces: dict[str, Trace], recordings: Sequence[Recording], arm: ArmModel, accept: Sequence[str]
+) -> tuple[dict[str, Trace], list[Recording], Sifted]:
+    """The logs to learn from; prints a note on each other one, and on what differs in these.
+
+    Args:
+        traces: by file name.
+        recordings: the same with their loads.
+        arm: nominal numbers and drive gains.
+        accept: names of logs to keep in any case.
+
+    Raises:
+        ValueError: a name of no log.
+    """
+    from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.arm_logs import log_named
+    from tauguard.detectors.methods.free_logs import sift
+
+    names = list(traces)
+    accepted = [log_named(name, f"--accept {name}", names) for name in accept]
+    own = dict(zip(names, recordings, strict=True))
+    sifted = sift(own, arm, accepted)
+    print_notes(odd_notes(sifted))
+    out = {log.name for log in sifted.left_out}
+    kept = [name for name in names if name not in out]
+    return {name: traces[name] for name in kept}, [own[name] for name in kept], sifted
+
+
+def odd_notes(sifted: Sifted) -> list[str]:
+    """A line on each log that stands out, and on each whose torques differ all along."""
+    from tauguard.detectors.evaluation.card_page import times
+
+    notes = []
+    for log in sifted.left_out:
+        cause = (
+            f"a load (then give --payload {log.name}=KG or =unknown), another temperature"
+            if log.throughout
+            else "something touched the arm"
+        )
+        notes.append(
+            f"{log.name} stands out: {times(log)}, judged by the other logs, which have "
+            f"{_others(sifted.kept)}: {cause}, or a motion that they do not show. It is left out; "
+            f"if nothing touched the arm, keep it with --accept {log.name}"
+        )
+    notes += [
+        f"{log.name} stands out ({times(log)}) and is kept as --accept says: a contact in it "
+        "raises the bounds, and others like it are then missed"
+        for log in sifted.accepted
+    ]
+    notes += [
+        f"{log.name}: its torques differ from the other logs' all along: did the arm carry "
+        f"something (then give --payload {log.name}=KG or =unknown)?"
+        for log in sifted.kept
+        if log.throughout
+    ]
+    return notes
+
+
+def _others(logs: Sequence[JudgedLog]) -> str:
+    count = sum(len(log.alarms) for log in logs)
+    return f"{count or 'none'} in {sum(log.seconds for log in logs) / 60:.1f} min"
 
 
 def never_moved(traces: list[Trace]) -> list[str]:
@@ -226,7 +295,7 @@ def show_card(
     detector: FittedFreeMotion, traces: list[Trace], sifted: Sifted, target: Path | None
 ) -> None:
     """Print what the detector can find, and draw it."""
-    from tauguard.cli.threshold_card import draw, text
+    from tauguard.detectors.evaluation.card_page import draw, text
     from tauguard.detectors.evaluation.threshold_card import threshold_card
 
     found = threshold_card(detector, traces, sifted)

@@ -123,7 +123,7 @@ class EventFolder:
 
     def add(self, name: str, matching: Matching, of: tuple[Trace, Detection]) -> None:
         """The events of one recording, under the name by which a reader finds it."""
-        from tauguard.cli.event_page import row_of
+        from tauguard.replay.event_page import row_of
 
         trace, detection = of
         held = self._held(trace, detection)
@@ -149,9 +149,9 @@ class EventFolder:
         self, event: Event, row: dict[str, Any], of: tuple[Trace, Detection], held: Array
     ) -> None:
         """The recording and the picture of one event."""
-        from tauguard.cli.event_figure import draw_event
-        from tauguard.cli.event_page import facts
         from tauguard.replay import write_rrd
+        from tauguard.replay.event_figure import draw_event
+        from tauguard.replay.event_page import facts
         from tauguard.replay.story import cut
 
         trace, detection = of
@@ -166,7 +166,7 @@ class EventFolder:
 
     def finish(self) -> Path:
         """Write the page; its path."""
-        from tauguard.cli.event_page import OFFLINE, definitions, events_html
+        from tauguard.replay.event_page import OFFLINE, definitions, events_html
         from tauguard.report.page import page
         from tauguard.whole_file import write_whole
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from tauguard.cli.event_page import OFFLINE
+from tauguard.replay.event_page import OFFLINE
 
 #: A collision that is found later than this is shown [s].
 LATE = 0.05
@@ -76,10 +76,10 @@ def _build() -> str:
 def judged(folder: Path, seed: int) -> dict[str, object]:
     """Train as `tauguard demo` does and record what goes wrong on its test motions."""
     from tauguard.cli.demo import FALSE_ALARMS_PER_HOUR
-    from tauguard.cli.events import EventFolder
     from tauguard.datasets import demo_plan, simulate_all
     from tauguard.detectors import SrqSvr, match_detection, train
     from tauguard.detectors.calibration.nominal import nominal_arm
+    from tauguard.replay.events import EventFolder
 
     plan = demo_plan(seed, "cura6")
     training = list(simulate_all(plan.train, None, "simulate training"))
@@ -94,8 +94,8 @@ def judged(folder: Path, seed: int) -> dict[str, object]:
 
 
 def _html(folder: Path, counts: str, rows: list[dict[str, Any]]) -> str:
-    from tauguard.cli.event_page import definitions
-    from tauguard.cli.events import KINDS, command_to_open
+    from tauguard.replay.event_page import definitions
+    from tauguard.replay.events import KINDS, command_to_open
     from tauguard.report.page import Link, tables
 
     chosen = [row for kind in KINDS for row in [r for r in rows if r["kind"] == kind][:SHOWN]]

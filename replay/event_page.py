@@ -10,8 +10,8 @@ from urllib.parse import quote
 
 if TYPE_CHECKING:
     from tauguard.arrays import Array
-    from tauguard.cli.events import Event
     from tauguard.detectors import CollisionAlarm
+    from tauguard.replay.events import Event
     from tauguard.traces import Trace
 
 #: Without `tauguard replay --web` nothing answers at these links: they become plain text.

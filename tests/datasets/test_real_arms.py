@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from tauguard.cli.robot_files import check_named
+from tauguard.datasets.real_arms import check_named
 from tests.detectors.synthetic_arm import record
 
 

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Logs shorter than this say nothing of alarms per hour, logs shorter than that hardly [s].
 SHORTEST, SHORT = 300.0, 1800.0
+#: A log that begins later than this has the time of a clock [s].
+CLOCK = 1e6
 #: Alarms of a log whose seconds are listed.
 LISTED = 6
 #: What each force at the tool holds for.
@@ -46,6 +48,15 @@ def _levels(card: ThresholdCard) -> dict[str, Array]:
         "moving": card.moving,
         "starting": card.starting,
     }
+
+
+def printed_from(begin: float) -> float:
+    """What is subtracted from the times of a log that begins at ``begin`` [s], to print them.
+
+    The beginning itself if a clock stamped the log, as ROS does; else 0. Files keep the log's
+    times.
+    """
+    return begin if begin > CLOCK else 0.0
 
 
 def rate_text(high: float, seconds: float, said: str) -> str:
@@ -125,8 +136,6 @@ def _alarms(card: ThresholdCard) -> str:
 
 def times(log: JudgedLog) -> str:
     """How many alarms a log has, and at which seconds: "3 alarms at 1.2, 3.4, 5.6 s"."""
-    from tauguard.cli.real_logs import printed_from
-
     since = printed_from(log.begin)
     starts = [f"{alarm.start - since:.1f}" for alarm in log.alarms]
     shown = ", ".join(starts[:LISTED]) + (" ..." if len(starts) > LISTED else "")

@@ -1,0 +1,197 @@
+"""Logs of one real arm as commands take them: files, joints, units, loads."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tauguard.datasets.columns import column_map
+from tauguard.datasets.log_checks import saturated
+from tauguard.datasets.logs import Log, read_log
+from tauguard.datasets.real_arms import is_torque, robot_numbers, unnamed
+from tauguard.detectors import RobotNumbers
+from tauguard.detectors.calibration.recording import Load, Recording, moves
+from tauguard.traces import Trace
+
+#: Heaviest load that is accepted [kg]; a larger number is taken for grams.
+HEAVIEST = 100.0
+
+
+@dataclass(frozen=True)
+class ArmLogs:
+    """Logs of one arm, and the numbers of the robot that they were recorded on."""
+
+    traces: dict[str, Trace]  #: by file name, joints in the robot's order
+    numbers: RobotNumbers  #: of the joints that the logs have
+    notes: tuple[str, ...]  #: one line for each repair and each joint that is held fixed
+
+
+def log_files(logs: Sequence[Path]) -> list[Path]:
+    """The files themselves; for a folder the ``.csv`` and ``.mcap`` files in it.
+
+    Raises:
+        ValueError: there are none, or two have one name.
+    """
+    files: list[Path] = []
+    for path in logs:
+        inside = sorted([*path.glob("*.csv"), *path.glob("*.mcap")]) if path.is_dir() else [path]
+        if not inside:
+            raise ValueError(f"{path}: no .csv or .mcap files in it")
+        files += inside
+    names = [path.name for path in files]
+    if not files:
+        raise ValueError("no logs: give .csv or .mcap files, or a folder of them")
+    if len(set(names)) < len(names):
+        raise ValueError(f"logs: {', '.join(names)}; expected files of different names")
+    return files
+
+
+def read_one(log: Path, columns: str | None, torque: bool = False) -> Log:
+    """One log, its joints in the file's order; each note begins with the file's name.
+
+    Args:
+        log: CSV or MCAP.
+        columns: preset or JSON file of a column map.
+        torque: its currents, or efforts, are joint torques [N m].
+
+    Raises:
+        ValueError: as :func:`~tauguard.datasets.logs.read_log`.
+    """
+    read = read_log(log, column_map(columns))
+    trace, notes = read.trace, read.notes
+    if torque:
+        notes = tuple(n.replace("taken as current [A]", "joint torque [N m]") for n in notes)
+        trace = dataclasses.replace(trace, meta={**trace.meta, "effort": "torque"})
+    return Log(trace, tuple(f"{log.name}: {note}" for note in notes))
+
+
+def read_logs(
+    logs: Sequence[Path], columns: str | None, robot: Path, torque: bool = False
+) -> ArmLogs:
+    """The logs of one arm to learn from.
+
+    Args:
+        logs: files or folders.
+        columns: preset or JSON file of a column map.
+        robot: URDF or MJCF file of the arm.
+        torque: the logs hold joint torques [N m] in place of currents.
+
+    Raises:
+        ValueError: a saturated current, currents in one log and torques in another, joints that
+            the robot does not have, or what reading raises.
+    """
+    read = {path.name: read_one(path, columns, torque) for path in log_files(logs)}
+    notes = [note for log in read.values() for note in log.notes]
+    numbers, held = robot_numbers(robot, next(iter(read.values())).trace.joint_names)
+    traces = {name: matched(log.trace, numbers.joint_names) for name, log in read.items()}
+    for name, trace in traces.items():
+        _refuse_saturated(name, trace)
+    if len({is_torque(trace) for trace in traces.values()}) > 1:
+        raise ValueError("some logs hold currents, others torques: give those of one kind")
+    return ArmLogs(traces, numbers, (*notes, *held))
+
+
+def _refuse_saturated(log: str, trace: Trace) -> None:
+    for joint, row, count, peak in saturated(trace):
+        what, unit = ("torque", "N m") if is_torque(trace) else ("current", "A")
+        raise ValueError(
+            f"{log}: the {what} of {joint} stays at {peak:g} {unit} for {count} samples, "
+            f"{trace.t[row] - trace.t[0]:.2f} s after the beginning: saturated, so the torque is "
+            "not known; leave this log out or cut it there"
+        )
+
+
+def matched(trace: Trace, names: tuple[str, ...]) -> Trace:
+    """The trace with the robot's joints in the robot's order.
+
+    Raises:
+        ValueError: joints that do not match.
+    """
+    given = trace.joint_names
+    if len(given) != len(names):
+        raise ValueError(
+            f"the log has {len(given)} joints ({', '.join(given)}), "
+            f"the robot {len(names)} ({', '.join(names)})"
+        )
+    if given == unnamed(len(given)) or given == names:
+        return dataclasses.replace(trace, joint_names=names)
+    if set(given) != set(names):
+        raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
+    order = [given.index(name) for name in names]
+    tables = ("q", "qd", "current", "q_des", "qd_des", "qdd_des")
+    moved: dict[str, Any] = {
+        name: getattr(trace, name)[:, order] for name in tables if getattr(trace, name) is not None
+    }
+    return dataclasses.replace(trace, joint_names=names, **moved)
+
+
+def moving(traces: dict[str, Trace]) -> tuple[dict[str, Trace], list[str]]:
+    """The logs in which some joint moves, and a note on each of the others.
+
+    If no joint moves in any log, all logs are returned: calibration then says so.
+    """
+    still = [name for name, trace in traces.items() if not moves(trace)]
+    notes = [f"{name}: no joint moves in it; calibration leaves it out" for name in still]
+    return {n: t for n, t in traces.items() if n not in still} or traces, notes
+
+
+def log_named(name: str, flag: str, logs: Sequence[str]) -> str:
+    """The log that a flag names by its file name, with or without the ending.
+
+    Raises:
+        ValueError: no such log, or two.
+    """
+    found = [log for log in logs if name == log] or [log for log in logs if name == Path(log).stem]
+    if len(found) != 1:
+        there = f"two are called {name!r}" if found else f"no log {name!r}"
+        raise ValueError(f"{flag}: {there}; there are {', '.join(logs)}")
+    return found[0]
+
+
+def with_loads(traces: dict[str, Trace], payload: Sequence[str]) -> list[Recording]:
+    """Each trace with its load.
+
+    Args:
+        traces: by file name.
+        payload: LOG=KG, LOG=KG,X,Y,Z or LOG=unknown, one each; other logs carried nothing.
+
+    Raises:
+        ValueError: a payload that cannot be read or belongs to no log.
+    """
+    loads: dict[str, Load | None] = {}
+    for text in payload:
+        name, _, value = text.rpartition("=")
+        log = log_named(name, f"--payload {text}", list(traces))
+        form = "LOG=KG, LOG=KG,X,Y,Z or LOG=unknown"
+        loads[log] = None if value == "unknown" else _load(text, value, form)
+    return [Recording(trace, loads.get(name, Load())) for name, trace in traces.items()]
+
+
+def parse_load(text: str) -> Load:
+    """The load in ``--payload KG`` or ``--payload KG,X,Y,Z``.
+
+    Raises:
+        ValueError: another form.
+    """
+    if text == "unknown":
+        raise ValueError("--payload unknown: leave it out instead")
+    return _load(text, text, "KG or KG,X,Y,Z, 0 for nothing")
+
+
+def _load(text: str, value: str, form: str) -> Load:
+    try:
+        parts = [float(v) for v in value.split(",")]
+    except ValueError:
+        parts = []
+    if len(parts) not in (1, 4):
+        raise ValueError(f"--payload {text}: expected {form}")
+    if parts[0] > HEAVIEST:
+        raise ValueError(
+            f"--payload {text}: {parts[0]:g} kg, expected at most {HEAVIEST:g}; "
+            "loads are given in kg"
+        )
+    centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
+    return Load(parts[0], centre)

@@ -1,0 +1,271 @@
+"""The numbers of a real arm: from its robot file, its drives, and what a user knows of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tauguard.datasets.drives import REVERSAL, DriveNumbers, preset_drive
+from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
+from tauguard.detectors.calibration.arm_file import load_arm
+from tauguard.detectors.calibration.assessment import (
+    OUTLYING,
+    OUTLYING_IN_DOUBT,
+    explained,
+    outlier,
+    start_gains,
+)
+from tauguard.detectors.calibration.held_joints import holding
+from tauguard.detectors.calibration.recording import Load, Recording, moves
+from tauguard.models import pin_model
+from tauguard.traces import Trace
+
+#: Two files describe one arm if its joints differ by at most this in position [m] and in every
+#: entry of the rotation matrix.
+SAME_PLACE = 1e-3
+
+
+def robot_numbers(
+    robot: Path, given: tuple[str, ...] | None = None
+) -> tuple[RobotNumbers, tuple[str, ...]]:
+    """The numbers of a robot file, and a note if joints that the log lacks are held at zero.
+
+    Args:
+        robot: URDF or MJCF.
+        given: joints of the log, in any order, or ``joint_1``, ... (default: all of the robot's).
+
+    Raises:
+        ValueError: joints that the robot does not have.
+    """
+    numbers = RobotNumbers.from_pin(pin_model(robot))
+    names = numbers.joint_names
+    if given is None or len(given) >= len(names):
+        return numbers, ()
+    kept = names[: len(given)] if given == unnamed(len(given)) else given
+    if not set(kept) <= set(names):
+        raise ValueError(f"the log's joints are {', '.join(given)}, the robot's {', '.join(names)}")
+    lacking = [name for name in names if name not in kept]
+    note = f"the log lacks {', '.join(lacking)} of {robot.name}: held fixed at 0"
+    return holding(numbers, lacking), (note,)
+
+
+def unnamed(count: int) -> tuple[str, ...]:
+    """The names of joints that have no name: ``joint_1``, ..."""
+    return tuple(f"joint_{i}" for i in range(1, count + 1))
+
+
+def is_torque(trace: Trace) -> bool:
+    """Whether a log holds joint torques instead of currents."""
+    return trace.meta.get("effort") == "torque"
+
+
+# -- does the robot file belong to the model, to the logs? ----------------------------------------
+
+
+def check_robot(robot: Path, trained: RobotNumbers, model: Path) -> None:
+    """Refuse a robot file that cannot be read, or that is not of the arm a model was trained on.
+
+    Joint names and the places of the joints must agree; masses may differ, as calibration changes
+    them.
+
+    Raises:
+        ValueError: one line that names both files.
+    """
+    try:
+        numbers = RobotNumbers.from_pin(pin_model(robot))
+    except ValueError as error:
+        name = "" if str(robot) in str(error) else f"{robot}: "
+        raise ValueError(f"{name}{error}") from None
+    own, names = numbers.joint_names, trained.joint_names
+    if not set(names) <= set(own):
+        raise ValueError(
+            f"{robot} has the joints {', '.join(own)}; {model} was trained on {', '.join(names)}"
+        )
+    held = holding(numbers, [name for name in own if name not in names])
+    order = [held.joint_names.index(name) for name in names]
+    moved = np.abs(held.translation[order] - trained.translation).max(axis=1)
+    turned = np.abs(held.rotation[order] - trained.rotation).max(axis=(1, 2))
+    if (moved > SAME_PLACE).any() or (turned > SAME_PLACE).any():
+        joint = int(np.argmax(np.maximum(moved, turned)))
+        raise ValueError(
+            f"{robot} is not the arm that {model} was trained on: {names[joint]} stands "
+            f"{1e3 * moved[joint]:.0f} mm from where it stood; give the robot file of training"
+        )
+
+
+def check_named(robot: Path, columns: str | None, traces: Sequence[Trace]) -> None:
+    """Refuse the robot file of one UR beside the columns of another UR.
+
+    The preset of the columns would bring the gains of its own arm. Files and columns of other
+    names are accepted.
+
+    Raises:
+        ValueError: one line that names both.
+    """
+    known = r"ur(?:3|5|10|16|20|30)e?"
+    name = re.search(r'<(?:robot|mujoco)[^>]*?(?:name|model)="([^"]*)"', robot.read_text())
+    names = f"{name.group(1) if name else ''} {robot.stem}".lower()
+    arms = re.findall(rf"(?<![a-z0-9]){known}(?![a-z0-9])", names)
+    presets = {str(trace.meta.get("columns") or columns) for trace in traces}
+    others = sorted(p for p in presets if re.fullmatch(known, p) and arms and p not in arms)
+    if others:
+        raise ValueError(
+            f"{robot.name} is the file of a {arms[0]}, the columns are those of a {others[0]}: "
+            f"give the {others[0]}'s file; if the log is of a {arms[0]}, give its own --gains or a "
+            "column map with its torques"
+        )
+
+
+# -- drive gains and friction ---------------------------------------------------------------------
+
+
+def initial_arm(
+    numbers: RobotNumbers,
+    recordings: Sequence[Recording],
+    columns: str | None,
+    gains: tuple[float, ...],
+    scale: str,
+) -> tuple[ArmModel, str]:
+    """The arm that a calibration begins with, and what fixes the scale of its torques.
+
+    Args:
+        numbers: of the robot file.
+        recordings: logs with their loads.
+        columns: preset or column map that was given.
+        gains: that were given [N m/A], one a joint; empty for none.
+        scale: "gains", "payload", "masses", or "auto" for the first of these that is known.
+
+    Returns:
+        The arm, and "torques", "gains", "preset", "payload" or "masses".
+
+    Raises:
+        ValueError: not one gain a joint, or logs of different presets.
+    """
+    if is_torque(recordings[0].trace):
+        if gains:
+            raise ValueError("--gains: the logs hold joint torques, which need none")
+        return ArmModel(numbers, np.ones(numbers.joints)), "torques"
+    traces = [r.trace for r in recordings]
+    preset = None if gains else preset_drive(columns, traces)
+    known = any(r.load is not None and r.load.mass > 0 for r in recordings)
+    if scale == "auto":
+        otherwise = "payload" if known else "masses"
+        scale = "gains" if gains or (preset and not known) else otherwise
+    if preset is not None:
+        gains = preset[1].gain
+        scale = "preset" if scale == "gains" else scale
+    _check_count(gains, numbers)
+    if not gains and scale == "gains":
+        raise ValueError(f"--gains: give {numbers.joints} numbers, N m of torque per ampere")
+    begin = np.array(gains) if gains else start_gains(numbers, traces)
+    return ArmModel(numbers, begin), scale
+
+
+def arm_of_log(
+    robot: Path,
+    columns: str | None,
+    gains: tuple[float, ...],
+    viscous: tuple[float, ...],
+    coulomb: tuple[float, ...],
+    trace: Trace,
+    numbers: RobotNumbers,
+) -> tuple[ArmModel, str]:
+    """The arm of a log without a trained model, and where its gains and friction come from.
+
+    They are those of a calibrated robot file, else those given, else 1 for a log of torques, else
+    those of the preset of the log's columns.
+
+    Args:
+        robot: URDF or MJCF file.
+        columns: preset or column map that was given.
+        gains: that were given [N m/A], one a joint; empty for none.
+        viscous: friction that was given [N m s/rad], one a joint; empty for none.
+        coulomb: friction that was given [N m], one a joint; empty for none.
+        trace: the log.
+        numbers: of the robot file, for the joints of the log.
+
+    Raises:
+        ValueError: no gains, not one a joint, or some beside those of a calibrated robot file.
+    """
+    calibrated = load_arm(robot)
+    if calibrated is not None:
+        if gains or viscous or coulomb:
+            raise ValueError(
+                f"{robot.name} is calibrated and brings its own gains and friction: leave out "
+                "--gains, --viscous and --coulomb, or give the robot's own file"
+            )
+        return calibrated, f"the calibration in {robot.name}"
+    source = "the flags"
+    if not gains:
+        check_named(robot, columns, [trace])
+        if is_torque(trace):
+            gains, source = (1.0,) * numbers.joints, "the log's torques"
+        elif (preset := preset_drive(columns, [trace])) is not None:
+            name, known = preset
+            gains, source = known.gain, f"the preset {name}"
+            viscous, coulomb = viscous or known.viscous, coulomb or known.coulomb
+        else:
+            raise ValueError(
+                f"--gains: give {numbers.joints} numbers, N m of joint torque per ampere"
+            )
+    _check_count(gains, numbers)
+    drive = DriveNumbers(gains, viscous, coulomb)
+    coulomb, viscous = (x or (0.0,) * numbers.joints for x in (drive.coulomb, drive.viscous))
+    friction = FrictionModel.coulomb_viscous(coulomb, viscous, width=REVERSAL)
+    return ArmModel(numbers, np.array(drive.gain), friction), source
+
+
+def _check_count(gains: Sequence[float], numbers: RobotNumbers) -> None:
+    if gains and len(gains) != numbers.joints:
+        raise ValueError(f"--gains: {len(gains)} numbers for {numbers.joints} joints")
+
+
+# -- what a calibration leaves unexplained --------------------------------------------------------
+
+
+def calibration_notes(
+    arm: ArmModel, traces: dict[str, Trace], recordings: Sequence[Recording], held: Sequence[Any]
+) -> list[str]:
+    """Notes on torque that a calibration does not explain, and on a log that may have had a load.
+
+    Args:
+        arm: identified.
+        traces: by file name.
+        recordings: the same traces with their loads.
+        held: held-out residual of each [N m], (n,) each; empty: not known.
+
+    Raises:
+        ValueError: so much torque is unexplained that the logs cannot be the arm's as given.
+    """
+    bare = [k for k, r in enumerate(recordings) if r.load == Load() and moves(r.trace)]
+    names, refused = list(traces), ""
+    notes: tuple[str, ...] = ()
+    try:
+        notes = explained(arm, [recordings[k].trace for k in bare])
+    except ValueError as error:
+        refused = str(error)
+    doubtful = bool(notes or refused)
+    least = OUTLYING_IN_DOUBT if doubtful else OUTLYING
+    asked = []
+    found = outlier([held[k] for k in bare], least) if len(held) else None
+    if found is not None:
+        log = names[bare[found[0]]]
+        asked.append(
+            f"{log} is {found[1]:.1f} times as far from what the other logs predict as they are: "
+            f"did {log} carry something (then give --payload {log}=KG or =unknown), or did "
+            "something touch the arm (then leave the log out)?"
+        )
+    given = [
+        f"{r.load.mass:g} kg in {n}"
+        for n, r in zip(names, recordings, strict=True)
+        if r.load is not None and r.load.mass > 0
+    ]
+    if given and doubtful:
+        asked.append(f"loads given: {', '.join(given)}; are these right, and in kg?")
+    if refused:
+        raise ValueError("; ".join([refused, *asked]))
+    return [*notes, *asked]
