@@ -41,9 +41,9 @@ std::vector<T> list(const Array& values) {
   return std::vector<T>(values.data(), values.data() + values.size());
 }
 
-inline std::pair<Shape, Frame> shape_of(int core, const Doubles& size, double radius,
-                                        const Doubles& pos, const Doubles& mat,
-                                        const Rows3& vertices) {
+inline std::pair<Shape, LocalFrame> shape_of(int core, const Doubles& size, double radius,
+                                             const Doubles& pos, const Doubles& mat,
+                                             const Rows3& vertices) {
   Shape shape{static_cast<Core>(core),
               {size.data()[0], size.data()[1], size.data()[2]},
               radius,
@@ -54,7 +54,7 @@ inline std::pair<Shape, Frame> shape_of(int core, const Doubles& size, double ra
               {}};
   for (const Vec& v : vectors(vertices))
     shape.x.push_back(v[0]), shape.y.push_back(v[1]), shape.z.push_back(v[2]);
-  Frame frame;
+  LocalFrame frame;
   for (int i = 0; i < 3; ++i) {
     frame.row[i] = {mat.data()[3 * i], mat.data()[3 * i + 1], mat.data()[3 * i + 2]};
     frame.at[i] = pos.data()[i];

@@ -6,10 +6,12 @@
 #pragma once
 
 #include "engine.hpp"
-#include "shapes.hpp"
 #include "stiffening.hpp"
+#include "tauguard/rigid/support_shape.hpp"
 
 namespace tauguard::contacts {
+
+using namespace rigid;  // the convex kernel
 
 class Mocap {
  public:

@@ -7,7 +7,7 @@
 namespace tauguard::contacts {
 namespace {
 
-Box box_at(const Mover& m) {
+Box box_at(const SupportShape& m) {
   Box box;
   for (int k = 0; k < 3; ++k) {
     Vec d{};
@@ -29,7 +29,7 @@ Box widened(Box box, double by) {
   return box;
 }
 
-rigid::MovingBody vertices_of(const Shape& s, const Frame& in_body, const RigidMotion& motion,
+rigid::MovingBody vertices_of(const Shape& s, const LocalFrame& in_body, const RigidMotion& motion,
                               const Vec& origin) {
   rigid::MovingBody body(motion, origin);
   if (s.core == Core::hull)
@@ -50,7 +50,7 @@ rigid::MovingBody vertices_of(const Shape& s, const Frame& in_body, const RigidM
 
 // The box of both ends holds the chord of every point's way; the arc leaves its chord by at most
 // rho (1 - cos(angle / 2)). The last term covers rounding.
-Box swept(Mover m, const RigidMotion& motion) {
+Box swept(SupportShape m, const RigidMotion& motion) {
   if (m.half_space()) return {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
   m.move_to(0);
   Box box = box_at(m);
@@ -62,7 +62,7 @@ Box swept(Mover m, const RigidMotion& motion) {
   return box;
 }
 
-void Geoms::add(Shape shape, int body, const Frame& in_body) {
+void Geoms::add(Shape shape, int body, const LocalFrame& in_body) {
   shapes_.push_back(std::move(shape));
   surfaces_.emplace_back();
   in_body_.push_back(in_body);
@@ -77,8 +77,8 @@ void Geoms::add(Shape shape, int body, const Frame& in_body) {
   boxes_.resize(shapes_.size());
 }
 
-Mover Geoms::mover(int geom, const Vec& origin) const {
-  return Mover(shapes_[geom], in_body_[geom], motions_[body_[geom]], origin);
+SupportShape Geoms::mover(int geom, const Vec& origin) const {
+  return SupportShape(shapes_[geom], in_body_[geom], motions_[body_[geom]], origin);
 }
 
 void Geoms::update(const Poses& p) {
@@ -103,8 +103,8 @@ void Geoms::update(const Poses& p) {
 namespace {
 
 // Polytopes that only have to touch go through the kernel of rigid/, which follows their features.
-Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec& origin, Mover& a,
-                      Mover& b) {
+Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec& origin, SupportShape& a,
+                      SupportShape& b) {
   auto x = vertices_of(geoms.shape(pair.a), geoms.in_body(pair.a), geoms.motion(pair.a), origin);
   auto y = vertices_of(geoms.shape(pair.b), geoms.in_body(pair.b), geoms.motion(pair.b), origin);
   const rigid::Impact impact = rigid::first_contact(x, y, 0, 1);
@@ -119,11 +119,11 @@ Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, 
                     std::int32_t* face) {
   const Surface& surface = geoms.surface(pair.b);
   const RigidMotion& motion = geoms.motion(pair.b);
-  const Frame &in_body = geoms.in_body(pair.b),
-              body{{motion.r0[0], motion.r0[1], motion.r0[2]}, motion.x0};
+  const LocalFrame &in_body = geoms.in_body(pair.b),
+                   body{{motion.r0[0], motion.r0[1], motion.r0[2]}, motion.x0};
   const Box near = widened(geoms.box(pair.a), threshold);
   const double drift = norm(motion.linear);
-  Mover a = geoms.mover(pair.a, origin);
+  SupportShape a = geoms.mover(pair.a, origin);
   Touch first;
   for (std::size_t i = 0; i < surface.triangles.size(); ++i) {
     const Vec y = in_body.out(surface.centre[i]), c = body.out(y);
@@ -133,8 +133,8 @@ Touch surface_touch(const Geoms& geoms, const GeomPair& pair, double threshold, 
     bool far = false;
     for (int k = 0; k < 3; ++k) far = far || c[k] + way < near.lo[k] || c[k] - way > near.hi[k];
     if (far) continue;
-    Mover b(surface.triangles[i], in_body, motion, origin);
-    const Touch touch = first_touch(a, b, threshold, 0);
+    SupportShape b(surface.triangles[i], in_body, motion, origin);
+    const Touch touch = first_contact(a, b, threshold, 0);
     if (!touch.hit) continue;
     if (!first.hit || touch.t < first.t || (touch.t == first.t && touch.distance < first.distance))
       first = touch, *face = static_cast<std::int32_t>(i);
@@ -165,10 +165,10 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
     const auto touch_within = [&](double threshold) {
       if (!geoms.surface(pair.b).triangles.empty() && geoms.shape(pair.a).core != Core::half_space)
         return surface_touch(geoms, pair, threshold, origin, &face);
-      Mover a = geoms.mover(pair.a, origin), b = geoms.mover(pair.b, origin);
+      SupportShape a = geoms.mover(pair.a, origin), b = geoms.mover(pair.b, origin);
       const bool polytopes = geoms.shape(pair.a).polytope() && geoms.shape(pair.b).polytope();
       return polytopes && threshold == 0 ? polytopes_touch(geoms, pair, origin, a, b)
-                                         : first_touch(a, b, threshold, 0);
+                                         : first_contact(a, b, threshold, 0);
     };
     Touch touch = touch_within(0);
     if (!touch.hit && pair.reach > 0) touch = touch_within(pair.reach);
@@ -217,10 +217,10 @@ Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const dou
           start[i] = x_t0 + 3 * elements[corners * e + i],
           end[i] = x_t1 + 3 * elements[corners * e + i];
         const Vec origin = {start[0][0], start[0][1], start[0][2]};
-        Mover a = geoms.mover(pair.geom, origin);
-        Mover b(start, end, corners, radius, origin);
-        Touch touch = first_touch(a, b, 0, 0);
-        if (!touch.hit && pair.reach > 0) touch = first_touch(a, b, pair.reach, 0);
+        SupportShape a = geoms.mover(pair.geom, origin);
+        SupportShape b(start, end, corners, radius, origin);
+        Touch touch = first_contact(a, b, 0, 0);
+        if (!touch.hit && pair.reach > 0) touch = first_contact(a, b, pair.reach, 0);
         if (touch.hit)
           rows->push_back({pair.geom, 0, static_cast<std::int32_t>(e), touch.t, touch.distance,
                            touch.point + origin, touch.normal});
@@ -238,9 +238,9 @@ bool simplices_touch(const double* x_t0, const double* x_t1, const std::int32_t*
     start[1][i] = x_t0 + 3 * b[i], end[1][i] = x_t1 + 3 * b[i];
   }
   const Vec origin = {start[0][0][0], start[0][0][1], start[0][0][2]};
-  Mover x(start[0], end[0], corners, 0.5 * distance, origin),
+  SupportShape x(start[0], end[0], corners, 0.5 * distance, origin),
       y(start[1], end[1], corners, 0.5 * distance, origin);
-  *touch = first_touch(x, y, 0, 0);
+  *touch = first_contact(x, y, 0, 0);
   touch->point = touch->point + origin;
   return touch->hit;
 }

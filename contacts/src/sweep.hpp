@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "advance.hpp"
+#include "tauguard/rigid/first_contact.hpp"
 
 namespace tauguard::contacts {
+
+using namespace rigid;  // the convex kernel
 
 // How far apart counts, beside touching: contacts up to `reach` are listed where the surfaces do
 // not touch.
@@ -30,7 +32,7 @@ struct Box {
 };
 
 // Holds all of a moving shape on its way; `motion` is its body's.
-Box swept(Mover mover, const RigidMotion& motion);
+Box swept(SupportShape mover, const RigidMotion& motion);
 
 // Where the bodies are at both ends of a step: (nbody, 3) and (nbody, 9). `turn`, if given, is
 // about how far each turns between them (nbody, 3) [rad]: it decides how many whole turns are made.
@@ -52,7 +54,7 @@ struct Surface {
 
 class Geoms {
  public:
-  void add(Shape shape, int body, const Frame& in_body);
+  void add(Shape shape, int body, const LocalFrame& in_body);
   // Gives the last geom a surface.
   void add_surface(Surface surface) { surfaces_.back() = std::move(surface); }
   std::size_t size() const { return shapes_.size(); }
@@ -67,15 +69,15 @@ class Geoms {
   const Box& box(int geom) const { return boxes_[geom]; }
   const Shape& shape(int geom) const { return shapes_[geom]; }
   const Surface& surface(int geom) const { return surfaces_[geom]; }
-  const Frame& in_body(int geom) const { return in_body_[geom]; }
+  const LocalFrame& in_body(int geom) const { return in_body_[geom]; }
   const RigidMotion& motion(int geom) const { return motions_[body_[geom]]; }
-  Mover mover(int geom, const Vec& origin) const;
+  SupportShape mover(int geom, const Vec& origin) const;
   std::int64_t moved() const { return moved_; }
 
  private:
   std::vector<Shape> shapes_;
   std::vector<Surface> surfaces_;
-  std::vector<Frame> in_body_;
+  std::vector<LocalFrame> in_body_;
   std::vector<int> body_;
   std::vector<int> bodies_;           // those that have geoms
   std::vector<RigidMotion> motions_;  // by body, as the rest

@@ -14,7 +14,7 @@ constexpr double touching = 1e-6;
 // last cores leaves at the least (advance.cpp leaves 128).
 constexpr double rounded = 512, left_over = 64;
 
-bool apart_at(Mover& a, Mover& b, double t, double share, double roundoffs) {
+bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double roundoffs) {
   a.move_to(t), b.move_to(t);
   const double radii = a.radius() + b.radius();
   const double needed = radii + share * (a.reach() + b.reach() + radii) +
@@ -32,17 +32,17 @@ template <class MakeA, class MakeB>
 bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* hit) {
   double close = touching;
   const auto touch = [&](int level, double from) {
-    Mover a = a_at(level), b = b_at(level);
-    return first_touch(a, b, 0, from, close);
+    SupportShape a = a_at(level), b = b_at(level);
+    return first_contact(a, b, 0, from, close);
   };
   const auto separate = [&](int level, double t) {
-    Mover a = a_at(level), b = b_at(level);
+    SupportShape a = a_at(level), b = b_at(level);
     return apart_at(a, b, t, resting, rounded);
   };
   // Last cores that did not meet so far may be as near as rounding lets them, and must not meet
   // now.
   const auto hardly = [&] {
-    Mover a = a_at(levels - 1), b = b_at(levels - 1);
+    SupportShape a = a_at(levels - 1), b = b_at(levels - 1);
     return apart_at(a, b, 0, 0, left_over);
   };
   int level = 0;
@@ -76,7 +76,7 @@ void include(Box* box, const double* p) {
 
 }  // namespace
 
-int Verdict::add(Shape shape, int body, const Frame& in_body) {
+int Verdict::add(Shape shape, int body, const LocalFrame& in_body) {
   const double extent = norm(in_body.at) + shape.extent() + shape.radius;
   entries_.push_back({std::move(shape), in_body, body, extent});
   whole_.push_back(0), boxes_.emplace_back();
@@ -104,9 +104,9 @@ void Verdict::add_flex_pair(std::vector<std::int32_t> a, std::vector<double> rad
                          std::move(skip), std::move(known)});
 }
 
-Mover Verdict::mover(int entry, const Vec& origin) const {
+SupportShape Verdict::mover(int entry, const Vec& origin) const {
   const Entry& e = entries_[entry];
-  return Mover(e.shape, e.in_body, motions_[e.body], origin);
+  return SupportShape(e.shape, e.in_body, motions_[e.body], origin);
 }
 
 // How far a point of the shape goes at most against something that goes by `drift`.
@@ -187,7 +187,7 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
               0};
       if (!judged([&](int level) { return mover(pair.a[level], origin); },
                   [&](int level) {
-                    return Mover(start, stop, pair.corners, pair.radii[level], origin);
+                    return SupportShape(start, stop, pair.corners, pair.radii[level], origin);
                   },
                   static_cast<int>(pair.a.size()), &pair.known[e], &hit))
         continue;

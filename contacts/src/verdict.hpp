@@ -22,7 +22,7 @@ struct Hit {
 class Verdict {
  public:
   // A shape at some level, on a body; returns its number.
-  int add(Shape shape, int body, const Frame& in_body);
+  int add(Shape shape, int body, const LocalFrame& in_body);
   // Both partners' shapes, level by level.
   void add_pair(std::vector<std::int32_t> a, std::vector<std::int32_t> b);
   // A geom's shapes and the flex's radii, level by level; elements (count, corners) of all
@@ -38,7 +38,7 @@ class Verdict {
  private:
   struct Entry {
     Shape shape;
-    Frame in_body;
+    LocalFrame in_body;
     int body;
     double extent;
   };
@@ -56,7 +56,7 @@ class Verdict {
   };
 
   void update(const Poses& poses);
-  Mover mover(int entry, const Vec& origin) const;
+  SupportShape mover(int entry, const Vec& origin) const;
   double travel(int entry, const Vec& drift) const;
   void judge_rigid(std::size_t pair, std::vector<Hit>* hits);
   void judge_flex(std::size_t pair, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);

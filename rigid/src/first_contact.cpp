@@ -1,29 +1,19 @@
-// Conservative advancement along separating directions that turn with the bodies.
-//
-// Take a time t, a unit n and any rate r, and let the direction be n(h) = n + h r. With
-// s(h) = min_b n(h).x_b - max_a n(h).x_a at time t + h, the bodies are apart while s > 0, whatever
-// n and r are. Measured from a's centre c, each projection is its tangent at h = 0 plus at most K
-// h^2 / 2, where K bounds its second derivative |2 r.(x - c)' + n(h).x''|; so s(h) >= G(h) = min_b
-// (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and computable: the step
-// goes to just before its root, and every time passed is certified. The direction is the best
-// separating axis of time t and r its own rate of turning: then all vertices of the touching
-// features keep one tangent, and the steps converge quadratically, as Newton's do, but from below.
-// (With r = 0 a turning face tilts away from n and convergence is linear.)
-//
-// Bodies grown by balls of radii R in all are apart while s(h) > R |n(h)|, and |n(h)| is at most
-// 1 + (h |r|)^2 / 2 for r across n: R and R |r|^2 join the constant and K. Their direction is that
-// of the nearest points of the hulls, and r the rate at which the features turn that these lie on.
+// First contact of bodies given by vertices. The direction is the best separating axis of time t
+// and r its own rate of turning: then all vertices of the touching features keep one tangent, and
+// the steps converge quadratically, as Newton's do, but from below. (With r = 0 a turning face
+// tilts away from n and convergence is linear.) The direction of bodies grown by balls is that of
+// the nearest points of the hulls, and r the rate at which the features turn that these lie on.
 #include "tauguard/rigid/first_contact.hpp"
 
 #include <algorithm>
 
-#include "nearest.hpp"
+#include "advancement.hpp"
 #include "tauguard/geometry/interrupt.hpp"
+#include "tauguard/rigid/distance.hpp"
 
 namespace tauguard::rigid {
 namespace {
 
-constexpr double unit_roundoff = 0x1p-53;
 // A guard against creeping along a resting gap; the time reached is still never late. Bodies that
 // pass close by each other take a few steps a radian, so the turning of both counts.
 constexpr int most_steps = 20000, steps_a_radian = 64;
@@ -141,73 +131,21 @@ Axis best_axis(const MovingBody& a, const MovingBody& b, double enough) {
   return best;
 }
 
-// G and its slope at h, from the projections p + h v of both bodies.
-class Lower {
- public:
-  Lower(const MovingBody& a, const MovingBody& b, const Axis& axis, double horizon, double margin)
-      : margin_(margin + rounding(a, b)) {
-    const double turn = norm(axis.rate) * (1 + 0x1p-40), drift = turn * horizon;
-    const double speed_b = norm(b.linear() - a.linear()) * (1 + 0x1p-40) + b.turning_speed();
-    half_k_ = turn * (a.turning_speed() + speed_b) +
-              0.5 * (a.acceleration(axis.n, drift) + b.acceleration(axis.n, drift)) +
-              0.5 * rounding(a, b) * turn * turn;
-    project(a, axis, a.centre, a.linear(), &a_);
-    project(b, axis, a.centre, a.linear(), &b_);
-  }
-
-  double operator()(double h, double* slope) const {
-    double top = -INFINITY, bottom = INFINITY, top_v = 0, bottom_v = 0;
-    for (const auto& [p, v] : a_)
-      if (p + h * v > top) top = p + h * v, top_v = v;
-    for (const auto& [p, v] : b_)
-      if (p + h * v < bottom) bottom = p + h * v, bottom_v = v;
-    *slope = bottom_v - top_v - 2 * half_k_ * h;
-    return bottom - top - half_k_ * h * h - margin_;
-  }
-
- private:
-  using Tangents = std::vector<std::array<double, 2>>;
-
-  static void project(const MovingBody& body, const Axis& axis, const Vec& centre, const Vec& drift,
-                      Tangents* out) {
-    out->resize(body.now.size());
-    for (std::size_t i = 0; i < body.now.size(); ++i) {
-      const Vec x = body.now[i] - centre;
-      (*out)[i] = {dot(axis.n, x), dot(axis.rate, x) + dot(axis.n, body.velocity[i] - drift)};
-    }
-  }
-
-  Tangents a_, b_;
-  double half_k_, margin_;
-};
-
-// The largest step found with G >= 0 on [0, step]; at_zero = G(0) > 0. Newton from the right stays
-// right of the root of a concave function; the chord from (0, G(0)) to a point right of the root
-// crosses zero left of it.
-double safe_step(const Lower& g, double at_zero, double limit) {
-  double slope, h = limit, value = g(h, &slope);
-  if (value >= 0) return limit;
-  for (int i = 0; i < 60 && value < -1e-6 * at_zero; ++i) {
-    const double next = h - value / slope;
-    if (!(next < h) || !(next > 0)) break;
-    h = next;
-    value = g(h, &slope);
-  }
-  return value >= 0 ? h : h * (at_zero / (at_zero - value)) * (1 - 4 * unit_roundoff);
-}
-
 double certified_step(const MovingBody& a, const MovingBody& b, const Axis& axis, double margin,
                       double left) {
   // Beyond the time that the direction takes to turn by a radian its tangent says nothing.
-  const double turn = norm(axis.rate), horizon = turn * left > 1 ? 1 / turn : left;
-  return safe_step(Lower(a, b, axis, horizon, margin), axis.separation - margin, horizon);
+  const double rate = norm(axis.rate), horizon = rate * left > 1 ? 1 / rate : left;
+  const Turning direction{axis.n, axis.rate, rate * (1 + 0x1p-40)};
+  const SeparationBound<MovingBody> g(a, b, direction, horizon, margin + rounding(a, b),
+                                      rounding(a, b));
+  return safe_step(g, axis.separation - margin, horizon, 1e-6);
 }
 
 // How far the step goes for which the bodies stay apart along one fixed direction whatever their
 // angles are; `axis` becomes that direction. Bodies that turn fast and pass by each other are kept
 // apart by it in a few steps, where their true surfaces would take one for each radian.
 double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* axis) {
-  const Vec between = b.centre - a.centre, drift = b.linear() - a.linear();
+  const Vec between = b.centre() - a.centre(), drift = b.linear() - a.linear();
   const auto across = [](const Vec& v, const Vec& n) { return v - dot(v, n) * n; };
   const Vec tried[] = {axis->n,
                        between,
@@ -253,20 +191,17 @@ Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
   // Rounding: a projection takes fewer than 40 operations on values up to `magnitude`, once for
   // each body, and again in the tangents; 128 covers both.
   const double margin = 128 * unit_roundoff * (a.magnitude() + b.magnitude());
-  double t = start, before = start;
-  Axis last;  // of time `before`, certainly separating: at contact itself rounding may leave no
-              // direction
+  double t, before = start;
+  Axis axis, last;  // of time t; of time `before`, certainly separating: at contact itself rounding
+                    // may leave no direction
   const double turning = (a.angular_speed() + b.angular_speed()) * (end - start);
   const double limit = most_steps + steps_a_radian * std::min(turning, 1e6);
-  for (int step = 0; step < limit; ++step) {
+  const auto close = [&](double) {
     geometry::poll_interrupt();
-    a.move_to(t), b.move_to(t);
-    Axis axis = best_axis(a, b, 2 * margin);
-    const auto touch = [&] {
-      return Impact{t, true, contact_normal(a, b, last, t - before, axis)};
-    };
-    if (axis.separation <= 2 * margin) return touch();
-    const double left = end - t;
+    axis = best_axis(a, b, 2 * margin);
+    return axis.separation <= 2 * margin;
+  };
+  const auto certified = [&](double left) {
     double h = certified_step(a, b, axis, margin, left);
     if (h < left && rounding(a, b) > 0) {  // the nearest features may be about to change
       Axis still = axis;
@@ -279,12 +214,11 @@ Impact first_contact(MovingBody& a, MovingBody& b, double start, double end) {
       const double longer = spun_step(a, b, margin, &fixed);
       if (longer > h) h = longer, axis = fixed;
     }
-    if (h >= left) return {end, false, axis.n};
-    last = axis, before = t;
-    if (t + h <= t) return touch();
-    t += h;
-  }
-  return {t, true, last.n};
+    if (h < left) last = axis, before = t;
+    return h;
+  };
+  if (!advance(a, b, start, end, limit, close, certified, &t)) return {t, false, axis.n};
+  return {t, true, contact_normal(a, b, last, t - before, axis)};
 }
 
 }  // namespace tauguard::rigid

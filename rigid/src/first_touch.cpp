@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "convex_contact.hpp"
-#include "nearest.hpp"
+#include "tauguard/rigid/distance.hpp"
 
 namespace tauguard::rigid {
 namespace {

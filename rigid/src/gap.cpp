@@ -5,7 +5,7 @@
 #include "convex_contact.hpp"
 #include "exact_gap.hpp"
 #include "facet_depth.hpp"
-#include "nearest.hpp"
+#include "tauguard/rigid/distance.hpp"
 
 namespace tauguard::rigid {
 namespace {

@@ -153,7 +153,7 @@ struct Way {
   Poses poses() const { return {xpos[0], xmat[0], xpos[1], xmat[1]}; }
 };
 
-const Frame in_place{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
+const LocalFrame in_place{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
 
 // When two balls of radius r first touch on straight ways; infinite if never.
 double balls(const Way& w, double r) {
@@ -169,7 +169,7 @@ double balls(const Way& w, double r) {
 
 // Whether the cores share a point at a sampled time before `t`.
 bool touch_before(Geoms& geoms, double t) {
-  Mover a = geoms.mover(0, Vec{}), b = geoms.mover(1, Vec{});
+  SupportShape a = geoms.mover(0, Vec{}), b = geoms.mover(1, Vec{});
   const double radii = a.radius() + b.radius();
   for (int k = 0; k < (t > 0 ? 24 : 0); ++k) {
     a.move_to(t * k / 24), b.move_to(t * k / 24);

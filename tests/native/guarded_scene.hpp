@@ -141,7 +141,7 @@ inline int add_shape(const mjModel* m, int geom, double layer, Verdict* verdict)
   if (round) shape.radius = m->geom_size[3 * geom] - layer;
   double mat[9];
   mju_quat2Mat(mat, m->geom_quat + 4 * geom);
-  Frame frame;
+  LocalFrame frame;
   for (int i = 0; i < 3; ++i)
     frame.row[i] = {mat[3 * i], mat[3 * i + 1], mat[3 * i + 2]},
     frame.at[i] = m->geom_pos[3 * geom + i];

@@ -18,7 +18,7 @@ Shape shape_of(Input& in) {
   return shape;
 }
 
-const Frame in_place{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
+const LocalFrame in_place{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
 
 // Of two bodies at both ends of a step; what a diverging simulation gives is not excluded.
 struct Way {

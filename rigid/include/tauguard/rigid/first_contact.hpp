@@ -1,7 +1,7 @@
 // First contact of two moving convex bodies, from below.
 #pragma once
 
-#include "tauguard/rigid/moving_body.hpp"
+#include "tauguard/rigid/distance.hpp"
 
 namespace tauguard::rigid {
 
@@ -19,5 +19,24 @@ Impact first_contact(MovingBody& a, MovingBody& b, double start, double end);
 inline double contact_tolerance(const MovingBody& a, const MovingBody& b) {
   return 1e-9 * (a.radius() + b.radius()) + 0x1p-40 * (a.magnitude() + b.magnitude());
 }
+
+// Where and when two support shapes touch.
+struct Touch {
+  bool hit = false;
+  double t = INFINITY;    // the shapes are further apart than the threshold on [start, t)
+  double distance = NAN;  // signed, between both surfaces at t: negative is penetration
+  Vec point{}, normal{};  // relative to the shapes' origin; the normal from a to b
+};
+
+// Advances from `start` to 1 while the surfaces are further apart than `threshold` >= 0. Shapes
+// closer than the fraction `touching` of their size touch: a smaller one costs steps, a larger one
+// is early by as much.
+Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double start,
+                    double touching = 1e-10);
+
+// The contact at the present time t of both shapes; `n` is the last direction in which they were
+// apart, or zero.
+Touch describe(const SupportShape& a, const SupportShape& b, const Distance& d, const Vec& n,
+               double t);
 
 }  // namespace tauguard::rigid

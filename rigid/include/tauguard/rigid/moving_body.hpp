@@ -66,14 +66,14 @@ class MovingBody {
   void add_normal(const Vec& n) { add_direction(normals_, n); }
   void add_edge(const Vec& e) { add_direction(edges_, e); }
 
-  // Sets `now`, `velocity`, `centre`, `normal` and `edge` for time t.
+  // Sets `now`, `velocity`, `centre()`, `normal` and `edge` for time t.
   void move_to(double t) {
     const double c = std::cos(motion_.speed * t), s = std::sin(motion_.speed * t);
     const double w = motion_.speed;
     now.resize(vertices_.size()), velocity.resize(vertices_.size());
-    centre = shift_ + t * motion_.linear;
+    centre_ = shift_ + t * motion_.linear;
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
-      now[i] = centre + vertices_[i].at(c, s);
+      now[i] = centre_ + vertices_[i].at(c, s);
       velocity[i] = motion_.linear + w * (c * vertices_[i].side - s * vertices_[i].swing);
     }
     normal.clear(), edge.clear();
@@ -100,6 +100,10 @@ class MovingBody {
   }
   // Bound on the speed of any vertex about the centre.
   double turning_speed() const { return motion_.speed * sweep_ * (1 + 0x1p-40); }
+  // Bound on the speed of any vertex against something that goes by `drift`.
+  double speed_about(const Vec& drift) const {
+    return norm(motion_.linear - drift) * (1 + 0x1p-40) + turning_speed();
+  }
   Vec angular() const { return motion_.speed * motion_.axis; }
   const Vec& axis() const { return motion_.axis; }  // unit, zero where nothing turns
   double angular_speed() const { return motion_.speed; }
@@ -107,11 +111,11 @@ class MovingBody {
   double magnitude() const {
     return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_ + rounding;
   }
+  const Vec& centre() const { return centre_; }  // of the rotation
   double radius() const { return radius_; }
   const Vec& linear() const { return motion_.linear; }
 
   std::vector<Vec> now, velocity, normal, edge;
-  Vec centre{};          // of the rotation
   double rounding = 0;   // the body is the hull of its vertices grown by a ball of this radius
   bool complete = true;  // normals and crossed edges hold a separating axis of any disjoint pair
 
@@ -123,7 +127,7 @@ class MovingBody {
   }
 
   const RigidMotion& motion_;
-  Vec shift_;
+  Vec shift_, centre_{};
   std::vector<Swing> vertices_, normals_, edges_;
   double radius_ = 0, sweep_ = 0;
 };

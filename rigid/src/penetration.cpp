@@ -2,14 +2,14 @@
 // nearest to the origin is the shortest translation of b that separates the cores. The polytope
 // need not hold the origin yet: its faces expand in the order of their signed distance, those with
 // the origin outside first.
-#include "penetration.hpp"
+#include "tauguard/rigid/distance.hpp"
 
 #include <algorithm>
 #include <array>
 #include <utility>
 #include <vector>
 
-namespace tauguard::contacts {
+namespace tauguard::rigid {
 namespace {
 
 constexpr int most_vertices = 200;
@@ -28,7 +28,8 @@ struct Face {
 
 class Polytope {
  public:
-  Polytope(const Mover& a, const Mover& b) : a_(a), b_(b), size_(a.reach() + b.reach()) {}
+  Polytope(const SupportShape& a, const SupportShape& b)
+      : a_(a), b_(b), size_(a.reach() + b.reach()) {}
 
   Vertex along(const Vec& d) const {
     Vertex p;
@@ -133,7 +134,7 @@ class Polytope {
     faces_.push_back({{i, j, k}, n, dot(n, p)});
   }
 
-  const Mover &a_, &b_;
+  const SupportShape &a_, &b_;
   double size_;
   Vec inside_{};
   std::vector<Vertex> vertices_;
@@ -142,7 +143,7 @@ class Polytope {
 
 }  // namespace
 
-void penetration(const Mover& a, const Mover& b, Distance* d) {
+void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
   Polytope polytope(a, b);
   Vec flat{};
   if (!polytope.start(&flat)) {
@@ -162,4 +163,4 @@ void penetration(const Mover& a, const Mover& b, Distance* d) {
   d->on_a = d->on_b = 0.5 * (on_a + on_b);
 }
 
-}  // namespace tauguard::contacts
+}  // namespace tauguard::rigid

@@ -1,8 +1,8 @@
-#include "shapes.hpp"
+#include "tauguard/rigid/support_shape.hpp"
 
 #include <algorithm>
 
-namespace tauguard::contacts {
+namespace tauguard::rigid {
 
 Vec Shape::support(const Vec& d) const {
   switch (core) {
@@ -118,7 +118,8 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
   return RigidMotion(pose, linear, angular);
 }
 
-Mover::Mover(const Shape& shape, const Frame& in_body, const RigidMotion& motion, const Vec& origin)
+SupportShape::SupportShape(const Shape& shape, const LocalFrame& in_body, const RigidMotion& motion,
+                           const Vec& origin)
     : shape_(&shape),
       in_body_(in_body),
       motion_(&motion),
@@ -129,8 +130,8 @@ Mover::Mover(const Shape& shape, const Frame& in_body, const RigidMotion& motion
   magnitude_ = norm(shift_) + norm(motion.linear) + (4 + motion.speed) * reach_ + radius_;
 }
 
-Mover::Mover(const double* const* x_t0, const double* const* x_t1, int count, double radius,
-             const Vec& origin)
+SupportShape::SupportShape(const double* const* x_t0, const double* const* x_t1, int count,
+                           double radius, const Vec& origin)
     : count_(count), radius_(radius) {
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -142,13 +143,13 @@ Mover::Mover(const double* const* x_t0, const double* const* x_t1, int count, do
   }
 }
 
-void Mover::move_to(double t) {
+void SupportShape::move_to(double t) {
   if (!turning_) {
     for (int i = 0; i < count_; ++i) now_[i] = start_[i] + t * velocity_[i];
     return;
   }
   centre_ = shift_ + t * motion_->linear;
-  Frame body{{motion_->r0[0], motion_->r0[1], motion_->r0[2]}, centre_};
+  LocalFrame body{{motion_->r0[0], motion_->r0[1], motion_->r0[2]}, centre_};
   if (motion_->speed != 0) {
     const double angle = motion_->speed * t, c = std::cos(angle), s = std::sin(angle),
                  half = std::sin(0.5 * angle);
@@ -166,7 +167,7 @@ void Mover::move_to(double t) {
                          body.row[i][2] * in_body_.row[2][j];
 }
 
-Vec Mover::support(const Vec& d) const {
+Vec SupportShape::support(const Vec& d) const {
   if (turning_) return frame_.out(shape_->support(frame_.back(d)));
   int best = 0;
   double most = dot(d, now_[0]);
@@ -177,39 +178,43 @@ Vec Mover::support(const Vec& d) const {
   return now_[best];
 }
 
-double Mover::tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift) const {
+double SupportShape::tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift,
+                             double* slope) const {
   if (turning_) {
     // x = centre + y and x' = linear + w x y, and n.(w x y) = y.(n x w).
-    const Vec m = n + h * (r + cross(n, angular()));
+    const Vec rate = r + cross(n, angular()), m = n + h * rate;
     const Vec y = support(m) - centre_, from = centre_ - c;
-    return dot(n, from) + h * (dot(r, from) + dot(n, motion_->linear - drift)) + dot(m, y);
+    const double straight = dot(r, from) + dot(n, motion_->linear - drift);
+    *slope = straight + dot(rate, y);
+    return dot(n, from) + h * straight + dot(m, y);
   }
   double most = -INFINITY;
   for (int i = 0; i < count_; ++i) {
     const Vec x = now_[i] - c;
-    most = std::max(most, dot(n, x) + h * (dot(r, x) + dot(n, velocity_[i] - drift)));
+    const double v = dot(r, x) + dot(n, velocity_[i] - drift), p = dot(n, x) + h * v;
+    if (p > most) most = p, *slope = v;
   }
   return most;
 }
 
-double Mover::speed_about(const Vec& drift) const {
+double SupportShape::speed_about(const Vec& drift) const {
   if (turning_) return norm(motion_->linear - drift) + motion_->speed * reach_;
   double most = 0;
   for (int i = 0; i < count_; ++i) most = std::max(most, norm(velocity_[i] - drift));
   return most;
 }
 
-double Mover::acceleration(const Vec& n, double drift) const {
+double SupportShape::acceleration(const Vec& n, double drift) const {
   if (!turning_ || motion_->speed == 0) return 0;
   const Vec across = n - dot(n, motion_->axis) * motion_->axis;
   return motion_->speed * motion_->speed * reach_ * (norm(across) + drift + 0x1p-40);
 }
 
-Vec Mover::middle() const {
+Vec SupportShape::middle() const {
   if (turning_) return frame_.at;
   Vec sum{};
   for (int i = 0; i < count_; ++i) sum = sum + now_[i];
   return (1.0 / count_) * sum;
 }
 
-}  // namespace tauguard::contacts
+}  // namespace tauguard::rigid

@@ -4,20 +4,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "tauguard/geometry/rounding.hpp"
 #include "tauguard/rigid/moving_body.hpp"
 
-namespace tauguard::contacts {
+namespace tauguard::rigid {
 
-using rigid::cross;
-using rigid::dot;
-using rigid::norm;
-using rigid::RigidMotion;
-using rigid::Vec;
-using rigid::operator+;
-using rigid::operator-;
-using rigid::operator*;
-
-constexpr double unit_roundoff = 0x1p-53;
+using geometry::unit_roundoff;
 
 enum class Core : std::uint8_t { half_space, point, segment, ellipsoid, disc_prism, box, hull };
 
@@ -35,7 +27,7 @@ struct Shape {
   bool polytope() const { return core == Core::box || core == Core::hull; }
 };
 
-struct Frame {
+struct LocalFrame {
   Vec row[3];  // of the rotation
   Vec at;
   Vec out(const Vec& y) const { return Vec{dot(row[0], y), dot(row[1], y), dot(row[2], y)} + at; }
@@ -50,17 +42,19 @@ RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const d
 
 // A shape on a moving body, or a simplex whose vertices move linearly. Positions are relative to an
 // origin near both partners.
-class Mover {
+class SupportShape {
  public:
-  Mover(const Shape& shape, const Frame& in_body, const RigidMotion& motion, const Vec& origin);
-  Mover(const double* const* x_t0, const double* const* x_t1, int count, double radius,
-        const Vec& origin);
+  SupportShape(const Shape& shape, const LocalFrame& in_body, const RigidMotion& motion,
+               const Vec& origin);
+  SupportShape(const double* const* x_t0, const double* const* x_t1, int count, double radius,
+               const Vec& origin);
 
   void move_to(double t);
   Vec support(const Vec& d) const;
   // Max over the core of n.(x - c) + h (r.(x - c) + n.(x' - drift)): the tangent of the projection
-  // on n + h r.
-  double tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift) const;
+  // on n + h r, and its slope.
+  double tangent(const Vec& n, const Vec& r, double h, const Vec& c, const Vec& drift,
+                 double* slope) const;
   double speed_about(const Vec& drift) const;  // no point moves faster than this against drift
   double acceleration(const Vec& n,
                       double drift) const;  // bound on |n.x''| for n within drift of the given one
@@ -76,7 +70,7 @@ class Mover {
 
  private:
   const Shape* shape_ = nullptr;
-  Frame in_body_{}, frame_{};
+  LocalFrame in_body_{}, frame_{};
   const RigidMotion* motion_ = nullptr;
   bool turning_ = false;
   int count_ = 0;
@@ -84,4 +78,4 @@ class Mover {
   double radius_ = 0, reach_ = 0, magnitude_ = 0;
 };
 
-}  // namespace tauguard::contacts
+}  // namespace tauguard::rigid

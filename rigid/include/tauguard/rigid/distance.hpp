@@ -1,0 +1,45 @@
+// How far apart two convex bodies are at one instant, or how deep in each other: to rounding, with
+// bounds from both sides for support shapes.
+#pragma once
+
+#include "tauguard/rigid/support_shape.hpp"
+
+namespace tauguard::rigid {
+
+// Points whose convex hull is meant.
+using PointList = std::vector<Vec>;
+
+// The nearest points of two hulls, or one common point where they meet, and the features that these
+// lie on: rows of a and of b. Four pairs: the hulls meet.
+struct Nearest {
+  Vec a, b;
+  int size;
+  std::array<std::array<std::size_t, 2>, 4> corner;
+};
+Nearest nearest(const PointList& a, const PointList& b);
+
+// A point of both hulls where they meet, otherwise the middle of their nearest points.
+Vec middle_point(const PointList& a, const PointList& b);
+
+// The unit direction from a to b along which the hulls are furthest apart; false where they meet.
+bool separating_direction(const PointList& a, const PointList& b, Vec* n, double* separation);
+
+struct Distance {
+  double lower = -INFINITY;  // certified: the cores are this far apart along n (negative: they may
+                             // overlap)
+  double upper = INFINITY;   // the length of a segment between both cores
+  Vec n{};                   // unit, from a to b
+  Vec on_a{}, on_b{};        // the ends of that segment
+  bool overlap = false;      // the cores share a point, to rounding
+};
+
+// Of the cores at the present time of both shapes. `guess` is the first direction tried. The search
+// ends early once `lower` exceeds `needed` and lies within a tenth of what is left above it.
+Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec& guess, double needed);
+
+// Replaces the fields of an overlapping `d`: `lower` is minus the penetration depth of the cores,
+// `n` the direction in which b leaves a by the shortest path, and both points are the middle of the
+// overlap.
+void penetration(const SupportShape& a, const SupportShape& b, Distance* d);
+
+}  // namespace tauguard::rigid

@@ -1,0 +1,135 @@
+// Conservative advancement (Mirtich 1996; Zhang, Lee and Kim 2006) along separating directions that
+// turn with the bodies.
+//
+// Take a time t, a unit n and any rate r, and let the direction be n(h) = n + h r. With
+// s(h) = min_b n(h).x_b - max_a n(h).x_a at time t + h, the bodies are apart while s > 0, whatever
+// n and r are. Measured from a's centre c, each projection is its tangent at h = 0 plus at most K
+// h^2 / 2, where K bounds its second derivative |2 r.(x - c)' + n(h).x''|; so s(h) >= G(h) = min_b
+// (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and computable: the step
+// goes to just before its root, and every time passed is certified.
+//
+// Bodies grown by balls of radii R in all are apart while s(h) > R |n(h)|, and |n(h)| is at most
+// 1 + (h |r|)^2 / 2 for r across n: R and R |r|^2 join the constant and K.
+#pragma once
+
+#include <algorithm>
+#include <utility>
+
+#include "tauguard/rigid/support_shape.hpp"
+
+namespace tauguard::rigid {
+
+// A direction, its rate of turning, and a bound on |rate|.
+struct Turning {
+  Vec n, rate;
+  double turn;
+};
+
+// The largest tangent over the vertices of a body, and its slope.
+class VertexTangents {
+ public:
+  VertexTangents(const MovingBody& body, const Vec& n, const Vec& rate, const Vec& centre,
+                 const Vec& drift)
+      : lines_(body.now.size()) {
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+      const Vec x = body.now[i] - centre;
+      lines_[i] = {dot(n, x), dot(rate, x) + dot(n, body.velocity[i] - drift)};
+    }
+  }
+  double operator()(double h, double* slope) const {
+    double top = -INFINITY;
+    for (const auto& [p, v] : lines_)
+      if (p + h * v > top) top = p + h * v, *slope = v;
+    return top;
+  }
+
+ private:
+  std::vector<std::array<double, 2>> lines_;
+};
+
+// The same of a shape: one call of its support function.
+class SupportTangent {
+ public:
+  SupportTangent(const SupportShape& shape, const Vec& n, const Vec& rate, const Vec& centre,
+                 const Vec& drift)
+      : shape_(shape), n_(n), rate_(rate), centre_(centre), drift_(drift) {}
+  double operator()(double h, double* slope) const {
+    return shape_.tangent(n_, rate_, h, centre_, drift_, slope);
+  }
+
+ private:
+  const SupportShape& shape_;
+  const Vec n_, rate_, centre_, drift_;
+};
+
+inline VertexTangents tangents(const MovingBody& body, const Vec& n, const Vec& rate,
+                               const Vec& centre, const Vec& drift) {
+  return VertexTangents(body, n, rate, centre, drift);
+}
+inline SupportTangent tangents(const SupportShape& shape, const Vec& n, const Vec& rate,
+                               const Vec& centre, const Vec& drift) {
+  return SupportTangent(shape, n, rate, centre, drift);
+}
+
+// G and its slope at h, for surfaces `offset` from the cores; the part `radius` of it turns.
+template <class Body>
+class SeparationBound {
+ public:
+  SeparationBound(const Body& a, const Body& b, const Turning& d, double horizon, double offset,
+                  double radius)
+      : a_(tangents(a, d.n, d.rate, a.centre(), a.linear())),
+        b_(tangents(b, -1.0 * d.n, -1.0 * d.rate, a.centre(), a.linear())),
+        offset_(offset) {
+    const double drift = d.turn * horizon;
+    half_k_ = d.turn * (a.speed_about(a.linear()) + b.speed_about(a.linear())) +
+              0.5 * (a.acceleration(d.n, drift) + b.acceleration(d.n, drift)) +
+              0.5 * radius * d.turn * d.turn;
+  }
+
+  double operator()(double h, double* slope) const {
+    double up, down;
+    const double top = a_(h, &up), bottom = b_(h, &down);
+    *slope = -down - up - 2 * half_k_ * h;
+    return -bottom - top - half_k_ * h * h - offset_;
+  }
+
+ private:
+  decltype(tangents(std::declval<Body>(), {}, {}, {}, {})) a_, b_;
+  double offset_, half_k_;
+};
+
+// The largest step found with G >= 0 on [0, step]; at_zero = G(0) > 0. Newton from the right stays
+// right of the root of a concave function; the chord from (0, G(0)) to a point right of the root
+// crosses zero left of it. Newton ends where G is below zero by less than the share `accuracy`.
+template <class Bound>
+double safe_step(const Bound& g, double at_zero, double limit, double accuracy) {
+  double slope, h = limit, value = g(h, &slope);
+  if (value >= 0) return limit;
+  for (int i = 0; i < 60 && value < -accuracy * at_zero; ++i) {
+    const double next = h - value / slope;
+    if (!(next < h) || !(next > 0)) break;
+    h = next;
+    value = g(h, &slope);
+  }
+  return value >= 0 ? h : h * (at_zero / (at_zero - value)) * (1 - 4 * unit_roundoff);
+}
+
+// Moves both bodies on from `start` until `close(t)`, by steps `certified(left)` on which they stay
+// apart. True where they came close, at the time *t, which is never late; false where all of
+// [start, end] is certified.
+template <class Body, class Close, class Certified>
+bool advance(Body& a, Body& b, double start, double end, double most_steps, const Close& close,
+             const Certified& certified, double* t) {
+  *t = start;
+  for (int step = 0; step < most_steps; ++step) {
+    a.move_to(*t), b.move_to(*t);
+    if (close(*t)) return true;
+    const double left = end - *t, h = certified(left);
+    if (h >= left) return *t = end, false;
+    if (*t + h <= *t) return true;
+    *t += h;
+  }
+  return true;
+}
+
+}  // namespace tauguard::rigid

@@ -1,0 +1,167 @@
+#include "tauguard/rigid/distance.hpp"
+
+#include "gjk.hpp"
+
+namespace tauguard::rigid {
+namespace {
+
+using Rows = std::array<std::size_t, 2>;
+struct SourcePoints {
+  Vec a, b;
+};
+
+// The first row that is furthest along n.
+std::size_t extreme(const PointList& points, const Vec& n) {
+  std::size_t best = 0;
+  double most = dot(n, points[0]);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const double x = dot(n, points[i]);
+    if (most < x) most = x, best = i;
+  }
+  return best;
+}
+
+// Ends where no difference is nearer, to rounding.
+struct ToRounding {
+  void visit(const Simplex<Rows>&) {}
+  bool enough(const Vec& v, const Vec& next) const {
+    return dot(v, v) - dot(v, next) <= 1e-14 * dot(v, v);
+  }
+  void stuck(const Simplex<Rows>&, const Vec&) {}
+};
+
+template <class Watch>
+Simplex<Rows> descend_hulls(const PointList& a, const PointList& b, Watch& watch) {
+  const auto support = [&](const Vec& v) {
+    const std::size_t i = extreme(a, v), j = extreme(b, -1.0 * v);
+    return Corner<Rows>{b[j] - a[i], {i, j}, 0};
+  };
+  return descend(Corner<Rows>{b[0] - a[0], {0, 0}, 1.0}, support, watch, 0.0);
+}
+
+// Close to contact the nearest point itself is all cancellation, so the normals of the last
+// simplex's triangles are tried as well; the best of them wins.
+struct Separating : ToRounding {
+  const PointList &a, &b;
+  Vec* n;
+  double* separation;
+
+  Separating(const PointList& a, const PointList& b, Vec* n, double* separation)
+      : a(a), b(b), n(n), separation(separation) {}
+  void attempt(const Vec& d) {
+    const double length = norm(d);
+    if (!(length > 0)) return;
+    for (const double sign : {1.0, -1.0}) {
+      const Vec u = (sign / length) * d;
+      const double s = dot(u, b[extreme(b, -1.0 * u)]) - dot(u, a[extreme(a, u)]);
+      if (s > *separation) *separation = s, *n = u;
+    }
+  }
+  void visit(const Simplex<Rows>& s) {
+    attempt(s.nearest());
+    if (s.size() == 3) attempt(cross(s.w(1) - s.w(0), s.w(2) - s.w(0)));
+  }
+  void stuck(const Simplex<Rows>& s, const Vec& next) {
+    const int size = s.size() + 1;
+    const Vec all[4] = {s.w(0), size > 2 ? s.w(1) : next, size > 3 ? s.w(2) : next, next};
+    for (int skip = 0; size == 4 && skip < 4; ++skip)
+      attempt(cross(all[(skip + 1) % 4] - all[skip], all[(skip + 2) % 4] - all[skip]));
+    if (size == 3) attempt(cross(all[1] - all[0], all[2] - all[0]));
+  }
+};
+
+// Keeps the best certified lower bound, and ends by it.
+struct Bounded {
+  Distance& out;
+  double needed;
+
+  void attempt(const Vec& direction, const Vec& w) {
+    const double length = norm(direction);
+    if (!(length > 0)) return;
+    const double lower = dot(direction, w) / length;
+    if (lower > out.lower) out.lower = lower, out.n = (1 / length) * direction;
+  }
+  void visit(const Simplex<SourcePoints>&) {}
+  bool enough(const Vec& v, const Vec& next) {
+    attempt(v, next);
+    const double length = norm(v);
+    return length - out.lower <= 1e-10 * length ||
+           (out.lower > needed && length - out.lower < 0.1 * (out.lower - needed));
+  }
+  void stuck(const Simplex<SourcePoints>&, const Vec&) {}
+};
+
+Distance of_half_space(const SupportShape& a, const SupportShape& b) {
+  Distance d;
+  d.n = a.plane_normal();
+  d.on_b = b.support(-1.0 * d.n);
+  d.lower = dot(d.n, d.on_b - a.middle());
+  d.on_a = d.on_b - d.lower * d.n;
+  d.upper = std::fabs(d.lower);
+  d.overlap = d.lower < 0;
+  return d;
+}
+
+}  // namespace
+
+bool separating_direction(const PointList& a, const PointList& b, Vec* n, double* separation) {
+  *separation = -INFINITY;
+  Separating watch(a, b, n, separation);
+  descend_hulls(a, b, watch);
+  return *separation > 0;
+}
+
+Vec middle_point(const PointList& a, const PointList& b) {
+  const Nearest near = nearest(a, b);
+  return 0.5 * (near.a + near.b);
+}
+
+Nearest nearest(const PointList& a, const PointList& b) {
+  ToRounding watch;
+  const Simplex<Rows> s = descend_hulls(a, b, watch);
+  Nearest out{{}, {}, s.size(), {}};
+  for (int i = 0; i < s.size(); ++i) {
+    const Corner<Rows>& c = s.corner(i);
+    out.a = out.a + c.weight * a[c.from[0]];
+    out.b = out.b + c.weight * b[c.from[1]];
+    out.corner[i] = c.from;
+  }
+  return out;
+}
+
+Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec& guess,
+                     double needed) {
+  if (a.half_space()) return of_half_space(a, b);
+  Distance out;
+  const auto support = [&](const Vec& v) {
+    const Vec p = a.support(v), q = b.support(-1.0 * v);
+    return Corner<SourcePoints>{q - p, {p, q}, 0};
+  };
+  Vec start = guess;
+  if (!(dot(start, start) > 0)) start = b.middle() - a.middle();
+  if (!(dot(start, start) > 0)) start = {0, 0, 1};
+  Corner<SourcePoints> first = support(start);
+  first.weight = 1;
+  Bounded watch{out, needed};
+  watch.attempt(start, first.w);
+  // Below this length v is rounding: 64 covers the dozen operations behind each coordinate of it.
+  const double rounding = 64 * unit_roundoff * (a.magnitude() + b.magnitude());
+  const Simplex<SourcePoints> s = descend(first, support, watch, rounding * rounding);
+  const double square = dot(s.nearest(), s.nearest());
+  out.overlap = s.size() == 4 || square <= rounding * rounding;
+  // Close to contact the nearest point is all cancellation: the face of the last simplex has a
+  // better normal.
+  if (!out.overlap && s.size() == 3) {
+    Vec n = cross(s.w(1) - s.w(0), s.w(2) - s.w(0));
+    if (dot(n, s.w(0)) < 0) n = -1.0 * n;
+    if (dot(n, n) > 0) watch.attempt(n, support(n).w);
+  }
+  out.upper = std::sqrt(square);
+  for (int i = 0; i < s.size(); ++i) {
+    const Corner<SourcePoints>& c = s.corner(i);
+    out.on_a = out.on_a + c.weight * c.from.a, out.on_b = out.on_b + c.weight * c.from.b;
+  }
+  return out;
+}
+
+}  // namespace tauguard::rigid
