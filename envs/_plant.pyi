@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 _Array = NDArray[np.float64]
 
-FIGURES: int
+METRICS: int
 CONTACT_WIDTH: int
 PEAK_WIDTH: int
 REACH_WIDTH: int
@@ -112,7 +112,7 @@ class Rows:
         self,
         *,
         observation: _Array,
-        figure: _Array,
+        metrics: _Array,
         tau_ext: _Array,
         target: _Array,
         q: _Array,

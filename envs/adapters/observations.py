@@ -62,7 +62,7 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
             raise ValueError(f"height {height}, width {width}: expected 1 or more pixels")
         self._arm = arm_env(env)
         self._shape, self._mode = (height, width), mode
-        self._camera = Camera(self._arm.world, self._arm.cell.datas[0], height, width)
+        self._camera = Camera(self._arm.compiled, self._arm.batch.datas[0], height, width)
         state = env.observation_space
         parts: dict[str, spaces.Space[Any]] = {"state": state}
         if mode != "depth":
@@ -90,7 +90,7 @@ class CameraObservation(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructor
 
     def _seen(self, observation: Array) -> Pictures:
         seen: Pictures = {"state": observation}
-        target = self._arm.cell.target[0]
+        target = self._arm.batch.target[0]
         if self._mode != "depth":
             seen["rgb"] = self._camera.colours(target)
         if self._mode != "rgb":
@@ -120,13 +120,13 @@ class DetectorObservation(gymnasium.Wrapper[Array, Array, Array, Array], RecordC
         gymnasium.Wrapper.__init__(self, env)
         inner = arm_env(env)
         if detector is not None:
-            inner.cell.attach(detector)
-        elif inner.world.settings.detector is None:
+            inner.batch.attach(detector)
+        elif inner.compiled.settings.detector is None:
             raise ValueError(
                 "detector: the environment has none; give one to the wrapper or to make: "
                 f"{', '.join(DETECTORS)}, or the path of a trained detector"
             )
-        n = len(inner.world.scene.joint_names)
+        n = len(inner.compiled.scene.joint_names)
         box = env.observation_space
         assert isinstance(box, spaces.Box)
         bound = np.append(np.full(n, RESIDUAL_BOUND), 1.0)

@@ -11,7 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv, arm_env
-from tauguard.envs.gym.cell import BRAKE, FREE, LIMP, VELOCITY
+from tauguard.envs.gym.batch import Override
 from tauguard.envs.gym.settings import one_of
 
 #: The reactions, by name.
@@ -70,16 +70,16 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         one_of("reaction", reaction, REACTIONS)
         one_of("trigger", trigger, TRIGGERS)
         self._arm: ArmEnv = arm_env(env)
-        if trigger == "alarm" and self._arm.cell.sensing is None:
+        if trigger == "alarm" and self._arm.batch.sensing is None:
             raise ValueError("trigger 'alarm': the environment has no detector; use detector=")
         self.reaction, self.trigger = reaction, trigger
-        world = self._arm.world
-        n = len(world.scene.joint_names)
-        own = world.scene.facts.max_acceleration
+        compiled = self._arm.compiled
+        n = len(compiled.scene.joint_names)
+        own = compiled.scene.facts.max_acceleration
         self._deceleration = np.resize(own if deceleration is None else deceleration, n)
-        self._period = 1 / world.settings.control_rate
+        self._period = 1 / compiled.settings.control_rate
         # Critically damped gains: kp = w^2 M and kd = 2 w M.
-        self._inertia = world.gains.kd**2 / (4 * world.gains.kp)
+        self._inertia = compiled.gains.kd**2 / (4 * compiled.gains.kp)
         self._dead = self._dead_zone()
         self._retract_steps = round(RETRACT_TIME / self._period)
         self._past: deque[Array] = deque(maxlen=round(2.0 / self._period))
@@ -87,7 +87,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
 
     def _dead_zone(self) -> Array:
         """What the residual may be without contact [N m]; nothing where it is the truth."""
-        sensing = self._arm.cell.sensing
+        sensing = self._arm.batch.sensing
         if not sensing or self.trigger != "alarm":
             return np.zeros(len(self._deceleration))
         return sensing[0].bounds
@@ -98,7 +98,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         self._tau = self._measured = np.zeros(len(self._deceleration))
         self._returning: list[Array] | None = None
         self._past.clear()
-        self._arm.cell.plants[0].override(FREE, self._speed)
+        self._arm.batch.plants[0].override(Override.FREE, self._speed)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -113,7 +113,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         """Act, or react."""
         if self._since is not None and self.reaction != "continue":
             kind, speed = self._react()
-            self._arm.cell.plants[0].override(kind, speed)
+            self._arm.batch.plants[0].override(kind, speed)
             self._since += self._period
         observation, reward, terminated, truncated, info = self.env.step(action)
         self._look(info)
@@ -123,7 +123,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     def _look(self, info: dict[str, Any]) -> None:
         """Remember where the arm has been, and see whether the reaction must begin."""
         n = len(self._deceleration)
-        observation = self._arm.cell.observation[0]
+        observation = self._arm.batch.observation[0]
         self._past.append(observation[:n].copy())
         self._measured = observation[n : 2 * n].copy()
         if self._since is None and (info["alarm"] if self.trigger == "alarm" else info["force"]):
@@ -135,7 +135,9 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         """What replaces the next action: native code and joint velocities [rad/s]."""
         assert self._since is not None
         if self.reaction == "stop0":
-            return (LIMP if self._since < BRAKE_DELAY - 1e-9 else BRAKE), self._speed
+            return (
+                Override.LIMP if self._since < BRAKE_DELAY - 1e-9 else Override.BRAKE
+            ), self._speed
         if self.reaction == "admittance":
             step = self._period / ADMITTANCE_INERTIA
             damping = ADMITTANCE_INERTIA / ADMITTANCE_TIME
@@ -143,13 +145,13 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
             push = push / self._inertia
             # Implicit in the damping: stable for any period.
             self._speed = (self._speed + step * push) / (1 + step * damping)
-            return VELOCITY, self._speed
+            return Override.VELOCITY, self._speed
         stopped = self._slow_down()
         if self.reaction == "stop1" and stopped:
-            return BRAKE, self._speed
+            return Override.BRAKE, self._speed
         if self.reaction == "retract" and stopped:
-            return VELOCITY, self._back()
-        return VELOCITY, self._speed
+            return Override.VELOCITY, self._back()
+        return Override.VELOCITY, self._speed
 
     def _slow_down(self) -> bool:
         """All joints together, so that the arm stays on its path; whether it stands.

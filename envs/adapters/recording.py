@@ -30,8 +30,8 @@ class _Rows:
     qd: list[Array] = field(default_factory=list)
     current: list[Array] = field(default_factory=list)
     tau: list[Array] = field(default_factory=list)
-    contact: list[Array] = field(default_factory=list)
-    region: list[Array] = field(default_factory=list)
+    contact: list[NDArray[np.void]] = field(default_factory=list)
+    region: list[NDArray[np.void]] = field(default_factory=list)
     residual: list[Array] = field(default_factory=list)
     alarm: list[NDArray[np.bool_]] = field(default_factory=list)
 
@@ -68,7 +68,7 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
         """Act, and keep the rows of the action."""
         result = self.env.step(action)
-        if not result[4]["reason"]:
+        if not self._arm.batch.metrics["diverged"][0]:
             self._keep()
         if result[2] or result[3]:
             self._finish()
@@ -80,17 +80,17 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
         super().close()
 
     def _keep(self) -> None:
-        cell, rows = self._arm.cell, self._rows
-        signals = (cell.q[0], cell.qd[0], cell.current[0])
-        if cell.sensing is not None:
-            signals = cell.sensing[0].measured
-            rows.residual.append(cell.sensing[0].residuals.copy())
-            rows.alarm.append(cell.sensing[0].alarms.copy())
+        batch, rows = self._arm.batch, self._rows
+        signals = (batch.q[0], batch.qd[0], batch.current[0])
+        if batch.sensing is not None:
+            signals = batch.sensing[0].measured
+            rows.residual.append(batch.sensing[0].residuals.copy())
+            rows.alarm.append(batch.sensing[0].alarms.copy())
         for kept, signal in zip((rows.q, rows.qd, rows.current), signals, strict=True):
             kept.append(signal.copy())
-        rows.tau.append(cell.tau[0].copy())
-        rows.contact.append(cell.contact[0].copy())
-        rows.region.append(cell.region[0].copy())
+        rows.tau.append(batch.tau[0].copy())
+        rows.contact.append(batch.contact[0].copy())
+        rows.region.append(batch.region[0].copy())
 
     def _finish(self) -> None:
         rows, self._rows = self._rows, _Rows()
@@ -98,8 +98,8 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
             return
         trace = self._trace(rows)
         detection = None
-        if rows.alarm and self._arm.cell.sensing and self._arm.cell.sensing[0].detector:
-            detector = self._arm.cell.sensing[0].detector
+        if rows.alarm and self._arm.batch.sensing and self._arm.batch.sensing[0].detector:
+            detector = self._arm.batch.sensing[0].detector
             alarm, residual = np.concatenate(rows.alarm), np.concatenate(rows.residual)
             detection = Detection(
                 detector=detector.name,
@@ -116,12 +116,13 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
         self._count += 1
 
     def _trace(self, rows: _Rows) -> Trace:
-        world = self._arm.world
-        q, tau, contact = (np.concatenate(part) for part in (rows.q, rows.tau, rows.contact))
-        t: Array = np.arange(len(q), dtype=np.float64) * world.settings.timestep
+        compiled = self._arm.compiled
+        q, tau = np.concatenate(rows.q), np.concatenate(rows.tau)
+        contact = np.concatenate(rows.contact)
+        t: Array = np.arange(len(q), dtype=np.float64) * compiled.settings.timestep
         spec = self._arm.spec
         return Trace(
-            joint_names=world.scene.joint_names,
+            joint_names=compiled.scene.joint_names,
             t=t,
             q=q,
             qd=np.concatenate(rows.qd),
@@ -130,34 +131,36 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
             meta={
                 "seed": self._seed,
                 "environment": "" if spec is None else spec.id,
-                "model_sha256": hashlib.sha256(world.scene.xml.encode()).hexdigest(),
+                "model_sha256": hashlib.sha256(compiled.scene.xml.encode()).hexdigest(),
                 "tauguard": importlib.metadata.version("tauguard"),
                 "mujoco": mujoco.__version__,
             },
-            attachments={"scene.xml": world.scene.xml, **world.scene.nominal_texts},
+            attachments={"scene.xml": compiled.scene.xml, **compiled.scene.nominal_texts},
         )
 
-    def _truth(self, t: Array, tau: Array, contact: Array, region: Array) -> Truth:
-        world = self._arm.world
-        links = len(world.scene.link_bodies)
+    def _truth(
+        self, t: Array, tau: Array, contact: NDArray[np.void], region: NDArray[np.void]
+    ) -> Truth:
+        compiled = self._arm.compiled
+        links = len(compiled.scene.link_bodies)
         wrenches = Wrenches.empty(len(t), links)
-        touched = np.flatnonzero(contact[:, 1] > 0)
-        link = contact[touched, 1].astype(int) - 1
-        wrenches.force[touched, link] = contact[touched, 5:8]
-        wrenches.point[touched, link] = contact[touched, 2:5]
+        touched = np.flatnonzero(contact["link"] > 0)
+        link = contact["link"][touched].astype(int) - 1
+        wrenches.force[touched, link] = contact["force"][touched]
+        wrenches.point[touched, link] = contact["point"][touched]
         poses = np.tile(np.eye(4), (*region.shape[:2], 1, 1))
         if region.size:
-            turns = Rotation.from_quat(region[..., 3:].reshape(-1, 4), scalar_first=True)
+            turns = Rotation.from_quat(region["quat_wxyz"].reshape(-1, 4), scalar_first=True)
             poses[:, :, :3, :3] = turns.as_matrix().reshape(*region.shape[:2], 3, 3)
-        poses[:, :, :3, 3] = region[..., :3]
+        poses[:, :, :3, 3] = region["position"]
         return Truth(
             tau_ext=tau,
-            contact_force=contact[:, 0].copy(),
+            contact_force=contact["net_force"].copy(),
             collisions=collisions(t, wrenches, tau, []),
-            payload=np.full(len(t), world.settings.payload_g / 1000),
-            contact_link=contact[:, 1].astype(np.int64),
-            contact_point=contact[:, 2:5].copy(),
-            contact_vector=contact[:, 5:8].copy(),
-            obstacle_names=tuple(r.name for r in world.regions),
+            payload=np.full(len(t), compiled.settings.payload_g / 1000),
+            contact_link=contact["link"].astype(np.int64),
+            contact_point=contact["point"].copy(),
+            contact_vector=contact["force"].copy(),
+            obstacle_names=tuple(r.name for r in compiled.regions),
             obstacle_poses=poses,
         )

@@ -11,7 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv, arm_env
-from tauguard.envs.gym.cell import FREE, VELOCITY
+from tauguard.envs.gym.batch import Override
 from tauguard.envs.gym.settings import positive
 
 #: Distances beyond this are not looked at [m].
@@ -68,20 +68,20 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} {value}: expected 0 or more")
         self._arm: ArmEnv = arm_env(env)
-        world = self._arm.world
-        if not world.regions:
+        compiled = self._arm.compiled
+        if not compiled.regions:
             raise ValueError("no body regions to keep away from: make the environment with some")
         self._terms = (approach_speed, reaction_time, intrusion + uncertainty, hysteresis)
-        model = world.scene.model
+        model = compiled.scene.model
         self._geoms = [
             g
             for g in range(model.ngeom)
-            if model.geom_bodyid[g] in set(world.scene.link_bodies.tolist())
+            if model.geom_bodyid[g] in set(compiled.scene.link_bodies.tolist())
             and (model.geom_contype[g] or model.geom_conaffinity[g])
         ]
-        self._targets = [int(model.body_geomadr[r.body]) for r in world.regions]
-        own = world.scene.facts.max_acceleration
-        self._deceleration = np.resize(own, len(world.scene.joint_names))
+        self._targets = [int(model.body_geomadr[r.body]) for r in compiled.regions]
+        own = compiled.scene.facts.max_acceleration
+        self._deceleration = np.resize(own, len(compiled.scene.joint_names))
         self._stopped = False
 
     def reset(
@@ -95,7 +95,9 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
         """Act, or stand."""
         still = np.zeros(len(self._deceleration))
-        self._arm.cell.plants[0].override(VELOCITY if self._stopped else FREE, still)
+        self._arm.batch.plants[0].override(
+            Override.VELOCITY if self._stopped else Override.FREE, still
+        )
         observation, reward, terminated, truncated, info = self.env.step(action)
         return observation, reward, terminated, truncated, info | self._judge()
 
@@ -114,7 +116,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
 
     def _pair(self, geom: int, target: int) -> tuple[float, float]:
         """Distance of an arm's geom from a region [m], and the arm's speed at that point [m/s]."""
-        model, data = self._arm.cell.model(0), self._arm.cell.datas[0]
+        model, data = self._arm.batch.model(0), self._arm.batch.datas[0]
         ends = np.zeros(6)
         distance = mujoco.mj_geomDistance(model, data, geom, target, FAR, ends)
         if distance >= FAR:
@@ -123,10 +125,10 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
 
     def _speed(self, body: int, point: Array) -> float:
         """Of a point of a link [m/s], from the joints' axes as they are now."""
-        world, data = self._arm.world, self._arm.cell.datas[0]
-        model, total = world.scene.model, np.zeros(3)
+        compiled, data = self._arm.compiled, self._arm.batch.datas[0]
+        model, total = compiled.scene.model, np.zeros(3)
         for joint, dof, link in zip(
-            world.ids(), world.scene.dof_adr, world.scene.link_bodies, strict=True
+            compiled.ids(), compiled.scene.dof_adr, compiled.scene.link_bodies, strict=True
         ):
             if link > body or not _same_arm(model, int(link), body):
                 continue
@@ -137,7 +139,7 @@ class SpeedAndSeparation(gymnasium.Wrapper[Array, Array, Array, Array], RecordCo
 
     def _protective(self, speed: float) -> float:
         approach, reaction, fixed, _ = self._terms
-        data, dofs = self._arm.cell.datas[0], self._arm.world.scene.dof_adr
+        data, dofs = self._arm.batch.datas[0], self._arm.compiled.scene.dof_adr
         stopping = float((np.abs(data.qvel[dofs]) / self._deceleration).max())
         return approach * (reaction + stopping) + speed * (reaction + stopping / 2) + fixed
 

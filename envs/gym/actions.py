@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.world import World
+from tauguard.envs.gym.compiled import CompiledScene
 
 #: Largest Cartesian increment: at this speed [m/s] and turning at this speed [rad/s].
 CARTESIAN_SPEED, CARTESIAN_TURN = 0.5, 1.5
@@ -29,61 +29,63 @@ class Entry:
     unit: str
 
 
-def action_table(world: World) -> list[Entry]:
+def action_table(compiled: CompiledScene) -> list[Entry]:
     """What -1 and 1 stand for, entry by entry."""
-    centre, scale = action_scale(world)
+    centre, scale = action_scale(compiled)
     unit = {
         "current": "A",
         "torque": "N m, on top of gravity compensation",
         "joint_velocity": "rad/s",
         "joint_position": "rad",
     }
-    mode = world.settings.control
+    mode = compiled.settings.control
     if mode != "cartesian":
         return [
             Entry(f"{mode} of {name}", float(c - s), float(c + s), unit[mode])
-            for name, c, s in zip(world.scene.joint_names, centre, scale, strict=True)
+            for name, c, s in zip(compiled.scene.joint_names, centre, scale, strict=True)
         ]
     names = [f"{kind} {axis}" for kind in ("move along", "turn about") for axis in "xyz"]
     units = ["m a step"] * 3 + ["rad a step"] * 3
     return [
         Entry(f"tool {a + 1}: {name}", -float(s), float(s), u)
-        for a in range(len(world.tools))
+        for a in range(len(compiled.tools))
         for name, u, s in zip(names, units, scale[6 * a : 6 * a + 6], strict=True)
     ]
 
 
-def action_scale(world: World) -> tuple[Array, Array]:
+def action_scale(compiled: CompiledScene) -> tuple[Array, Array]:
     """Centre and half-width of what an action stands for, shapes (m,)."""
-    settings, n = world.settings, len(world.scene.joint_names)
+    settings, n = compiled.settings, len(compiled.scene.joint_names)
     zero = np.zeros(n)
     if settings.control == "cartesian":
         period = 1 / settings.control_rate
         one = np.repeat([CARTESIAN_SPEED * period, CARTESIAN_TURN * period], 3)
-        scale = np.tile(one, len(world.tools))
+        scale = np.tile(one, len(compiled.tools))
         return np.zeros_like(scale), scale
     if settings.control == "joint_velocity":
-        return zero, world.max_speed
+        return zero, compiled.max_speed
     if settings.control == "joint_position":
-        low = np.maximum(world.joint_range[:, 0], world.scene.home - POSITION_REACH)
-        high = np.minimum(world.joint_range[:, 1], world.scene.home + POSITION_REACH)
+        low = np.maximum(compiled.joint_range[:, 0], compiled.scene.home - POSITION_REACH)
+        high = np.minimum(compiled.joint_range[:, 1], compiled.scene.home + POSITION_REACH)
         return (low + high) / 2, (high - low) / 2
     torque = np.where(
-        np.isfinite(world.torque_limit), world.torque_limit, SOFT_LIMIT * world.gains.kp
+        np.isfinite(compiled.torque_limit), compiled.torque_limit, SOFT_LIMIT * compiled.gains.kp
     )
     if settings.control == "torque":
         return zero, torque
-    return zero, torque / np.abs(world.nominal.gain)
+    return zero, torque / np.abs(compiled.nominal.gain)
 
 
-def observation_table(world: World) -> list[Entry]:
+def observation_table(compiled: CompiledScene) -> list[Entry]:
     """Names, ranges and units of the observation, entry by entry."""
-    joints = world.scene.joint_names
+    joints = compiled.scene.joint_names
     turn = np.where(
-        np.isfinite(world.joint_range), world.joint_range, [[-4 * np.pi, 4 * np.pi]] * len(joints)
+        np.isfinite(compiled.joint_range),
+        compiled.joint_range,
+        [[-4 * np.pi, 4 * np.pi]] * len(joints),
     )
     turn = turn + np.array([-0.5, 0.5])
-    most = np.where(np.isfinite(world.torque_limit), world.torque_limit, TORQUE_BOUND)
+    most = np.where(np.isfinite(compiled.torque_limit), compiled.torque_limit, TORQUE_BOUND)
     rows = [
         Entry(f"position of {name}", float(low), float(high), "rad")
         for name, (low, high) in zip(joints, turn, strict=True)
@@ -93,10 +95,10 @@ def observation_table(world: World) -> list[Entry]:
         Entry(f"motor torque of {name}", -1.5 * float(m), 1.5 * float(m), "N m")
         for name, m in zip(joints, most, strict=True)
     ]
-    tools = [f"tool {i + 1}" for i in range(len(world.tools))]
+    tools = [f"tool {i + 1}" for i in range(len(compiled.tools))]
     parts = [(f"position of {tool}", "m", DISTANCE_BOUND) for tool in tools]
     parts += [(f"target less {tool}", "m", DISTANCE_BOUND) for tool in tools]
-    for region in world.regions:
+    for region in compiled.regions:
         parts += [
             (f"position of the {region.name}", "m", DISTANCE_BOUND),
             (f"velocity of the {region.name}", "m/s", SPEED_BOUND),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -11,24 +10,17 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.cell import (
-    COST,
-    DISTANCE,
-    DIVERGED,
-    FORCE,
-    LINK,
-    ONSET,
-    ONSET_TIME,
-    RATIO,
-    REGION,
-    REGION_FORCE,
-    TIME,
-    Cell,
+from tauguard.envs.gym.batch import Batch, StepMetrics
+from tauguard.envs.gym.compiled import (
+    CompiledScene,
+    compile_scene,
+    crossing,
+    opposite,
+    region_pressure,
 )
 from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import Picture
 from tauguard.envs.gym.settings import Settings, one_of
-from tauguard.envs.gym.world import World, build_world, crossing, opposite, region_pressure
 from tauguard.models import BodyProxy, Person, Scene
 
 #: Why a diverged episode ended.
@@ -38,8 +30,17 @@ DIVERGED_REASON = (
 RENDER_MODES = ("rgb_array", "human")
 
 
+class Outcome(NamedTuple):
+    """What a task says of one step: numbers of one copy, or arrays of all."""
+
+    rewards: dict[str, Any]  #: named terms, the task's :attr:`Task.terms`; the reward is their sum
+    success: Any
+    memory: Any  #: what :meth:`Task.score` gets at the next step
+    terminated: Any = False
+
+
 class Task:
-    """What is to be done in a cell: where an episode starts and what a step is worth."""
+    """What is to be done: where an episode starts, what a step is worth, when it is over."""
 
     #: Keywords that differ from those of :class:`tauguard.envs.gym.settings.Settings`.
     defaults: ClassVar[dict[str, Any]] = {}
@@ -47,12 +48,16 @@ class Task:
     arms: ClassVar[int] = 1
     #: Keywords of the task itself, with their defaults.
     options: ClassVar[dict[str, Any]] = {}
+    #: Names of the terms of the reward; ``info`` has each as ``reward_NAME``.
+    terms: ClassVar[tuple[str, ...]] = ()
+    #: ``info["reason"]`` where the task terminates an episode.
+    ended: ClassVar[str] = ""
 
-    def __init__(self, cell: Cell, **options: Any) -> None:
-        """Keep the cell."""
-        self.cell = cell
+    def __init__(self, batch: Batch, **options: Any) -> None:
+        """Keep the batch."""
+        self.batch = batch
         #: What :meth:`score` remembers from one step to the next, a number a copy.
-        self.memory = np.zeros(cell.rows)
+        self.memory = np.zeros(batch.rows)
 
     @classmethod
     def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
@@ -65,15 +70,14 @@ class Task:
         return opposite(bare, reach)
 
     def start(self, i: int, rng: np.random.Generator) -> None:
-        """Begin an episode of copy ``i``; the last thing it does is :meth:`Cell.start`."""
+        """Begin an episode of copy ``i``; the last thing it does is :meth:`Batch.start`."""
         raise NotImplementedError
 
-    def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
-        """Reward, whether the task is over, success, and what to remember of a step.
+    def score(self, step: StepMetrics, memory: Any) -> Outcome:
+        """Judge a step; the same arithmetic for one copy and for arrays of all gives equal bits.
 
         Args:
-            figure: the columns of :data:`tauguard.envs.gym.cell.FIGURES`: of one copy or arrays
-                of all: the same arithmetic gives the same bits.
+            step: what the action came to.
             memory: what the last step, or :meth:`start`, left.
         """
         raise NotImplementedError
@@ -104,14 +108,15 @@ class ArmEnv(gymnasium.Env[Array, Array]):
     with its samples, "" for nothing), ``onset`` (a collision began in this
     step), ``onset_time`` of the latest one [s] (-1: none yet), ``link`` of the peak force (1-based,
     0: none), ``tau_ext_peak`` (by joint, of the largest size [N m]), ``alarm_delay`` of the latest
-    collision [s] (-1: no alarm, or none yet), and ``reason``, why an episode was cut short (""
-    where it was not). Peaks are over the physics steps of the action.
+    collision [s] (-1: no alarm, or none yet), ``reason``, why the episode was terminated or cut
+    short ("" where it goes on, or its steps are over), and ``reward_NAME`` of each term of the
+    reward, whose sum is the reward. Peaks are over the physics steps of the action.
 
     Of each of the k body regions in :attr:`regions`, at its peak: ``region_force`` [N],
     ``region_pressure`` [N/cm^2], ``region_point`` [m] and ``region_direction`` of the force on the
     person, shapes (k,), (k,), (k, 3), (k, 3), zero where nothing touched; without ``contact_area``
-    the pressure is an estimate, see :func:`tauguard.envs.gym.world.region_pressure`. With checkers,
-    ``contacts`` has the pairs that each reported.
+    the pressure is an estimate, see :func:`tauguard.envs.gym.compiled.region_pressure`. With
+    checkers, ``contacts`` has the pairs that each reported.
 
     The limits follow ISO 10218-2:2025; not every value could be confirmed from an open source:
     ``unwrapped.regions`` says which were not. A simulated force replaces no measurement.
@@ -135,40 +140,41 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         if render_mode is not None:
             one_of("render_mode", render_mode, RENDER_MODES)
         self.render_mode, self._keywords = render_mode, dict(keywords)
-        self.world, self.cell, self.task = build(self.task_type, keywords, 1)
-        self.metadata = frame_rate(self.world)
-        self.action_space, self.observation_space = make_spaces(self.cell)
-        self._shape, self._area = self.action_space.shape, self.world.settings.contact_area
+        self.compiled, self.batch, self.task = build(self.task_type, keywords, 1)
+        self.metadata = frame_rate(self.compiled)
+        self.action_space, self.observation_space = make_spaces(self.batch)
+        self._shape, self._area = self.action_space.shape, self.compiled.settings.contact_area
         #: The only copy's rows, views.
-        self._seen, self._figure = self.cell.observation[0], self.cell.figure[0]
-        self._tau_ext, self._residual = self.cell.tau_ext[0], self.cell.residual[0]
+        self._seen, self._row = self.batch.observation[0], self.batch.metrics.view(np.float64)
+        self._tau_ext, self._residual = self.batch.tau_ext[0], self.batch.residual[0]
         self._picture: Picture | None = None
+        self._no_reward = dict.fromkeys(self.task.terms, 0.0)
         self._begun = False
 
     @property
     def scene(self) -> Scene:
         """What is simulated: the compiled model, joint names, home pose, the arm's MJCF."""
-        return self.world.scene
+        return self.compiled.scene
 
     @property
     def model(self) -> Any:
         """The compiled ``mujoco.MjModel``."""
-        return self.cell.model(0)
+        return self.batch.model(0)
 
     @property
     def data(self) -> Any:
         """The ``mujoco.MjData`` that is stepped; to look at, not to write to."""
-        return self.cell.datas[0]
+        return self.batch.datas[0]
 
     @property
     def drawn(self) -> dict[str, Array]:
         """What the keyword ``randomize`` gave this episode, by name."""
-        return dict(self.cell.drawn[0])
+        return dict(self.batch.drawn[0])
 
     @property
     def regions(self) -> tuple[Any, ...]:
         """The body regions in the scene: names, limits, and which values are unconfirmed."""
-        return self.world.regions
+        return self.compiled.regions
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -184,15 +190,15 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             ValueError: ``options`` that the keyword ``randomize`` does not name, or values that
                 cannot be.
         """
-        check_options(options or {}, self.world.settings.randomize or {})
+        check_options(options or {}, self.compiled.settings.randomize or {})
         super().reset(seed=seed)
-        self.cell.draw(0, self.np_random, options or {})
+        self.batch.draw(0, self.np_random, options or {})
         self.task.start(0, self.np_random)
-        self.cell.cost_sum[0] = 0.0
+        self.batch.cost_sum[0] = 0.0
         self._begun = True
         if self.render_mode == "human":
             self.render()
-        return self._seen.copy(), self._info(self._figure.tolist(), False)
+        return self._seen.copy(), self._info(self._metrics(), self._no_reward, False, "")
 
     def step(self, action: ArrayLike) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Act for one control step; entries beyond [-1, 1] count as -1 and 1.
@@ -202,27 +208,29 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         """
         if not self._begun:
             raise gymnasium.error.ResetNeeded("call reset before step")
-        cell, task = self.cell, self.task
+        batch, task = self.batch, self.task
         values = np.ascontiguousarray(action, dtype=np.float64)
         if values.shape != self._shape:
             raise ValueError(
                 f"action: shape {values.shape}, expected {self._shape}: "
-                f"{', '.join(entry.name for entry in cell.actions)}"
+                f"{', '.join(entry.name for entry in batch.actions)}"
             )
-        cell.step(0, values, self.np_random)
-        figure = self._figure.tolist()
-        reward, over, success, task.memory[0] = task.score(figure, task.memory.item(0))
-        diverged = figure[DIVERGED] != 0
-        info = self._info(figure, success)
+        batch.step(0, values, self.np_random)
+        step = self._metrics()
+        rewards, success, task.memory[0], over = task.score(step, task.memory.item(0))
+        diverged = step.diverged != 0
+        reason = DIVERGED_REASON if diverged else task.ended if over else ""
+        info = self._info(step, rewards, success, reason)
         if success and not diverged:
             task.after(0, self.np_random)
         if self.render_mode == "human":
             self.render()
-        return self._seen.copy(), float(reward), over and not diverged, diverged, info
+        reward = float(sum(rewards.values()))
+        return self._seen.copy(), reward, over and not diverged, diverged, info
 
     def get_state(self) -> dict[str, Any]:
         """Everything that the next steps depend on, for :meth:`set_state`; plain arrays."""
-        return self.cell.get_state(0) | {
+        return self.batch.get_state(0) | {
             "memory": np.array(self.task.memory),
             "task": self.task.get_state(),
             "rng": self.np_random.bit_generator.state,
@@ -235,7 +243,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         Raises:
             ValueError: a state of another environment.
         """
-        self.cell.set_state(0, state)
+        self.batch.set_state(0, state)
         self.task.memory[:] = state["memory"]
         self.task.set_state(state["task"])
         self.np_random.bit_generator.state = state["rng"]
@@ -256,31 +264,38 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self.spec = saved["spec"]
         self.set_state(saved["state"])
 
-    def _info(self, figure: list[float], success: bool) -> dict[str, Any]:
-        cell, area = self.cell, self._area
+    def _metrics(self) -> StepMetrics:
+        return StepMetrics._make(self._row.tolist())
+
+    def _info(
+        self, step: StepMetrics, rewards: dict[str, Any], success: bool, reason: str
+    ) -> dict[str, Any]:
+        batch, area = self.batch, self._area
         info = {
-            "time": figure[TIME],
-            "distance": figure[DISTANCE],
+            "time": step.time,
+            "distance": step.distance,
             "success": success,
-            "force": figure[FORCE],
-            "cost": figure[COST],
-            "cost_sum": cell.cost_sum.item(0),
-            "pressure": figure[REGION_FORCE] / area if area else 0.0,
-            "limit_ratio": figure[RATIO],
-            "region": int(figure[REGION]),
+            "force": step.force,
+            "cost": step.cost,
+            "cost_sum": batch.cost_sum.item(0),
+            "pressure": step.region_force / area if area else 0.0,
+            "limit_ratio": step.limit_ratio,
+            "region": int(step.region),
             "tau_ext": self._tau_ext.copy(),
             "residual": self._residual.copy(),
-            "alarm": cell.alarm.item(0),
-            "onset": bool(figure[ONSET]),
-            "onset_time": figure[ONSET_TIME],
-            "link": int(figure[LINK]),
-            "fault": cell.faults()[0],
-            "tau_ext_peak": cell.tau_peak[0].copy(),
-            "alarm_delay": cell.alarm_delay.item(0),
-            "reason": DIVERGED_REASON if figure[DIVERGED] else "",
-        } | touches(cell, 0)
-        if cell.checks:
-            info["contacts"] = cell.contacts[0].copy()
+            "alarm": batch.alarm.item(0),
+            "onset": bool(step.onset),
+            "onset_time": step.onset_time,
+            "link": int(step.link),
+            "fault": batch.faults()[0],
+            "tau_ext_peak": batch.tau_peak[0].copy(),
+            "alarm_delay": batch.alarm_delay.item(0),
+            "reason": reason,
+        } | touches(batch, 0)
+        for name, term in rewards.items():
+            info[f"reward_{name}"] = float(term)
+        if batch.checks:
+            info["contacts"] = batch.contacts[0].copy()
         return info
 
     def render(self) -> NDArray[np.uint8] | None:
@@ -289,8 +304,8 @@ class ArmEnv(gymnasium.Env[Array, Array]):
             gymnasium.logger.warn("render_mode was not given to make: nothing to render")
             return None
         if self._picture is None:
-            self._picture = Picture(self.world, self.cell.datas[0], self.render_mode)
-        return self._picture.show(self.cell.target[0])
+            self._picture = Picture(self.compiled, self.batch.datas[0], self.render_mode)
+        return self._picture.show(self.batch.target[0])
 
     def close(self) -> None:
         """Close the window or the renderer."""
@@ -311,8 +326,10 @@ def arm_env(env: gymnasium.Env[Any, Any]) -> ArmEnv:
     return inner
 
 
-def build(task_type: type[Task], keywords: dict[str, Any], rows: int) -> tuple[World, Cell, Task]:
-    """World, cell and task of an environment with these keywords."""
+def build(
+    task_type: type[Task], keywords: dict[str, Any], rows: int
+) -> tuple[CompiledScene, Batch, Task]:
+    """Scene, batch and task of an environment with these keywords."""
     own = {name: keywords.pop(name, value) for name, value in task_type.options.items()}
     try:
         settings = Settings.from_keywords(task_type.defaults, keywords)
@@ -320,31 +337,31 @@ def build(task_type: type[Task], keywords: dict[str, Any], rows: int) -> tuple[W
         if own and str(error).startswith("keyword "):
             raise ValueError(f"{error}, {', '.join(own)}") from None
         raise
-    world = build_world(settings, task_type.arms, task_type.proxy, task_type.person)
-    cell = Cell(world, rows)
-    return world, cell, task_type(cell, **own)
+    compiled = compile_scene(settings, task_type.arms, task_type.proxy, task_type.person)
+    batch = Batch(compiled, rows)
+    return compiled, batch, task_type(batch, **own)
 
 
-def touches(cell: Cell, rows: int | slice) -> dict[str, Array]:
+def touches(batch: Batch, rows: int | slice) -> dict[str, Array]:
     """What each body region felt in one copy, or in all, at its peak."""
-    peak = cell.peak[rows].copy()
+    peak = batch.peak[rows].copy()
     return {
-        "region_force": peak[..., 0],
-        "region_pressure": region_pressure(cell.world, peak[..., 0]),
-        "region_point": peak[..., 1:4],
-        "region_direction": peak[..., 4:7],
+        "region_force": peak["force"],
+        "region_pressure": region_pressure(batch.compiled, peak["force"]),
+        "region_point": peak["point"],
+        "region_direction": peak["direction"],
     }
 
 
-def frame_rate(world: World) -> dict[str, Any]:
+def frame_rate(compiled: CompiledScene) -> dict[str, Any]:
     """The metadata of an environment: a picture shows one action."""
-    rate = max(1, round(world.settings.control_rate))
+    rate = max(1, round(compiled.settings.control_rate))
     return {"render_modes": list(RENDER_MODES), "render_fps": rate}
 
 
-def make_spaces(cell: Cell) -> tuple[Any, Any]:
+def make_spaces(batch: Batch) -> tuple[Any, Any]:
     """Of one environment's actions and observations."""
-    low = np.array([entry.low for entry in cell.observations])
-    high = np.array([entry.high for entry in cell.observations])
-    action = spaces.Box(-1.0, 1.0, (len(cell.actions),), np.float32)
+    low = np.array([entry.low for entry in batch.observations])
+    high = np.array([entry.high for entry in batch.observations])
+    action = spaces.Box(-1.0, 1.0, (len(batch.actions),), np.float32)
     return action, spaces.Box(low, high, dtype=np.float64)

@@ -17,7 +17,7 @@ from tauguard.models.payload import load_body
 from tauguard.models.person import SEGMENTS
 
 if TYPE_CHECKING:
-    from tauguard.envs.gym.world import World
+    from tauguard.envs.gym.compiled import CompiledScene
 
 
 @dataclass(frozen=True)
@@ -187,12 +187,12 @@ def check_options(given: Mapping[str, Any], known: Mapping[str, Distribution]) -
 
 def draw(
     known: Mapping[str, Distribution],
-    world: World,
+    compiled: CompiledScene,
     rng: np.random.Generator,
     stated: Mapping[str, Any],
 ) -> dict[str, Array]:
     """One episode's values; what is stated replaces a draw, which is made all the same."""
-    n, found = len(world.scene.joint_names), {}
+    n, found = len(compiled.scene.joint_names), {}
     for name, spread in known.items():
         size = n if PARAMETERS[name].each else 1
         values = spread.draw(rng, size)
@@ -207,23 +207,23 @@ def draw(
 
 @dataclass
 class Variant:
-    """What one copy simulates instead of the world's own."""
+    """What one copy simulates instead of the compiled scene's own."""
 
     model: mujoco.MjModel
     drive: Drive
     person: Person | None
 
 
-def vary(world: World, model: mujoco.MjModel, drawn: Mapping[str, Array]) -> Variant:
-    """Put drawn values into ``model``, a copy of the world's that belongs to one copy alone."""
-    base = world.scene.model
-    _weigh(world.scene, base, model, drawn)
-    person = world.person
+def vary(compiled: CompiledScene, model: mujoco.MjModel, drawn: Mapping[str, Array]) -> Variant:
+    """Put drawn values into ``model``, the model of one copy."""
+    base = compiled.scene.model
+    _weigh(compiled.scene, base, model, drawn)
+    person = compiled.person
     if person is not None:
         own: dict[str, Any] = {name: float(drawn[name][0]) for name in _OF_PERSON if name in drawn}
         person = replace(person, **own)
         _resize(model, person)
-    return Variant(model, _drive(world.scene.drive, drawn), person)
+    return Variant(model, _drive(compiled.scene.drive, drawn), person)
 
 
 def _weigh(
@@ -272,6 +272,6 @@ def _drive(drive: Drive, drawn: Mapping[str, Array]) -> Drive:
     return replace(drive, gain=gain, friction=friction, sensors=sensors)
 
 
-def own_model(world: World) -> mujoco.MjModel:
-    """A copy of the world's model that one copy may change."""
-    return copy.copy(world.scene.model)
+def own_model(compiled: CompiledScene) -> mujoco.MjModel:
+    """A model that one copy may change."""
+    return copy.copy(compiled.scene.model)

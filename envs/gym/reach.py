@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.base import ArmEnv, Task
-from tauguard.envs.gym.cell import DISTANCE, Cell
+from tauguard.envs.gym.base import ArmEnv, Outcome, Task
+from tauguard.envs.gym.batch import Batch, StepMetrics
+from tauguard.envs.gym.compiled import LOWEST, NEAREST, pose_box, tool_position
 from tauguard.envs.gym.vector import VectorArmEnv
-from tauguard.envs.gym.world import LOWEST, NEAREST, pose_box, tool_position
 
 #: A target counts as reached this near [m], and is worth this much reward.
 TOLERANCE, BONUS = 0.03, 1.0
 #: An episode starts this near to home [rad].
 START_SPREAD = 0.1
-#: With a person: this share of targets is the one of so many whose straight way passes nearest to
-#: them, and as often their hand reaches for that way: to a place in its outer part, give or take
-#: [m], where it stays [s].
-TEMPTED, CANDIDATES = 0.5, 6
-OUTER, GIVE_OR_TAKE, STAYS = (0.4, 1.0), 0.03, 0.6
+#: Probability that the next target is the candidate whose straight path passes closest to the
+#: person, and number of candidates. With the same probability their hand moves onto the path.
+NEAR_PERSON, CANDIDATES = 0.5, 6
+#: The hand goes to a place between these fractions of the path, with this deviation [m], and stays
+#: there for this long [s].
+HAND_FRACTION, HAND_DEVIATION, HAND_STAYS = (0.4, 1.0), 0.03, 0.6
 #: A target is at least this far from where the tool is [m].
 APART = 0.1
 
@@ -32,62 +32,63 @@ class Reach(Task):
     """Reward: how much nearer the tool came [m], and 1 for a target; then comes the next one."""
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": ("person",)}
+    terms: ClassVar[tuple[str, ...]] = ("progress", "target")
 
-    def __init__(self, cell: Cell, **options: Any) -> None:
+    def __init__(self, batch: Batch, **options: Any) -> None:
         """Prepare drawing targets."""
-        super().__init__(cell)
-        self._scratch = mujoco.MjData(cell.world.scene.model)
-        low, high = pose_box(cell.world.scene)
+        super().__init__(batch)
+        self._scratch = mujoco.MjData(batch.compiled.scene.model)
+        low, high = pose_box(batch.compiled.scene)
         each = len(low) // self.arms
         parts = [slice(arm * each, (arm + 1) * each) for arm in range(self.arms)]
         #: An arm each: where its joints are in qpos, and the box of poses to draw from.
-        self._poses = [(cell.world.scene.qpos_adr[p], low[p], high[p]) for p in parts]
-        model = cell.world.scene.model
-        #: A moving region each: addresses in qpos and qvel, span [m], speed [m/s].
-        self._ways = [
+        self._poses = [(batch.compiled.scene.qpos_adr[p], low[p], high[p]) for p in parts]
+        model = batch.compiled.scene.model
+        #: Of each region, None where it is held: addresses in qpos and qvel, span [m], speed [m/s].
+        self._crossings = [
             (int(model.jnt_qposadr[r.joint]), int(model.jnt_dofadr[r.joint]), r.span, r.speed)
             if r.joint >= 0
             else None
-            for r in cell.world.regions
+            for r in batch.compiled.regions
         ]
-        base = cell.world.scene.model.joint(cell.world.scene.joint_names[0]).id
-        mujoco.mj_forward(cell.world.scene.model, self._scratch)
+        base = batch.compiled.scene.model.joint(batch.compiled.scene.joint_names[0]).id
+        mujoco.mj_forward(batch.compiled.scene.model, self._scratch)
         self._base: list[float] = self._scratch.xanchor[base].tolist()
 
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Near home, regions anywhere on their lines, a new target."""
-        cell = self.cell
-        home = cell.world.scene.home
-        cell.place(i, home + rng.uniform(-START_SPREAD, START_SPREAD, len(home)))
+        batch = self.batch
+        home = batch.compiled.scene.home
+        batch.place(i, home + rng.uniform(-START_SPREAD, START_SPREAD, len(home)))
         self.send_regions(i, rng)
-        cell.send_person(i, rng)
-        cell.start(i)
-        for arm in range(cell.world.arms):
-            cell.target[i, arm] = self.draw(rng, arm, None)
-        if cell.world.person is not None:
-            self.tempt(i, rng, None)
-        cell.plants[i].refresh()
-        self.memory[i] = cell.figure[i, DISTANCE]
+        batch.send_person(i, rng)
+        batch.start(i)
+        for arm in range(batch.compiled.arms):
+            batch.target[i, arm] = self.draw(rng, arm, None)
+        if batch.compiled.person is not None:
+            self.aim_near_person(i, rng, None)
+        batch.plants[i].refresh()
+        self.memory[i] = batch.metrics["distance"][i]
 
     def send_regions(self, i: int, rng: np.random.Generator) -> None:
         """Each at its speed towards the middle of its line, from its outer part."""
-        data = self.cell.datas[i]
+        data = self.batch.datas[i]
         qpos, qvel = data.qpos, data.qvel
-        for way in self._ways:
+        for crossing in self._crossings:
             side, place = 2.0 * int(rng.integers(2)) - 1.0, rng.uniform(0.5, 1.0)
-            if way is not None:
-                at, moves, span, speed = way
+            if crossing is not None:
+                at, moves, span, speed = crossing
                 qpos[at], qvel[moves] = side * place * span, -side * speed
 
     def draw(self, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
         """A place [m] that the tool can reach, at least :data:`APART` from ``apart``."""
-        world, scratch = self.cell.world, self._scratch
+        compiled, scratch = self.batch.compiled, self._scratch
         (adr, low, high), (bx, by, _) = self._poses[arm], self._base
         place = np.zeros(3)
         for _ in range(100):
             scratch.qpos[adr] = rng.uniform(low, high)
-            mujoco.mj_kinematics(world.scene.model, scratch)
-            place = tool_position(world, scratch, arm)
+            mujoco.mj_kinematics(compiled.scene.model, scratch)
+            place = tool_position(compiled, scratch, arm)
             x, y, z = place.tolist()
             near = arm == 0 and math.hypot(x - bx, y - by) < NEAREST
             still = apart is not None and np.linalg.norm(place - apart) < APART
@@ -95,51 +96,51 @@ class Reach(Task):
                 break
         return place
 
-    def tempt(self, i: int, rng: np.random.Generator, apart: Array | None) -> None:
-        """A target beyond the person, or their hand in the way to it: the first arm's."""
-        cell, data = self.cell, self.cell.datas[i]
-        tool = tool_position(cell.world, data)
-        behind, reaches = rng.random(2) < TEMPTED
+    def aim_near_person(self, i: int, rng: np.random.Generator, apart: Array | None) -> None:
+        """The first arm's target near the person, or the person's hand on the path to it."""
+        batch, data = self.batch, self.batch.datas[i]
+        tool = tool_position(batch.compiled, data)
+        behind, reaches = rng.random(2) < NEAR_PERSON
         if behind:
-            bodies = [r.body for r in cell.world.regions if r.mocap >= 0]
+            bodies = [r.body for r in batch.compiled.regions if r.mocap >= 0]
             places = [self.draw(rng, 0, apart) for _ in range(CANDIDATES)]
             nearest = [_clearance(tool, place, data.xpos[bodies]) for place in places]
-            cell.target[i, 0] = places[int(np.argmin(nearest))]
-        way = tool + rng.uniform(*OUTER) * (cell.target[i, 0] - tool)
-        goal = way + rng.normal(0.0, GIVE_OR_TAKE, 3)
+            batch.target[i, 0] = places[int(np.argmin(nearest))]
+        place = tool + rng.uniform(*HAND_FRACTION) * (batch.target[i, 0] - tool)
+        place += rng.normal(0.0, HAND_DEVIATION, 3)
         if reaches:
-            cell.plants[i].aim(goal, STAYS)
+            batch.plants[i].aim(place, HAND_STAYS)
 
-    def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
+    def score(self, step: StepMetrics, memory: Any) -> Outcome:
         """Progress and bonus; never over by itself. The memory is the last distance [m]."""
-        distance = figure[DISTANCE]
-        reached = distance < TOLERANCE
-        return memory - distance + BONUS * reached, distance < 0, reached, distance
+        reached = step.distance < TOLERANCE
+        rewards = {"progress": memory - step.distance, "target": BONUS * reached}
+        return Outcome(rewards, success=reached, memory=step.distance)
 
     def after(self, i: int, rng: np.random.Generator) -> None:
         """The next target."""
-        cell = self.cell
-        for arm in range(cell.world.arms):
-            cell.target[i, arm] = self.draw(rng, arm, cell.target[i, arm].copy())
-        if cell.world.person is not None:
-            self.tempt(i, rng, cell.target[i, 0].copy())
-        cell.plants[i].refresh()
-        self.memory[i] = cell.figure[i, DISTANCE]
+        batch = self.batch
+        for arm in range(batch.compiled.arms):
+            batch.target[i, arm] = self.draw(rng, arm, batch.target[i, arm].copy())
+        if batch.compiled.person is not None:
+            self.aim_near_person(i, rng, batch.target[i, 0].copy())
+        batch.plants[i].refresh()
+        self.memory[i] = batch.metrics["distance"][i]
 
 
 def _clearance(begin: Array, end: Array, points: Array) -> float:
-    """Least distance of points (m, 3) from the way from ``begin`` to ``end`` [m]."""
-    way = end - begin
-    share = np.clip((points - begin) @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
-    return float(np.linalg.norm(begin + share[:, None] * way - points, axis=1).min())
+    """Least distance of points (m, 3) from the segment from ``begin`` to ``end`` [m]."""
+    path = end - begin
+    fraction = np.clip((points - begin) @ path / max(float(path @ path), 1e-12), 0.0, 1.0)
+    return float(np.linalg.norm(begin + fraction[:, None] * path - points, axis=1).min())
 
 
 class ReachEnv(ArmEnv):
     """Bring the tool to places beside a person who works, reaches into the way and walks.
 
-    Half of the targets lie where the way to them passes near the person, and half of the times the
-    person's hand reaches for that way: who ignores people hits them. A single body region that
-    crosses the workspace is ``obstacles=("hand",)``.
+    The straight path to half of the targets passes close to the person, and half of the times the
+    person's hand moves onto the path: a policy that ignores people hits them. A single body region
+    that crosses the workspace is ``obstacles=("hand",)``.
 
     ## Actions (joint velocity, the default; n joints)
 
@@ -155,7 +156,7 @@ class ReachEnv(ArmEnv):
     | "joint_position" | n | 2 rad from home or the end of its range, at largest speed |
     | "cartesian" | 6 | tool: 0.5 m/s along and 1.5 rad/s about x, y, z, a step's worth |
 
-    ``unwrapped.cell.actions`` and ``unwrapped.cell.observations`` are these tables with numbers.
+    ``unwrapped.batch.actions`` and ``unwrapped.batch.observations`` are these tables with numbers.
 
     ## Observations (n joints, k body regions; 3 n + 6 + 6 k numbers)
 

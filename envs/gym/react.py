@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -11,11 +10,11 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.envs.gym.base import ArmEnv, Task
-from tauguard.envs.gym.cell import FORCE, FREE, ONSET_TIME, RATIO, SPEED, TIME, VELOCITY, Cell
+from tauguard.envs.gym.base import ArmEnv, Outcome, Task
+from tauguard.envs.gym.batch import Batch, Override, StepMetrics
+from tauguard.envs.gym.compiled import CompiledScene, find_tools, tool_position
 from tauguard.envs.gym.settings import positive
 from tauguard.envs.gym.vector import VectorArmEnv
-from tauguard.envs.gym.world import World, find_tools, tool_position
 from tauguard.models import BodyProxy, Person, Scene
 
 #: The tool swings along y and meets the region at its home pose, this far behind the start [m].
@@ -39,24 +38,26 @@ class React(Task):
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": ("chest",)}
     options: ClassVar[dict[str, Any]] = {"speed": 0.5, "approach": True}
+    terms: ClassVar[tuple[str, ...]] = ("rest", "force", "speed")
+    ended: ClassVar[str] = f"at rest without contact for {REST_TIME:g} s"
 
-    def __init__(self, cell: Cell, **options: Any) -> None:
+    def __init__(self, batch: Batch, **options: Any) -> None:
         """Take the task's own keywords.
 
         Args:
-            cell: where it happens.
+            batch: where it happens.
             **options: ``speed`` of the tool at the blow [m/s], ``approach``: begin at the alarm or
                 the touch (True), or before the motion (False).
         """
-        super().__init__(cell)
+        super().__init__(batch)
         self._speed = float(options["speed"])
         positive("speed", self._speed)
-        if not cell.world.regions:
+        if not batch.compiled.regions:
             raise ValueError("obstacles (): expected a body region to strike, such as 'chest'")
         self._approach = bool(options["approach"])
-        self._scratch = mujoco.MjData(cell.world.scene.model)
-        self._meeting = home_tool(cell.world)
-        self.swing = [np.zeros((0, 0))] * cell.rows
+        self._scratch = mujoco.MjData(batch.compiled.scene.model)
+        self._meeting = home_tool(batch.compiled)
+        self.swing = [np.zeros((0, 0))] * batch.rows
 
     @classmethod
     def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
@@ -82,30 +83,30 @@ class React(Task):
 
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Swing into the region, up to the alarm (with a detector) or the first touch."""
-        cell, period = self.cell, 1 / self.cell.world.settings.control_rate
+        batch, period = self.batch, 1 / self.batch.compiled.settings.control_rate
         aside = rng.uniform(-ASIDE, ASIDE, 2)
         begin = self._meeting + np.array([aside[0], -RUN_UP, aside[1]])
         speed = self._speed * (1 + rng.uniform(-SPEED_SHARE, SPEED_SHARE))
         self.swing[i] = self._plan(begin, speed, period)
-        cell.place(i, self.swing[i][0])
-        cell.target[i, 0] = begin + np.array([0.0, RUN_UP + BEYOND, 0.0])
-        cell.send_person(i, rng)
-        cell.start(i)
+        batch.place(i, self.swing[i][0])
+        batch.target[i, 0] = begin + np.array([0.0, RUN_UP + BEYOND, 0.0])
+        batch.send_person(i, rng)
+        batch.start(i)
         self.memory[i] = 0.0
-        still = np.zeros(len(cell.actions))
-        if cell.sensing is not None:  # a detector that must settle does so while the arm stands
-            cell.plants[i].override(VELOCITY, np.zeros(len(self.swing[i][0])))
-            for _ in range(math.ceil(cell.sensing[i].settle / period - 1e-9)):
-                cell.step(i, still, rng)
+        still = np.zeros(len(batch.actions))
+        if batch.sensing is not None:  # a detector that must settle does so while the arm stands
+            batch.plants[i].override(Override.VELOCITY, np.zeros(len(self.swing[i][0])))
+            for _ in range(math.ceil(batch.sensing[i].settle / period - 1e-9)):
+                batch.step(i, still, rng)
         way = np.diff(self.swing[i], axis=0) / period
         for speeds in way if self._approach else way[:0]:
-            cell.plants[i].override(VELOCITY, speeds)
-            cell.step(i, still, rng)
-            since = cell.figure[i, TIME] - cell.figure[i, ONSET_TIME]
-            touched = cell.figure[i, ONSET_TIME] >= 0
-            if touched and (cell.sensing is None or cell.alarm[i] or since >= PATIENCE):
+            batch.plants[i].override(Override.VELOCITY, speeds)
+            batch.step(i, still, rng)
+            now = batch.metrics[i]
+            since, touched = now["time"] - now["onset_time"], now["onset_time"] >= 0
+            if touched and (batch.sensing is None or batch.alarm[i] or since >= PATIENCE):
                 break
-        cell.plants[i].override(FREE, np.zeros(len(self.swing[i][0])))
+        batch.plants[i].override(Override.FREE, np.zeros(len(self.swing[i][0])))
 
     def get_state(self) -> Any:
         """The planned swing."""
@@ -117,10 +118,10 @@ class React(Task):
 
     def _plan(self, begin: Array, speed: float, period: float) -> Array:
         """Joint positions, one an action, of a straight swing that speeds up at once: (T, n)."""
-        world, model, data = self.cell.world, self.cell.world.scene.model, self._scratch
-        adr = world.scene.qpos_adr
+        compiled, model, data = self.batch.compiled, self.batch.compiled.scene.model, self._scratch
+        adr = compiled.scene.qpos_adr
         data.qpos[:] = model.qpos0
-        data.qpos[adr] = world.scene.home
+        data.qpos[adr] = compiled.scene.home
         self._move(begin, 30)
         rows = [data.qpos[adr].copy()]
         travelled, total = 0.0, RUN_UP + BEYOND
@@ -133,33 +134,37 @@ class React(Task):
 
     def _move(self, place: Array, rounds: int) -> None:
         """Bring the scratch copy's tool to ``place``, turning as little as it may."""
-        world, model, data = self.cell.world, self.cell.world.scene.model, self._scratch
-        jac, dofs = np.zeros((3, model.nv)), world.scene.dof_adr
+        compiled, model, data = self.batch.compiled, self.batch.compiled.scene.model, self._scratch
+        jac, dofs = np.zeros((3, model.nv)), compiled.scene.dof_adr
         for _ in range(rounds):
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
-            tool = tool_position(world, data)
-            mujoco.mj_jac(model, data, jac, None, tool, world.tools[0][1])
+            tool = tool_position(compiled, data)
+            mujoco.mj_jac(model, data, jac, None, tool, compiled.tools[0][1])
             part = jac[:, dofs]
             way = np.linalg.solve(part @ part.T + 1e-4 * np.eye(3), place - tool)
-            data.qpos[world.scene.qpos_adr] += np.clip(part.T @ way, -0.2, 0.2)
+            data.qpos[compiled.scene.qpos_adr] += np.clip(part.T @ way, -0.2, 0.2)
 
-    def score(self, figure: Sequence[Any], memory: Any) -> tuple[Any, Any, Any, Any]:
+    def score(self, step: StepMetrics, memory: Any) -> Outcome:
         """Force and speed cost; rest without contact ends it. It remembers the time at rest [s]."""
-        period = 1 / self.cell.world.settings.control_rate
-        calm = (figure[FORCE] == 0) & (figure[SPEED] < REST_SPEED)
+        period = 1 / self.batch.compiled.settings.control_rate
+        calm = (step.force == 0) & (step.speed_ratio < REST_SPEED)
         rested = (memory + period) * calm
         over = rested >= REST_TIME - 1e-9
-        price = FORCE_PRICE * figure[RATIO] + SPEED_PRICE * figure[SPEED]
-        return REST_PRIZE * over - period * price, over, over, rested
+        rewards = {
+            "rest": REST_PRIZE * over,
+            "force": -period * FORCE_PRICE * step.limit_ratio,
+            "speed": -period * SPEED_PRICE * step.speed_ratio,
+        }
+        return Outcome(rewards, success=over, memory=rested, terminated=over)
 
 
-def home_tool(world: World) -> Array:
+def home_tool(compiled: CompiledScene) -> Array:
     """Where the tool is at home [m], shape (3,)."""
-    data = mujoco.MjData(world.scene.model)
-    data.qpos[world.scene.qpos_adr] = world.scene.home
-    mujoco.mj_kinematics(world.scene.model, data)
-    return tool_position(world, data)
+    data = mujoco.MjData(compiled.scene.model)
+    data.qpos[compiled.scene.qpos_adr] = compiled.scene.home
+    mujoco.mj_kinematics(compiled.scene.model, data)
+    return tool_position(compiled, data)
 
 
 def _bare_tool(bare: Scene, data: mujoco.MjData) -> Array:

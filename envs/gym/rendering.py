@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.envs.gym.world import World
+from tauguard.envs.gym.compiled import CompiledScene
 
 #: Of a picture [px].
 HEIGHT, WIDTH = 480, 640
@@ -43,9 +43,9 @@ def _need_display() -> None:
         )
 
 
-def _staged(world: World) -> mujoco.MjModel:
+def _staged(compiled: CompiledScene) -> mujoco.MjModel:
     """The scene with floor, sky and lamp, which are drawn and not simulated."""
-    spec = mujoco.MjSpec.from_string(world.scene.xml)
+    spec = mujoco.MjSpec.from_string(compiled.scene.xml)
     bright, blue = SKY
     spec.add_texture(
         name="sky",
@@ -56,12 +56,12 @@ def _staged(world: World) -> mujoco.MjModel:
         width=256,
         height=256,
     )
-    person = world.person
+    person = compiled.person
     floor = FLOOR_HEIGHT if person is None else person.floor
     _draw(spec, mujoco.mjtGeom.mjGEOM_PLANE, FLOOR, [0, 0, floor], FLOOR_COLOUR)
     if floor < FLOOR_HEIGHT:
         height = (FLOOR_HEIGHT - floor) / 2
-        for base in _bases(world):
+        for base in _bases(compiled):
             place = [base[0], base[1], FLOOR_HEIGHT - height]
             _draw(spec, mujoco.mjtGeom.mjGEOM_BOX, [*PEDESTAL, height], place, PEDESTAL_COLOUR)
     spec.worldbody.add_light(
@@ -81,19 +81,19 @@ def _draw(
     spec.worldbody.add_geom(type=kind, size=size, pos=place, rgba=rgba, contype=0, conaffinity=0)
 
 
-def _bases(world: World) -> list[NDArray[np.float64]]:
+def _bases(compiled: CompiledScene) -> list[NDArray[np.float64]]:
     """Where the arms stand [m]."""
-    model = world.scene.model
-    return [model.body_pos[model.body_rootid[body]] for _, body, _ in world.tools]
+    model = compiled.scene.model
+    return [model.body_pos[model.body_rootid[body]] for _, body, _ in compiled.tools]
 
 
 class Stage:
     """The scene as it is shown, and its own state, which follows the simulated one."""
 
-    def __init__(self, world: World, data: mujoco.MjData) -> None:
+    def __init__(self, compiled: CompiledScene, data: mujoco.MjData) -> None:
         """Set the lights and place the camera."""
-        self._world, self._data = world, data
-        self.model = _staged(world)
+        self._world, self._data = compiled, data
+        self.model = _staged(compiled)
         self.drawn = mujoco.MjData(self.model)
         vis = self.model.vis
         vis.quality.offsamples = 8
@@ -104,17 +104,17 @@ class Stage:
 
     def look(self, camera: Any) -> None:
         """From beside the first arm's front; two arms from the side, so that neither hides one."""
-        world, reach = self._world, self._world.reach
-        if world.person is not None:
-            places = np.array([*_bases(world), [*world.person.position, 0.0]])
+        compiled, reach = self._world, self._world.reach
+        if compiled.person is not None:
+            places = np.array([*_bases(compiled), [*compiled.person.position, 0.0]])
             x, y = places[:, :2].mean(axis=0)
-            camera.lookat[:] = (x, y, world.person.floor + 0.5 * world.person.stature)
+            camera.lookat[:] = (x, y, compiled.person.floor + 0.5 * compiled.person.stature)
             camera.distance, camera.azimuth, camera.elevation = 2.9, 130.0, -12.0
-        elif world.arms == 1:
+        elif compiled.arms == 1:
             camera.lookat[:] = (0.35 * reach, 0.0, 0.4 * reach)
             camera.distance, camera.azimuth, camera.elevation = 1.9 * reach, 140.0, -20.0
         else:
-            base = self.model.body_pos[self.model.body_rootid[world.tools[-1][1]]]
+            base = self.model.body_pos[self.model.body_rootid[compiled.tools[-1][1]]]
             camera.lookat[:] = (base[0] / 2, base[1] / 2, 0.35 * reach)
             camera.distance, camera.azimuth, camera.elevation = 2.4 * reach, 100.0, -20.0
 
@@ -144,17 +144,17 @@ class Stage:
 
 
 class Camera(Stage):
-    """An off-screen camera on one copy of a world."""
+    """An off-screen camera on one copy of a compiled."""
 
     def __init__(
-        self, world: World, data: mujoco.MjData, height: int = HEIGHT, width: int = WIDTH
+        self, compiled: CompiledScene, data: mujoco.MjData, height: int = HEIGHT, width: int = WIDTH
     ) -> None:
         """Open it.
 
         Raises:
             RuntimeError: there is nothing to draw with; the message says what would help.
         """
-        super().__init__(world, data)
+        super().__init__(compiled, data)
         size = self.model.vis.global_
         size.offwidth, size.offheight = max(size.offwidth, width), max(size.offheight, height)
         self._camera = mujoco.MjvCamera()
@@ -190,15 +190,15 @@ class Camera(Stage):
 
 
 class Window(Stage):
-    """A window on one copy of a world."""
+    """A window on one copy of a compiled."""
 
-    def __init__(self, world: World, data: mujoco.MjData) -> None:
+    def __init__(self, compiled: CompiledScene, data: mujoco.MjData) -> None:
         """Open it.
 
         Raises:
             RuntimeError: there is nothing to draw with; the message says what would help.
         """
-        super().__init__(world, data)
+        super().__init__(compiled, data)
         _need_display()
         with _no_picture():
             from mujoco import viewer
@@ -225,13 +225,13 @@ class Window(Stage):
 class Picture:
     """What ``render`` shows: a picture, or a window that follows."""
 
-    def __init__(self, world: World, data: mujoco.MjData, mode: str) -> None:
+    def __init__(self, compiled: CompiledScene, data: mujoco.MjData, mode: str) -> None:
         """Open it.
 
         Raises:
             RuntimeError: there is nothing to draw with; the message says what would help.
         """
-        self._view = Window(world, data) if mode == "human" else Camera(world, data)
+        self._view = Window(compiled, data) if mode == "human" else Camera(compiled, data)
 
     def show(self, targets: NDArray[np.float64]) -> NDArray[np.uint8] | None:
         """Draw the state and a ball at each target, shape (arms, 3)."""

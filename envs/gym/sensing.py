@@ -22,8 +22,8 @@ from tauguard.detectors.detector import same_rate
 from tauguard.detectors.estimation.gains import ENVIRONMENT_GAIN, PLAIN_GAIN
 from tauguard.detectors.faults.monitor import Monitor
 from tauguard.envs.gym.actions import observation_table
+from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.settings import DETECTORS
-from tauguard.envs.gym.world import World
 from tauguard.models import Drive, pin_model
 
 #: The plain detector's thresholds: times the breakaway friction, plus a share of the torque limit.
@@ -247,8 +247,8 @@ class PerArm:
             part.set_state(own)
 
 
-def listening(world: World, wanted: object) -> Callable[[], Listener] | None:
-    """What makes a detector for each copy of ``world``: by name, of a model file, or trained.
+def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener] | None:
+    """What makes a detector for each copy of ``compiled``: by name, of a model file, or trained.
 
     Raises:
         ValueError: nothing that can detect, or a model file of another arm.
@@ -256,8 +256,8 @@ def listening(world: World, wanted: object) -> Callable[[], Listener] | None:
     if wanted is None:
         return None
     if isinstance(wanted, str) and wanted in DETECTORS:
-        n, dt, arms = len(world.scene.facts.joints), world.settings.timestep, _arms(world)
-        ranges = [world.joint_range[k * n : (k + 1) * n] for k in range(world.arms)]
+        n, dt, arms = len(compiled.scene.facts.joints), compiled.settings.timestep, _arms(compiled)
+        ranges = [compiled.joint_range[k * n : (k + 1) * n] for k in range(compiled.arms)]
 
         def observers() -> Listener:
             parts = [
@@ -276,35 +276,35 @@ def listening(world: World, wanted: object) -> Callable[[], Listener] | None:
             f"detector: a {type(wanted).__name__}; expected {', '.join(DETECTORS)}, the path of a "
             "trained detector, or a tauguard.detectors.CollisionAlarm"
         )
-    return partial(AlarmListener, _fitting(world, wanted))
+    return partial(AlarmListener, _fitting(compiled, wanted))
 
 
-def _fitting(world: World, alarm: CollisionAlarm) -> CollisionAlarm:
-    """The alarm, if it is of an arm and a sample rate like the world's."""
-    joints, own = alarm.detector.arm.robot.joints, len(world.scene.joint_names)
+def _fitting(compiled: CompiledScene, alarm: CollisionAlarm) -> CollisionAlarm:
+    """The alarm, if it is of an arm and a sample rate like the scene's."""
+    joints, own = alarm.detector.arm.robot.joints, len(compiled.scene.joint_names)
     if joints != own:
         raise ValueError(
             f"detector: trained on {joints} joints, the scene has {own}; train one on this arm"
         )
-    if not same_rate(world.settings.timestep, alarm.detector.dt):
+    if not same_rate(compiled.settings.timestep, alarm.detector.dt):
         raise ValueError(
             f"detector: works at {1e3 * alarm.detector.dt:g} ms a sample, the scene's time step is "
-            f"{1e3 * world.settings.timestep:g} ms; train one at this rate"
+            f"{1e3 * compiled.settings.timestep:g} ms; train one at this rate"
         )
     return alarm
 
 
-def _arms(world: World) -> list[tuple[RobotNumbers, Drive]]:
+def _arms(compiled: CompiledScene) -> list[tuple[RobotNumbers, Drive]]:
     """Nominal numbers of each arm; the second one looks the other way, which gravity cannot see."""
-    robot = RobotNumbers.from_pin(pin_model(world.scene.arm_model))
-    drive = world.scene.facts.nominal
-    if world.settings.ideal_drive:
+    robot = RobotNumbers.from_pin(pin_model(compiled.scene.arm_model))
+    drive = compiled.scene.facts.nominal
+    if compiled.settings.ideal_drive:
         drive = replace(drive, friction=None)
-    return [(robot, drive)] * world.arms
+    return [(robot, drive)] * compiled.arms
 
 
 class Sensing:
-    """The sensors of one copy of a world, and the detector that listens to them.
+    """The sensors of one copy of a compiled, and the detector that listens to them.
 
     Attributes:
         measured: q, qd and current at every physics step of the last action, (substeps, n) each.
@@ -313,17 +313,17 @@ class Sensing:
         sensors: what measures; None: without errors.
     """
 
-    def __init__(self, world: World, make: Callable[[], Listener] | None) -> None:
+    def __init__(self, compiled: CompiledScene, make: Callable[[], Listener] | None) -> None:
         """Keep the parts; ``make`` gives a fresh detector, ``None``: there is none."""
-        self.sensors = world.scene.drive.sensors
-        self._gain = world.nominal.gain
+        self.sensors = compiled.scene.drive.sensors
+        self._gain = compiled.nominal.gain
         self._make = make
         self.detector = make() if make else None
-        table = observation_table(world)
+        table = observation_table(compiled)
         self._low = np.array([entry.low for entry in table])
         self._high = np.array([entry.high for entry in table])
-        self._none = np.zeros(len(world.scene.joint_names))
-        steps = world.settings.substeps
+        self._none = np.zeros(len(compiled.scene.joint_names))
+        steps = compiled.settings.substeps
         self.residuals = np.zeros((steps, len(self._none)))
         self.alarms = np.zeros(steps, dtype=np.bool_)
         self.measured = (self.residuals, self.residuals, self.residuals)

@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from tauguard.contacts import Checker, State, checker, registered
 from tauguard.contacts.checker import asked
-from tauguard.envs.gym.world import World
+from tauguard.envs.gym.compiled import CompiledScene
 
 
 class StepChecks:
-    """The checkers of one copy of a world.
+    """The checkers of one copy of a compiled.
 
     Attributes:
         counts: how many pairs of geoms or flexes each checker reported during the last action,
             shape (checkers,).
     """
 
-    def __init__(self, world: World, names: Sequence[str]) -> None:
+    def __init__(self, compiled: CompiledScene, names: Sequence[str]) -> None:
         """Make the checkers.
 
         Raises:
@@ -30,7 +30,7 @@ class StepChecks:
         for name in names:
             if name not in registered():
                 raise ValueError(f"checkers {name!r}: expected some of {', '.join(registered())}")
-        self._model = world.scene.model
+        self._model = compiled.scene.model
         self._scratch = mujoco.MjData(self._model)
         self._checkers: list[Checker] = [checker(name, self._model) for name in names]
         self._pairs: list[set[tuple[int, ...]]] = [set() for _ in names]

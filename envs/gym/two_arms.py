@@ -8,7 +8,7 @@ import numpy as np
 
 from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.reach import Reach
-from tauguard.envs.gym.two_arms_scene import PLACE
+from tauguard.envs.gym.second_arm import PLACE
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import Person, Scene, Table
 

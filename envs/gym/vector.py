@@ -23,19 +23,7 @@ from tauguard.envs.gym.base import (
     make_spaces,
     touches,
 )
-from tauguard.envs.gym.cell import (
-    COST,
-    DISTANCE,
-    DIVERGED,
-    FORCE,
-    LINK,
-    ONSET,
-    ONSET_TIME,
-    RATIO,
-    REGION,
-    REGION_FORCE,
-    TIME,
-)
+from tauguard.envs.gym.batch import StepMetrics
 from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import Picture
 from tauguard.envs.gym.settings import one_of
@@ -79,9 +67,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             one_of("render_mode", render_mode, RENDER_MODES)
         self.num_envs, self.render_mode, self._threads = num_envs, render_mode, threads
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.world, self.cell, self.task = build(self.task_type, keywords, num_envs)
-        self.metadata = frame_rate(self.world) | {"autoreset_mode": self.autoreset_mode}
-        self.single_action_space, self.single_observation_space = make_spaces(self.cell)
+        self.compiled, self.batch, self.task = build(self.task_type, keywords, num_envs)
+        self.metadata = frame_rate(self.compiled) | {"autoreset_mode": self.autoreset_mode}
+        self.single_action_space, self.single_observation_space = make_spaces(self.batch)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._limit = max_episode_steps
@@ -103,7 +91,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         """
         stated = {key: value for key, value in (options or {}).items() if key != "reset_mask"}
         try:
-            check_options(stated, self.world.settings.randomize or {})
+            check_options(stated, self.compiled.settings.randomize or {})
         except ValueError as error:
             raise ValueError(f"{error}; reset_mask always works") from None
         if isinstance(seed, list):
@@ -119,7 +107,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         mask = self._chosen((options or {}).get("reset_mask"))
         for k in np.flatnonzero(mask):
             self._begin(int(k), stated)
-        return self.cell.observation.copy(), self._infos(np.zeros_like(mask), mask)
+        return self.batch.observation.copy(), self._infos(
+            self._no_reward(), np.zeros_like(mask), mask
+        )
 
     def _chosen(self, mask: Any) -> Bools:
         if mask is None:
@@ -129,9 +119,9 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         return mask.astype(np.bool_)
 
     def _begin(self, i: int, stated: Mapping[str, Any] = MappingProxyType({})) -> None:
-        self.cell.draw(i, self._rngs[i], stated)
+        self.batch.draw(i, self._rngs[i], stated)
         self.task.start(i, self._rngs[i])
-        self.cell.cost_sum[i] = 0.0
+        self.batch.cost_sum[i] = 0.0
         self._elapsed[i], self._over[i] = 0, False
 
     def step(  # type: ignore[override]
@@ -142,7 +132,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         Raises:
             ValueError: actions of another shape, or with entries that are not finite.
         """
-        cell = self.cell
+        batch = self.batch
         values = np.ascontiguousarray(actions, dtype=np.float64)
         if values.shape != self.action_space.shape:
             raise ValueError(
@@ -155,41 +145,42 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             raise gymnasium.error.ResetNeeded(
                 f"copies {np.flatnonzero(self._over)} are over: reset them with a reset_mask"
             )
-        cell.step_all(values, going, self._rngs, self._threads)
-        task, figure = self.task, list(cell.figure.T)
-        rewards, overs, successes, task.memory[:] = task.score(figure, task.memory.copy())
-        diverged = figure[DIVERGED] != 0
+        batch.step_all(values, going, self._rngs, self._threads)
+        task, step = self.task, self._metrics()
+        terms, successes, task.memory[:], overs = task.score(step, task.memory.copy())
+        diverged = step.diverged != 0
         self._elapsed += going
         late = self._elapsed >= self._limit if self._limit else np.zeros_like(diverged)
         terminated = overs & ~diverged & going
         truncated = (diverged | late) & going
-        rewards = np.where(going, rewards, 0.0)
-        fresh = np.flatnonzero(~going)
-        for i in fresh:
+        terms = {name: np.where(going, term, 0.0) for name, term in terms.items()}
+        rewards = sum(terms.values(), np.zeros(self.num_envs))
+        for i in np.flatnonzero(~going):
             self._begin(int(i))
-        infos = self._infos(successes & going, np.ones_like(going))
+        infos = self._infos(terms, successes & going, np.ones_like(going))
+        infos["reason"][terminated] = task.ended
         for i in np.flatnonzero(successes & going & ~diverged):
-            self.task.after(int(i), self._rngs[i])
+            task.after(int(i), self._rngs[i])
         self._over = terminated | truncated
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._over.any():
             infos = self._restart(infos)
         if self.render_mode == "human":
             self.render()
-        return cell.observation.copy(), rewards, terminated, truncated, infos
+        return batch.observation.copy(), rewards, terminated, truncated, infos
 
     def _restart(self, infos: dict[str, Any]) -> dict[str, Any]:
         """SAME_STEP: the finished copies begin anew; what they ended with goes into ``final_``."""
         done = self._over.copy()
         observations = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(done):
-            observations[i] = self.cell.observation[i].copy()
+            observations[i] = self.batch.observation[i].copy()
         final = {key: value.copy() for key, value in infos.items()}
         for key in [k for k in final if not k.startswith("_")]:
             final[key][~done] = np.zeros_like(final[key][~done])
             final[f"_{key}"] = done.copy()
         for i in np.flatnonzero(done):
             self._begin(int(i))
-        fresh = self._infos(np.zeros_like(done), done)
+        fresh = self._infos(self._no_reward(), np.zeros_like(done), done)
         for key in [k for k in infos if not k.startswith("_")]:
             infos[key][done] = fresh[key][done]
         return {
@@ -199,34 +190,42 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
             "_final_info": done.copy(),
         } | infos
 
-    def _infos(self, success: Bools, mask: Bools) -> dict[str, Any]:
-        cell, area = self.cell, self.world.settings.contact_area
-        figure = self.cell.figure.T.copy()  # a row a figure: no view of what the next step writes
+    def _metrics(self) -> StepMetrics:
+        """What the last action came to; no view of what the next one writes."""
+        table = self.batch.metrics.copy()
+        return StepMetrics(*(table[name] for name in StepMetrics._fields))
+
+    def _no_reward(self) -> dict[str, Array]:
+        return {name: np.zeros(self.num_envs) for name in self.task.terms}
+
+    def _infos(self, terms: dict[str, Array], success: Bools, mask: Bools) -> dict[str, Any]:
+        batch, area, step = self.batch, self.compiled.settings.contact_area, self._metrics()
         reason = np.full(self.num_envs, "", dtype=object)
-        reason[figure[DIVERGED] != 0] = DIVERGED_REASON
+        reason[step.diverged != 0] = DIVERGED_REASON
         infos: dict[str, Any] = {
-            "time": figure[TIME],
-            "distance": figure[DISTANCE],
+            "time": step.time,
+            "distance": step.distance,
             "success": success.copy(),
-            "force": figure[FORCE],
-            "cost": figure[COST],
-            "cost_sum": cell.cost_sum.copy(),
-            "pressure": figure[REGION_FORCE] / area if area else np.zeros(self.num_envs),
-            "limit_ratio": figure[RATIO],
-            "region": figure[REGION].astype(np.int64),
-            "tau_ext": cell.tau_ext.copy(),
-            "residual": cell.residual.copy(),
-            "alarm": cell.alarm.copy(),
-            "onset": figure[ONSET] != 0,
-            "onset_time": figure[ONSET_TIME],
-            "link": figure[LINK].astype(np.int64),
-            "fault": np.array(cell.faults(), dtype=object),
-            "tau_ext_peak": cell.tau_peak.copy(),
-            "alarm_delay": cell.alarm_delay.copy(),
+            "force": step.force,
+            "cost": step.cost,
+            "cost_sum": batch.cost_sum.copy(),
+            "pressure": step.region_force / area if area else np.zeros(self.num_envs),
+            "limit_ratio": step.limit_ratio,
+            "region": step.region.astype(np.int64),
+            "tau_ext": batch.tau_ext.copy(),
+            "residual": batch.residual.copy(),
+            "alarm": batch.alarm.copy(),
+            "onset": step.onset != 0,
+            "onset_time": step.onset_time,
+            "link": step.link.astype(np.int64),
+            "fault": np.array(batch.faults(), dtype=object),
+            "tau_ext_peak": batch.tau_peak.copy(),
+            "alarm_delay": batch.alarm_delay.copy(),
             "reason": reason,
-        } | touches(cell, slice(None))
-        if cell.checks:
-            infos["contacts"] = cell.contacts.copy()
+        } | touches(batch, slice(None))
+        infos |= {f"reward_{name}": term for name, term in terms.items()}
+        if batch.checks:
+            infos["contacts"] = batch.contacts.copy()
         for key in list(infos):
             infos[f"_{key}"] = mask.copy()
         return infos
@@ -236,8 +235,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         if self.render_mode is None:
             return None
         if self._picture is None:
-            self._picture = Picture(self.world, self.cell.datas[0], self.render_mode)
-        picture = self._picture.show(self.cell.target[0])
+            self._picture = Picture(self.compiled, self.batch.datas[0], self.render_mode)
+        picture = self._picture.show(self.batch.target[0])
         return None if picture is None else (picture,)
 
     def close_extras(self, **kwargs: Any) -> None:

@@ -245,15 +245,15 @@ void bind_surroundings(nb::module_& m) {
 void bind_outputs(nb::module_& m) {
   nb::class_<Rows>(m, "Rows").def(
       "__init__",
-      [](Rows* self, Array observation, Array figure, Array tau_ext, Array target, Array q,
+      [](Rows* self, Array observation, Array metrics, Array tau_ext, Array target, Array q,
          Array qd, Array current, Array tau, Array contact, Array region, Array tau_peak,
          Array peak, Array reaches, Array walks) {
         new (self)
-            Rows{held(observation), held(figure),  held(tau_ext), held(target),  held(q),
+            Rows{held(observation), held(metrics), held(tau_ext), held(target),  held(q),
                  held(qd),          held(current), held(tau),     held(contact), held(region),
                  held(tau_peak),    held(peak),    held(reaches), held(walks)};
       },
-      nb::kw_only(), "observation"_a, "figure"_a, "tau_ext"_a, "target"_a, "q"_a, "qd"_a,
+      nb::kw_only(), "observation"_a, "metrics"_a, "tau_ext"_a, "target"_a, "q"_a, "qd"_a,
       "current"_a, "tau"_a, "contact"_a, "region"_a, "tau_peak"_a, "peak"_a, "reaches"_a,
       "walks"_a);
   nb::class_<Track>(m, "Track")
@@ -362,5 +362,5 @@ NB_MODULE(_plant, m) {
   m.attr("WALK_WIDTH") = walk_width;
   m.attr("PERSON_SEGMENTS") = person_segments;
   m.attr("SENSOR_WIDTH") = sensor_width;
-  m.attr("FIGURES") = static_cast<int>(figures);
+  m.attr("METRICS") = static_cast<int>(metrics_width);
 }

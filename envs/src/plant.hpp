@@ -111,7 +111,7 @@ class Plant {
     finish();
   }
 
-  // The observation and figures once more, after a target has moved.
+  // The observation and metrics once more, after a target has moved.
   void refresh() {
     if (sound_) observe();
     report();
@@ -307,7 +307,8 @@ class Plant {
     if (std::fabs(at_now) > r.span) physics_.qvel()[r.dof] = at_now > 0 ? -r.speed : r.speed;
   }
 
-  // q, qd, torque; a tool's position and the way to its target; a region's position and velocity.
+  // q, qd, torque; a tool's position and the vector to its target; a region's position and
+  // velocity.
   void observe() {
     double* out = rows_.observation.data();
     const auto put = [&](Vec3 v) {
@@ -322,9 +323,9 @@ class Plant {
     double away = 0.0;
     for (const Tool& tool : around_.tools) put(around_.arms.tool(tool));
     for (std::size_t a = 0; a < around_.tools.size(); ++a) {
-      const Vec3 way = load(rows_.target.data() + 3 * a) - around_.arms.tool(around_.tools[a]);
-      away = std::max(away, norm(way));
-      put(way);
+      const Vec3 left = load(rows_.target.data() + 3 * a) - around_.arms.tool(around_.tools[a]);
+      away = std::max(away, norm(left));
+      put(left);
     }
     for (std::size_t i = 0; i < around_.regions.size(); ++i) {
       const Region& r = around_.regions[i];
@@ -334,26 +335,26 @@ class Plant {
     double* seen = rows_.observation.data();
     for (std::size_t k = 0; k < around_.low.size(); ++k)
       seen[k] = std::min(std::max(seen[k], around_.low[k]), around_.high[k]);
-    rows_.figure.data()[distance] = away;
+    rows_.result().distance = away;
   }
 
   void report() {
-    double* f = rows_.figure.data();
-    f[time_now] = static_cast<double>(count_) * drives_.dt;
-    f[force] = contact_.force;
-    f[cost] = contact_.cost;
-    f[ratio] = contact_.ratio;
-    f[region_force] = contact_.region_force;
-    f[onset] = contact_.onset ? 1.0 : 0.0;
-    f[onset_time] = contact_.onset_time;
-    f[link] = contact_.link;
-    f[region] = contact_.region;
-    f[diverged] = sound_ ? 0.0 : 1.0;
+    Metrics& m = rows_.result();
+    m.time = static_cast<double>(count_) * drives_.dt;
+    m.force = contact_.force;
+    m.cost = contact_.cost;
+    m.limit_ratio = contact_.ratio;
+    m.region_force = contact_.region_force;
+    m.onset = contact_.onset ? 1.0 : 0.0;
+    m.onset_time = contact_.onset_time;
+    m.link = contact_.link;
+    m.region = contact_.region;
+    m.diverged = sound_ ? 0.0 : 1.0;
     double fastest = 0.0;
     for (std::size_t i = 0; i < joints(); ++i)
       fastest = std::max(fastest,
                          std::fabs(physics_.qvel()[drives_.joints[i].dof]) / controls.max_speed[i]);
-    f[speed_ratio] = std::isfinite(fastest) ? fastest : 0.0;
+    m.speed_ratio = std::isfinite(fastest) ? fastest : 0.0;
   }
 };
 

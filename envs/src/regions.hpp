@@ -18,7 +18,7 @@ struct Region {
   int mocap = -1;                          // of the frame that a person moves; -1: no person's
   bool held = false;                       // cannot move away
   int sensor = -1;                         // address of its ten contact numbers
-  double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no blow is allowed
+  double quasi_static = 0, transient = 0;  // limits [N]; transient 0: no impact is allowed
   double span = 0, speed = 0;  // it turns back this far from its origin [m], at this speed [m/s]
   double touching = 0;         // unbroken contact so far [s]
   double force = 0;            // at the last physics step [N]
@@ -89,9 +89,10 @@ inline void read_links(const Kinematics& arms, const double* sensor, double t, C
   }
 }
 
-// Reads the regions' contact sensors. A blow counts against the transient limit, unbroken contact
-// beyond half a second and a region that cannot move away against the quasi-static one. Where no
-// blow is allowed the whole force is cost, and the ratio is against the quasi-static limit.
+// Reads the regions' contact sensors. An impact counts against the transient limit, unbroken
+// contact beyond half a second and a region that cannot move away against the quasi-static one.
+// Where no impact is allowed the whole force is cost, and the ratio is against the quasi-static
+// limit.
 inline void read_regions(std::vector<Region>& regions, const double* sensors, double dt, Contact& c,
                          double* peaks) {
   double cost = 0;
@@ -105,8 +106,8 @@ inline void read_regions(std::vector<Region>& regions, const double* sensors, do
       continue;
     }
     r.touching += dt;
-    const bool blow = !r.held && r.touching <= transient_time;
-    const double limit = blow ? r.transient : r.quasi_static;
+    const bool impact = !r.held && r.touching <= transient_time;
+    const double limit = impact ? r.transient : r.quasi_static;
     const double ratio = force / (limit > 0 ? limit : r.quasi_static);
     cost += std::max(0.0, force - limit);
     c.region_force = std::max(c.region_force, force);

@@ -1,6 +1,7 @@
 // What surrounds the drives of a plant, and the rows that its results go to.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "kinematics.hpp"
@@ -10,22 +11,12 @@
 
 namespace tauguard::envs {
 
-// Columns of the row of figures.
-enum Figure {
-  time_now,
-  distance,
-  force,
-  cost,
-  ratio,
-  region_force,
-  onset,
-  onset_time,
-  link,
-  region,
-  diverged,
-  speed_ratio,
-  figures
+// What one action came to, as numbers; Python's StepMetrics has the same fields in this order.
+struct Metrics {
+  double time, distance, force, cost, limit_ratio, region_force;
+  double onset, onset_time, link, region, diverged, speed_ratio;
 };
+constexpr std::size_t metrics_width = sizeof(Metrics) / sizeof(double);
 
 // What surrounds the drives: the arms' links and tools, body regions, contact sensors.
 struct Surroundings {
@@ -40,11 +31,13 @@ struct Surroundings {
 
 // Where an environment's results go: rows of arrays that Python owns.
 struct Rows {
-  Held observation, figure, tau_ext, target;
+  Held observation, metrics, tau_ext, target;
   Held q, qd, current, tau;  // physics steps x joints
   Held contact, region;      // physics steps x contact_width, physics steps x regions x 7
   Held tau_peak, peak;       // joints; regions x peak_width
   Held reaches, walks;       // the person's script: hands x rows x reach_width, rows x walk_width
+
+  Metrics& result() const { return *reinterpret_cast<Metrics*>(metrics.data()); }
 };
 
 // Where a run along a table of references is written to: row k belongs to the state before step k.

@@ -18,7 +18,6 @@ from studies.simulation.reactions import reactions, trained_detector
 from tauguard.contacts import registered
 from tauguard.envs.adapters.reactions import REACTIONS
 from tauguard.envs.gym.base import ArmEnv
-from tauguard.envs.gym.cell import DIVERGED
 from tauguard.models import body_region
 from tauguard.report import Row
 
@@ -152,7 +151,7 @@ def acting(env: gymnasium.Env[Any, Any], actions: np.ndarray, seed: int) -> Call
 
 def driven(env: ArmEnv, actions: np.ndarray, seed: int) -> Callable[[], object]:
     """The bare physics loop: mj_step and the drives, natively; no observation, no reward."""
-    plant, steps = env.cell.plants[0], env.world.settings.substeps
+    plant, steps = env.batch.plants[0], env.compiled.settings.substeps
     rows = actions.astype(np.float64)
 
     def call() -> None:
@@ -167,28 +166,28 @@ def driven(env: ArmEnv, actions: np.ndarray, seed: int) -> Callable[[], object]:
 def recorded(env: ArmEnv, actions: np.ndarray, seed: int) -> tuple[np.ndarray, float]:
     """The forces that the drives apply at every physics step, and how far a replay strays [rad]."""
     env.reset(seed=seed)
-    plant, data, found = env.cell.plants[0], env.cell.datas[0], []
+    plant, data, found = env.batch.plants[0], env.batch.datas[0], []
     for action in actions.astype(np.float64):
         plant.begin(action)
-        for _ in range(env.world.settings.substeps):
+        for _ in range(env.compiled.settings.substeps):
             plant.run(1)
             found.append(data.qfrc_applied.copy())
         plant.finish()
-    assert not env.cell.figure[0, DIVERGED]
-    last = data.qpos[env.world.scene.qpos_adr].copy()
+    assert not env.batch.metrics["diverged"][0]
+    last = data.qpos[env.compiled.scene.qpos_adr].copy()
     forces = np.array(found)
     states, _ = bare(env, forces, seed)()
-    model, adr = env.world.scene.model, env.world.scene.qpos_adr
+    model, adr = env.compiled.scene.model, env.compiled.scene.qpos_adr
     return forces, float(np.abs(states[0, -1, 1 : 1 + model.nq][adr] - last).max())
 
 
 def bare(env: ArmEnv, forces: np.ndarray, seed: int) -> Callable[[], Any]:
     """MuJoCo's own compiled loop over the same scene, start and forces."""
-    model = env.world.scene.model
+    model = env.compiled.scene.model
     env.reset(seed=seed)
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     state = np.empty(mujoco.mj_stateSize(model, kind))
-    mujoco.mj_getState(model, env.cell.datas[0], state, kind)
+    mujoco.mj_getState(model, env.batch.datas[0], state, kind)
     data = mujoco.MjData(model)
     applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 
@@ -258,11 +257,11 @@ def batched(seed: int, count: int, threads: int) -> tuple[Callable[[], object], 
         The call, and its copies' largest joint difference from ``mj_step`` of one of them [rad].
     """
     env = made(seed)
-    model, data = env.world.scene.model, env.cell.datas[0]
+    model, data = env.compiled.scene.model, env.batch.datas[0]
     env.step(np.zeros(6))
     batch = Batch(model, COPIES, threads)
     start, force = data.qpos.copy(), data.qfrc_applied.copy()
-    substeps = env.world.settings.substeps
+    substeps = env.compiled.settings.substeps
 
     def call() -> None:
         batch.qpos[:], batch.qvel[:], batch.qfrc_applied[:] = start, 0.0, force

@@ -87,8 +87,8 @@ def swing(speed: float, detector: Any, reaction: str, arm: int, seed: int) -> di
     env.reset(seed=seed)
     inner = env.unwrapped
     assert isinstance(inner, ReactEnv)
-    way = np.diff(inner.task.swing[0], axis=0) * 100 / inner.world.max_speed  # type: ignore[attr-defined]
-    n = len(inner.world.scene.joint_names)
+    way = np.diff(inner.task.swing[0], axis=0) * 100 / inner.compiled.max_speed  # type: ignore[attr-defined]
+    n = len(inner.compiled.scene.joint_names)
     tools, times, force, onset, begun = [], [], 0.0, -1.0, -1.0
     for step in range(len(way) + 150):
         action = way[step] if step < len(way) else np.zeros(n)

@@ -97,8 +97,8 @@ def test_a_zero_force_takes_the_arrow_away(tmp_path):
 
     env = gymnasium.make("tauguard/Reach-v0").unwrapped
     env.reset(seed=0)
-    view = live.LiveView(env.world.scene.model, tmp_path / "a.rrd")
-    view.show(env.cell.datas[0], 0.0, np.zeros((1, 3)))
+    view = live.LiveView(env.compiled.scene.model, tmp_path / "a.rrd")
+    view.show(env.batch.datas[0], 0.0, np.zeros((1, 3)))
     view.contact(np.zeros(3), np.array([0.0, 0.0, 100.0]))
     view.contact(np.full(3, np.nan), np.zeros(3))
     view.close()

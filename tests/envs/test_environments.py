@@ -15,7 +15,6 @@ from gymnasium.utils.env_checker import check_env
 
 import tauguard
 from tauguard.environments import ENVIRONMENTS
-from tauguard.envs.gym.cell import FIGURES
 from tauguard.envs.gym.reach import ReachEnv
 from tauguard.envs.gym.settings import CONTROLS
 from tauguard.models import BodyProxy
@@ -116,10 +115,10 @@ def test_a_robot_that_is_not_there():
 def test_bad_actions(action, words):
     env = gym.make(REACH).unwrapped
     env.reset(seed=0)
-    before = env.cell.figure.copy()
+    before = env.batch.metrics.copy()
     with pytest.raises(ValueError, match=words):
         env.step(action)
-    assert np.array_equal(before, env.cell.figure)
+    assert np.array_equal(before, env.batch.metrics)
 
 
 def test_step_before_reset():
@@ -131,7 +130,7 @@ def test_a_diverged_simulation_ends_truncated_without_nan():
     env = gym.make(REACH, obstacles=()).unwrapped
     env.reset(seed=0)
     good, *_ = env.step(np.zeros(6))
-    env.cell.datas[0].qvel[2] = 1e6
+    env.batch.datas[0].qvel[2] = 1e6
     for _ in range(3):
         observation, reward, terminated, truncated, info = env.step(np.ones(6))
         assert truncated
@@ -147,17 +146,17 @@ def test_a_diverged_simulation_ends_truncated_without_nan():
 def stepped(mode, action, steps, **keywords):
     env = gym.make(REACH, control=mode, obstacles=(), ideal_drive=True, **keywords).unwrapped
     env.reset(seed=5)
-    first = env.cell.observation[0].copy()
+    first = env.batch.observation[0].copy()
     for _ in range(steps):
         env.step(np.asarray(action, dtype=float))
-    return env, first, env.cell.observation[0].copy()
+    return env, first, env.batch.observation[0].copy()
 
 
 def test_zero_velocity_stands_still_and_full_velocity_moves_at_full_speed():
     _, first, last = stepped("joint_velocity", np.zeros(6), 100)
     assert np.abs(last[:6] - first[:6]).max() < 1e-3
     env, _, last = stepped("joint_velocity", [0.5, 0, 0, 0, 0, 0], 60)
-    assert last[6] == pytest.approx(0.5 * env.world.max_speed[0], rel=0.01)
+    assert last[6] == pytest.approx(0.5 * env.compiled.max_speed[0], rel=0.01)
 
 
 def test_zero_torque_floats_and_zero_current_falls():
@@ -170,7 +169,7 @@ def test_zero_torque_floats_and_zero_current_falls():
 def test_position_mode_arrives_where_the_table_says():
     action = np.array([0.2, 0.1, -0.1, 0.2, -0.2, 0.3])
     env, _, last = stepped("joint_position", action, 300)
-    low, high = np.array([(e.low, e.high) for e in env.cell.actions]).T
+    low, high = np.array([(e.low, e.high) for e in env.batch.actions]).T
     assert last[:6] == pytest.approx(low + (action + 1) / 2 * (high - low), abs=0.01)
 
 
@@ -192,11 +191,11 @@ def test_observation_agrees_with_mujoco():
     rng = np.random.default_rng(0)
     for _ in range(30):
         observation = env.step(rng.uniform(-1, 1, 6))[0]
-    model = env.world.scene.model
+    model = env.compiled.scene.model
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = env.cell.datas[0].qpos, env.cell.datas[0].qvel
+    data.qpos[:], data.qvel[:] = env.batch.datas[0].qpos, env.batch.datas[0].qvel
     mujoco.mj_forward(model, data)
-    named = dict(zip([e.name for e in env.cell.observations], observation, strict=True))
+    named = dict(zip([e.name for e in env.batch.observations], observation, strict=True))
     assert [named[f"position of joint{i}"] for i in range(1, 7)] == pytest.approx(data.qpos[:6])
     assert [named[f"position of tool 1, {a}"] for a in "xyz"] == pytest.approx(
         data.site("flange").xpos
@@ -220,13 +219,13 @@ def struck():
     proxy = BodyProxy("hand", position=(0.0, 0.6, 0.45), direction=(0.0, -1.0, 0.0))
     env = gym.make(REACH, obstacles=(proxy,), control_rate=1000, contact_area=2.0).unwrapped
     env.reset(seed=0)
-    model, data = env.world.scene.model, env.cell.datas[0]
+    model, data = env.compiled.scene.model, env.batch.datas[0]
     joint = model.joint("hand")
     data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = 0.0, 0.5
     infos, forces = [], []
     for _ in range(1500):
         env.step(np.zeros(6))
-        infos.append(env._info(env.cell.figure[0].tolist(), False))
+        infos.append(env._info(env._metrics(), {}, False, ""))
         # The engine's own account of the same step: J^T of every contact.
         tau = np.zeros(model.nv)
         for c in range(data.ncon):
@@ -238,7 +237,7 @@ def struck():
                 jac = np.zeros((3, model.nv))
                 mujoco.mj_jac(model, data, jac, None, data.contact[c].pos, body)
                 tau += sign * jac.T @ (frame.T @ local[:3])
-        forces.append(tau[env.world.scene.dof_adr])
+        forces.append(tau[env.compiled.scene.dof_adr])
     return env, infos, np.array(forces)
 
 
@@ -280,17 +279,17 @@ def test_a_clamped_region_counts_against_its_quasi_static_limit():
     proxy = BodyProxy("hand", position=(0.0, 0.0, 0.0), clamped=True, radius=0.05)
     env = gym.make(REACH, obstacles=(proxy,), ideal_drive=True).unwrapped
     env.reset(seed=0)
-    data = env.cell.datas[0]
-    tool = env.cell.observation[0, 18:21]
+    data = env.batch.datas[0]
+    tool = env.batch.observation[0, 18:21]
     data.mocap_pos[0] = tool - np.array([0.0, 0.0, 0.12])
     ratios, forces = [], []
     for _ in range(80):
-        jac = np.zeros((3, env.world.scene.model.nv))
+        jac = np.zeros((3, env.compiled.scene.model.nv))
         mujoco.mj_jacBody(
-            env.world.scene.model, data, jac, None, int(env.world.scene.link_bodies[-1])
+            env.compiled.scene.model, data, jac, None, int(env.compiled.scene.link_bodies[-1])
         )
         down = np.linalg.pinv(jac[:, :6]) @ [0, 0, -0.1]
-        env.cell.plants[0].override(1, down)
+        env.batch.plants[0].override(1, down)
         info = env.step(np.zeros(6))[4]
         ratios.append(info["limit_ratio"])
         forces.append(info["force"])
@@ -304,15 +303,15 @@ def test_reaching_a_target_pays_and_brings_the_next():
     env.reset(seed=4)
     total, successes = 0.0, 0
     for _ in range(400):
-        way = env.cell.observation[0, 21:24]
+        way = env.batch.observation[0, 21:24]
         action = np.concatenate([np.clip(way / 0.02, -1, 1), np.zeros(3)])
-        target = env.cell.target.copy()
+        target = env.batch.target.copy()
         _, reward, _, _, info = env.step(action)
         total += reward
         if info["success"]:
             successes += 1
-            assert not np.array_equal(target, env.cell.target)
-            assert np.linalg.norm(env.cell.target - target) >= 0.1
+            assert not np.array_equal(target, env.batch.target)
+            assert np.linalg.norm(env.batch.target - target) >= 0.1
     assert total > successes >= 1
 
 
@@ -320,7 +319,7 @@ def test_the_observer_raises_an_alarm_after_a_blow():
     proxy = BodyProxy("chest", position=(0.21, 0.7, 0.9), direction=(0.0, -1.0, 0.0))
     env = gym.make(REACH, obstacles=(proxy,), detector="observer").unwrapped
     env.reset(seed=0)
-    model, data = env.world.scene.model, env.cell.datas[0]
+    model, data = env.compiled.scene.model, env.batch.datas[0]
     data.qpos[model.joint("chest").qposadr[0]], data.qvel[model.joint("chest").dofadr[0]] = 0.1, 1.0
     alarm_at = onset_at = None
     for step in range(150):
@@ -364,7 +363,7 @@ env = gymnasium.make("tauguard/Reach-v0", render_mode="rgb_array")
 env.reset(seed=0)
 a = env.render()
 assert a.shape == (480, 640, 3) and a.dtype == numpy.uint8
-env.unwrapped.cell.target[:] += 0.3
+env.unwrapped.batch.target[:] += 0.3
 b = env.render()
 green = [(p[..., 1].astype(int) > p[..., 0].astype(int) + 60).sum() for p in (a, b)]
 moved = (a != b).any(axis=2).sum()
@@ -379,10 +378,6 @@ assert len(numpy.unique(a.reshape(-1, 3), axis=0)) > 100
     if out.returncode and "no picture" in out.stderr:
         pytest.skip("the EGL library cannot draw here")
     assert out.returncode == 0, out.stderr
-
-
-def test_figures_are_named_once():
-    assert len(set(FIGURES)) == len(FIGURES)
 
 
 @pytest.mark.parametrize("kind", [str, Path])

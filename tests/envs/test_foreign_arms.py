@@ -50,15 +50,15 @@ def test_a_passive_gripper_works_in_every_environment(arm):
 def test_the_velocity_servo_follows(arm):
     """Half speed on every joint for 0.3 s: the arm keeps up within a fiftieth of its speed."""
     envs = make(arm(21), num_envs=1)
-    world = envs.unwrapped.world
+    compiled = envs.unwrapped.compiled
     envs.reset(seed=0)
-    n = len(world.scene.joint_names)
-    low, high = np.clip(world.joint_range, -10, 10).T
-    way = np.where(low + high > 2 * world.scene.home, 1.0, -1.0)
+    n = len(compiled.scene.joint_names)
+    low, high = np.clip(compiled.joint_range, -10, 10).T
+    way = np.where(low + high > 2 * compiled.scene.home, 1.0, -1.0)
     for _ in range(30):
         seen, *_ = envs.step(0.25 * way[None])
-    error = np.abs(seen[0, n : 2 * n] - 0.25 * way * world.max_speed)
-    assert (error < 0.02 * world.max_speed).all()
+    error = np.abs(seen[0, n : 2 * n] - 0.25 * way * compiled.max_speed)
+    assert (error < 0.02 * compiled.max_speed).all()
 
 
 def test_a_joint_at_its_end_raises_no_alarm(arm):

@@ -9,22 +9,24 @@ import pytest
 
 from tauguard.environments import ENVIRONMENTS
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "environments.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "environments.md"
 
 
-def table():
-    text = PAGE.read_text().partition("## What `info` holds")[2]
+def table(terms):
+    text = PAGE.read_text().partition("## Read `info`")[2]
     lines = next(part for part in text.split("\n\n") if part.startswith("| key")).splitlines()[2:]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     assert all(len(row) == 4 and row[3] for row in cells)
-    return {key.strip("`"): tuple(re.findall(r"\w+", shape)) for key, shape, _, _ in cells}
+    shapes = {key.strip("`"): tuple(re.findall(r"\w+", shape)) for key, shape, _, _ in cells}
+    del shapes["reward_NAME"]
+    return shapes | {f"reward_{term}": () for term in terms}
 
 
 @pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
 @pytest.mark.parametrize("keywords", [{}, {"checkers": ("mujoco",), "obstacles": ("person",)}])
 def test_the_table_has_every_key_and_its_shape(name, keywords):
     env = gym.make(f"tauguard:{name}", detector="observer", **keywords)
-    arm, stated = env.unwrapped, table()
+    arm, stated = env.unwrapped, table(env.unwrapped.task.terms)
     sizes = {"n": len(arm.scene.joint_names), "k": len(arm.regions), "3": 3}
     sizes["checkers"] = len(keywords.get("checkers", ()))
     if not keywords:
@@ -40,5 +42,5 @@ def test_native_copies_put_a_row_a_copy_in_front():
     )
     info = envs.reset(seed=0)[1]
     keys = {key for key in info if not key.startswith("_")}
-    assert keys == set(table()) - {"contacts"}
+    assert keys == set(table(envs.unwrapped.task.terms)) - {"contacts"}
     assert all(len(info[key]) == 2 for key in keys)

@@ -74,7 +74,7 @@ def test_who_stands_still_stands_still():
 
 def struck(**keywords):
     """The arm runs into a person who stands in front of it; infos of every action."""
-    standing = gym.make("tauguard/React-v0", obstacles=("person",)).unwrapped.world.person
+    standing = gym.make("tauguard/React-v0", obstacles=("person",)).unwrapped.compiled.person
     someone = replace(standing, **keywords)
     env = gym.make(
         "tauguard/React-v0", obstacles=(someone,), approach=False, detector="observer"
@@ -82,9 +82,9 @@ def struck(**keywords):
     env.reset(seed=3)
     infos = []
     for speeds in np.diff(env.task.swing[0], axis=0) * 100:
-        env.cell.plants[0].override(1, speeds)
+        env.batch.plants[0].override(1, speeds)
         infos.append(env.step(np.zeros(6))[4])
-    env.cell.plants[0].override(1, np.zeros(6))
+    env.batch.plants[0].override(1, np.zeros(6))
     for _ in range(80):
         infos.append(env.step(np.zeros(6))[4])
     return env, infos
@@ -117,10 +117,10 @@ def test_a_touched_person_steps_back_after_their_reaction_time():
     onset = next(i for i, info in enumerate(infos) if info["onset"])
     assert onset < len(infos) - 60
     body = env.data.body("person_chest_motion").xpos
-    assert body[1] > env.world.person.position[1] + 0.1
+    assert body[1] > env.compiled.person.position[1] + 0.1
     still, others = struck(reacts=False)
     assert still.data.body("person_chest_motion").xpos[1] == pytest.approx(
-        still.world.person.position[1]
+        still.compiled.person.position[1]
     )
     # Before the reaction time both are the same.
     for a, b in zip(infos[: onset + 19], others, strict=False):
@@ -165,7 +165,7 @@ def test_forces_on_a_person_are_the_engines():
     env.reset(seed=1)
     model, data, found = env.model, env.data, 0
     for _ in range(6000):
-        way = env.cell.observation[0, 21:24]
+        way = env.batch.observation[0, 21:24]
         _, _, _, _, info = env.step(np.append(np.clip(way / 0.02, -1, 1), np.zeros(3)))
         total = {}
         for c in range(data.ncon):

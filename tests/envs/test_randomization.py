@@ -97,14 +97,16 @@ def test_what_is_drawn_acts():
         assert np.abs(fallen(**{name: value}) - same).max() > 1e-3, name
     assert np.array_equal(fallen(), same)
     env.reset(seed=0, options={"mass": 1.2})
-    link = env.world.scene.link_bodies
-    assert env.model.body_mass[link] == pytest.approx(1.2 * env.world.scene.model.body_mass[link])
+    link = env.compiled.scene.link_bodies
+    assert env.model.body_mass[link] == pytest.approx(
+        1.2 * env.compiled.scene.model.body_mass[link]
+    )
 
 
 def test_contacts_keep_the_stiffness_that_they_say():
     env = gym.make(REACH, randomize={"mass": (0.5, 2.0), "payload_g": (0, 5000)}).unwrapped
     env.reset(seed=0)
-    base = env.world.scene.model
+    base = env.compiled.scene.model
 
     def stiffness(model):
         inverse = model.body_invweight0[:, 0][model.geom_bodyid]
@@ -119,7 +121,7 @@ def test_a_taller_person_is_taller():
     heights = []
     for stature in (1.5, 1.9):
         env.reset(seed=0, options={"stature": stature})
-        heights.append(env.data.body("person_skull").xpos[2] - env.world.person.floor)
+        heights.append(env.data.body("person_skull").xpos[2] - env.compiled.person.floor)
         radius = env.model.geom("person_chest").size[0]
         assert radius == pytest.approx(0.070 * stature)
     assert heights[1] / heights[0] == pytest.approx(1.9 / 1.5, rel=0.02)

@@ -64,9 +64,9 @@ def test_seven_joints_from_a_urdf(name, urdf):
 
 
 def tool_velocity(env):
-    model, data = env.world.scene.model, env.cell.datas[0]
+    model, data = env.compiled.scene.model, env.batch.datas[0]
     velocity = np.zeros(6)
-    site = env.world.tools[0][0]
+    site = env.compiled.tools[0][0]
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_SITE, site, velocity, 0)
     return velocity[3:]
 
@@ -79,7 +79,7 @@ def test_react_begins_at_the_first_touch_at_about_the_asked_speed(speed):
         assert info["onset"]
         assert info["force"] > 0
         assert info["time"] - info["onset_time"] <= 0.01 + 1e-9
-        mujoco.mj_forward(env.world.scene.model, env.cell.datas[0])
+        mujoco.mj_forward(env.compiled.scene.model, env.batch.datas[0])
         reached = tool_velocity(env)
         assert 0.6 * speed < reached[1] < 1.3 * speed
         assert np.abs(reached[[0, 2]]).max() < 0.3 * speed
@@ -160,7 +160,7 @@ def test_react_rejects_a_speed_that_cannot_be():
 def test_the_cloth_is_pushed_and_pushes_back():
     env = gym.make("tauguard/ClothReach-v0", control="cartesian", checkers=("rigid",)).unwrapped
     env.reset(seed=0)
-    data = env.cell.datas[0]
+    data = env.batch.datas[0]
     hanging = data.flexvert_xpos.copy()
     forces = []
     for step in range(110):
@@ -182,7 +182,7 @@ def test_a_checker_sees_the_blow_that_the_sensors_feel():
     proxy = BodyProxy("hand", position=(0.0, 0.6, 0.45), direction=(0.0, -1.0, 0.0))
     env = gym.make("tauguard/Reach-v0", obstacles=(proxy,), checkers=("rigid",)).unwrapped
     env.reset(seed=0)
-    model, data = env.world.scene.model, env.cell.datas[0]
+    model, data = env.compiled.scene.model, env.batch.datas[0]
     joint = model.joint("hand")
     data.qpos[joint.qposadr[0]], data.qvel[joint.dofadr[0]] = 0.2, 0.5
     touched, seen = [], []
@@ -198,7 +198,7 @@ def test_a_checker_sees_the_blow_that_the_sensors_feel():
 def test_two_arms_push_one_another_with_equal_and_opposite_forces():
     env = gym.make("tauguard/TwoArms-v0", control="cartesian", control_rate=1000).unwrapped
     env.reset(seed=0)
-    model, data = env.world.scene.model, env.cell.datas[0]
+    model, data = env.compiled.scene.model, env.batch.datas[0]
     action = np.zeros(12)
     action[[0, 1, 6]] = 1, -0.3, -1
     checked = 0
@@ -215,7 +215,7 @@ def test_two_arms_push_one_another_with_equal_and_opposite_forces():
                 body = int(model.geom_bodyid[data.contact[c].geom[side]])
                 mujoco.mj_jac(model, data, jac, None, data.contact[c].pos, body)
                 tau += sign * jac.T @ world
-        expected = tau[env.world.scene.dof_adr]
+        expected = tau[env.compiled.scene.dof_adr]
         scale = np.abs(expected).max()
         assert info["tau_ext"] == pytest.approx(expected, abs=5e-3 * scale + 1e-9)
         if np.abs(info["tau_ext"][:6]).max() > 1 and np.abs(info["tau_ext"][6:]).max() > 1:
@@ -227,8 +227,8 @@ def test_two_arms_push_one_another_with_equal_and_opposite_forces():
 
 def test_two_arms_use_the_same_arm_twice():
     env = gym.make("tauguard/TwoArms-v0").unwrapped
-    model = env.world.scene.model
-    for name in env.world.scene.joint_names[:6]:
+    model = env.compiled.scene.model
+    for name in env.compiled.scene.joint_names[:6]:
         other = model.joint("arm2_" + name)
         assert model.joint(name).armature == other.armature
         assert model.body(model.jnt_bodyid[model.joint(name).id]).mass == pytest.approx(

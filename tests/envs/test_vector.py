@@ -116,7 +116,7 @@ def test_a_diverged_copy_leaves_the_others_alone():
     alone = gym.make_vec("tauguard/Reach-v0", num_envs=2).unwrapped
     for one in (vector, alone):
         one.reset(seed=0)
-    vector.cell.datas[0].qvel[0] = 1e6
+    vector.batch.datas[0].qvel[0] = 1e6
     actions = np.full((2, 6), 0.3)
     got, expected = vector.step(actions), alone.step(actions)
     assert got[3].tolist() == [True, False]

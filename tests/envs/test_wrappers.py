@@ -24,7 +24,7 @@ def swung(reaction, trigger="contact", speed=0.5, detector=None, seconds=2.0):
     env = Reaction(made, reaction, trigger)
     env.reset(seed=0)
     inner = env.unwrapped
-    swing = np.diff(inner.task.swing[0], axis=0) * 100 / inner.world.max_speed
+    swing = np.diff(inner.task.swing[0], axis=0) * 100 / inner.compiled.max_speed
     rows = []
     for step in range(round(seconds * 100)):
         action = swing[step] if step < len(swing) else np.zeros(6)
@@ -106,7 +106,7 @@ def test_a_stop_in_free_motion_takes_the_time_of_its_deceleration():
     ideal = speed / cura6.MAX_ACCELERATION[0]
     lag = 4 / 30  # the servo's bandwidth is 30 rad/s, critically damped
     assert ideal - 0.01 <= taken * 0.01 <= ideal + lag
-    assert inner.world.max_speed[0] * 0.45 < speed
+    assert inner.compiled.max_speed[0] * 0.45 < speed
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_the_separation_monitor_lets_nobody_meet_a_moving_arm():
         env = SpeedAndSeparation(env) if guarded else env
         env.reset(seed=0)
         inner = env.unwrapped
-        data, model = inner.cell.datas[0], inner.world.scene.model
+        data, model = inner.batch.datas[0], inner.compiled.scene.model
         data.qpos[model.joint("hand").qposadr[0]] = -0.6
         data.qvel[model.joint("hand").dofadr[0]] = 0.8
         stopped = separations = 0
@@ -160,7 +160,7 @@ def test_the_separation_monitor_lets_nobody_meet_a_moving_arm():
                 stopped += info["stopped"]
                 separations += info["separation"] < info["protective_distance"]
             if info["onset"] and speed_at_touch is None:
-                speed_at_touch = float(inner.cell.figure[0, 11])
+                speed_at_touch = float(inner.batch.metrics["speed_ratio"][0])
         results[guarded] = speed_at_touch
         if guarded:
             assert stopped > 0
@@ -181,7 +181,7 @@ def test_a_recording_holds_what_the_environment_said(tmp_path):
     env = RecordMcap(gym.make(REACT, detector="observer", approach=False), tmp_path / "runs")
     env.reset(seed=7)
     inner = env.unwrapped
-    swing = np.diff(inner.task.swing[0], axis=0) * 100 / inner.world.max_speed
+    swing = np.diff(inner.task.swing[0], axis=0) * 100 / inner.compiled.max_speed
     infos = [env.step(action)[4] for action in swing]
     env.reset(seed=8)
     env.step(np.zeros(6))
@@ -210,13 +210,13 @@ def test_a_recording_holds_what_the_environment_said(tmp_path):
 def test_the_observer_judges_a_block_as_it_judges_sample_by_sample():
     env = gym.make("tauguard/Reach-v0", detector="observer").unwrapped
     env.reset(seed=1)
-    block = env.cell.sensing[0].detector
+    block = env.batch.sensing[0].detector
     single = ObserverListener(block._observer.robot, block._drive, 1e-3)
     rng = np.random.default_rng(0)
     for _ in range(20):
         env.step(rng.uniform(-1, 1, 6))
-        measured = env.cell.sensing[0].measured
+        measured = env.batch.sensing[0].measured
         for row, sample in enumerate(zip(*measured, strict=True)):
             residual, alarm = single.steps(*(x[None] for x in sample))
-            assert alarm == env.cell.sensing[0].alarms[row]
-            assert np.array_equal(residual[0], env.cell.sensing[0].residuals[row])
+            assert alarm == env.batch.sensing[0].alarms[row]
+            assert np.array_equal(residual[0], env.batch.sensing[0].residuals[row])

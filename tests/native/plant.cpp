@@ -160,7 +160,8 @@ Cell::Cell(Mode mode, std::uint64_t seed, bool alone) : scene(mjcf()) {
   const std::size_t n = arm_joints, regions = s.regions.size();
   observed = 3 * n + 6 + 6 * regions;
   s.low.assign(observed, -50.0), s.high.assign(observed, 50.0);
-  rows.observation = array({observed}), rows.figure = array({figures}), rows.tau_ext = array({n});
+  rows.observation = array({observed}), rows.metrics = array({metrics_width}),
+  rows.tau_ext = array({n});
   rows.target = array({3}), rows.q = array({substeps, n}), rows.qd = array({substeps, n});
   rows.current = array({substeps, n}), rows.tau = array({substeps, n});
   rows.contact = array({substeps, contact_width}), rows.region = array({substeps, regions, 7});
@@ -195,7 +196,7 @@ bool same(const std::vector<double>& a, const std::vector<double>& b) {
 
 std::vector<double> seen(const Cell& cell) {
   std::vector<double> out = cell.plant->state();
-  for (const Held* h : {&cell.rows.observation, &cell.rows.figure, &cell.rows.tau, &cell.rows.peak,
+  for (const Held* h : {&cell.rows.observation, &cell.rows.metrics, &cell.rows.tau, &cell.rows.peak,
                         &cell.rows.contact, &cell.rows.current})
     out.insert(out.end(), h->data(), h->data() + h->size());
   out.insert(out.end(), cell.scene.data->qpos, cell.scene.data->qpos + cell.scene.model->nq);
@@ -207,10 +208,11 @@ void check_rows(const Cell& cell) {
     const double x = cell.rows.observation.data()[k];
     check(x >= -50 && x <= 50, "an observation out of its bounds");
   }
-  const double* f = cell.rows.figure.data();
-  for (int k = 0; k < figures; ++k) check(std::isfinite(f[k]), "a figure that is no number");
-  check(f[cost] >= 0 && f[force] >= 0 && f[ratio] >= 0, "a force below 0");
-  check(f[link] >= 0 && f[link] <= arm_joints, "a link that is not there");
+  for (std::size_t k = 0; k < metrics_width; ++k)
+    check(std::isfinite(cell.rows.metrics.data()[k]), "a metric that is no number");
+  const Metrics& m = cell.rows.result();
+  check(m.cost >= 0 && m.force >= 0 && m.limit_ratio >= 0, "a force below 0");
+  check(m.link >= 0 && m.link <= arm_joints, "a link that is not there");
   for (std::size_t k = 0; k < cell.rows.current.size(); ++k)
     check(std::fabs(cell.rows.current.data()[k]) <= 8 * (1 + 1e-12), "a current over its limit");
 }
@@ -232,7 +234,7 @@ int actions(Random& random, int rounds) {
         if (own() % 20 == 0) cell.plant->controls.override = static_cast<Override>(own() % 4);
         cell.plant->step(row);
         check_rows(cell);
-        if (cell.rows.figure.data()[diverged] != 0) {
+        if (cell.rows.result().diverged != 0) {
           mj_resetData(cell.scene.model, cell.scene.data);
           mj_forward(cell.scene.model, cell.scene.data);
           cell.plant->reset();
@@ -314,7 +316,7 @@ int snapshots(Random& random, int rounds) {
     other.plant->step(row);
     cell.plant->step(row);
     for (Cell* c : {&cell, &other})
-      if (c->rows.figure.data()[diverged] != 0 || c == &other) {
+      if (c->rows.result().diverged != 0 || c == &other) {
         mj_resetData(c->scene.model, c->scene.data);
         mj_forward(c->scene.model, c->scene.data);
         c->plant->reset();

@@ -49,10 +49,10 @@ def tool_error(robot: str, ideal: bool, integral: float, seconds: float) -> floa
     control = OperationalSpace(model, frame, rest=rest, integral=integral, dt=1 / RATE)
     goal = control.pose(scene.home).copy()
     goal[:3, 3] += OFFSET
-    largest = np.array([entry.high for entry in inner.cell.actions])
+    largest = np.array([entry.high for entry in inner.batch.actions])
     for _ in range(round(seconds * RATE)):
         q, qd = inner.data.qpos[scene.qpos_adr], inner.data.qvel[scene.dof_adr]
-        current = control.torque(q, qd, goal) / inner.world.nominal.gain
+        current = control.torque(q, qd, goal) / inner.compiled.nominal.gain
         env.step(np.clip(current / largest, -1, 1)[:n])
     where = control.pose(inner.data.qpos[scene.qpos_adr])
     env.close()

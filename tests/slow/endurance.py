@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from slow.small_detector import trained
 
 if TYPE_CHECKING:
-    from tauguard.envs.base import ArmEnv
+    from tauguard.envs.gym.base import ArmEnv
 
 #: Physics steps and actions a second [Hz]; percentiles of the times of an action.
 SAMPLES, RATE, PERCENTILES = 250.0, 50.0, (50.0, 99.0, 99.9, 99.99)
@@ -60,14 +60,14 @@ def moved(env: ArmEnv, begin: float, count: int) -> dict[str, float]:
         Resident memory [MiB], rms residual of the worst joint [N m], alarms, actions with a fault,
         and percentiles of the time of an action [us].
     """
-    home, top = env.world.scene.home, env.world.scene.facts.max_speed
+    home, top = env.compiled.scene.home, env.compiled.scene.facts.max_speed
     omega = 2 * np.pi / np.resize(PERIODS, len(home))
     wall, own = (np.zeros(count, np.int64) for _ in range(2))
     squares, up, alarms, faults = np.zeros(len(home)), False, 0, 0
     for k in range(count):
         t = begin + k / RATE
         swing = SWING * min(1.0, t / BEGIN)
-        q = env.cell.datas[0].qpos[env.world.scene.qpos_adr]
+        q = env.batch.datas[0].qpos[env.compiled.scene.qpos_adr]
         back = FOLLOW * (home + swing * np.sin(omega * t) - q)
         action = np.clip((swing * omega * np.cos(omega * t) + back) / top, -1, 1)
         start = time.perf_counter_ns(), time.thread_time_ns()

@@ -81,18 +81,18 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
     from tauguard.replay.live import LiveView
 
     inner = env.unwrapped
-    view = LiveView(inner.world.shown(), save, port)
+    view = LiveView(inner.compiled.shown(), save, port)
     charts = {
         "force": "Contact force [N], and of its limit [%]",
         "tau_ext": "External torque, truth [N m]",
         "residual": "Residual of the detector [N m]",
         "tool": "Distance to the target [m]",
     }
-    if inner.cell.sensing is None:
+    if inner.batch.sensing is None:
         del charts["residual"]
     view.layout(charts)
     env.action_space.seed(seed)
-    period, now, episodes, worst = 1 / inner.world.settings.control_rate, 0.0, 0, 0.0
+    period, now, episodes, worst = 1 / inner.compiled.settings.control_rate, 0.0, 0, 0.0
     diverged = 0
     _, info = env.reset(seed=seed)
     began = time.perf_counter()
@@ -102,7 +102,7 @@ def run(env: Any, policy: str, seconds: float, seed: int, save: Path | None, por
         _, _, terminated, truncated, info = env.step(action)
         now += period
         worst = max(worst, info["limit_ratio"])
-        diverged += bool(info["reason"])
+        diverged += info["reason"].startswith("diverged")
         if terminated or truncated:
             episodes += 1
             _, info = env.reset()
@@ -126,27 +126,29 @@ def chosen(env: Any, inner: Any, policy: str) -> Any:
         return env.action_space.sample()
     if policy == "still":
         return np.zeros(env.action_space.shape)
-    cell = inner.cell
-    n, arms = len(inner.world.scene.joint_names), inner.world.arms
+    batch = inner.batch
+    n, arms = len(inner.compiled.scene.joint_names), inner.compiled.arms
     at = 3 * n + 3 * arms
-    ways = cell.observation[0, at : at + 3 * arms].reshape(arms, 3)
+    left = batch.observation[0, at : at + 3 * arms].reshape(arms, 3)
     action = np.zeros((arms, 6))
-    largest = np.array([entry.high for entry in cell.actions]).reshape(arms, 6)[:, :3]
-    # A tenth of the way a step, so that the tool slows down before it arrives.
-    action[:, :3] = np.clip(0.1 * ways / largest, -1, 1)
+    largest = np.array([entry.high for entry in batch.actions]).reshape(arms, 6)[:, :3]
+    # A tenth of the distance a step, so that the tool slows down before it arrives.
+    action[:, :3] = np.clip(0.1 * left / largest, -1, 1)
     return action.ravel()
 
 
 def send(view: Any, inner: Any, info: dict[str, Any], now: float) -> None:
     """One instant: the scene and the charts."""
-    cell, names = inner.cell, list(inner.world.scene.joint_names)
-    view.show(cell.datas[0], now, cell.target[0])
-    contact = cell.contact[0]
-    strongest = contact[contact[:, 0].argmax()]
-    view.contact(strongest[2:5], strongest[5:8] if info["force"] else 0 * strongest[5:8])
-    share = 100 * info["limit_ratio"]
-    view.chart("force", ["force [N]", "of the limit [%]"], [info["force"], share])
+    import numpy as np
+
+    batch, names = inner.batch, list(inner.compiled.scene.joint_names)
+    view.show(batch.datas[0], now, batch.target[0])
+    contact = batch.contact[0]
+    strongest = contact[contact["net_force"].argmax()]
+    view.contact(strongest["point"], strongest["force"] if info["force"] else np.zeros(3))
+    percent = 100 * info["limit_ratio"]
+    view.chart("force", ["force [N]", "of the limit [%]"], [info["force"], percent])
     view.chart("tau_ext", names, info["tau_ext"])
-    if cell.sensing is not None:
+    if batch.sensing is not None:
         view.chart("residual", [*names, "alarm"], [*info["residual"], float(info["alarm"])])
     view.chart("tool", ["distance"], [info["distance"]])

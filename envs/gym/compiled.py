@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.envs.gym.randomization import check_names
+from tauguard.envs.gym.second_arm import add_second_arm, both_drives
 from tauguard.envs.gym.settings import PERSON, Settings
-from tauguard.envs.gym.two_arms_scene import add_second_arm, both_drives
 from tauguard.envs.plant import Gains
 from tauguard.models import (
     BodyProxy,
@@ -66,7 +66,7 @@ class RegionInfo:
 
 
 @dataclass(frozen=True)
-class World:
+class CompiledScene:
     """A scene, and what the controller and the observation need to know about it."""
 
     settings: Settings
@@ -101,12 +101,12 @@ Placing = Callable[[str, Scene, float], BodyProxy]
 Standing = Callable[[Scene, float], Person]
 
 
-def build_world(
+def compile_scene(
     settings: Settings,
     arms: int = 1,
     placing: Placing | None = None,
     standing: Standing | None = None,
-) -> World:
+) -> CompiledScene:
     """Compile what ``settings`` ask for, and nothing else.
 
     Args:
@@ -166,7 +166,7 @@ def _people(
     return tuple(proxies), person
 
 
-def _known(settings: Settings, scene: Scene, bare: Scene, reach: float, arms: int) -> World:
+def _known(settings: Settings, scene: Scene, bare: Scene, reach: float, arms: int) -> CompiledScene:
     model = scene.model
     joints = [model.joint(name).id for name in scene.joint_names]
     limited = model.jnt_limited[joints].astype(bool)[:, None]
@@ -177,7 +177,7 @@ def _known(settings: Settings, scene: Scene, bare: Scene, reach: float, arms: in
     # A gripper that moves is rigid in what the controller believes.
     rigid = bare.arm_model if bare.facts.gripper else bare.model
     bodies = [rigid.body(bare.model.body(int(b)).name).id for b in bare.link_bodies]
-    return World(
+    return CompiledScene(
         settings=settings,
         scene=scene,
         nominal=nominal if arms == 1 else both_drives(nominal),
@@ -258,16 +258,16 @@ def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
     )
 
 
-def region_pressure(world: World, force: Array) -> Array:
+def region_pressure(compiled: CompiledScene, force: Array) -> Array:
     """Mean pressure on each body region [N/cm^2] under forces of shape (..., k) [N].
 
     Over the setting ``contact_area`` where it is stated. Else over the circle that a flat surface
     makes with a round region at the depth that its stiffness allows, area = pi radius F / k
     (Hertz' geometry): an estimate, and a low one, since a robot's edge presses harder.
     """
-    if world.settings.contact_area is not None:
-        return force / world.settings.contact_area
-    least = np.array([r.stiffness / (np.pi * r.radius) for r in world.regions]) / 1e4
+    if compiled.settings.contact_area is not None:
+        return force / compiled.settings.contact_area
+    least = np.array([r.stiffness / (np.pi * r.radius) for r in compiled.regions]) / 1e4
     return np.where(force > 0, least, 0.0)
 
 
@@ -291,9 +291,9 @@ def _carried(model: mujoco.MjModel, body: int, by: int) -> bool:
     return body == by
 
 
-def tool_position(world: World, data: mujoco.MjData, arm: int = 0) -> Array:
+def tool_position(compiled: CompiledScene, data: mujoco.MjData, arm: int = 0) -> Array:
     """Where a tool is [m], shape (3,); kinematics must be up to date."""
-    site, body, _ = world.tools[arm]
+    site, body, _ = compiled.tools[arm]
     return np.array(data.site_xpos[site] if site >= 0 else data.xpos[body])
 
 

@@ -1,10 +1,11 @@
-"""One or many running copies of a world: the native plants and the arrays that they share."""
+"""One or many running copies of a compiled: the native plants and the arrays that they share."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -13,93 +14,115 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.envs import _plant
 from tauguard.envs.gym.actions import Entry, action_scale, action_table, observation_table
+from tauguard.envs.gym.compiled import CompiledScene, RegionInfo
 from tauguard.envs.gym.people import REACHES, WALKS, anatomy, draw_script
 from tauguard.envs.gym.randomization import Variant, draw, own_model, vary
 from tauguard.envs.gym.sensing import Sensing, listening
 from tauguard.envs.gym.settings import CONTROLS
 from tauguard.envs.gym.step_checks import StepChecks
-from tauguard.envs.gym.world import RegionInfo, World
 from tauguard.envs.plant import make_plant
 from tauguard.models import Person
 
-#: Columns of :attr:`Cell.figure`, in the native order.
-FIGURES = (
-    "time", "distance", "force", "cost", "limit_ratio", "region_force",
-    "onset", "onset_time", "link", "region", "diverged", "speed_ratio",
-)  # fmt: skip
-(
-    TIME,
-    DISTANCE,
-    FORCE,
-    COST,
-    RATIO,
-    REGION_FORCE,
-    ONSET,
-    ONSET_TIME,
-    LINK,
-    REGION,
-    DIVERGED,
-    SPEED,
-) = range(len(FIGURES))
-assert len(FIGURES) == _plant.FIGURES
+
+class StepMetrics(NamedTuple):
+    """What one action came to: numbers of one copy, or arrays with a number a copy.
+
+    Every field is a number for the native side's sake: flags are 0 or 1.
+    """
+
+    time: Any  #: since the episode began [s]
+    distance: Any  #: of the tool, of several the farthest, from its target [m]
+    force: Any  #: largest force on a link [N]
+    cost: Any  #: largest sum of the forces on body regions beyond their limits [N]
+    limit_ratio: Any  #: largest force on a body region over its limit
+    region_force: Any  #: largest force on a body region [N]
+    onset: Any  #: a collision began
+    onset_time: Any  #: of the latest collision [s]; -1: none yet
+    link: Any  #: of the largest force, 1-based; 0: none
+    region: Any  #: of the largest ratio, 1-based; 0: none
+    diverged: Any  #: a position is not finite, or a speed beyond 1000
+    speed_ratio: Any  #: of the fastest joint over its largest speed, after the action
+
+
+#: The same as columns of :attr:`Batch.metrics`.
+METRICS = np.dtype([(name, np.float64) for name in StepMetrics._fields])
+#: At a physics step: net force on the arm [N]; link (1-based, 0: none), point [m] and force [N] of
+#: the largest force on a link.
+CONTACT = np.dtype([("net_force", "f8"), ("link", "f8"), ("point", "f8", 3), ("force", "f8", 3)])
+#: Where a body is [m]; its orientation as w, x, y, z.
+POSE = np.dtype([("position", "f8", 3), ("quat_wxyz", "f8", 4)])
+#: Of a body region over an action: force [N], point [m], direction of the force on the person.
+PEAK = np.dtype([("force", "f8"), ("point", "f8", 3), ("direction", "f8", 3)])
+assert METRICS.itemsize == 8 * _plant.METRICS
+assert CONTACT.itemsize == 8 * _plant.CONTACT_WIDTH
+assert PEAK.itemsize == 8 * _plant.PEAK_WIDTH
+
+
+class Override(IntEnum):
+    """What replaces an action, by its native code."""
+
+    FREE = 0  #: nothing: the action counts
+    VELOCITY = 1  #: joint velocities
+    LIMP = 2  #: no power
+    BRAKE = 3  #: no power, and brakes
+
+
 #: What a snapshot holds: MuJoCo's integration state, derived fields that are read before the next
 #: physics step, and rows of a copy.
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
 ROWS = (
-    "observation", "figure", "tau_ext", "residual", "alarm", "target", "contacts",
+    "observation", "metrics", "tau_ext", "residual", "alarm", "target", "contacts",
     "q", "qd", "current", "tau", "contact", "region", "tau_peak", "peak", "alarm_delay",
     "alarm_last", "cost_sum", "reaches", "walks",
 )  # fmt: skip
 #: An alarm later than this after the onset does not detect it [s].
 LATEST = 0.5
-#: What replaces an action, by its native code: nothing, velocities, no power, no power and brakes.
-FREE, VELOCITY, LIMP, BRAKE = range(4)
 
 
-class Cell:
-    """``rows`` copies of a world that run side by side and know nothing of one another.
+class Batch:
+    """``rows`` copies of one simulation, independent of one another.
 
     Attributes:
         observation: shape (rows, size).
-        figure: shape (rows, len(FIGURES)).
+        metrics: of the last action, by the names of :class:`StepMetrics`, shape (rows,).
         tau_ext: external joint torque at the last physics step [N m], shape (rows, n).
+        tau_peak: external torque of the largest size over the action, by joint [N m], (rows, n).
         target: of the tools [m], shape (rows, arms, 3).
         residual: of the detector [N m], shape (rows, n); zero without one.
         alarm: of the detector, shape (rows,).
+        alarm_delay: of the latest collision's alarm [s], -1 where there is none, shape (rows,).
         contacts: pairs that each checker reported during the last action, shape (rows, checkers).
+        cost_sum: of the episode's actions so far [N], shape (rows,).
         q, qd, current, tau: positions, velocities, motor currents [A] and external torque [N m] at
             every physics step of the last action, shape (rows, substeps, n).
-        contact: at every physics step the net force on the arm [N], and link (1-based, 0: none),
-            point [m] and force [N] of the largest force on a link, shape (rows, substeps, 8).
-        region: where the body regions were, position [m] and quaternion (w, x, y, z), shape
-            (rows, substeps, regions, 7).
-        tau_peak: external torque of the largest size over the action, by joint [N m], (rows, n).
-        peak: of each body region over the action: force [N], point [m], direction of the force on
-            the person, shape (rows, regions, 7); zero without a touch.
-        cost_sum: of the episode's actions so far [N], shape (rows,).
-        drawn: what differs from the world in each copy's episode, by name.
-        alarm_delay: of the latest collision's alarm [s], -1 where there is none, shape (rows,).
+        contact: what touched the arm at every physics step, by the names of :data:`CONTACT`, shape
+            (rows, substeps).
+        region: where the body regions were, by the names of :data:`POSE`, shape (rows, substeps,
+            regions).
+        peak: of each body region, by the names of :data:`PEAK`, zero without a touch, shape (rows,
+            regions).
         reaches, walks: what a person does, see :func:`tauguard.envs.gym.people.draw_script`.
+        drawn: what differs from the scene in each copy's episode, by name.
     """
 
-    def __init__(self, world: World, rows: int) -> None:
+    def __init__(self, compiled: CompiledScene, rows: int) -> None:
         """Allocate the data of every copy and bind the plants."""
-        self.world, self.rows = world, rows
-        self.observations: list[Entry] = observation_table(world)
-        self.actions: list[Entry] = action_table(world)
-        n, steps = len(world.scene.joint_names), world.settings.substeps
+        self.compiled, self.rows = compiled, rows
+        self.observations: list[Entry] = observation_table(compiled)
+        self.actions: list[Entry] = action_table(compiled)
+        n, steps = len(compiled.scene.joint_names), compiled.settings.substeps
         self.observation = np.zeros((rows, len(self.observations)))
-        self.figure = np.zeros((rows, len(FIGURES)))
+        self.metrics = np.zeros(rows, METRICS)
         self.tau_ext, self.residual = np.zeros((rows, n)), np.zeros((rows, n))
         self.alarm = np.zeros(rows, dtype=np.bool_)
-        self.target = np.zeros((rows, world.arms, 3))
+        self.target = np.zeros((rows, compiled.arms, 3))
         self.q, self.qd, self.current, self.tau = (np.zeros((rows, steps, n)) for _ in range(4))
-        self.contact = np.zeros((rows, steps, _plant.CONTACT_WIDTH))
-        regions = len(world.regions)
-        self.region = np.zeros((rows, steps, regions, 7))
+        self.contact = np.zeros((rows, steps), CONTACT)
+        regions = len(compiled.regions)
+        self.region = np.zeros((rows, steps, regions), POSE)
         self.tau_peak = np.zeros((rows, n))
-        self.peak = np.zeros((rows, regions, _plant.PEAK_WIDTH))
+        self.peak = np.zeros((rows, regions), PEAK)
         self.alarm_delay = np.full(rows, -1.0)
         self.alarm_last = np.zeros(rows, dtype=np.bool_)
         self.cost_sum = np.zeros(rows)
@@ -107,43 +130,43 @@ class Cell:
         self.reaches = np.zeros((rows, 2, REACHES, _plant.REACH_WIDTH))
         self.walks = np.zeros((rows, WALKS, _plant.WALK_WIDTH))
         self._variants: list[Variant | None] = [None] * rows
-        self.datas = [mujoco.MjData(world.scene.model) for _ in range(rows)]
+        self.datas = [mujoco.MjData(compiled.scene.model) for _ in range(rows)]
         self.plants = [self._make_plant(i) for i in range(rows)]
         self.sensing: list[Sensing] | None = None
-        self.attach(world.settings.detector)
-        names = world.settings.checkers
-        self.checks = [StepChecks(world, names) for _ in range(rows)] if names else []
+        self.attach(compiled.settings.detector)
+        names = compiled.settings.checkers
+        self.checks = [StepChecks(compiled, names) for _ in range(rows)] if names else []
         self.contacts = np.zeros((rows, len(names)), dtype=np.int64)
 
     def attach(self, detector: object) -> None:
         """Put a detector into every copy's loop; ``None`` takes it out."""
-        make = listening(self.world, detector)
-        needed = make is not None or self.world.settings.noise
-        self.sensing = [Sensing(self.world, make) for _ in range(self.rows)] if needed else None
+        make = listening(self.compiled, detector)
+        needed = make is not None or self.compiled.settings.noise
+        self.sensing = [Sensing(self.compiled, make) for _ in range(self.rows)] if needed else None
         self.residual[:], self.alarm[:] = 0.0, False
 
     def model(self, i: int) -> mujoco.MjModel:
         """What copy ``i`` simulates."""
         variant = self._variants[i]
-        return self.world.scene.model if variant is None else variant.model
+        return self.compiled.scene.model if variant is None else variant.model
 
     def person(self, i: int) -> Person | None:
         """The person of copy ``i``."""
         variant = self._variants[i]
-        return self.world.person if variant is None else variant.person
+        return self.compiled.person if variant is None else variant.person
 
     def draw(self, i: int, rng: np.random.Generator, stated: Mapping[str, Any]) -> None:
         """Draw what the setting ``randomize`` names for the next episode of copy ``i``."""
-        known = self.world.settings.randomize
+        known = self.compiled.settings.randomize
         if known:
-            self._become(i, draw(known, self.world, rng, stated))
+            self._become(i, draw(known, self.compiled, rng, stated))
 
     def _become(self, i: int, drawn: dict[str, Array]) -> None:
         """Make copy ``i`` what was drawn."""
         if not drawn:
             return
-        model = self.model(i) if self._variants[i] else own_model(self.world)
-        self._variants[i] = variant = vary(self.world, model, drawn)
+        model = self.model(i) if self._variants[i] else own_model(self.compiled)
+        self._variants[i] = variant = vary(self.compiled, model, drawn)
         self.drawn[i] = drawn
         self.plants[i] = self._make_plant(i)
         if self.sensing is not None:
@@ -153,7 +176,7 @@ class Cell:
         """Put copy ``i`` at rest at ``q`` [rad], shape (n,), everything else where it began."""
         data = self.datas[i]
         mujoco.mj_resetData(self.model(i), data)
-        data.qpos[self.world.scene.qpos_adr] = q
+        data.qpos[self.compiled.scene.qpos_adr] = q
 
     def send_person(self, i: int, rng: np.random.Generator) -> None:
         """Draw what the person of copy ``i`` does in the next episode, if there is one."""
@@ -182,7 +205,7 @@ class Cell:
             "physics": physics,
             "derived": derived,
             "plant": np.array(self.plants[i].state()),
-            "rows": {name: getattr(self, name)[i].copy() for name in ROWS},
+            "rows": {name: getattr(self, name)[i : i + 1].copy() for name in ROWS},
             "detector": listener.get_state() if listener else None,
             "drawn": {name: values.copy() for name, values in self.drawn[i].items()},
         }
@@ -202,7 +225,7 @@ class Cell:
         for name, values in state["derived"].items():
             getattr(data, name)[:] = values
         for name, values in state["rows"].items():
-            getattr(self, name)[i] = values
+            getattr(self, name)[i : i + 1] = values
         if self.sensing is not None:
             self.sensing[i].reset()
             listener = self.sensing[i].detector
@@ -215,7 +238,7 @@ class Cell:
             self._checked_step(i, action)
         else:
             self.plants[i].step(action)
-        self.cost_sum[i] += self.figure[i, COST]
+        self.cost_sum[i] += self.metrics["cost"][i]
         if self.sensing is not None:
             self._sense(i, rng)
 
@@ -228,25 +251,25 @@ class Cell:
                 self._checked_step(int(i), actions[i])
         else:
             _plant.step_all(self.plants, actions, mask, threads)
-        self.cost_sum[mask] += self.figure[mask, COST]
+        self.cost_sum[mask] += self.metrics["cost"][mask]
         if self.sensing is not None:
             for i in np.flatnonzero(mask):
                 self._sense(int(i), rngs[i])
 
     def _sense(self, i: int, rng: np.random.Generator) -> None:
         assert self.sensing is not None
-        if self.figure[i, DIVERGED]:
+        if self.metrics["diverged"][i]:
             return
         sensing = self.sensing[i]
-        if self.figure[i, ONSET]:
+        if self.metrics["onset"][i]:
             self.alarm_delay[i] = -1.0
         before = bool(self.alarm_last[i])
         measured = sensing.measure(rng, self.q[i], self.qd[i], self.current[i])
         self.residual[i], self.alarm[i] = sensing.detect(*measured)
-        if self.alarm[i] and self.alarm_delay[i] < 0 <= self.figure[i, ONSET_TIME]:
+        if self.alarm[i] and self.alarm_delay[i] < 0 <= self.metrics["onset_time"][i]:
             self._time_alarm(i, before)
         self.alarm_last[i] = sensing.alarms[-1]
-        if self.world.settings.noise:
+        if self.compiled.settings.noise:
             sensing.show(self.observation[i], *measured)
 
     def faults(self) -> list[str]:
@@ -256,9 +279,9 @@ class Cell:
     def _time_alarm(self, i: int, before: bool) -> None:
         """How long after the onset the alarm rose; one that was up before detects nothing."""
         alarms = self.sensing[i].alarms if self.sensing else np.zeros(0)
-        dt, now = self.world.settings.timestep, self.figure[i, TIME]
+        dt, now = self.compiled.settings.timestep, self.metrics["time"][i]
         rises = alarms & ~np.append(before, alarms[:-1])
-        delays = now - dt * np.arange(len(alarms), 0, -1) - self.figure[i, ONSET_TIME]
+        delays = now - dt * np.arange(len(alarms), 0, -1) - self.metrics["onset_time"][i]
         found = np.flatnonzero(rises & (delays > -dt / 2))
         if found.size and delays[found[0]] <= LATEST:
             self.alarm_delay[i] = max(0.0, float(delays[found[0]]))
@@ -268,7 +291,7 @@ class Cell:
         plant, data, checks = self.plants[i], self.datas[i], self.checks[i]
         plant.begin(action)
         checks.begin(data)
-        for _ in range(self.world.settings.substeps):
+        for _ in range(self.compiled.settings.substeps):
             plant.run(1)
             if not np.isfinite(data.qpos).all():
                 break
@@ -277,70 +300,77 @@ class Cell:
         plant.finish()
 
     def _make_plant(self, i: int) -> _plant.Plant:
-        world, data, variant = self.world, self.datas[i], self._variants[i]
-        scene = world.scene
+        compiled, data, variant = self.compiled, self.datas[i], self._variants[i]
+        scene = compiled.scene
         if variant is not None:
             scene = replace(scene, model=variant.model, drive=variant.drive)
-        plant = make_plant(scene, world.nominal, world.gains, data)
+        plant = make_plant(scene, compiled.nominal, compiled.gains, data)
         rows = _plant.Rows(
             observation=self.observation[i],
-            figure=self.figure[i],
+            metrics=_numbers(self.metrics, i),
             tau_ext=self.tau_ext[i],
             target=self.target[i],
             q=self.q[i],
             qd=self.qd[i],
             current=self.current[i],
             tau=self.tau[i],
-            contact=self.contact[i],
-            region=self.region[i],
+            contact=_numbers(self.contact, i),
+            region=_numbers(self.region, i),
             tau_peak=self.tau_peak[i],
-            peak=self.peak[i],
+            peak=_numbers(self.peak, i),
             reaches=self.reaches[i],
             walks=self.walks[i],
         )
-        around = _surroundings(world, self.observations, self.person(i))
-        plant.surround(around, _controls(world), rows, substeps=world.settings.substeps)
+        around = _surroundings(compiled, self.observations, self.person(i))
+        plant.surround(around, _controls(compiled), rows, substeps=compiled.settings.substeps)
         return plant
 
 
-def _controls(world: World) -> _plant.Controls:
-    settings = world.settings
-    centre, scale = action_scale(world)
+def _numbers(table: NDArray[np.void], i: int) -> Array:
+    """Row ``i`` of a table with named columns, as the numbers that it consists of."""
+    return table[i : i + 1].view(np.float64)
+
+
+def _controls(compiled: CompiledScene) -> _plant.Controls:
+    settings = compiled.settings
+    centre, scale = action_scale(compiled)
     return _plant.Controls(
         mode=CONTROLS.index(settings.control),
-        period=float(world.scene.model.opt.timestep) * settings.substeps,
+        period=float(compiled.scene.model.opt.timestep) * settings.substeps,
         scale=scale.tolist(),
         centre=centre.tolist(),
-        max_speed=world.max_speed.tolist(),
-        torque_limit=world.torque_limit.tolist(),
-        low=world.joint_range[:, 0].tolist(),
-        high=world.joint_range[:, 1].tolist(),
+        max_speed=compiled.max_speed.tolist(),
+        torque_limit=compiled.torque_limit.tolist(),
+        low=compiled.joint_range[:, 0].tolist(),
+        high=compiled.joint_range[:, 1].tolist(),
     )
 
 
 def _surroundings(
-    world: World, observations: list[Entry], person: Person | None
+    compiled: CompiledScene, observations: list[Entry], person: Person | None
 ) -> _plant.Surroundings:
-    model, scene = world.scene.model, world.scene
-    each = len(scene.joint_names) // world.arms
+    model, scene = compiled.scene.model, compiled.scene
+    each = len(scene.joint_names) // compiled.arms
     links = [
         _plant.Link(
             joint=int(joint),
             body=int(scene.link_bodies[i]),
             first=i // each * each,
             slide=bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE),
-            mass=float(world.nominal_mass[i]),
-            com=world.nominal_com[i].tolist(),
+            mass=float(compiled.nominal_mass[i]),
+            com=compiled.nominal_com[i].tolist(),
         )
-        for i, joint in enumerate(world.ids())
+        for i, joint in enumerate(compiled.ids())
     ]
     labels = scene.spec.labels
     return _plant.Surroundings(
         links=links,
         gravity=model.opt.gravity.tolist(),
-        tools=[_plant.Tool(site=site, body=body, first=first) for site, body, first in world.tools],
-        regions=[_region(world, region) for region in world.regions],
-        person_begin=next((k for k, r in enumerate(world.regions) if r.mocap >= 0), -1),
+        tools=[
+            _plant.Tool(site=site, body=body, first=first) for site, body, first in compiled.tools
+        ],
+        regions=[_region(compiled, region) for region in compiled.regions],
+        person_begin=next((k for k, r in enumerate(compiled.regions) if r.mocap >= 0), -1),
         person=anatomy(person),
         sensor_begin=_sensor(model, "contact_link1") if labels else -1,
         low=[entry.low for entry in observations],
@@ -348,8 +378,8 @@ def _surroundings(
     )
 
 
-def _region(world: World, region: RegionInfo) -> _plant.Region:
-    model, joint = world.scene.model, region.joint
+def _region(compiled: CompiledScene, region: RegionInfo) -> _plant.Region:
+    model, joint = compiled.scene.model, region.joint
     return _plant.Region(
         body=region.body,
         joint=joint,
@@ -357,7 +387,7 @@ def _region(world: World, region: RegionInfo) -> _plant.Region:
         dof=int(model.jnt_dofadr[joint]) if joint >= 0 else -1,
         mocap=region.mocap,
         held=region.held,
-        sensor=_sensor(model, f"contact_{region.name}") if world.scene.spec.labels else -1,
+        sensor=_sensor(model, f"contact_{region.name}") if compiled.scene.spec.labels else -1,
         quasi_static=region.quasi_static,
         transient=region.transient,
         span=region.span,
