@@ -10,11 +10,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+from tauguard.atomic_write import write_atomic
 from tauguard.datasets.columns_of_shards import JOINT_SIGNALS, MEANING, RESIDUAL, schema
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import configuration_in, lines, read_head
 from tauguard.datasets.inspection import SplitSummary, summarised
-from tauguard.whole_file import write_whole
 
 CARD, CROISSANT = "README.md", "croissant.json"
 LICENSE, LICENSE_URL = "apache-2.0", "https://www.apache.org/licenses/LICENSE-2.0"
@@ -87,7 +87,7 @@ def write_cards(folder: Path) -> None:
 
 def _write(path: Path, text: str) -> None:
     if not path.is_file() or path.read_bytes() != text.encode():
-        write_whole(path, text)
+        write_atomic(path, text)
 
 
 def describe(configuration: Configuration) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tauguard.strangers import read_json, reading
+from tauguard.untrusted_input import read_json, reading
 
 Column = str | int
 

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
+from tauguard.atomic_write import PART, remove_parts, write_atomic
 from tauguard.datasets.code_identity import code, computed_bits, versions
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.robots import check_unchanged, nominal_texts
 from tauguard.datasets.schedule import stated_balance
 from tauguard.datasets.shard import fault, manifest_path, read_lines
-from tauguard.whole_file import PART, remove_parts, write_whole
 
 #: Of the folder's layout; a reader refuses newer ones.
 FORMAT = 2
@@ -206,7 +206,7 @@ def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> 
 
 def _write_once(path: Path, text: str) -> None:
     if not path.is_file() or path.read_bytes() != text.encode():
-        write_whole(path, text)
+        write_atomic(path, text)
 
 
 def _check_same(folder: Path, head: dict[str, Any]) -> None:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from tauguard.atomic_write import remove_parts
 from tauguard.datasets.workers import in_processes, terminable
 from tauguard.envs import Episode, simulate
 from tauguard.traces import Trace, read_mcap, write_mcap
-from tauguard.whole_file import remove_parts
 
 
 def simulate_all(

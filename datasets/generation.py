@@ -11,13 +11,13 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from tauguard.atomic_write import remove_parts
 from tauguard.datasets.card import write_cards
 from tauguard.datasets.code_identity import code
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import claimed
 from tauguard.datasets.shard import Done, ShardTask, make_shard
 from tauguard.datasets.workers import terminable, writing
-from tauguard.whole_file import remove_parts
 
 
 @dataclass

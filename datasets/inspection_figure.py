@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tauguard.whole_file import whole_file
+from tauguard.atomic_write import atomic_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,7 @@ def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
     _collision(axes[1, 1], folder, every)
     splits = ", ".join(f"{k} {v['hours']:.3g} h" for k, v in report["splits"].items())
     figure.suptitle(f"{report['name']}: {splits}")
-    with whole_file(path) as stream:
+    with atomic_file(path) as stream:
         figure.savefig(stream, dpi=110, format=path.suffix[1:] or "png")
     plt.close(figure)
 

@@ -10,8 +10,8 @@ from tqdm import tqdm
 from tauguard.datasets.arm_splits import training
 from tauguard.datasets.log_checks import checked
 from tauguard.datasets.reader import is_dataset
-from tauguard.strangers import reading
 from tauguard.traces import Trace, read_mcap
+from tauguard.untrusted_input import reading
 
 
 def labelled(folder: Path, arm: str | None = None) -> list[Trace]:

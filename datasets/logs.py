@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.datasets.columns import PRESETS, Column, ColumnMap, presets_of, presets_of_width
 from tauguard.datasets.log_checks import checked
-from tauguard.strangers import reading
 from tauguard.traces.trace import Trace
+from tauguard.untrusted_input import reading
 
 
 @dataclass(frozen=True)

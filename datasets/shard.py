@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tauguard.arrays import Array
+from tauguard.atomic_write import atomic_file, write_atomic
 from tauguard.datasets.code_identity import code
 from tauguard.datasets.columns_of_shards import (
     RESIDUAL,
@@ -31,7 +32,6 @@ from tauguard.envs import Simulation, SimulationDiverged
 from tauguard.envs.plant import untimed
 from tauguard.models import Drive, pin_model
 from tauguard.traces import Trace
-from tauguard.whole_file import whole_file, write_whole
 
 #: Rate of the momentum observer [1/s], and slope of the nominal friction at standstill [rad/s].
 OBSERVER_GAIN, STANDSTILL = 50.0, 0.05
@@ -152,7 +152,7 @@ def _write(
     folder: Path, task: ShardTask, configuration: Configuration, episodes: list[Planned]
 ) -> None:
     data = folder / data_path(task.split, task.number)
-    with whole_file(data) as stream:
+    with atomic_file(data) as stream:
         lines = _write_episodes(stream, configuration, episodes, task.code)
     common = {
         "shard": data_path(task.split, task.number),
@@ -161,7 +161,7 @@ def _write(
     }
     text = "".join(json.dumps({**line, **common}, sort_keys=True) + "\n" for line in lines)
     check = {"sha256_of_lines": hashlib.sha256(text.encode()).hexdigest()}
-    write_whole(folder / manifest_path(task.split, task.number), text + json.dumps(check) + "\n")
+    write_atomic(folder / manifest_path(task.split, task.number), text + json.dumps(check) + "\n")
 
 
 def _write_episodes(

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, TypeVar
 
-from tauguard.whole_file import remove_parts
+from tauguard.atomic_write import remove_parts
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 import skops.io
 
+from tauguard.atomic_write import write_atomic
 from tauguard.detectors.codec import checksum, decode, encode
 from tauguard.detectors.registry import file_type
 from tauguard.detectors.self_check import check_alarms, check_ranges
 from tauguard.detectors.signature import check_signature, key_of_user, signed
 from tauguard.detectors.thresholds.alarm import CollisionAlarm
-from tauguard.strangers import reading
-from tauguard.whole_file import write_whole
+from tauguard.untrusted_input import reading
 
 #: The version changes with what a detector computes from the same content, too: a threshold of
 #: one version means something else in another. 2: the filter of `Unknowns.for_detection`; 3: scores
@@ -94,7 +94,7 @@ def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
         "content": content,
     }
     try:
-        write_whole(Path(path), skops.io.dumps(container))
+        write_atomic(Path(path), skops.io.dumps(container))
     except OSError as error:
         raise ValueError(f"{path}: cannot be written ({error.strerror})") from None
 
@@ -132,15 +132,15 @@ def _container(path: Path) -> Mapping[str, Any]:
         raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
     try:
         _bounded(path)
-        strangers = skops.io.get_untrusted_types(data=data)
-        found = None if strangers else skops.io.loads(data, trusted=[])
+        unknown = skops.io.get_untrusted_types(data=data)
+        found = None if unknown else skops.io.loads(data, trusted=[])
     except Exception as error:  # whatever a damaged archive makes the readers of its parts raise
         earlier = _json_format(data)
         if earlier:
             raise ValueError(f"{path}: of the earlier format {earlier!r}; {ANEW}") from None
         raise ValueError(f"{path}: not a model file, or a damaged one ({_line(error)})") from None
-    if strangers:
-        raise ValueError(f"{path}: holds types that no detector needs: {', '.join(strangers)}")
+    if unknown:
+        raise ValueError(f"{path}: holds types that no detector needs: {', '.join(unknown)}")
     name = found.get("format") if isinstance(found, dict) else None
     if isinstance(name, str) and name.startswith(EARLIER):
         raise ValueError(f"{path}: of the earlier format {name!r}; {ANEW}")

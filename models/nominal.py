@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from tauguard.arrays import Array
 from tauguard.models.checks import rigid_pose
 from tauguard.models.robot_check import checked_robot, checked_text
-from tauguard.strangers import read_text
+from tauguard.untrusted_input import read_text
 
 #: Elements of a robot file inside one another, at most.
 MOST_DEPTH = 200

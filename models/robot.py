@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.strangers import read_text, reading
+from tauguard.untrusted_input import read_text, reading
 
 Numbers = tuple[float, ...]
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from tauguard.models.robot_trial import Trial
-from tauguard.strangers import read_text, reading
+from tauguard.untrusted_input import read_text, reading
 
 #: Files that include one another, at most.
 MOST_INCLUDES = 100

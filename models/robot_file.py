@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.atomic_write import write_atomic
 from tauguard.models.robot_check import checked_robot
-from tauguard.strangers import read_text
-from tauguard.whole_file import write_whole
+from tauguard.untrusted_input import read_text
 
 #: Name of the element (URDF) or of the custom text (MJCF) that holds a note.
 TAG = "tauguard"
@@ -39,7 +39,7 @@ def write_robot_file(
         text = _urdf(root, joints, inertial, note)
     else:
         text = _mjcf(Path(source), joints, inertial, note)
-    write_whole(Path(target), text)
+    write_atomic(Path(target), text)
 
 
 def read_note(source: str | Path) -> str | None:

@@ -33,8 +33,8 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
     import matplotlib.pyplot as plt
     import numpy as np
 
+    from tauguard.atomic_write import atomic_file
     from tauguard.report.charts import COLOURS, STYLE
-    from tauguard.whole_file import whole_file
 
     with plt.rc_context(STYLE):
         figure, (score, speed) = plt.subplots(
@@ -54,7 +54,7 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
         speed.plot(trace.t, fastest)
         speed.set(xlabel="time in the recording [s]", ylabel="fastest joint\n[rad/s]")
         speed.set(ylim=(0, None), xlim=(trace.t[0], trace.t[-1]))
-        with whole_file(path) as stream:
+        with atomic_file(path) as stream:
             figure.savefig(stream, dpi=100, format="png")
         plt.close(figure)
 

@@ -166,9 +166,9 @@ class EventFolder:
 
     def finish(self) -> Path:
         """Write the page; its path."""
+        from tauguard.atomic_write import write_atomic
         from tauguard.replay.event_page import OFFLINE, definitions, events_html
         from tauguard.report.page import page
-        from tauguard.whole_file import write_whole
 
         opens = escape(command_to_open(self._folder))
         how = (
@@ -185,7 +185,7 @@ class EventFolder:
         }
         path = self._folder / "index.html"
         text = page("What the detector got wrong", {"How to read": how, **sections})
-        write_whole(path, text)
+        write_atomic(path, text)
         return path
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tauguard.whole_file import write_whole
+from tauguard.atomic_write import write_atomic
 
 
 def write_json(path: Path, payload: Mapping[str, object]) -> None:
@@ -17,7 +17,7 @@ def write_json(path: Path, payload: Mapping[str, object]) -> None:
     text = json.dumps(_finite(payload), indent=2, allow_nan=False) + "\n"
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
-    write_whole(path, text)
+    write_atomic(path, text)
 
 
 def _finite(value: object) -> object:

@@ -16,10 +16,10 @@ from studies.glance import detection, kernels
 from studies.panels import panels, rows_of
 from studies.run import chart
 from studies.study_file import read_study
+from tauguard.atomic_write import write_atomic
 from tauguard.report import Row
 from tauguard.report.page import folded, page, picture, tables
 from tauguard.report.pareto import Panel, svg
-from tauguard.whole_file import write_whole
 
 #: A file of a study, read.
 Found = Mapping[str, Any]
@@ -55,7 +55,7 @@ def bind(
         **studies,
     }
     target = folder / "index.html"
-    write_whole(target, page("tauguard: speed against error", sections, _where(found, gaps)))
+    write_atomic(target, page("tauguard: speed against error", sections, _where(found, gaps)))
     return target
 
 

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from tauguard.atomic_write import atomic_file
 from tauguard.datasets.code_identity import detection_sources
 from tauguard.detectors.registry import file_type
 from tauguard.report import versions
-from tauguard.whole_file import whole_file
 
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
@@ -105,7 +105,7 @@ def write(path: Path, value: object) -> None:
     arrays: list[np.ndarray] = []
     text = json.dumps(_apart(value, arrays))
     named = {f"array{k}": array for k, array in enumerate(arrays)}
-    with whole_file(path) as stream:
+    with atomic_file(path) as stream:
         np.savez_compressed(stream, json=np.array(text), **named)  # type: ignore[arg-type]
 
 

@@ -11,10 +11,10 @@ from typing import Any
 
 from studies import SLOW_TESTS, STUDIES
 from studies.harness import Incomplete
+from tauguard.atomic_write import atomic_file
 from tauguard.report import Row, measured, table, write_json
 from tauguard.report.charts import STYLE
 from tauguard.report.machine import load, load_line
-from tauguard.whole_file import whole_file
 
 
 def run_study(
@@ -49,7 +49,7 @@ def run_study(
     print(table(shown(rows) if shown else rows, notes=getattr(study, "NOTES", {})))
     print(load_line(before, load()))
 
-    with whole_file(figure_path) as stream:
+    with atomic_file(figure_path) as stream:
         stream.write(chart(study, rows, figure_path.suffix[1:] or "png"))
     print(f"figure: {figure_path}")
     if json_path is not None:

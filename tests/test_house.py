@@ -1,4 +1,4 @@
-"""The house rules that imports can show: dependencies point one way, and light rooms stay light."""
+"""Imports point one way, and light packages load no heavy library."""
 
 import ast
 import re
@@ -41,14 +41,16 @@ ALLOWED = {
 }
 #: The packages inside envs, and what each may use of the others; plant.py is common to them.
 ENVS = {"episodes": set(), "gym": {"episodes"}, "adapters": {"gym", "episodes"}}
-#: Modules at the top that every room may use: they use each other and no room.
-SHARED = {"arrays", "lazy", "strangers", "whole_file"}
-#: The front door: what it does stands in the rooms.
-DOOR = {"__init__", "__main__", "environments"}
-FOLDERS = {room: ROOT / ("src/tauguard/cli" if room == "cli" else room) for room in ALLOWED}
+#: Modules at the top that every package may use: they use each other and no package.
+SHARED = {"arrays", "lazy", "untrusted_input", "atomic_write"}
+#: The entry points: what they start is in the packages.
+ENTRY = {"__init__", "__main__", "environments"}
+FOLDERS = {
+    package: ROOT / ("src/tauguard/cli" if package == "cli" else package) for package in ALLOWED
+}
 
 
-def rooms_imported(path: Path) -> set[str]:
+def packages_imported(path: Path) -> set[str]:
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
         names = []
@@ -63,10 +65,10 @@ def rooms_imported(path: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("room", sorted(ALLOWED))
-def test_imports_point_one_way(room):
-    for path in FOLDERS[room].rglob("*.py"):
-        backward = (rooms_imported(path) & ALLOWED.keys()) - ALLOWED[room] - {room}
+@pytest.mark.parametrize("package", sorted(ALLOWED))
+def test_imports_point_one_way(package):
+    for path in FOLDERS[package].rglob("*.py"):
+        backward = (packages_imported(path) & ALLOWED.keys()) - ALLOWED[package] - {package}
         assert not backward, f"{path.relative_to(ROOT)} imports {sorted(backward)}"
 
 
@@ -78,15 +80,15 @@ def test_imports_inside_envs_point_one_way(part):
         assert not backward, f"{path.relative_to(ROOT)} names {sorted(backward)}"
 
 
-def test_shared_modules_stand_on_no_room_and_nothing_else_stands_beside_them():
+def test_shared_modules_use_no_package_and_nothing_else_stands_beside_them():
     top = ROOT / "src" / "tauguard"
-    assert {path.stem for path in top.glob("*.py")} == SHARED | DOOR
+    assert {path.stem for path in top.glob("*.py")} == SHARED | ENTRY
     for name in SHARED:
-        assert rooms_imported(top / f"{name}.py") <= SHARED, name
-    for room in ALLOWED:
-        for path in FOLDERS[room].rglob("*.py"):
-            beside = rooms_imported(path) - ALLOWED.keys() - SHARED
-            beside -= DOOR | {"__version__"} if room == "cli" else set()
+        assert packages_imported(top / f"{name}.py") <= SHARED, name
+    for package in ALLOWED:
+        for path in FOLDERS[package].rglob("*.py"):
+            beside = packages_imported(path) - ALLOWED.keys() - SHARED
+            beside -= ENTRY | {"__version__"} if package == "cli" else set()
             assert not beside, f"{path.relative_to(ROOT)} imports {sorted(beside)}"
 
 
@@ -95,24 +97,24 @@ def test_the_product_does_not_know_the_studies():
         assert not re.search(r"^\s*(from|import) (studies|oracles)\b", path.read_text(), re.M), path
 
 
-@pytest.mark.parametrize("room", sorted(ALLOWED))
-def test_includes_point_one_way(room):
-    # Kernels of every room may stand on the headers of geometry, contacts on those of rigid too;
+@pytest.mark.parametrize("package", sorted(ALLOWED))
+def test_includes_point_one_way(package):
+    # Kernels of every package may include the headers of geometry, contacts on those of rigid too;
     # their own are found beside them.
-    others = {"geometry", "rigid"} if room in ("rigid", "contacts") else {"geometry"}
-    for path in [*(ROOT / room).rglob("*.cpp"), *(ROOT / room).rglob("*.hpp")]:
+    others = {"geometry", "rigid"} if package in ("rigid", "contacts") else {"geometry"}
+    for path in [*(ROOT / package).rglob("*.cpp"), *(ROOT / package).rglob("*.hpp")]:
         for name in re.findall(r'#include "([^"]+)"', path.read_text()):
             shared = re.fullmatch(rf"tauguard/({'|'.join(others)})/\w+\.hpp", name)
             beside = (path.parent / name).resolve()
-            assert shared or (beside.is_file() and beside.is_relative_to(ROOT / room)), (
+            assert shared or (beside.is_file() and beside.is_relative_to(ROOT / package)), (
                 f"{path.relative_to(ROOT)} includes {name}"
             )
 
 
-@pytest.mark.parametrize("room", ["geometry", "cloth", "rigid", "traces", "report"])
-def test_light_rooms_leave_heavy_libraries_unloaded(room):
+@pytest.mark.parametrize("package", ["geometry", "cloth", "rigid", "traces", "report"])
+def test_light_packages_leave_heavy_libraries_unloaded(package):
     code = (
-        f"import sys, tauguard.{room}; "
+        f"import sys, tauguard.{package}; "
         "print([m for m in ('mujoco', 'pinocchio', 'sklearn', 'rerun') if m in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.strangers import reading
+from tauguard.atomic_write import atomic_file
 from tauguard.traces import mcap_contacts
 from tauguard.traces.mcap_cdr import Anything, Layout
 from tauguard.traces.mcap_container import Contents, Group, Topic
@@ -25,7 +25,7 @@ from tauguard.traces.mcap_schemas import SCHEMAS
 from tauguard.traces.mcap_time import nanoseconds, stamp
 from tauguard.traces.mcap_writer import Writer
 from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
-from tauguard.whole_file import whole_file
+from tauguard.untrusted_input import reading
 
 FORMAT = "1"
 LIBRARY = f"tauguard traces {FORMAT}"
@@ -49,7 +49,7 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
     if detection is not None and detection.alarms:
         groups.append(alarm_group(detection.alarms))
     groups += [mcap_contacts.group(one) for one in trace.contacts if len(one)]
-    with whole_file(path) as stream:
+    with atomic_file(path) as stream:
         writer = Writer(stream, LIBRARY, SCHEMAS)
         writer.metadata("tauguard.meta", trace.meta)
         writer.metadata("tauguard.trace", describe(trace, detection))

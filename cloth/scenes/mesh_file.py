@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.strangers import reading
+from tauguard.untrusted_input import reading
 
 Points = NDArray[np.float64]
 Faces = NDArray[np.int32]

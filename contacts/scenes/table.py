@@ -14,7 +14,7 @@ from tauguard.contacts.scenes.scene import ContactScene
 from tauguard.models import Table
 from tauguard.models.obstacles import add_table
 from tauguard.models.scene import INTEGRATORS
-from tauguard.strangers import reading
+from tauguard.untrusted_input import reading
 
 SIZE = 0.15  #: longest side of the thing [m]
 HEIGHT = 0.05  #: of its lowest point above the table at the start [m]

@@ -16,8 +16,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from tauguard.atomic_write import atomic_file, write_atomic
 from tauguard.traces import Trace
-from tauguard.whole_file import whole_file, write_whole
 
 Array = NDArray[Any]
 
@@ -170,7 +170,7 @@ def _write_file(
         episodes.append(_episode(len(episodes), first, len(trace.t), where, own))
         first += len(trace.t)
         tables.append(pa.table({name: _column(x) for name, x in columns.items()}))
-    with whole_file(path) as stream:
+    with atomic_file(path) as stream:
         pq.write_table(pa.concat_tables(tables), stream, compression="zstd")
 
 
@@ -208,12 +208,12 @@ def _write_meta(
     robot: str,
     described: dict[str, dict[str, Any]],
 ) -> None:
-    with whole_file(folder / "meta/episodes/chunk-000/file-000.parquet") as stream:
+    with atomic_file(folder / "meta/episodes/chunk-000/file-000.parquet") as stream:
         pq.write_table(pa.Table.from_pylist(episodes), stream, compression="zstd")
-    with whole_file(folder / "meta/tasks.parquet") as stream:
+    with atomic_file(folder / "meta/tasks.parquet") as stream:
         pq.write_table(_tasks(), stream)
     stats = {name: one.values() for name, one in total.items()}
-    write_whole(folder / "meta/stats.json", json.dumps(stats, indent=1) + "\n")
+    write_atomic(folder / "meta/stats.json", json.dumps(stats, indent=1) + "\n")
     info = {
         "codebase_version": VERSION,
         "robot_type": robot,
@@ -229,7 +229,7 @@ def _write_meta(
         "video_path": None,
         "features": described,
     }
-    write_whole(folder / "meta/info.json", json.dumps(info, indent=1) + "\n")
+    write_atomic(folder / "meta/info.json", json.dumps(info, indent=1) + "\n")
 
 
 def _tasks() -> pa.Table:

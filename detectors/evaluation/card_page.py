@@ -6,7 +6,7 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tauguard.whole_file import whole_file
+from tauguard.atomic_write import atomic_file
 
 if TYPE_CHECKING:
     from tauguard.arrays import Array
@@ -167,6 +167,6 @@ def draw(target: Path, card: ThresholdCard) -> None:
     bars.set_title("Threshold card: what the free-motion detector finds", loc="left")
     words.axis("off")
     words.text(0, 1, "\n".join(lines), va="top", fontsize=8.5, family="monospace")
-    with whole_file(target) as stream:
+    with atomic_file(target) as stream:
         figure.savefig(stream, dpi=130, format=target.suffix[1:] or "png")
     plt.close(figure)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tauguard.whole_file import whole_file
+from tauguard.atomic_write import atomic_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,7 +112,7 @@ def draw(path: Path, summary: Mapping[str, Any], matchings: Sequence[Matching]) 
     _draw_strata(axes[0], summary["strata"])
     _draw_confusion(axes[1], summary["confusion"], summary["false_alarms_per_hour"])
     _draw_delays(axes[2], matchings)
-    with whole_file(path) as stream:
+    with atomic_file(path) as stream:
         figure.savefig(stream, dpi=110, format=path.suffix[1:] or "png")
     plt.close(figure)
 

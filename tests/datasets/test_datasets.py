@@ -14,6 +14,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from tauguard.atomic_write import atomic_file
 from tauguard.datasets import inspection
 from tauguard.datasets.configuration import load
 from tauguard.datasets.dataset_folder import HEAD, claimed, lines, read_head
@@ -21,7 +22,6 @@ from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.reader import read
 from tauguard.datasets.shard import simulated
 from tauguard.datasets.workers import WorkerDied, in_processes
-from tauguard.whole_file import whole_file
 
 from .conftest import contents
 
@@ -200,7 +200,7 @@ def test_a_full_disk_leaves_no_part_and_the_old_file(tmp_path):
     path.write_bytes(b"old")
 
     def fill():
-        with whole_file(path) as stream:
+        with atomic_file(path) as stream:
             stream.write(b"new")
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

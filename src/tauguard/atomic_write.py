@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, whatever happens while they are written."""
+"""Atomic writing: a file is complete or absent, whatever interrupts the writer."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ PART = ".part"
 
 
 @contextlib.contextmanager
-def whole_file(path: Path) -> Iterator[BinaryIO]:
+def atomic_file(path: Path) -> Iterator[BinaryIO]:
     """A stream whose bytes become ``path`` when the block ends without an error.
 
-    They are written beside ``path`` under a name that begins with a dot and ends in ``.part``,
-    forced to the disk, and renamed. After an error nothing is left of them and ``path`` is what it
-    was; only a process that is killed leaves its part (see :func:`remove_parts`).
+    The bytes go to a file beside ``path`` whose name begins with a dot and ends in ``.part``; it is
+    forced to the disk and renamed. After an error it is removed and ``path`` is unchanged. Only a
+    process that is killed leaves its ``.part`` file (see :func:`remove_parts`).
 
     Raises:
         OSError: the folder cannot be written, or the disk is full; the message names ``path``.
@@ -40,9 +40,9 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
-def write_whole(path: Path, content: bytes | str) -> None:
-    """Write ``content`` (text as UTF-8) to ``path``, whole or not at all."""
-    with whole_file(path) as stream:
+def write_atomic(path: Path, content: bytes | str) -> None:
+    """Write ``content`` (text as UTF-8) to ``path``, completely or not at all."""
+    with atomic_file(path) as stream:
         stream.write(content.encode() if isinstance(content, str) else content)
 
 

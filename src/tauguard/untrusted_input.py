@@ -1,4 +1,4 @@
-"""Files that somebody else made: reading them ends in an answer or in one line."""
+"""Reading of untrusted files: whatever is wrong with one becomes a ``ValueError`` of one line."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ MOST_TEXT = 1 << 26
 
 @contextlib.contextmanager
 def reading(path: str | Path, expected: str = "") -> Iterator[None]:
-    """In this block whatever the content of ``path`` causes becomes one ``ValueError`` of a line.
+    """Turn every error that the content of ``path`` causes in this block into a ``ValueError``.
 
-    Nesting too deep, numbers too large, missing names, wrong types: a reader cannot foresee all.
-    The message begins with the path; ``expected`` says what would have worked.
+    A reader cannot foresee every way in which a file can be wrong: nesting too deep, numbers too
+    large, missing names, wrong types. The message is one line and begins with the path;
+    ``expected`` says what would have worked.
 
     Raises:
         ValueError: the content cannot be read; the cause is chained.

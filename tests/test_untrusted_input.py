@@ -22,8 +22,8 @@ from tauguard.datasets import read_log
 from tauguard.live import rtde
 from tauguard.models.arm import load_arm
 from tauguard.models.nominal import compiled
-from tauguard.strangers import read_json, read_text, reading
 from tauguard.traces import read_mcap
+from tauguard.untrusted_input import read_json, read_text, reading
 
 
 @pytest.fixture(scope="module")
