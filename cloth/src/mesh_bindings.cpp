@@ -17,6 +17,7 @@
 #include "too_many.hpp"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 using namespace tauguard::cloth;
 using tauguard::geometry::CallLock;
 using tauguard::geometry::LongCall;
@@ -28,6 +29,7 @@ using Ids = nb::ndarray<const std::int32_t, nb::shape<-1>, nb::c_contig, nb::dev
 using Table = nb::ndarray<const std::uint8_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
 using Positions = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Pairs = nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 2>, nb::c_contig>;
+using Named = nb::typed<nb::dict, nb::str, nb::any>;
 
 template <class Array, class T>
 Array array_of(std::vector<T> values, std::initializer_list<std::size_t> shape) {
@@ -112,8 +114,9 @@ nb::dict stats_of(const BroadStats& s, std::size_t bytes) {
   return d;
 }
 
-nb::tuple candidates(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, bool fresh,
-                     std::size_t limit) {
+nb::typed<nb::tuple, Pairs, Pairs, Named> candidates(Mesh& mesh, Positions x_t0, Positions x_t1,
+                                                     double min_distance, bool fresh,
+                                                     std::size_t limit) {
   std::vector<std::int32_t> vf, ee;
   BroadStats broad;
   std::size_t bytes = 0;
@@ -159,8 +162,9 @@ nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
   return d;
 }
 
-nb::tuple find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double min_distance,
-               bool fresh, std::size_t limit) {
+nb::typed<nb::tuple, Named, Named, Named> find(Mesh& mesh, Positions x_t0, Positions x_t1,
+                                               int method, double min_distance, bool fresh,
+                                               std::size_t limit) {
   Collisions vf, ee;
   BroadStats broad;
   std::size_t bytes = 0;
@@ -181,7 +185,7 @@ nb::tuple find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double mi
                         stats);
 }
 
-nb::dict update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
+Named update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
   TopologyChange change;
   std::vector<std::int32_t> edges;
   {
@@ -203,10 +207,13 @@ nb::dict update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
 }  // namespace
 
 NB_MODULE(_mesh, m) {
+  m.doc() =
+      "Continuous collision detection of a mesh, one call a frame. Arguments are checked in "
+      "Python.";
   tauguard::geometry::bind_interrupts();
   nb::class_<Mesh>(m, "Mesh")
-      .def(nb::init<Faces, Ids, Table, int, bool, int>(), nb::arg("faces"), nb::arg("ids"),
-           nb::arg("meets"), nb::arg("k"), nb::arg("moving"), nb::arg("threads"))
+      .def(nb::init<Faces, Ids, Table, int, bool, int>(), "faces"_a, "ids"_a, "meets"_a, "k"_a,
+           "moving"_a, "threads"_a)
       .def("edges",
            [](Mesh& mesh) {
              std::vector<std::int32_t> list;
@@ -217,67 +224,70 @@ NB_MODULE(_mesh, m) {
              const std::size_t n = list.size() / 2;
              return array_of<Pairs>(std::move(list), {n, 2});
            })
-      .def("candidates", &candidates, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("min_distance"),
-           nb::arg("fresh"), nb::arg("limit"))
-      .def("find", &find, nb::arg("x_t0"), nb::arg("x_t1"), nb::arg("method"),
-           nb::arg("min_distance"), nb::arg("fresh"), nb::arg("limit"))
-      .def("update_topology", &update_topology, nb::arg("faces"), nb::arg("ids"), nb::arg("meets"));
-  m.def("solve",
-        [](bool vf, Positions x_t0, Positions x_t1,
-           nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu> rows,
-           int method, double min_distance,
-           nb::ndarray<std::uint8_t, nb::shape<-1>, nb::c_contig> hit,
-           nb::ndarray<double, nb::shape<-1>, nb::c_contig> toi,
-           nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> point,
-           nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> normal,
-           nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig> weights) {
-          Stats stats;
-          {
-            const LongCall call;
-            const tauguard::geometry::RoundToNearest guard;
-            const Ends ends = Ends::of(x_t0.data(), x_t1.data());
-            Projection points;
-            AxisFilter axes;
-            constexpr std::size_t pays =
-                4;  // queries a vertex: one costs 18 ns to project, a query saves 6
-            if (Method(method) == Method::ab2pf && min_distance == 0 &&
-                rows.shape(0) >= pays * x_t0.shape(0)) {
-              points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
-              axes.points = &points;
-            }
-            (vf ? solve_vf : solve_ee)(
-                ends, rows.data(), rows.shape(0), Method(method), min_distance, hit.data(),
-                {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
+      .def("candidates", &candidates, "x_t0"_a, "x_t1"_a, "min_distance"_a, "fresh"_a, "limit"_a)
+      .def("find", &find, "x_t0"_a, "x_t1"_a, "method"_a, "min_distance"_a, "fresh"_a, "limit"_a)
+      .def("update_topology", &update_topology, "faces"_a, "ids"_a, "meets"_a);
+  m.def(
+      "solve",
+      [](bool vf, Positions x_t0, Positions x_t1,
+         nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu> rows,
+         int method, double min_distance,
+         nb::ndarray<std::uint8_t, nb::shape<-1>, nb::c_contig> hit,
+         nb::ndarray<double, nb::shape<-1>, nb::c_contig> toi,
+         nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> point,
+         nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> normal,
+         nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig> weights) {
+        Stats stats;
+        {
+          const LongCall call;
+          const tauguard::geometry::RoundToNearest guard;
+          const Ends ends = Ends::of(x_t0.data(), x_t1.data());
+          Projection points;
+          AxisFilter axes;
+          constexpr std::size_t pays =
+              4;  // queries a vertex: one costs 18 ns to project, a query saves 6
+          if (Method(method) == Method::ab2pf && min_distance == 0 &&
+              rows.shape(0) >= pays * x_t0.shape(0)) {
+            points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
+            axes.points = &points;
           }
-          nb::dict counts;
-          add_counts(counts, stats);
-          return counts;
-        });
-  // For tests: the narrow phase's kernels from now on ("portable", "avx2"); another name: the
-  // fastest again.
+          (vf ? solve_vf : solve_ee)(
+              ends, rows.data(), rows.shape(0), Method(method), min_distance, hit.data(),
+              {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
+        }
+        Named counts;
+        add_counts(counts, stats);
+        return counts;
+      },
+      "vf"_a, "x_t0"_a, "x_t1"_a, "rows"_a, "method"_a, "min_distance"_a, "hit"_a, "toi"_a,
+      "point"_a, "normal"_a, "weights"_a);
   m.def(
       "force_batch_kernels",
-      [](const std::string& name) { return force_batch_kernels(name.c_str()); }, nb::arg("name"));
+      [](const std::string& name) { return force_batch_kernels(name.c_str()); }, "name"_a,
+      "For tests: narrow-phase kernels to use from now on (\"portable\", \"avx2\"); any other name "
+      "selects the fastest ones. True if they exist here.");
   // For tests: of two leaves, the lanes that each row meets, then how many share a vertex with
   // theirs; by the named variant, empty where it cannot run here.
-  m.def("leaf_pair", [](const std::string& variant,
-                        nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,
-                        nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> b,
-                        nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_a,
-                        nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_b,
-                        bool same) {
-    const OverlapKernels* kernels = overlap_kernels(variant.c_str());
-    std::vector<std::int32_t> found;
-    if (kernels) {
-      Overlaps out;
-      kernels->leaf_pair(
-          {a.data(), vertices_a.data(), static_cast<int>(vertices_a.shape(0)), 0xffff},
-          {b.data(), vertices_b.data(), static_cast<int>(vertices_b.shape(0)), 0xffff},
-          static_cast<int>(a.shape(0)), static_cast<int>(a.shape(1)), same, out);
-      for (int i = 0; i < lanes; ++i) found.push_back(out.rows >> i & 1 ? out.lanes_of[i] : 0);
-      found.push_back(static_cast<std::int32_t>(out.adjacent));
-    }
-    const std::size_t n = found.size();
-    return array_of<nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1>>>(std::move(found), {n});
-  });
+  m.def(
+      "leaf_pair",
+      [](const std::string& variant,
+         nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> a,
+         nb::ndarray<const float, nb::shape<-1, -1, 2, 16>, nb::c_contig> b,
+         nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_a,
+         nb::ndarray<const std::int32_t, nb::shape<-1, 16>, nb::c_contig> vertices_b, bool same) {
+        const OverlapKernels* kernels = overlap_kernels(variant.c_str());
+        std::vector<std::int32_t> found;
+        if (kernels) {
+          Overlaps out;
+          kernels->leaf_pair(
+              {a.data(), vertices_a.data(), static_cast<int>(vertices_a.shape(0)), 0xffff},
+              {b.data(), vertices_b.data(), static_cast<int>(vertices_b.shape(0)), 0xffff},
+              static_cast<int>(a.shape(0)), static_cast<int>(a.shape(1)), same, out);
+          for (int i = 0; i < lanes; ++i) found.push_back(out.rows >> i & 1 ? out.lanes_of[i] : 0);
+          found.push_back(static_cast<std::int32_t>(out.adjacent));
+        }
+        const std::size_t n = found.size();
+        return array_of<nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1>>>(std::move(found), {n});
+      },
+      "variant"_a, "a"_a, "b"_a, "vertices_a"_a, "vertices_b"_a, "same"_a);
 }

@@ -12,6 +12,7 @@
 namespace tauguard::contacts {
 
 namespace nb = nanobind;
+using namespace nb::literals;
 
 using Doubles = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Anything = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
@@ -20,6 +21,7 @@ using Rows9 = nb::ndarray<const double, nb::shape<-1, 9>, nb::c_contig, nb::devi
 using Ints = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using IntRows = nb::ndarray<const std::int32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Bytes = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Integers = nb::typed<nb::list, int>;
 using Mask = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 template <class T, std::size_t N>

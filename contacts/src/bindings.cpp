@@ -14,7 +14,12 @@ Poses poses_of(const Rows3& xpos_t0, const Rows9& xmat_t0, const Rows3& xpos_t1,
 }
 
 // Rows as (first, second, feature) and (time, distance, point, normal), and the counts.
-nb::tuple answer(const std::vector<Row>& rows, const Counts& counts) {
+// Rows (first, second, feature), rows (t, distance, point, normal), counts.
+using Answer = nb::typed<nb::tuple, nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 3>>,
+                         nb::ndarray<nb::numpy, double, nb::shape<-1, 8>>,
+                         nb::typed<nb::tuple, int, int, int>>;
+
+Answer answer(const std::vector<Row>& rows, const Counts& counts) {
   std::vector<std::int32_t> ids;
   std::vector<double> values;
   ids.reserve(3 * rows.size()), values.reserve(8 * rows.size());
@@ -66,7 +71,7 @@ class Scene {
     rigid_ = RigidPairs(std::move(list));
   }
 
-  nb::tuple find(Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1, Rows9 xmat_t1) {
+  Answer find(Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1, Rows9 xmat_t1) {
     std::vector<Row> rows;
     Counts counts;
     {
@@ -78,9 +83,9 @@ class Scene {
     return answer(rows, counts);
   }
 
-  nb::tuple find_flex(Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1, Rows9 xmat_t1, Rows3 x_t0,
-                      Rows3 x_t1, IntRows elements, double radius, Ints with, Doubles reach,
-                      Mask skip) {
+  Answer find_flex(Rows3 xpos_t0, Rows9 xmat_t0, Rows3 xpos_t1, Rows9 xmat_t1, Rows3 x_t0,
+                   Rows3 x_t1, IntRows elements, double radius, Ints with, Doubles reach,
+                   Mask skip) {
     std::vector<Row> rows;
     Counts counts;
     {
@@ -132,7 +137,7 @@ bool all_finite(Anything a, Anything b, Anything c) {
 }
 
 // Rows (simplex, simplex), of two lists, that come within `distance` of one another.
-nb::tuple simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs, double distance) {
+Answer simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs, double distance) {
   std::vector<Row> rows;
   {
     nb::gil_scoped_release release;
@@ -152,15 +157,18 @@ nb::tuple simplices(Rows3 x_t0, Rows3 x_t1, IntRows a, IntRows b, IntRows pairs,
 }  // namespace
 
 NB_MODULE(_contacts, m) {
+  m.doc() = "Contacts of a moving scene, and the guarded stepper. Arguments are checked in Python.";
   nb::class_<Scene>(m, "Scene")
       .def(nb::init<>())
-      .def("add", &Scene::add)
-      .def("surface", &Scene::surface)
-      .def("pairs", &Scene::pairs)
-      .def("find", &Scene::find)
-      .def("find_flex", &Scene::find_flex);
+      .def("add", &Scene::add, "core"_a, "size"_a, "radius"_a, "body"_a, "pos"_a, "mat"_a,
+           "vertices"_a, "normals"_a, "edges"_a)
+      .def("surface", &Scene::surface, "vertices"_a, "faces"_a)
+      .def("pairs", &Scene::pairs, "pairs"_a, "reach"_a)
+      .def("find", &Scene::find, "xpos_t0"_a, "xmat_t0"_a, "xpos_t1"_a, "xmat_t1"_a)
+      .def("find_flex", &Scene::find_flex, "xpos_t0"_a, "xmat_t0"_a, "xpos_t1"_a, "xmat_t1"_a,
+           "x_t0"_a, "x_t1"_a, "elements"_a, "radius"_a, "geoms"_a, "reach"_a, "skip"_a);
   bind_guard(m);
-  m.def("carried", &carried);
-  m.def("simplices", &simplices);
-  m.def("all_finite", &all_finite);
+  m.def("carried", &carried, "xpos"_a, "xmat"_a, "body"_a, "local"_a);
+  m.def("simplices", &simplices, "x_t0"_a, "x_t1"_a, "a"_a, "b"_a, "pairs"_a, "distance"_a);
+  m.def("all_finite", &all_finite, "a"_a, "b"_a, "c"_a);
 }

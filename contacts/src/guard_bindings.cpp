@@ -1,5 +1,8 @@
 // The guarded stepper: what of a model it covers, and its steps.
+#include <nanobind/stl/optional.h>
+
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "arrays.hpp"
@@ -180,7 +183,10 @@ class Guard {
 
   // Steps, contacts, cuts (time, pair, stiffened), pairs restored, passed and arrested, energy
   // added, and the state at the start if the step was redone.
-  nb::tuple report() const {
+  using Cuts = nb::typed<nb::list, nb::typed<nb::tuple, double, int, bool>>;
+  using State = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
+  nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, Integers, double, std::optional<State>>
+  report() const {
     const Report& r = stepper_->report();
     const auto ids = [](const std::vector<int>& values) {
       nb::list out;
@@ -195,14 +201,14 @@ class Guard {
   }
 
   // What passes on the way to where the data is now.
-  nb::list passing() {
+  nb::typed<nb::list, nb::any> passing() {
     std::vector<PairHit> through;
     for (PairHit& hit : stepper_->judge())
       if (hit.passed) through.push_back(std::move(hit));
     return rows_of(through);
   }
-  nb::list stiffened() const {
-    nb::list out;
+  Integers stiffened() const {
+    Integers out;
     for (const int pair : stepper_->stiffened()) out.append(pair);
     return out;
   }
@@ -248,16 +254,19 @@ class Guard {
 
 void bind_guard(nb::module_& m) {
   nb::class_<Guard>(m, "Guard")
-      .def(nb::init<nb::dict, nb::dict, nb::object>())
-      .def("add", &Guard::add)
-      .def("pair", &Guard::pair)
-      .def("flex_pair", &Guard::flex_pair)
-      .def("partners", &Guard::partners)
-      .def("sheet", &Guard::sheet)
-      .def("spins", &Guard::spins)
-      .def("pulled", &Guard::pulled)
-      .def("start", &Guard::start)
-      .def("step", &Guard::step, nb::arg("owner"), nb::arg("each").none())
+      .def(nb::init<nb::typed<nb::dict, nb::str, int>, nb::typed<nb::dict, nb::str, double>,
+                    nb::object>(),
+           "addresses"_a, "settings"_a, "held"_a)
+      .def("add", &Guard::add, "core"_a, "size"_a, "radius"_a, "body"_a, "pos"_a, "mat"_a,
+           "vertices"_a)
+      .def("pair", &Guard::pair, "a"_a, "b"_a)
+      .def("flex_pair", &Guard::flex_pair, "a"_a, "radii"_a, "elements"_a, "skip"_a)
+      .def("partners", &Guard::partners, "rows"_a)
+      .def("sheet", &Guard::sheet, "ends"_a, "rest"_a, "stiffness"_a)
+      .def("spins", &Guard::spins, "dofs"_a)
+      .def("pulled", &Guard::pulled, "equalities"_a)
+      .def("start", &Guard::start, "sheets"_a)
+      .def("step", &Guard::step, "owner"_a, "each"_a.none())
       .def("report", &Guard::report)
       .def("passing", &Guard::passing)
       .def("stiffened", &Guard::stiffened)

@@ -12,6 +12,7 @@
 namespace tauguard::detectors {
 
 namespace nb = nanobind;
+using namespace nb::literals;
 
 using In1 = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using In2 = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;

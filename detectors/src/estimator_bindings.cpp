@@ -85,28 +85,32 @@ void bind_estimator(nb::module_& m) {
              bool modelled, const Numbers& cycles, double play, std::size_t joints) {
             new (self) FrictionBasis(make_basis(bristles, stops, stribeck, slopes, loaded,
                                                 saturation, modelled, cycles, play, joints));
-          })
+          },
+          "bristles"_a, "stops"_a, "stribeck"_a, "slopes"_a, "loaded"_a, "saturation"_a,
+          "modelled"_a, "cycles"_a, "play"_a, "joints"_a)
       .def_prop_ro("columns", &FrictionBasis::columns)
-      .def("evaluate", &friction_columns, nb::arg(), nb::arg(), nb::arg(), nb::arg(),
-           nb::arg().noconvert());
+      .def("evaluate", &friction_columns, "q"_a, "qd"_a, "tau"_a, "load"_a, "out"_a.noconvert());
   nb::class_<Estimator>(m, "Estimator")
-      .def("__init__",
-           [](Estimator* self, const Chain& chain, const FrictionBasis& basis,
-              const Numbers& drive_gain, const Numbers& gain, const Numbers& weights,
-              const Numbers& deviation, const Numbers& persistence, const Numbers& noise,
-              double clip, int every, double lasting, double transition, bool weighted,
-              const Numbers& fusion, double plain_gain) {
-             const std::size_t n = chain.joints.size(), unknown = payload_numbers + per_joint * n;
-             require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
-                         weights.size() == n * basis.columns() && deviation.size() == unknown &&
-                         persistence.size() == unknown &&
-                         basis.cycles.size() == n * basis.ripples &&
-                         (fusion.empty() || fusion.size() == n * VelocityFusion::gain_numbers),
-                     "Estimator: array lengths differ");
-             new (self) Estimator(chain, basis,
-                                  {drive_gain, gain, weights, deviation, persistence, noise, clip,
-                                   every, lasting, transition, weighted, fusion, plain_gain});
-           })
+      .def(
+          "__init__",
+          [](Estimator* self, const Chain& chain, const FrictionBasis& basis,
+             const Numbers& drive_gain, const Numbers& gain, const Numbers& weights,
+             const Numbers& deviation, const Numbers& persistence, const Numbers& noise,
+             double clip, int every, double lasting, double transition, bool weighted,
+             const Numbers& fusion, double plain_gain) {
+            const std::size_t n = chain.joints.size(), unknown = payload_numbers + per_joint * n;
+            require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
+                        weights.size() == n * basis.columns() && deviation.size() == unknown &&
+                        persistence.size() == unknown && basis.cycles.size() == n * basis.ripples &&
+                        (fusion.empty() || fusion.size() == n * VelocityFusion::gain_numbers),
+                    "Estimator: array lengths differ");
+            new (self) Estimator(chain, basis,
+                                 {drive_gain, gain, weights, deviation, persistence, noise, clip,
+                                  every, lasting, transition, weighted, fusion, plain_gain});
+          },
+          "chain"_a, "basis"_a, "drive_gain"_a, "gain"_a, "weights"_a, "deviation"_a,
+          "persistence"_a, "noise"_a, "clip"_a, "every"_a, "lasting"_a, "transition"_a,
+          "weighted"_a, "fusion"_a, "plain_gain"_a)
       .def_prop_ro("started", &Estimator::started)
       .def(
           "theta",
@@ -114,11 +118,11 @@ void bind_estimator(nb::module_& m) {
             require(out.shape(0) == estimator.unknowns(), "theta: wrong length");
             std::copy(estimator.theta().begin(), estimator.theta().end(), out.data());
           },
-          nb::arg().noconvert())
+          "out"_a.noconvert())
       .def("reset", &Estimator::reset)
-      .def("run", &run, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(),
-           nb::arg().noconvert(), nb::arg().noconvert(), nb::arg().noconvert(),
-           nb::arg().noconvert())
+      .def("run", &run, "dt"_a, "q"_a, "qd"_a, "current"_a, "residual"_a.noconvert(),
+           "unexplained"_a.noconvert(), "acceleration"_a.noconvert(), "plain"_a.noconvert(),
+           "theta"_a.noconvert())
       .def(
           "step",
           [](Estimator& estimator, In1 q, In1 qd, In1 current, double dt, Out1 residual,
@@ -130,8 +134,8 @@ void bind_estimator(nb::module_& m) {
             estimator.step(q.data(), qd.data(), current.data(), dt, residual.data(),
                            unexplained.data(), acceleration.data());
           },
-          nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(),
-          nb::arg().noconvert());
+          "q"_a, "qd"_a, "current"_a, "dt"_a, "residual"_a.noconvert(), "unexplained"_a.noconvert(),
+          "acceleration"_a.noconvert());
 }
 
 }  // namespace tauguard::detectors

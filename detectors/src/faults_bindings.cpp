@@ -56,24 +56,29 @@ TorqueCheck* make_torques(In1 gain, In1 noise, double rate, In1 opposed, In1 lea
 
 void bind_faults(nb::module_& m) {
   nb::class_<FaultCheck>(m, "FaultCheck")
-      .def(nb::new_(&make_check))
-      .def("step",
-           [](FaultCheck& check, double t, In1 q, In1 qd, In1 current) {
-             const std::size_t n = check.joints();
-             require(q.shape(0) == n && qd.shape(0) == n && current.shape(0) == n,
-                     "q, qd, current: expected one entry a joint");
-             return numbers(check.step(t, q.data(), qd.data(), current.data()));
-           })
+      .def(nb::new_(&make_check), "dt"_a, "longest"_a, "odd"_a, "speed"_a, "repeats"_a, "window"_a,
+           "share"_a, "step_share"_a, "current"_a, "step"_a, "drift"_a, "stuck"_a)
+      .def(
+          "step",
+          [](FaultCheck& check, double t, In1 q, In1 qd, In1 current) {
+            const std::size_t n = check.joints();
+            require(q.shape(0) == n && qd.shape(0) == n && current.shape(0) == n,
+                    "q, qd, current: expected one entry a joint");
+            return numbers(check.step(t, q.data(), qd.data(), current.data()));
+          },
+          "t"_a, "q"_a, "qd"_a, "current"_a)
       .def("reset", &FaultCheck::reset);
   nb::class_<TorqueCheck>(m, "TorqueCheck")
-      .def(nb::new_(&make_torques))
-      .def("step",
-           [](TorqueCheck& check, In1 residual, In1 current, double dt) {
-             const std::size_t n = check.joints();
-             require(residual.shape(0) == n && current.shape(0) == n && dt > 0,
-                     "residual, current, dt: expected one entry a joint, dt above 0");
-             return numbers(check.step(residual.data(), current.data(), dt));
-           })
+      .def(nb::new_(&make_torques), "gain"_a, "noise"_a, "rate"_a, "opposed"_a, "least"_a, "most"_a)
+      .def(
+          "step",
+          [](TorqueCheck& check, In1 residual, In1 current, double dt) {
+            const std::size_t n = check.joints();
+            require(residual.shape(0) == n && current.shape(0) == n && dt > 0,
+                    "residual, current, dt: expected one entry a joint, dt above 0");
+            return numbers(check.step(residual.data(), current.data(), dt));
+          },
+          "residual"_a, "current"_a, "dt"_a)
       .def("extremes", &TorqueCheck::extremes);
 }
 

@@ -116,17 +116,18 @@ void gram(In2 a, In2 b, double sigma, Out2 out, int threads) {
 }  // namespace tauguard::detectors
 
 NB_MODULE(_kernel, m) {
+  m.doc() = "Kernel machines, scalings and windows on arrays.";
   using namespace tauguard::detectors;
   nb::class_<KernelSum>(m, "KernelSum")
-      .def(nb::new_(&make_kernel))
-      .def("rows", &rows, nb::arg(), nb::arg().noconvert(), nb::arg())
-      .def("series", &series, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
+      .def(nb::new_(&make_kernel), "vectors"_a, "coef"_a, "intercept"_a, "sigma"_a)
+      .def("rows", &rows, "x"_a, "out"_a.noconvert(), "threads"_a)
+      .def("series", &series, "signal"_a, "lag"_a, "count"_a, "out"_a.noconvert(), "threads"_a);
   nb::class_<Scaling>(m, "Scaling")
-      .def(nb::new_(&make_scaling))
-      .def("rows", &scale, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+      .def(nb::new_(&make_scaling), "joints"_a, "weights"_a, "units"_a, "factor"_a, "compress"_a)
+      .def("rows", &scale, "left"_a, "qd"_a, "acceleration"_a, "out"_a.noconvert());
   nb::class_<Window>(m, "Window")
-      .def(nb::new_(&make_window))
-      .def("step", &step, nb::arg(), nb::arg().noconvert());
-  m.def("gram", &gram, nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
-  m.def("windows", &windows, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+      .def(nb::new_(&make_window), "columns"_a, "lag"_a, "count"_a)
+      .def("step", &step, "row"_a, "out"_a.noconvert());
+  m.def("gram", &gram, "a"_a, "b"_a, "sigma"_a, "out"_a.noconvert(), "threads"_a);
+  m.def("windows", &windows, "signal"_a, "ends"_a, "lag"_a, "count"_a, "out"_a.noconvert());
 }

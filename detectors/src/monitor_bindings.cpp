@@ -86,7 +86,9 @@ Monitor* make_monitor(const FaultCheck& check, const Alarm& alarm, const Estimat
   return new Monitor(check, alarm, observer, torques, {dt, settle, span, window, bridged});
 }
 
-nb::tuple step(Monitor& monitor, double t, In1 q, In1 qd, In1 current) {
+// State, alarm, score, fault, joint, value, settling.
+nb::typed<nb::tuple, int, bool, double, int, int, double, bool> step(Monitor& monitor, double t,
+                                                                     In1 q, In1 qd, In1 current) {
   const std::size_t n = monitor.joints();
   require(q.shape(0) == n && qd.shape(0) == n && current.shape(0) == n,
           "q, qd, current: expected one entry a joint");
@@ -101,30 +103,46 @@ nb::tuple step(Monitor& monitor, double t, In1 q, In1 qd, In1 current) {
 void bind_monitor(nb::module_& m) {
   nb::class_<Scores>(m, "Scores")
       .def_prop_ro("joints", &Scores::joints)
-      .def("step", [](Scores& scores, In1 q, In1 qd, In1 current, double dt) {
-        check_sample(scores.joints(), q, qd, current, "current");
-        require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
-        return scores.step(q.data(), qd.data(), current.data(), dt);
-      });
-  m.def("free_scores",
-        [](const FreeMotion& stream) -> Source { return std::make_shared<FreeScores>(stream); });
-  m.def("limit_scores", &limit_scores);
-  m.def("kernel_scores", &kernel_scores);
-  m.def("python_scores", [](nb::object make, std::size_t joints) -> Source {
-    return std::make_shared<PythonScores>(std::move(make), joints);
-  });
+      .def(
+          "step",
+          [](Scores& scores, In1 q, In1 qd, In1 current, double dt) {
+            check_sample(scores.joints(), q, qd, current, "current");
+            require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
+            return scores.step(q.data(), qd.data(), current.data(), dt);
+          },
+          "q"_a, "qd"_a, "current"_a, "dt"_a);
+  m.def(
+      "free_scores",
+      [](const FreeMotion& stream) -> Source { return std::make_shared<FreeScores>(stream); },
+      "stream"_a);
+  m.def("limit_scores", &limit_scores, "estimator"_a, "joints"_a, "weights"_a, "units"_a,
+        "factor"_a, "compress"_a, "limits"_a);
+  m.def("kernel_scores", &kernel_scores, "estimator"_a, "joints"_a, "weights"_a, "units"_a,
+        "factor"_a, "compress"_a, "lag"_a, "count"_a, "vectors"_a, "coef"_a, "intercept"_a,
+        "sigma"_a, "graded"_a);
+  m.def(
+      "python_scores",
+      [](nb::object make, std::size_t joints) -> Source {
+        return std::make_shared<PythonScores>(std::move(make), joints);
+      },
+      "make"_a, "joints"_a);
   nb::class_<Alarm>(m, "Alarm")
-      .def(nb::new_(&make_alarm))
+      .def(nb::new_(&make_alarm), "scores"_a, "dt"_a, "settle"_a, "threshold"_a, "samples"_a,
+           "memory"_a, "speed"_a, "base"_a, "unit"_a)
       .def_prop_ro("score", &Alarm::score)
-      .def("step", [](Alarm& alarm, In1 q, In1 qd, In1 current, double dt) {
-        check_sample(alarm.joints(), q, qd, current, "current");
-        require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
-        return alarm.step(q.data(), qd.data(), current.data(), dt);
-      });
+      .def(
+          "step",
+          [](Alarm& alarm, In1 q, In1 qd, In1 current, double dt) {
+            check_sample(alarm.joints(), q, qd, current, "current");
+            require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
+            return alarm.step(q.data(), qd.data(), current.data(), dt);
+          },
+          "q"_a, "qd"_a, "current"_a, "dt"_a);
   nb::class_<Monitor>(m, "Monitor")
-      .def(nb::new_(&make_monitor))
+      .def(nb::new_(&make_monitor), "check"_a, "alarm"_a, "observer"_a, "torques"_a, "dt"_a,
+           "settle"_a, "span"_a, "window"_a, "bridged"_a)
       .def_prop_ro("settled", &Monitor::settled)
-      .def("step", &step);
+      .def("step", &step, "t"_a, "q"_a, "qd"_a, "current"_a);
 }
 
 }  // namespace tauguard::detectors

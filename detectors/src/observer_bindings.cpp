@@ -15,6 +15,7 @@
 #include "tauguard/geometry/thread_pool.hpp"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 using namespace tauguard::detectors;
 using tauguard::geometry::load;
 using tauguard::geometry::ThreadPool;
@@ -116,12 +117,15 @@ void filter(In1 gain, In1 dt, In2 p, In2 beta, In2 tau, Out2 out) {
 
 void bind_chain(nb::module_& m) {
   nb::class_<Chain>(m, "Chain")
-      .def("__init__",
-           [](Chain* self, Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 axis,
-              In2 inertial, In1 armature, In1 gravity) {
-             new (self) Chain(make_chain(parent, prismatic, rotation, translation, axis, inertial,
-                                         armature, gravity));
-           })
+      .def(
+          "__init__",
+          [](Chain* self, Ids parent, Ids prismatic, In3 rotation, In2 translation, In2 axis,
+             In2 inertial, In1 armature, In1 gravity) {
+            new (self) Chain(make_chain(parent, prismatic, rotation, translation, axis, inertial,
+                                        armature, gravity));
+          },
+          "parent"_a, "prismatic"_a, "rotation"_a, "translation"_a, "axis"_a, "inertial"_a,
+          "armature"_a, "gravity"_a)
       .def(
           "momentum",
           [](const Chain& chain, In2 q, In2 qd, Out2 p, Out2 beta, int threads) {
@@ -132,7 +136,7 @@ void bind_chain(nb::module_& m) {
                              beta.data() + n * t, work);
             });
           },
-          nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg())
+          "q"_a, "qd"_a, "p"_a.noconvert(), "beta"_a.noconvert(), "threads"_a)
       .def(
           "rnea",
           [](const Chain& chain, In2 q, In2 qd, In2 qdd, Out2 tau, int threads) {
@@ -143,7 +147,7 @@ void bind_chain(nb::module_& m) {
                          tau.data() + n * t, work);
             });
           },
-          nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg())
+          "q"_a, "qd"_a, "qdd"_a, "tau"_a.noconvert(), "threads"_a)
       .def(
           "mass_matrix",
           [](const Chain& chain, In2 q, Out3 m, int threads) {
@@ -155,7 +159,7 @@ void bind_chain(nb::module_& m) {
               chain.mass_matrix(q.data() + n * t, m.data() + n * n * t, work);
             });
           },
-          nb::arg(), nb::arg().noconvert(), nb::arg())
+          "q"_a, "m"_a.noconvert(), "threads"_a)
       .def(
           "regressor",
           [](const Chain& chain, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
@@ -169,7 +173,7 @@ void bind_chain(nb::module_& m) {
                               beta.data() + n * c * t, work);
             });
           },
-          nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg())
+          "q"_a, "qd"_a, "p"_a.noconvert(), "beta"_a.noconvert(), "threads"_a)
       .def(
           "link_regressor",
           [](const Chain& chain, int link, In2 q, In2 qd, Out3 p, Out3 beta, int threads) {
@@ -184,17 +188,19 @@ void bind_chain(nb::module_& m) {
                                    p.data() + n * c * t, beta.data() + n * c * t, work);
             });
           },
-          nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg().noconvert(), nb::arg());
+          "link"_a, "q"_a, "qd"_a, "p"_a.noconvert(), "beta"_a.noconvert(), "threads"_a);
 }
 
 void bind_observer(nb::module_& m) {
   nb::class_<Observer>(m, "Observer")
-      .def("__init__",
-           [](Observer* self, const Chain& chain, In1 gain) {
-             require(gain.shape(0) == chain.joints.size(), "gain: one entry a joint");
-             new (self)
-                 Observer(chain, std::vector<double>(gain.data(), gain.data() + gain.shape(0)));
-           })
+      .def(
+          "__init__",
+          [](Observer* self, const Chain& chain, In1 gain) {
+            require(gain.shape(0) == chain.joints.size(), "gain: one entry a joint");
+            new (self)
+                Observer(chain, std::vector<double>(gain.data(), gain.data() + gain.shape(0)));
+          },
+          "chain"_a, "gain"_a)
       .def_prop_ro("started", &Observer::started)
       .def("state", &Observer::state)
       .def(
@@ -202,12 +208,14 @@ void bind_observer(nb::module_& m) {
           [](Observer& observer, const std::vector<double>& saved) {
             require(observer.restore(saved), "state: of another arm");
           },
-          nb::arg("state"))
-      .def("reset",
-           [](Observer& observer, In1 q, In1 qd, In1 tau) {
-             check_sample(observer.chain().joints.size(), q, qd, tau, "tau");
-             observer.reset(q.data(), qd.data(), tau.data());
-           })
+          "state"_a)
+      .def(
+          "reset",
+          [](Observer& observer, In1 q, In1 qd, In1 tau) {
+            check_sample(observer.chain().joints.size(), q, qd, tau, "tau");
+            observer.reset(q.data(), qd.data(), tau.data());
+          },
+          "q"_a, "qd"_a, "tau"_a)
       .def(
           "step",
           [](Observer& observer, In1 q, In1 qd, In1 tau, double dt, Out1 out) {
@@ -218,16 +226,16 @@ void bind_observer(nb::module_& m) {
             const double* r = observer.step(q.data(), qd.data(), tau.data(), dt);
             std::copy(r, r + q.shape(0), out.data());
           },
-          nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg().noconvert());
+          "q"_a, "qd"_a, "tau"_a, "dt"_a, "out"_a.noconvert());
 }
 
 }  // namespace
 
 NB_MODULE(_observer, m) {
+  m.doc() = "Rigid-body terms, momentum observer, estimator, fault checks, monitor.";
   bind_chain(m);
   bind_observer(m);
-  m.def("filter", &filter, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
-        nb::arg().noconvert());
+  m.def("filter", &filter, "gain"_a, "dt"_a, "p"_a, "beta"_a, "tau"_a, "out"_a.noconvert());
   bind_estimator(m);
   bind_free_motion(m);
   bind_faults(m);

@@ -125,10 +125,11 @@ void network(In2 x, Ids widths, In1 weights, In1 biases, In1 centre, In1 scale, 
 
 NB_MODULE(_ranking, m) {
   using namespace tauguard::detectors;
-  m.def("bounded_cusum", &bounded_cusum, nb::arg(), nb::arg(), nb::arg().noconvert(),
-        nb::arg().noconvert());
-  m.def("forest", &forest, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
-        nb::arg(), nb::arg(), nb::arg().noconvert(), nb::arg());
-  m.def("network", &network, nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(), nb::arg(),
-        nb::arg().noconvert(), nb::arg());
+  m.doc() = "Bounded cumulative sums, forests of regression trees, networks.";
+  m.def("bounded_cusum", &bounded_cusum, "x"_a, "cap"_a, "state"_a.noconvert(),
+        "out"_a.noconvert());
+  m.def("forest", &forest, "x"_a, "roots"_a, "feature"_a, "threshold"_a, "left"_a, "right"_a,
+        "value"_a, "base"_a, "out"_a.noconvert(), "threads"_a);
+  m.def("network", &network, "x"_a, "widths"_a, "weights"_a, "biases"_a, "centre"_a, "scale"_a,
+        "out"_a.noconvert(), "threads"_a);
 }

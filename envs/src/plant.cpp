@@ -348,6 +348,7 @@ void bind_plant(nb::module_& m) {
 }  // namespace
 
 NB_MODULE(_plant, m) {
+  m.doc() = "The plant: an arm, its drives and surroundings, stepped natively.";
   bind_joint(m);
   bind_anatomy(m);
   bind_surroundings(m);

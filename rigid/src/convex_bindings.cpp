@@ -7,6 +7,7 @@
 #include "tauguard/geometry/interrupt_binding.hpp"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 using namespace tauguard::rigid;
 using tauguard::geometry::LongCall;
 
@@ -19,48 +20,71 @@ using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 void bind_convex(nb::module_& m) {
   m.def("has_avx2", [] { return use_avx2(); });
-  m.def("allow_vectors", [](bool allowed) { vectors_allowed = allowed; });
-  m.def("overlap", [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b,
-                      Offsets offsets_b, int method, int threads, Hits hit) {
-    const LongCall call;
-    return overlap(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
-                   static_cast<Method>(method), threads, hit.data());
-  });
-  m.def("overlap_boxes", [](Packed a, Packed blocks_a, Packed b, Packed blocks_b, double skew,
-                            int threads, Hits hit) {
-    const LongCall call;
-    const Bodies rows_a{Kind::boxes, a.data(), nullptr, a.shape(0)};
-    const Bodies rows_b{Kind::boxes, b.data(), nullptr, b.shape(0)};
-    return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0),
-                         threads, hit.data());
-  });
-  m.def("box_skew", [](Packed rotation, double tolerance) {
-    const LongCall call;
-    const Skew skew = box_skew(rotation.data(), rotation.shape(0), tolerance);
-    return std::pair(skew.largest, skew.first_beyond);
-  });
-  m.def("pack_boxes", [](Packed packed, Rows blocks) {
-    const LongCall call;
-    pack_boxes(packed.data(), packed.shape(0), blocks.data());
-  });
-  m.def("sweep",
-        [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
-           Packed displacement, int method, int threads, bool points, Hits hit, Rows out) {
-          const LongCall call;
-          return sweep(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), displacement.data(),
-                       hit.shape(0), static_cast<Method>(method), threads, points, hit.data(),
-                       out.data());
-        });
-  m.def("overlap_cached", [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b,
-                             Offsets offsets_b, int threads, Rows normals, Hits hit) {
-    const LongCall call;
-    return overlap_cached(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
-                          threads, normals.data(), hit.data());
-  });
-  m.def("witnesses", [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b,
-                        Offsets offsets_b, int threads, Hits hit, Rows out) {
-    const LongCall call;
-    witnesses(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), out.shape(0), threads,
-              hit.data(), out.data());
-  });
+  m.def("allow_vectors", [](bool allowed) { vectors_allowed = allowed; }, "allowed"_a);
+  m.def(
+      "overlap",
+      [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
+         int method, int threads, Hits hit) {
+        const LongCall call;
+        return overlap(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
+                       static_cast<Method>(method), threads, hit.data());
+      },
+      "kind_a"_a, "a"_a, "offsets_a"_a, "kind_b"_a, "b"_a, "offsets_b"_a, "method"_a, "threads"_a,
+      "hit"_a);
+  m.def(
+      "overlap_boxes",
+      [](Packed a, Packed blocks_a, Packed b, Packed blocks_b, double skew, int threads, Hits hit) {
+        const LongCall call;
+        const Bodies rows_a{Kind::boxes, a.data(), nullptr, a.shape(0)};
+        const Bodies rows_b{Kind::boxes, b.data(), nullptr, b.shape(0)};
+        return overlap_boxes(rows_a, blocks_a.data(), rows_b, blocks_b.data(), skew, hit.shape(0),
+                             threads, hit.data());
+      },
+      "a"_a, "blocks_a"_a, "b"_a, "blocks_b"_a, "skew"_a, "threads"_a, "hit"_a);
+  m.def(
+      "box_skew",
+      [](Packed rotation, double tolerance) {
+        const LongCall call;
+        const Skew skew = box_skew(rotation.data(), rotation.shape(0), tolerance);
+        return std::pair(skew.largest, skew.first_beyond);
+      },
+      "rotation"_a, "tolerance"_a);
+  m.def(
+      "pack_boxes",
+      [](Packed packed, Rows blocks) {
+        const LongCall call;
+        pack_boxes(packed.data(), packed.shape(0), blocks.data());
+      },
+      "packed"_a, "blocks"_a);
+  m.def(
+      "sweep",
+      [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
+         Packed displacement, int method, int threads, bool points, Hits hit, Rows out) {
+        const LongCall call;
+        return sweep(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), displacement.data(),
+                     hit.shape(0), static_cast<Method>(method), threads, points, hit.data(),
+                     out.data());
+      },
+      "kind_a"_a, "a"_a, "offsets_a"_a, "kind_b"_a, "b"_a, "offsets_b"_a, "displacement"_a,
+      "method"_a, "threads"_a, "points"_a, "hit"_a, "out"_a);
+  m.def(
+      "overlap_cached",
+      [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
+         int threads, Rows normals, Hits hit) {
+        const LongCall call;
+        return overlap_cached(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), hit.shape(0),
+                              threads, normals.data(), hit.data());
+      },
+      "kind_a"_a, "a"_a, "offsets_a"_a, "kind_b"_a, "b"_a, "offsets_b"_a, "threads"_a, "normals"_a,
+      "hit"_a);
+  m.def(
+      "witnesses",
+      [](int kind_a, Packed a, Offsets offsets_a, int kind_b, Packed b, Offsets offsets_b,
+         int threads, Hits hit, Rows out) {
+        const LongCall call;
+        witnesses(view(kind_a, a, offsets_a), view(kind_b, b, offsets_b), out.shape(0), threads,
+                  hit.data(), out.data());
+      },
+      "kind_a"_a, "a"_a, "offsets_a"_a, "kind_b"_a, "b"_a, "offsets_b"_a, "threads"_a, "hit"_a,
+      "out"_a);
 }

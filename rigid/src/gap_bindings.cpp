@@ -5,6 +5,7 @@
 #include "tauguard/geometry/interrupt_binding.hpp"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 using namespace tauguard::rigid;
 using tauguard::geometry::interruptible_for;
 using tauguard::geometry::LongCall;
@@ -94,13 +95,21 @@ void mesh_impacts(const Mesh& mesh, int kind, Packed data, Offsets offsets, Radi
 }  // namespace
 
 void bind_gaps(nb::module_& m) {
-  m.def("gaps", &gaps);
-  m.def("meets", &meets);
-  m.def("time_of_impact", &impacts);
+  m.def("gaps", &gaps, "kind_a"_a, "a"_a, "offsets_a"_a, "radius_a"_a, "kind_b"_a, "b"_a,
+        "offsets_b"_a, "radius_b"_a, "out"_a, "threads"_a);
+  m.def("meets", &meets, "kind_a"_a, "a"_a, "offsets_a"_a, "radius_a"_a, "kind_b"_a, "b"_a,
+        "offsets_b"_a, "radius_b"_a, "hit"_a, "threads"_a);
+  m.def("time_of_impact", &impacts, "kind_a"_a, "a"_a, "offsets_a"_a, "radius_a"_a, "kind_b"_a,
+        "b"_a, "offsets_b"_a, "radius_b"_a, "pose_a"_a, "linear_a"_a, "angular_a"_a, "pose_b"_a,
+        "linear_b"_a, "angular_b"_a, "out"_a, "threads"_a);
 }
 
 void bind_bodies(nb::class_<Mesh>& mesh) {
-  mesh.def("meets", &mesh_meets);
-  mesh.def("gaps", &mesh_gaps);
-  mesh.def("time_of_impact_of_bodies", &mesh_impacts);
+  mesh.def("meets", &mesh_meets, "kind"_a, "bodies"_a, "offsets"_a, "radius"_a, "faces"_a,
+           "threads"_a);
+  mesh.def("gaps", &mesh_gaps, "kind"_a, "bodies"_a, "offsets"_a, "radius"_a, "out"_a, "faces"_a,
+           "threads"_a);
+  mesh.def("time_of_impact_of_bodies", &mesh_impacts, "kind"_a, "bodies"_a, "offsets"_a, "radius"_a,
+           "pose_mesh"_a, "linear_mesh"_a, "angular_mesh"_a, "pose_body"_a, "linear_body"_a,
+           "angular_body"_a, "out"_a, "faces"_a, "threads"_a);
 }

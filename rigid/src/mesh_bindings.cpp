@@ -8,6 +8,7 @@
 #include "tauguard/geometry/interrupt_binding.hpp"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 using namespace tauguard::rigid;
 using tauguard::geometry::interruptible_for;
 using tauguard::geometry::LongCall;
@@ -33,7 +34,9 @@ auto owned(std::vector<T>&& values, std::array<std::size_t, N> shape) {
 }
 
 // All contacts of every pose: (pose row, face of a, face of b) and (point, normal, depth) a row.
-nb::tuple contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit, int threads) {
+using Rows = nb::typed<nb::tuple, nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 3>>,
+                       nb::ndarray<nb::numpy, double, nb::shape<-1, 7>>>;
+Rows contacts(const Mesh& a, const Mesh& b, Poses poses, std::size_t limit, int threads) {
   std::vector<std::int32_t> rows;
   std::vector<double> values;
   {
@@ -79,39 +82,47 @@ void bind_bodies(nb::class_<Mesh>& mesh);
 void bind_volumes(nb::module_& m);
 
 NB_MODULE(_rigid_mesh, m) {
+  m.doc() = "Meshes and rigid motion over batches of poses. Arguments are checked in Python.";
   tauguard::geometry::bind_interrupts();
   bind_gaps(m);
   bind_volumes(m);
   nb::class_<Mesh> mesh(m, "Mesh");
   bind_bodies(mesh);
-  mesh.def("__init__",
-           [](Mesh* self, Vertices vertices, Faces faces, const std::string& volume) {
-             const LongCall call;
-             new (self) Mesh(vertices.data(), faces.data(), faces.shape(0), kind_of(volume));
-           })
-      .def("overlap",
-           [](const Mesh& a, const Mesh& b, Poses poses, Pairs out, int threads) {
-             const LongCall call;
-             interruptible_for(poses.shape(0), threads, 8, [&](auto begin, auto end, auto) {
-               Scratch scratch;
-               for (auto i = begin; i < end; ++i) {
-                 const FacePair p = first_overlap(a, b, Pose(poses.data() + 16 * i), scratch);
-                 out.data()[2 * i] = p.a;
-                 out.data()[2 * i + 1] = p.b;
-               }
-             });
-           })
-      .def("contacts", &contacts)
-      .def("time_of_impact", &impact_of_meshes);
+  mesh.def(
+          "__init__",
+          [](Mesh* self, Vertices vertices, Faces faces, const std::string& volume) {
+            const LongCall call;
+            new (self) Mesh(vertices.data(), faces.data(), faces.shape(0), kind_of(volume));
+          },
+          "vertices"_a, "faces"_a, "volume"_a)
+      .def(
+          "overlap",
+          [](const Mesh& a, const Mesh& b, Poses poses, Pairs out, int threads) {
+            const LongCall call;
+            interruptible_for(poses.shape(0), threads, 8, [&](auto begin, auto end, auto) {
+              Scratch scratch;
+              for (auto i = begin; i < end; ++i) {
+                const FacePair p = first_overlap(a, b, Pose(poses.data() + 16 * i), scratch);
+                out.data()[2 * i] = p.a;
+                out.data()[2 * i + 1] = p.b;
+              }
+            });
+          },
+          "other"_a, "poses"_a, "out"_a, "threads"_a)
+      .def("contacts", &contacts, "other"_a, "poses"_a, "limit"_a, "threads"_a)
+      .def("time_of_impact", &impact_of_meshes, "other"_a, "pose_a"_a, "linear_a"_a, "angular_a"_a,
+           "pose_b"_a, "linear_b"_a, "angular_b"_a, "out"_a, "faces"_a, "threads"_a);
   // Row by row, for tests of the exact answer.
-  m.def("triangles_overlap",
-        [](nb::ndarray<const double, nb::shape<-1, 2, 3, 3>, nb::c_contig, nb::device::cpu> pairs,
-           nb::ndarray<bool, nb::shape<-1>, nb::c_contig, nb::device::cpu> out) {
-          const LongCall call;
-          const tauguard::geometry::RoundToNearest guard;
-          for (std::size_t i = 0; i < pairs.shape(0); ++i) {
-            const auto* t = reinterpret_cast<const Triangle*>(pairs.data() + 18 * i);
-            out.data()[i] = triangles_overlap(t[0], t[1]);
-          }
-        });
+  m.def(
+      "triangles_overlap",
+      [](nb::ndarray<const double, nb::shape<-1, 2, 3, 3>, nb::c_contig, nb::device::cpu> pairs,
+         nb::ndarray<bool, nb::shape<-1>, nb::c_contig, nb::device::cpu> out) {
+        const LongCall call;
+        const tauguard::geometry::RoundToNearest guard;
+        for (std::size_t i = 0; i < pairs.shape(0); ++i) {
+          const auto* t = reinterpret_cast<const Triangle*>(pairs.data() + 18 * i);
+          out.data()[i] = triangles_overlap(t[0], t[1]);
+        }
+      },
+      "pairs"_a, "out"_a);
 }

@@ -8,6 +8,7 @@
 #include "mesh_volumes.hpp"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 using namespace tauguard::rigid;
 
 using Corners = nb::ndarray<const double, nb::shape<-1, 3, 3>, nb::c_contig, nb::device::cpu>;
@@ -140,11 +141,11 @@ template <class Volume>
 void bind(nb::module_& m, const char* name) {
   const auto release = nb::call_guard<nb::gil_scoped_release>();
   nb::class_<Volumes<Volume>>(m, name)
-      .def(nb::init<Corners, Offsets>())
+      .def(nb::init<Corners, Offsets>(), "corners"_a, "offsets"_a)
       .def("fit", &Volumes<Volume>::fit, release)
-      .def("place", &Volumes<Volume>::place, release)
-      .def("meet", &Volumes<Volume>::meet, release)
-      .def("write", &Volumes<Volume>::write, release)
+      .def("place", &Volumes<Volume>::place, "poses"_a, release)
+      .def("meet", &Volumes<Volume>::meet, "pairs"_a, "out"_a, release)
+      .def("write", &Volumes<Volume>::write, "out"_a, release)
       .def_ro_static("numbers", &Volume::numbers);
 }
 
