@@ -13,8 +13,8 @@ __all__ = ["Admittance", "ComputedTorque", "GravityPD", "OperationalSpace", "fri
 
 #: The Coulomb part rises over this speed [rad/s].
 SMOOTHING = 0.02
-#: A direction that is this much less mobile than the most mobile one counts as nearly lost: there
-#: the tool grows soft instead of the torque growing without bound. Elsewhere nothing is damped.
+#: A direction whose mobility is below this fraction of the largest one is nearly singular. There
+#: the tool's stiffness falls, so that torques stay bounded; other directions are not damped.
 NEARLY_LOST = 1e-4
 #: The integral stays within what the spring gives at this error [m, rad].
 INTEGRAL_REACH = 0.05
@@ -189,9 +189,9 @@ class OperationalSpace:
         mass = np.triu(data.M) + np.triu(data.M, 1).T
         inverse = np.linalg.solve(mass, jac.T)
         values, axes = np.linalg.eigh(jac @ inverse)
-        share = values / (NEARLY_LOST * values[-1])
-        soft = np.where(share < 1, np.clip(share, 0, 1), 1.0) / np.maximum(values, 1e-300)
-        kept = np.where(share > 1e-4, 1 / np.maximum(values, 1e-300), 0.0)
+        mobility = values / (NEARLY_LOST * values[-1])
+        soft = np.where(mobility < 1, np.clip(mobility, 0, 1), 1.0) / np.maximum(values, 1e-300)
+        kept = np.where(mobility > 1e-4, 1 / np.maximum(values, 1e-300), 0.0)
         twist = -(jac @ qd) if twist_des is None else np.asarray(twist_des) - jac @ qd
         wanted = self.stiffness * error + self.damping * twist + self._integrated(error)
         force = axes @ (soft * (axes.T @ wanted))

@@ -44,11 +44,11 @@ class Gains:
         if facts.sources.get("bandwidth") == "default":
             w = w * min(1.0, derive.MOST_PER_STEP / mode)
         elif mode > derive.LIMIT_PER_STEP:
-            dt, share = float(model.opt.timestep), derive.MOST_PER_STEP / mode
+            dt, fraction = float(model.opt.timestep), derive.MOST_PER_STEP / mode
             raise ValueError(
                 f"timestep {dt} s: too long for the servo of joint {names[joint]!r} at a bandwidth "
-                f"of {w[joint]:g} rad/s; expected a timestep of at most {dt * share:.1g} s, or a "
-                f"bandwidth of at most {w[joint] * share:.2g} rad/s"
+                f"of {w[joint]:g} rad/s; expected a timestep of at most {dt * fraction:.1g} s, or "
+                f"a bandwidth of at most {w[joint] * fraction:.2g} rad/s"
             )
         return cls(w**2 * inertia, 2 * w * inertia)
 
@@ -107,7 +107,7 @@ def _joints(scene: Scene, nominal: Drive, gains: Gains) -> list[_plant.Joint]:
     warm = 0.0 if friction is None else friction.temperature - friction.reference_temperature
     level = 0.0 if friction is None else 1 + friction.coulomb_per_kelvin * warm
     thick = 0.0 if friction is None else 1 + friction.viscous_per_kelvin * warm
-    known, share = nominal.friction, scene.facts.compensation
+    known, compensated = nominal.friction, scene.facts.compensation
     return [
         _plant.Joint(
             qpos=int(scene.qpos_adr[i]),
@@ -126,8 +126,8 @@ def _joints(scene: Scene, nominal: Drive, gains: Gains) -> list[_plant.Joint]:
             kd=gains.kd[i],
             rated_speed=0.0 if drive.rated_speed is None else drive.rated_speed[i],
             no_load_speed=0.0 if drive.no_load_speed is None else drive.no_load_speed[i],
-            known_coulomb=0.0 if known is None else share * float(known.coulomb[i]),
-            known_viscous=0.0 if known is None else share * float(known.viscous[i]),
+            known_coulomb=0.0 if known is None else compensated * float(known.coulomb[i]),
+            known_viscous=0.0 if known is None else compensated * float(known.viscous[i]),
             cycles=[] if ripple is None else ripple.cycles.tolist(),
             amplitude=[] if ripple is None else ripple.amplitude[i].tolist(),
             phase=[] if ripple is None else ripple.phase[i].tolist(),

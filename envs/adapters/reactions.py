@@ -20,8 +20,8 @@ REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
 TRIGGERS = ("alarm", "contact")
 #: Brakes hold this long after the power is cut [s] (assumed; data sheets say 10 to 50 ms).
 BRAKE_DELAY = 0.02
-#: A retraction follows the way back at this share of the speed it came with, and for this long [s]
-#: beyond where it was when the reaction began.
+#: A retraction goes back along the path at this fraction of the speed with which the arm came, and
+#: for this long [s] beyond where it was when the reaction began.
 RETRACT_SPEED, RETRACT_TIME = 0.5, 0.3
 #: The admittance's virtual inertia in units of the joint's own, and its time constant [s].
 ADMITTANCE_INERTIA, ADMITTANCE_TIME = 0.5, 0.1
@@ -35,10 +35,10 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
     * ``stop1``: category 1: the drives stop the arm along its path, then power off and brakes.
       The deceleration is the arm's own limit, which is gentler than a brake: the peak force comes
       within 50 ms of the touch and is higher than with ``stop0``. It is that of ``stop2`` and
-      ``retract`` too, which begin in the same way.
+      ``retract`` too, which begin with the same stop.
     * ``stop2``: category 2: the drives stop the arm and hold it.
-    * ``retract``: stop as in category 2, go back the way the arm came and beyond where it was at
-      the trigger, hold.
+    * ``retract``: stop as in category 2, go back along the path beyond where the arm was at the
+      trigger, hold.
     * ``admittance``: the arm yields to the residual beyond the detector's thresholds (to the true
       external torque where the trigger is the contact): ``M dv/dt = tau - D v`` in every joint.
 
@@ -161,8 +161,8 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         """
         squared = float(self._speed @ self._speed)
         if squared > 0:
-            share = float(self._measured @ self._speed) / squared
-            self._speed = self._speed * min(max(share, 0.0), 1.0)
+            fraction = float(self._measured @ self._speed) / squared
+            self._speed = self._speed * min(max(fraction, 0.0), 1.0)
         fastest = (np.abs(self._speed) / self._deceleration).max()
         if fastest <= self._period:
             self._speed = np.zeros_like(self._speed)
@@ -171,7 +171,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return False
 
     def _back(self) -> Array:
-        """Velocity along the remembered way, backwards; zero once the time is over."""
+        """Velocity backwards along the remembered path; zero once the time is over."""
         if self._returning is None:
             rows, each = np.array(self._past), round(1 / RETRACT_SPEED)
             assert self._since is not None

@@ -16,7 +16,7 @@ from tauguard.models import Scene
 
 #: A clamp needs a link that moves at least this fast [m/s] to run into it.
 CLAMP_SPEED = 0.005
-#: Shortest and longest way of the link's surface past the sample of a clamp [m].
+#: The link's surface travels at least and at most this far after it meets a clamp [m].
 CLAMP_TRAVEL = (0.002, 0.06)
 #: A clamp stands for its duration and this long [s].
 CLAMP_HOLD = 0.1
@@ -28,7 +28,7 @@ LEAD = 0.15
 
 @dataclass(frozen=True)
 class Target:
-    """Where an obstacle meets a link: a point of its surface and the way towards it."""
+    """Where an obstacle meets a link: a point of the surface and the direction of the push."""
 
     row: int  #: sample of the motion
     body: int  #: MuJoCo body of the link
@@ -38,8 +38,8 @@ class Target:
 
 
 @dataclass(frozen=True)
-class _Way:
-    """A link and the arm's joints at some rows of the motion; the link for a while longer."""
+class _LinkPath:
+    """A link and the arm's joints at rows of the motion; the link's rows go on beyond the last."""
 
     rows: list[int]  #: R of them
     body: int  #: MuJoCo body of the link
@@ -79,20 +79,20 @@ class Aim:
     def find(self, plan: CollisionPlan, rng: np.random.Generator, last: int) -> Target | None:
         """A target for ``plan`` at the first sample that offers one, up to sample ``last``."""
         first = round(plan.time / self._dt)
-        way = self._way(plan, range(first, max(first + 1, last), self._stride))
-        usable = self._quick_enough(plan, way)
-        for number, row in enumerate(way.rows):
+        path = self._link_path(plan, range(first, max(first + 1, last), self._stride))
+        usable = self._quick_enough(plan, path)
+        for number, row in enumerate(path.rows):
             if plan.at_rest and not self._still[row]:
                 continue
             if not usable[number]:
                 self._draw(plan, rng, CASTS)
                 continue
-            target = self._cast(plan, way, number, rng)
+            target = self._cast(plan, path, number, rng)
             if target is not None:
                 return target
         return None
 
-    def _way(self, plan: CollisionPlan, rows: range) -> _Way:
+    def _link_path(self, plan: CollisionPlan, rows: range) -> _LinkPath:
         body = int(self._scene.link_bodies[plan.link - 1])
         longer = self._standing(plan) if plan.kind == "clamp" else 1
         stops = slice(rows.start, rows[-1] + longer, self._stride)
@@ -107,23 +107,23 @@ class Aim:
             else:
                 spin += turn
                 speed += cross(turn, position[: len(at)] - anchor[:, joint])
-        return _Way(list(rows), body, position, rotation, anchor, axis, speed, spin)
+        return _LinkPath(list(rows), body, position, rotation, anchor, axis, speed, spin)
 
-    def _quick_enough(self, plan: CollisionPlan, way: _Way) -> NDArray[np.bool_]:
+    def _quick_enough(self, plan: CollisionPlan, path: _LinkPath) -> NDArray[np.bool_]:
         """At which rows some point that :meth:`_inside` gives may be quick enough for a clamp.
 
         Speed is convex along a line, so that the ends of the line in each geom have the largest.
         """
         if plan.kind != "clamp":
-            return np.ones(len(way.rows), dtype=bool)
-        model, count = self._scene.model, len(way.rows)
+            return np.ones(len(path.rows), dtype=bool)
+        model, count = self._scene.model, len(path.rows)
         fastest = np.zeros(count)
         for geom in self._geoms[plan.link - 1]:
             turned = np.zeros(9)
             mujoco.mju_quat2Mat(turned, model.geom_quat[geom])
             for end in (-0.8, 0.8):
                 local = model.geom_pos[geom] + end * model.geom_size[geom, 1] * turned[2::3]
-                speed = way.speed + cross(way.spin, way.rotation[:count] @ local)
+                speed = path.speed + cross(path.spin, path.rotation[:count] @ local)
                 fastest = np.maximum(fastest, np.linalg.norm(speed, axis=1))
         return fastest > 0.999 * CLAMP_SPEED
 
@@ -146,30 +146,30 @@ class Aim:
         return geoms, places, pushes
 
     def _cast(
-        self, plan: CollisionPlan, way: _Way, number: int, rng: np.random.Generator
+        self, plan: CollisionPlan, path: _LinkPath, number: int, rng: np.random.Generator
     ) -> Target | None:
         """The first target of :data:`CASTS` rays at a row; only what it took is drawn."""
         data = self._data
-        data.qpos[self._scene.qpos_adr] = self._motion.q[way.rows[number]]
+        data.qpos[self._scene.qpos_adr] = self._motion.q[path.rows[number]]
         mujoco.mj_kinematics(self._scene.model, data)
         before = rng.bit_generator.state
         geoms, places, pushes = self._draw(plan, rng, CASTS)
         inside = data.geom_xpos[geoms] + data.geom_xmat[geoms][:, 2::3] * places[:, None]
         if plan.kind == "clamp":
-            pushes = -way.velocity(number, inside)
+            pushes = -path.velocity(number, inside)
         size = np.sqrt((pushes**2).sum(axis=1))
         quick = size >= (CLAMP_SPEED if plan.kind == "clamp" else 0.0)
         pushes /= np.where(size > 0, size, 1.0)[:, None]
-        points, hit = self._hits(way.body, inside, pushes, quick)
+        points, hit = self._hits(path.body, inside, pushes, quick)
         if plan.kind == "clamp":
-            hit &= self._stops_soon(plan, way, number, points, pushes)
+            hit &= self._stops_soon(plan, path, number, points, pushes)
         for taken in np.flatnonzero(hit):
             point, push = points[taken], pushes[taken]
-            if self._reaches(plan, way, number, point, push):
+            if self._reaches(plan, path, number, point, push):
                 rng.bit_generator.state = before
                 self._draw(plan, rng, int(taken) + 1)
-                speed = way.velocity(number, point)
-                return Target(way.rows[number], way.body, point, push, speed)
+                speed = path.velocity(number, point)
+                return Target(path.rows[number], path.body, point, push, speed)
         return None
 
     def _hits(
@@ -187,18 +187,18 @@ class Aim:
         return origins + distances[:, None] * pushes, hit
 
     def _reaches(
-        self, plan: CollisionPlan, way: _Way, number: int, point: Array, push: Array
+        self, plan: CollisionPlan, path: _LinkPath, number: int, point: Array, push: Array
     ) -> bool:
         """Whether some force of the plan's range gives a torque of its severity here."""
         if plan.severity is None or plan.force is None:
             return True
         levers = [0.0]
         for joint in self._poses.moving[plan.link - 1]:
-            along = way.axis[number, joint]
+            along = path.axis[number, joint]
             arm = (
                 push
                 if self._poses.sliding[joint]
-                else cross(point - way.anchor[number, joint], push)
+                else cross(point - path.anchor[number, joint], push)
             )
             levers += [abs(float(along @ arm))] if joint < 4 else []
         low, high = plan.severity
@@ -208,14 +208,14 @@ class Aim:
         return round((plan.duration + CLAMP_HOLD) / self._dt)
 
     def _stops_soon(
-        self, plan: CollisionPlan, way: _Way, number: int, points: Array, pushes: Array
+        self, plan: CollisionPlan, path: _LinkPath, number: int, points: Array, pushes: Array
     ) -> NDArray[np.bool_]:
-        """Whether the surface goes on for a little way only: it presses and does not sweep."""
+        """Whether the surface travels only a little further, so that it presses, not sweeps."""
         count = len(range(0, self._standing(plan), self._stride))
         stand = slice(number, number + count)
-        position, rotation = way.position[stand], way.rotation[stand]
+        position, rotation = path.position[stand], path.rotation[stand]
         local = (points - position[0]) @ rotation[0]
-        # The way along -push of each point: rows x points.
+        # How far each point travels along -push: rows x points.
         turned = np.einsum("pi,tij,pj->tp", pushes, rotation, local)
         along = turned + position @ pushes.T - (points * pushes).sum(axis=1)
         reach = (-along).max(axis=0)
@@ -228,7 +228,7 @@ def pulse_wrench(
     """A half-sine force at the target's point as a wrench about ``com``.
 
     Args:
-        target: where and which way.
+        target: where, and in which direction.
         com: centre of mass of the link while it is pushed, shape (rows, 3) [m].
         force: peak [N].
         duration: [s].
@@ -252,7 +252,7 @@ def pulse_wrench(
 def launch(target: Target, speed: float, radius: float) -> tuple[Array, Array]:
     """Start position and velocity of a striker that reaches the target after :data:`LEAD` seconds.
 
-    ``speed`` is relative to the struck point, along the push.
+    ``speed`` is relative to the point that is hit, along the push.
     """
     velocity = target.velocity + speed * target.direction
     centre = target.point - radius * target.direction

@@ -108,7 +108,7 @@ def random_motion(
         seconds: exact length of the motion [s].
         speed: percent of ``space.max_speed``, above 0 to 100.
         dt: sample interval [s].
-        single_joint: share of the segments that move one joint only.
+        single_joint: fraction of the segments that move one joint only.
         dwell: shortest and longest pause [s].
 
     Raises:

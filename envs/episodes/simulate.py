@@ -180,12 +180,12 @@ class Simulation:
 
     def _known_friction(self) -> Array:
         """What the servo adds to make up for the friction that it knows of [N m], (T, n)."""
-        friction, share = self.nominal.friction, self.scene.facts.compensation
-        if friction is None or share == 0:
+        friction, fraction = self.nominal.friction, self.scene.facts.compensation
+        if friction is None or fraction == 0:
             return np.zeros_like(self.motion.qd)
         qd = self.motion.qd
         level = friction.coulomb * np.tanh(qd / FRICTION_SMOOTHING)
-        return np.asarray(share * (level + friction.viscous * qd))
+        return np.asarray(fraction * (level + friction.viscous * qd))
 
     def _row(self, time: float) -> int:
         return round(time / self.episode.timestep)

@@ -22,13 +22,13 @@ from tauguard.envs.episodes.loop import AlongMotion, Rollout
 from tauguard.envs.episodes.poses import Poses, cross
 from tauguard.models import Scene
 
-#: Out of everybody's way: where an obstacle waits [m].
+#: Where an obstacle waits while it is not used, far from the arm [m].
 PARKED = np.array([0.0, 0.0, 50.0])
 #: Targets to try for one collision, and strengths to try on each.
 TARGETS, TRIES = 16, 10
 #: A person is not pushed harder in a collision worth detecting: such a target is given up [N].
 FORCE_LIMIT = 400.0
-#: An obstacle that touches the arm sooner than this after it was put there stood in its way [s].
+#: An obstacle that touches the arm sooner than this [s] overlapped it where it was placed.
 CLEAR = 0.01
 #: A clamp's strength counts from this far in front of the arm's deepest reach [m]: its depth is
 #: the strength less this, and may be negative where another part of the link reaches further.
@@ -61,7 +61,7 @@ class Striking:
         follow: AlongMotion,
         rng: np.random.Generator,
     ) -> None:
-        """For one scene and its motion; ``rng`` draws where and which way it is struck.
+        """For one scene and its motion; ``rng`` draws where and from where it is hit.
 
         It knows nothing of the simulation that it serves: a cycle of references would keep each
         one's megabytes of native memory until Python next looks for cycles, hundreds later.

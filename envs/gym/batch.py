@@ -1,4 +1,4 @@
-"""One or many running copies of a compiled: the native plants and the arrays that they share."""
+"""One or many running copies of a scene: the native plants and the arrays that they fill."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ SHEET = Cloth(count=8, size=0.5, mass=0.1, position=(0.55, 0.0, 0.55))
 
 
 class ClothReach(Reach):
-    """Reach, with a cloth in the way and, where asked for, contact checkers that watch it."""
+    """Reach across a hanging cloth and, where asked for, contact checkers that watch it."""
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "cloth": SHEET}
 

@@ -55,7 +55,7 @@ class RegionInfo:
     body: int
     joint: int  #: -1: held in place
     quasi_static: float  #: limit [N]
-    transient: float  #: limit [N]; 0: no blow is allowed
+    transient: float  #: limit [N]; 0: no impact is allowed
     mocap: int  #: of the frame that a person moves; -1: not of a person
     held: bool  #: cannot move away: its limit is the quasi-static one
     stiffness: float  #: of its contact [N/m]
@@ -307,8 +307,8 @@ def arm_reach(scene: Scene) -> float:
     for _ in range(200):
         data.qpos[scene.qpos_adr] = rng.uniform(low, high)
         mujoco.mj_kinematics(model, data)
-        way = data.xpos[scene.link_bodies[-1]] - data.xanchor[first]
-        best = max(best, float(np.linalg.norm(way)))
+        span = data.xpos[scene.link_bodies[-1]] - data.xanchor[first]
+        best = max(best, float(np.linalg.norm(span)))
     return best
 
 

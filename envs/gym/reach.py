@@ -136,7 +136,7 @@ def _clearance(begin: Array, end: Array, points: Array) -> float:
 
 
 class ReachEnv(ArmEnv):
-    """Bring the tool to places beside a person who works, reaches into the way and walks.
+    """Bring the tool to places beside a person who works, reaches into the path and walks.
 
     The straight path to half of the targets passes close to the person, and half of the times the
     person's hand moves onto the path: a policy that ignores people hits them. A single body region

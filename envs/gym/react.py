@@ -17,17 +17,17 @@ from tauguard.envs.gym.settings import positive
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import BodyProxy, Person, Scene
 
-#: The tool swings along y and meets the region at its home pose, this far behind the start [m].
+#: The tool swings along y; it meets the region at the home pose, this far from the start [m].
 RUN_UP = 0.25
 #: The motion would have gone on this far [m].
 BEYOND = 0.25
-#: Radius of the struck ball, and of the last link around its tool, about [m].
+#: Radius of the ball that is hit, and of the last link around its tool, about [m].
 BALL, LINK = 0.07, 0.05
-#: The struck point varies by this much across the swing [m], the speed by this share.
-ASIDE, SPEED_SHARE = 0.02, 0.2
+#: The point of impact varies by this much across the swing [m], the speed by this fraction.
+ASIDE, SPEED_SPREAD = 0.02, 0.2
 #: Without an alarm the episode begins at the latest this long after the first touch [s].
 PATIENCE = 0.1
-#: At rest: no touch and every joint below this share of its largest speed, for this long [s].
+#: At rest: no touch and every joint below this fraction of its largest speed, for this long [s].
 REST_SPEED, REST_TIME = 0.02, 0.2
 #: Weights of the reward a second: force over its limit, speed over the largest; at the end.
 FORCE_PRICE, SPEED_PRICE, REST_PRIZE = 10.0, 1.0, 1.0
@@ -46,8 +46,8 @@ class React(Task):
 
         Args:
             batch: where it happens.
-            **options: ``speed`` of the tool at the blow [m/s], ``approach``: begin at the alarm or
-                the touch (True), or before the motion (False).
+            **options: ``speed`` of the tool at the impact [m/s]; ``approach``: begin at the alarm
+                or the touch (True), or before the motion (False).
         """
         super().__init__(batch)
         self._speed = float(options["speed"])
@@ -61,7 +61,7 @@ class React(Task):
 
     @classmethod
     def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
-        """In the way of the swing, free to give way along it."""
+        """On the path of the swing, free to move along it."""
         data = mujoco.MjData(bare.model)
         data.qpos[bare.qpos_adr] = bare.home
         mujoco.mj_kinematics(bare.model, data)
@@ -70,7 +70,7 @@ class React(Task):
 
     @classmethod
     def person(cls, bare: Scene, reach: float) -> Person:
-        """Stands with hanging arms, the chest in the way of the swing."""
+        """Stands with hanging arms, the chest on the path of the swing."""
         data = mujoco.MjData(bare.model)
         data.qpos[bare.qpos_adr] = bare.home
         mujoco.mj_kinematics(bare.model, data)
@@ -86,7 +86,7 @@ class React(Task):
         batch, period = self.batch, 1 / self.batch.compiled.settings.control_rate
         aside = rng.uniform(-ASIDE, ASIDE, 2)
         begin = self._meeting + np.array([aside[0], -RUN_UP, aside[1]])
-        speed = self._speed * (1 + rng.uniform(-SPEED_SHARE, SPEED_SHARE))
+        speed = self._speed * (1 + rng.uniform(-SPEED_SPREAD, SPEED_SPREAD))
         self.swing[i] = self._plan(begin, speed, period)
         batch.place(i, self.swing[i][0])
         batch.target[i, 0] = begin + np.array([0.0, RUN_UP + BEYOND, 0.0])
@@ -98,9 +98,9 @@ class React(Task):
             batch.plants[i].override(Override.VELOCITY, np.zeros(len(self.swing[i][0])))
             for _ in range(math.ceil(batch.sensing[i].settle / period - 1e-9)):
                 batch.step(i, still, rng)
-        way = np.diff(self.swing[i], axis=0) / period
-        for speeds in way if self._approach else way[:0]:
-            batch.plants[i].override(Override.VELOCITY, speeds)
+        speeds = np.diff(self.swing[i], axis=0) / period
+        for speed in speeds if self._approach else speeds[:0]:
+            batch.plants[i].override(Override.VELOCITY, speed)
             batch.step(i, still, rng)
             now = batch.metrics[i]
             since, touched = now["time"] - now["onset_time"], now["onset_time"] >= 0
@@ -142,8 +142,8 @@ class React(Task):
             tool = tool_position(compiled, data)
             mujoco.mj_jac(model, data, jac, None, tool, compiled.tools[0][1])
             part = jac[:, dofs]
-            way = np.linalg.solve(part @ part.T + 1e-4 * np.eye(3), place - tool)
-            data.qpos[compiled.scene.qpos_adr] += np.clip(part.T @ way, -0.2, 0.2)
+            weight = np.linalg.solve(part @ part.T + 1e-4 * np.eye(3), place - tool)
+            data.qpos[compiled.scene.qpos_adr] += np.clip(part.T @ weight, -0.2, 0.2)
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
         """Force and speed cost; rest without contact ends it. It remembers the time at rest [s]."""
@@ -173,12 +173,12 @@ def _bare_tool(bare: Scene, data: mujoco.MjData) -> Array:
 
 
 class ReactEnv(ArmEnv):
-    """A swinging tool has struck a body region: choose what the arm does next.
+    """A swinging tool has hit a body region: choose what the arm does next.
 
     An episode begins at the first touch, or with ``detector=`` at its alarm (at the latest 0.1 s
     after the touch); with ``approach=False`` it begins before the swing. A trained detector settles
     first, while the arm stands. ``speed`` is that of the
-    tool at the blow [m/s], give or take 20 %.
+    tool at the impact [m/s], varied by 20 %.
 
     ## Actions (joint velocity, the default; n joints)
 

@@ -26,8 +26,8 @@ from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.settings import DETECTORS
 from tauguard.models import Drive, pin_model
 
-#: The plain detector's thresholds: times the breakaway friction, plus a share of the torque limit.
-FRICTION_SHARE, TORQUE_SHARE = 1.5, 0.03
+#: The plain detector's thresholds: multiples of the breakaway friction and of the torque limit.
+FRICTION_FACTOR, TORQUE_FACTOR = 1.5, 0.03
 #: An arm without torque limits gets this threshold [N m].
 PLAIN_THRESHOLD = 5.0
 #: A trained detector's residual may be so many standard deviations without contact.
@@ -132,10 +132,10 @@ class ObserverListener:
         self._ends = JointEnds(free if ranges is None else ranges, dt, gain)
         self._observer, self._drive = MomentumObserver(robot, gain, dt), drive
         limit = np.where(np.isfinite(drive.torque_limit), drive.torque_limit, np.nan)
-        share = TORQUE_SHARE * limit
+        bounds = TORQUE_FACTOR * limit
         if drive.friction is not None:
-            share = share + FRICTION_SHARE * drive.friction.static
-        self.bounds: Array = np.where(np.isfinite(share), share, PLAIN_THRESHOLD)
+            bounds = bounds + FRICTION_FACTOR * drive.friction.static
+        self.bounds: Array = np.where(np.isfinite(bounds), bounds, PLAIN_THRESHOLD)
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """An alarm is up where a residual exceeds its bound."""
@@ -295,7 +295,7 @@ def _fitting(compiled: CompiledScene, alarm: CollisionAlarm) -> CollisionAlarm:
 
 
 def _arms(compiled: CompiledScene) -> list[tuple[RobotNumbers, Drive]]:
-    """Nominal numbers of each arm; the second one looks the other way, which gravity cannot see."""
+    """Nominal numbers of each arm; the second is only turned about the vertical."""
     robot = RobotNumbers.from_pin(pin_model(compiled.scene.arm_model))
     drive = compiled.scene.facts.nominal
     if compiled.settings.ideal_drive:

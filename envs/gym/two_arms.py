@@ -1,4 +1,4 @@
-"""TwoArms-v0: two arms over one table, in one another's way."""
+"""TwoArms-v0: two arms over one table, whose workspaces overlap."""
 
 from __future__ import annotations
 

@@ -59,11 +59,11 @@ inline double ripple(const Joint& j, double q) {
   return j.gain * sum;
 }
 
-// The share of the current limit that is there in the direction of a speed: the rest of the voltage
-// goes into the motor's back-EMF.
+// Fraction of the current limit that is available in the direction of a speed; the motor's back-EMF
+// takes the rest of the voltage.
 inline double reserve(const Joint& j, double speed) {
-  const double share = (j.no_load_speed - speed) / (j.no_load_speed - j.rated_speed);
-  return std::min(std::max(share, -1.0), 1.0);
+  const double fraction = (j.no_load_speed - speed) / (j.no_load_speed - j.rated_speed);
+  return std::min(std::max(fraction, -1.0), 1.0);
 }
 
 // The current [A] that a drive can give of a wanted one at a joint speed.

@@ -42,15 +42,15 @@ struct Script {
 constexpr int reach_width = 5, walk_width = 3;
 // Peak over mean speed of a minimum-jerk path.
 constexpr double peak_over_mean = 1.875;
-// Drawing back: so many times the usual speed; the hand keeps away for so long [s]. A step back:
-// how far [m], how long it takes and lasts [s].
+// After a touch the hand withdraws at this multiple of its speed and stays away for this long [s].
+// The person steps back this far [m], within this time, and stays there for this long [s].
 constexpr double startle = 1.6, quiet = 1.0;
 constexpr double step_back = 0.3, step_time = 0.6, step_lasts = 2.0;
-// Who sits leans back instead, by this much a metre of a step [rad/m]; a trunk leans at most so
-// fast [rad/s].
+// A seated person leans back instead, by this angle per metre of a step [rad/m], at most at this
+// rate [rad/s].
 constexpr double lean_back = 1.2, lean_rate = 1.2;
-// A touch that is felt [N]; how fast they turn [rad/s]; the body leans towards what is farther than
-// this share of the arm's length; the arm stretches up to this share.
+// Smallest force that a person feels [N]; turning rate [rad/s]. The body leans towards a goal
+// farther than the fraction `comfort` of the arm's length, which stretches up to `stretch`.
 constexpr double felt = 1.0, turn_rate = 3.0, comfort = 0.95, stretch = 0.985, most_lean = 0.7;
 
 inline double minimum_jerk(double u) {
@@ -89,7 +89,7 @@ class Person {
   void reset(const Script& script) {
     script_ = script;
     from_ = to_ = walk_place(0);
-    way_ = Course{};
+    path_ = Course{};
     walking_ = false;
     next_walk_ = 0;
     until_ = script_.walks[0];
@@ -135,7 +135,7 @@ class Person {
       visit(h.from, each), visit(h.goal, each);
     }
     visit(from_, each), visit(to_, each);
-    way_.visit(each), back_.visit(each);
+    path_.visit(each), back_.visit(each);
     each(walking_), each(next_walk_), each(until_), each(back_until_);
     each(turned_), each(stride_), each(swing_), each(lowered_), each(lean_);
     for (double& t : touched_) each(t);
@@ -161,7 +161,7 @@ class Person {
   std::array<Reach, 2> hands_;
   std::array<Vec3, 2> grip_;  // where the hands are
   Vec3 from_, to_;            // of a walk
-  Course way_, back_;
+  Course path_, back_;
   bool walking_ = false;
   int next_walk_ = 0;
   double until_ = 0, back_until_ = 0;
@@ -231,18 +231,18 @@ class Person {
       next_walk_ = (next_walk_ + 1) % static_cast<int>(script_.walk_rows);
       from_ = to_;
       to_ = walk_place(next_walk_);
-      way_ = {0.0, 1.0, t, path_time(norm(to_ - from_), body_.walk_speed)};
+      path_ = {0.0, 1.0, t, path_time(norm(to_ - from_), body_.walk_speed)};
       walking_ = true;
-      for (int side = 0; side < 2; ++side) withdraw(side, t, body_.hand_speed, way_.lasts);
-    } else if (walking_ && way_.done(t)) {
+      for (int side = 0; side < 2; ++side) withdraw(side, t, body_.hand_speed, path_.lasts);
+    } else if (walking_ && path_.done(t)) {
       walking_ = false;
       until_ = t + script_.walks[walk_width * next_walk_];
     }
-    const Vec3 way = to_ - from_;
-    const bool far = walking_ && norm(way) > 0.5 && way_.done(t + 0.6) == false;
-    turn(far ? std::atan2(way.y, way.x) : body_.facing, dt);
+    const Vec3 path = to_ - from_;
+    const bool far = walking_ && norm(path) > 0.5 && path_.done(t + 0.6) == false;
+    turn(far ? std::atan2(path.y, path.x) : body_.facing, dt);
     lowered_ += std::min(std::max((walking_ || body_.hanging) - lowered_, -2.0 * dt), 2.0 * dt);
-    const double speed = walking_ ? norm(way) * (way_.at(t) - way_.at(t - dt)) / dt : 0.0;
+    const double speed = walking_ ? norm(path) * (path_.at(t) - path_.at(t - dt)) / dt : 0.0;
     swing_ = 0.4 * std::min(1.0, speed / 1.0);
     stride_ += speed * dt * 4.0;  // [rad/m]: a step of 0.8 m
   }
@@ -278,8 +278,8 @@ class Person {
 
   void place(int segment, Vec3 a, Vec3 b) {
     centre[segment] = mix(a, b, 0.5);
-    const Vec3 way = b - a;
-    const Vec3 d = (1.0 / norm(way)) * way;
+    const Vec3 path = b - a;
+    const Vec3 d = (1.0 / norm(path)) * path;
     // The turn that takes -z to d; no capsule points straight up.
     std::array<double, 4>& q = quat_wxyz[segment];
     q = {1.0 - d.z, d.y, -d.x, 0.0};
@@ -317,7 +317,7 @@ class Person {
     const double back = back_.at(t);
     axes_.forward = {std::cos(turned_), std::sin(turned_), 0};
     axes_.left = {-std::sin(turned_), std::cos(turned_), 0};
-    axes_.hip = mix(from_, to_, walking_ ? way_.at(t) : 1.0);
+    axes_.hip = mix(from_, to_, walking_ ? path_.at(t) : 1.0);
     if (!body_.seated) axes_.hip += -back * axes_.forward;
     const Vec3 goals[2] = {hand_place(0, t), hand_place(1, t)};
     double lean = 0.0;
@@ -360,9 +360,9 @@ class Person {
   // Two links to the goal of the palm, the elbow down and outwards.
   void arm(int side, Vec3 shoulder, Vec3 goal, double sign) {
     const double first = body_.upper_arm, second = body_.lower_arm + body_.grip;
-    const Vec3 way = goal - shoulder;
-    const double size = norm(way);
-    const Vec3 direction = size > 1e-6 ? (1.0 / size) * way : axes_.forward;
+    const Vec3 path = goal - shoulder;
+    const double size = norm(path);
+    const Vec3 direction = size > 1e-6 ? (1.0 / size) * path : axes_.forward;
     const double least = std::fabs(first - second) + 0.1 * second;
     const double r = std::min(std::max(size, least), stretch * (first + second));
     const double c = (first * first + r * r - second * second) / (2.0 * first * r);

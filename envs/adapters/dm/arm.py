@@ -99,7 +99,7 @@ def without_frames(xml: str) -> str:
         xml: text that MuJoCo has written: orientations are quaternions.
 
     Raises:
-        ValueError: something in a frame is oriented in another way than by a quaternion.
+        ValueError: something in a frame has an orientation that is no quaternion.
     """
     root = ElementTree.fromstring(xml)
     world = root.find("worldbody")
@@ -122,9 +122,9 @@ def _flatten(parent: ElementTree.Element) -> None:
 
 
 def _pose(element: ElementTree.Element) -> tuple[Array, Array]:
-    for way in ("euler", "axisangle", "xyaxes", "zaxis"):
-        if element.get(way) is not None:
-            raise ValueError(f"<{element.tag} {way}>: expected a quaternion inside a frame")
+    for name in ("euler", "axisangle", "xyaxes", "zaxis"):
+        if element.get(name) is not None:
+            raise ValueError(f"<{element.tag} {name}>: expected a quaternion inside a frame")
     pos = np.array(element.get("pos", "0 0 0").split(), dtype=float)
     quat = np.array(element.get("quat", "1 0 0 0").split(), dtype=float)
     return pos, quat / np.linalg.norm(quat)
