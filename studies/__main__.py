@@ -7,4 +7,4 @@ from tauguard.cli import run_command
 if __name__ == "__main__":
     name, *args = sys.argv[1:]
     debug = "--debug" in args
-    run_command(f"studies.{name}", name, [arg for arg in args if arg != "--debug"], debug)
+    run_command(f"studies.framework.{name}", name, [a for a in args if a != "--debug"], debug)

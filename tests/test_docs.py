@@ -2,6 +2,8 @@
 
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -39,18 +41,37 @@ def test_links_lead_somewhere(page):
         assert (page.parent / link).exists(), f"{page.name}: {link}"
 
 
+@pytest.fixture(scope="module")
+def studies():
+    """Every name that `tauguard bench` takes: studies, their parts' full names and own names."""
+    command = [sys.executable, "-m", "tauguard", "bench", "list"]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    found = {"NAME", "list", "all", "--quick"}
+    for line in listed.splitlines():
+        if not line.startswith(" "):
+            study = line.partition(":")[0]
+            found.add(study)
+        elif line:
+            words = line.split()
+            alias = words[1].strip("()") if words[1].startswith("(") else words[0]
+            found |= {f"{study}-{words[0]}", alias}
+    return found
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name)
-def test_commands_exist(page):
+def test_commands_exist(page, studies):
     """What follows `tauguard` in shell blocks is a command, and its flags are its own."""
     from tauguard.cli import COMMANDS
-    from tauguard.cli.checkout import STUDY_COMMANDS
 
     shell = "\n".join(re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL))
     told = shell + "\n".join(re.findall(r"`(tauguard [^`]+)`", page.read_text()))
     for command, rest in re.findall(r"tauguard ([a-z][a-z-]*)([^\n]*)", told):
+        if command == "bench":
+            assert rest.split()[0] in studies, rest
         assert command in COMMANDS, command
-        folder = ROOT / ("studies" if command in STUDY_COMMANDS else "src/tauguard/cli")
-        source = (folder / f"{command.replace('-', '_')}.py").read_text()
+        of_studies = command in ("bench", "report")
+        folder = "studies/framework" if of_studies else "src/tauguard/cli"
+        source = (ROOT / folder / f"{command.replace('-', '_')}.py").read_text()
         for flag in re.findall(r"--([a-z-]+)", rest):
             assert re.search(rf"\b{flag.replace('-', '_')}:", source), f"{command} --{flag}"
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from studies.cloth.check import Job, judged
 from studies.cloth.queries import Answer, Queries, solver
-from studies.workers import Workers
+from studies.framework import Workers
 from tauguard.report import Row
 
 Positions = NDArray[np.float64]  # (n, 2, 4, 3): both ends of the step, four vertices

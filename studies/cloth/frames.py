@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from studies.cloth.peer import load_ipctk
 from studies.cloth.scaling import CLOTHS, Step, bound, scaled, step_at
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.cloth import Frame as FrameAnswer
 from tauguard.cloth import Groups, MeshCCD
 from tauguard.cloth.scenes import SCENES, load_sequence
@@ -65,7 +65,7 @@ def methods(frame: Frame, repeats: int) -> list[Row]:
         (method, volume): MeshCCD(frame.faces, method, groups=frame.groups, volume=volume)
         for method, volume in ENTRIES
     }
-    spent = measure(
+    spent = time_in_turn(
         {" ".join(key): bound(ccd.find, *frame.step) for key, ccd in meshes.items()},
         repeats,
         process_time,
@@ -138,7 +138,7 @@ def peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row]
     x_t0, x_t1 = (np.asfortranarray(x) for x in frame.step)
     mesh = ipctk.CollisionMesh(x_t0, ccd.edges, frame.faces)
     found = ipctk.Candidates()
-    spent = measure(
+    spent = time_in_turn(
         {
             "ours": bound(ccd.find, *frame.step),
             "LBVH": lambda: found.build(mesh, x_t0, x_t1, 0.0, ipctk.LBVH()),

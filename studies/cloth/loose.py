@@ -12,7 +12,7 @@ import numpy as np
 from oracles.point_contact import point_edge_time, point_point_time
 from studies.cloth.peer import load_ipctk
 from studies.cloth.scaling import bound, scaled, scenes, step_at
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.arrays import Array
 from tauguard.cloth import Impacts, MeshCCD, point_edge, point_point
 from tauguard.report import Row
@@ -58,7 +58,7 @@ def point_queries(n: int, seed: int, repeats: int) -> list[Row]:
         query, corners, first_time = QUERIES[kind]
         x = drawn(rng, n, corners, meet)
         found = query(*x)
-        spent = measure({"": bound(query, *x)}, repeats, process_time)[""]
+        spent = time_in_turn({"": bound(query, *x)}, repeats, process_time)[""]
         known = range(min(n, KNOWN))
         truth = np.array([first_time(*x[:, i]) for i in known])
         hit, toi = found.hit[: len(truth)], found.toi[: len(truth)]
@@ -145,7 +145,7 @@ def safe_steps(triangles: int, seed: int, repeats: int) -> list[Row]:
             calls["peer"] = ask
             row["peer_step"] = theirs = float(ask())
             row["peer_meets_after"] = meets(exact, x_t0, x_t1, theirs)
-        spent = measure(calls, repeats, process_time)
+        spent = time_in_turn(calls, repeats, process_time)
         row["ms"] = scaled(spent["ours"], 1e3)
         row["peer_ms"] = scaled(spent["peer"], 1e3) if "peer" in spent else "ipctk is not installed"
         rows.append(row)

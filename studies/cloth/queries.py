@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from studies.cloth.frames import Frame
 from studies.cloth.peer import load_ipctk
 from studies.cloth.scaling import bound
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.cloth import MeshCCD, _mesh
 from tauguard.cloth.impacts import METHODS
 from tauguard.report import Row, rate
@@ -184,9 +184,9 @@ def _methods(name: str, total: int, queries: Queries, truth: Answer, repeats: in
     few = np.arange(0, len(queries.rows), 1 + len(queries.rows) // 2000)
     lists = {method: queries.some(few) if method == "exact" else queries for method in METHODS}
     calls = {method: solver(lists[method], method) for method in METHODS}
-    spent = measure(calls, repeats, process_time)
+    spent = time_in_turn(calls, repeats, process_time)
     clear = queries.some(~truth.hit)
-    spent["clear"] = measure({"": solver(clear, "ab2pf")}, repeats, process_time)[""]
+    spent["clear"] = time_in_turn({"": solver(clear, "ab2pf")}, repeats, process_time)[""]
     exact = solver(queries.some(truth.hit), "exact")()
     rows: list[Row] = []
     for method, call in calls.items():
@@ -249,7 +249,7 @@ def _peers(
         part = ipctk.Candidates()
         setattr(part, "fv_candidates" if queries.vertex else "ee_candidates", timed)
         step = [np.asfortranarray(x) for x in queries[1:3]]
-        seconds = measure(
+        seconds = time_in_turn(
             {"": bound(part.compute_collision_free_stepsize, mesh, *step, 0.0, method)},
             3,
             process_time,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.cloth import VOLUMES, Groups, MeshCCD
 from tauguard.cloth.scenes import SCENES, Scene
 from tauguard.report import Row
@@ -43,7 +43,7 @@ def volumes(triangles: int, seed: int, repeats: int) -> list[Row]:
     for scene in scenes(triangles, seed):
         step = step_at(scene, 0.85)
         meshes = {kind: MeshCCD(scene.faces, groups=scene.groups, volume=kind) for kind in KINDS}
-        times = measure(
+        times = time_in_turn(
             {kind: bound(ccd.find, *step) for kind, ccd in meshes.items()}, repeats, process_time
         )
         for kind, ccd in meshes.items():
@@ -111,7 +111,7 @@ def size(sizes: list[int], seed: int, repeats: int) -> list[Row]:
             step = step_at(scene, 0.7)
             ccd = MeshCCD(scene.faces, groups=scene.groups)
             few = repeats if triangles < 300_000 else min(repeats, 3)
-            spent = measure({"frame": bound(ccd.find, *step)}, few, process_time)["frame"]
+            spent = time_in_turn({"frame": bound(ccd.find, *step)}, few, process_time)["frame"]
             stats = ccd.find(*step).stats
             points.append((len(scene.faces), spent["median"]))
             candidates = stats.vf["candidates"] + stats.ee["candidates"]
@@ -138,7 +138,7 @@ def threads(triangles: int, seed: int, repeats: int) -> list[Row]:
     for scene in scenes(triangles, seed):
         step = step_at(scene, 0.85)
         meshes = {n: MeshCCD(scene.faces, groups=scene.groups, threads=n) for n in (1, 2)}
-        spent = measure({str(n): bound(ccd.find, *step) for n, ccd in meshes.items()}, repeats)
+        spent = time_in_turn({str(n): bound(ccd.find, *step) for n, ccd in meshes.items()}, repeats)
         one, two = (ccd.find(*step) for ccd in meshes.values())
         rows.append(
             {
@@ -178,7 +178,7 @@ def topology(triangles: int, seed: int, repeats: int) -> list[Row]:
                 "rebuild": bound(_build_and_find, cut, scene.groups, step),
                 "frame": bound(ccd.find, *step),
             }
-            spent = measure(calls, repeats)
+            spent = time_in_turn(calls, repeats)
             rows.append(
                 {
                     "study": "topology",

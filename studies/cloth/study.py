@@ -85,7 +85,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """Rows of every part; the recorded ones join in where ``TAUGUARD_DATA`` says where they are.
 
     A quick run has no recorded frames: their 6.9 million candidates take ipctk minutes.
@@ -158,7 +158,7 @@ def recorded() -> Path | None:
     return Path(named)
 
 
-def shown(rows: list[Row]) -> list[Row]:
+def table(rows: list[Row]) -> list[Row]:
     """Rows for the printed tables: rates as counts, ``k of n``."""
     return [{key: _count(value) for key, value in row.items()} for row in rows]
 

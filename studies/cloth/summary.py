@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from studies.harness import answer, timed
+from studies.framework import answer, timed
 from tauguard.report import Row
 
 #: Times that a whole frame, and a query, of a peer or comparator is asked to take of ab2pf's.

@@ -1,1 +1,60 @@
-"""The studies of contact checkers and of guarded steps beside MuJoCo."""
+"""Contacts: checkers beside MuJoCo's own contacts, and guarded steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from studies.framework import Part, Point, Study, groups, number, table_rows
+from tauguard.report import Row
+
+STUDY = Study(
+    "contact checkers and guarded steps: what is missed, when it is seen, at what cost",
+    {
+        "checkers": Part(
+            "contacts.study",
+            "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",
+        ),
+        "guard": Part(
+            "contacts.guard",
+            "guarded steps on scenes drawn at random, beside MuJoCo's modes and fine fixed steps",
+            ("keep",),
+            alias="guard",
+        ),
+    },
+)
+#: Methods that begin so are peers.
+PEERS = ("MuJoCo", "mujoco", "plain", "speculative", "ipc")
+
+
+def points(rows: Sequence[Row]) -> Iterator[Point]:
+    """When checkers report the first contact, and steps over fast contacts."""
+    for row in table_rows(rows, "scenes"):
+        cost, error = number(row.get("us_per_step")), number(row.get("first_error_ms"))
+        if cost and error is not None:
+            method = str(row["checker"])
+            yield Point(
+                "Contact checkers: when the first contact is reported",
+                method,
+                cost,
+                abs(error),
+                "",
+                "peer" if method.startswith(PEERS) else "",
+                "microseconds a step",
+                "error of the first report [ms]",
+            )
+    thrown = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
+    for method, own in groups(thrown, lambda row: str(row["method"])).items():
+        known = [row["over_fixed"] for row in own if row["over_fixed"] is not None]
+        n = sum(row["held"]["n"] for row in own)
+        if known and n:
+            held = sum(row["held"]["value"] * row["held"]["n"] for row in own)
+            yield Point(
+                "Steps over fast contacts, scenes drawn at random",
+                method,
+                sum(known) / len(known),
+                1 - held / n,
+                "",
+                "peer" if method.startswith(PEERS) else "",
+                "time over the longest fixed step that holds",
+                "share of scenes passed through",
+            )

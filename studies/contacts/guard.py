@@ -18,7 +18,7 @@ import numpy as np
 
 from studies.contacts.draws import FAMILIES
 from studies.contacts.play import Line, Played, lines
-from studies.harness import answer
+from studies.framework import answer
 from tauguard.contacts import GuardedStepper
 from tauguard.contacts.scenes import arm_boxes, arm_cloth
 from tauguard.report import Row, rate
@@ -66,7 +66,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
+def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     """Rows of both studies and of what they say together.
 
     Scenes that the folder ``keep`` holds are not played again.
@@ -218,7 +218,7 @@ def _summary(rows: list[Row]) -> list[Row]:
     return out
 
 
-def shown(rows: list[Row]) -> list[Row]:
+def table(rows: list[Row]) -> list[Row]:
     """The rows of all timesteps together, and those of the guard at each."""
     return [
         r

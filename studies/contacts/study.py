@@ -19,7 +19,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from studies.harness import answer, timed
+from studies.framework import answer, timed
 from tauguard.contacts import Report, Score, State, checker, compare, contacts_of
 from tauguard.contacts.scenes import SCENES, arm_cloth, ball_cloth
 from tauguard.report import Row, rate
@@ -47,7 +47,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """Rows of the three studies; the scenes have no random input, so ``seed`` changes nothing."""
     timesteps = (5e-3,) if quick else (1e-3, 2e-3, 5e-3)
     rows = [

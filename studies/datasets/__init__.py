@@ -1,1 +1,18 @@
-"""Generation of datasets: what it costs and where, what it writes, and what a kill leaves."""
+"""Datasets: generation and detectors trained from their files."""
+
+from studies.framework import Part, Study
+
+STUDY = Study(
+    "generating, storing and reading datasets, and detectors trained from their files",
+    {
+        "generation": Part(
+            "datasets.study", "generation: rate beside mujoco.rollout, bytes, reading, memory"
+        ),
+        "entries": Part(
+            "datasets.entries",
+            "every detector on tauguard-collisions-v1, and trained by path beside from traces",
+            ("keep",),
+            alias="entries",
+        ),
+    },
+)

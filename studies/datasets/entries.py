@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.workers import Workers
+from studies.framework import Workers
 from tauguard.datasets.arm_splits import episodes_of_splits
 from tauguard.datasets.configuration import Configuration, load
 from tauguard.datasets.generation import generate_dataset
@@ -68,7 +68,7 @@ class Entry:
     splits: tuple[tuple[str, tuple[Matching, ...]], ...]
 
 
-def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
+def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     """Rows ``entries``, a detector and split each, and two rows ``by path``.
 
     Args:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.datasets.configuration import Configuration, load, parse
 from tauguard.datasets.generation import generate_dataset
 from tauguard.report import Row
@@ -108,6 +108,6 @@ def _read(path: Path) -> Row:
         calls["pandas"] = lambda: pandas.read_parquet(path, columns=[column])
         ours = calls["pyarrow"]()[column].to_numpy()
         row["equal"] = bool(np.array_equal(ours, calls["pandas"]()[column].to_numpy()))
-    for name, time in measure(calls, repeats=7).items():
+    for name, time in time_in_turn(calls, repeats=7).items():
         row[f"{name} [MB/s]"] = 4e-6 * rows / time["median"]
     return row

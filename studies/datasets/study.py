@@ -25,7 +25,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """All rows; the quick run has few episodes."""
     return [
         *rate_rows(quick, seed),

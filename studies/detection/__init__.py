@@ -1,1 +1,91 @@
-"""The studies of detectors: alarms, thresholds, online use, and what follows an alarm."""
+"""Collision detection from proprioception, on simulated arms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from studies.framework import Part, Point, Study, number, table_rows
+from tauguard.report import Row, cell
+
+STUDY = Study(
+    "how many collisions detectors find, how soon, and at which rate of false alarms",
+    {
+        "experiment": Part(
+            "detection.study",
+            "the dissertation's experiment: detectors, speeds, operating points, false alarms",
+            ("detector", "robot", "keep"),
+        ),
+        "false_alarms": Part(
+            "detection.false_alarms",
+            "thresholds for a rate of false alarms, on ten arms of fresh seeds",
+            ("keep",),
+            alias="false_alarms",
+        ),
+        "guarantee": Part(
+            "detection.conformal",
+            "false alarms per hour: what calibration guarantees, and what is counted",
+            alias="detection_conformal",
+        ),
+        "parts": Part(
+            "detection.parts",
+            "what each part of the detector brings: left out, everything else stays",
+            ("keep",),
+            alias="detection_parts",
+        ),
+        "ladder": Part(
+            "detection.ladder",
+            "from the dissertation's setting to ours: one change at a time",
+            ("keep",),
+            alias="detection_ladder",
+        ),
+        "online": Part(
+            "detection.online",
+            "observer and SVR a sample: microseconds, and fewer support vectors",
+            alias="detection_online",
+        ),
+        "diagnosis": Part(
+            "detection.diagnosis",
+            "after the alarm: link, force, point and kind of event against the truth",
+            alias="diagnosis",
+        ),
+    },
+)
+
+
+def points(rows: Sequence[Row]) -> Iterator[Point]:
+    """A simulated millisecond, the kernel sum of one sample, and every detector."""
+    for row in table_rows(rows, "real time"):
+        question = "1 ms of arm, drives, observer and detector"
+        error = f"score within {row['difference_to_online']:.0e} of the offline one"
+        yield Point(question, "tauguard", row["total_us"], math.nan, error, "ours")
+        peer, its = "mujoco.rollout of the bare arm", number(row["peer_us"]) or 0.0
+        yield Point(question, peer, its, math.nan, "same motion", "peer")
+    for row in table_rows(rows, "kernel")[:1]:
+        question = f"the SVR's output, {row['support_vectors']} support vectors"
+        error = f"output within {row['difference_to_sklearn']:.0e}"
+        yield Point(question, "tauguard", number(row["us"]) or 0.0, math.nan, error, "ours")
+        its = number(row["sklearn_us"]) or 0.0
+        yield Point(question, "scikit-learn's predict", its, math.nan, "the reference", "peer")
+    cost = {row["detector"]: number(row["us"]) for row in table_rows(rows, "step")}
+    for row in table_rows(rows, "hourly"):
+        us, found = cost.get(row["detector"]), number(row["sensitivity"])
+        if row["speed"] == 0 and us is not None and found is not None:
+            question = "Detectors online, aimed at 0.25 false alarms an hour"
+            axes = ("microseconds a sample", "fraction missed from 16 N m up")
+            yield Point(question, row["detector"], us, 1 - found, "", "", *axes)
+
+
+def detections(rows: Sequence[Row]) -> Iterator[Row]:
+    """Every detector at the threshold for a rate of false alarms, all speeds together."""
+    for row in (row for row in table_rows(rows, "hourly") if row["speed"] == 0):
+        delay, found = row["delay_ms"], row["sensitivity"]
+        yield {
+            "tried on": "simulated arms",
+            "detector": row["detector"],
+            "found from 16 N m up": f"{round((found['value'] or 0) * found['n'])} of {found['n']} "
+            f"({cell(found)})",
+            "false alarms an hour": cell(row["false_alarms_per_hour"]),
+            "median delay": "-" if delay["median"] is None else f"{delay['median']:.0f} ms",
+            "95 % within": "-" if delay["p95"] is None else f"{delay['p95']:.0f} ms",
+        }

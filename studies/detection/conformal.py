@@ -98,7 +98,7 @@ def guarantee_rows(
     """
     from tqdm import tqdm
 
-    from studies.workers import Workers
+    from studies.framework import Workers
 
     total = plan.calibration + plan.fresh
     settle = max(detector.settle for detector in detectors)
@@ -170,7 +170,7 @@ def trained(names: Sequence[str], arm: Mismatch, seed: int, *, quick: bool) -> l
     return [make_detector(name).fit(traces, believed) for name in names]
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """Train, calibrate and count: 6 + 10 hours of motion, 6 minutes and less when quick."""
     from tauguard.models import Mismatch
 

@@ -25,7 +25,7 @@ from studies.detection.diagnosis_pool import (
 from studies.detection.fleet import CALIBRATE, TEST, Training, stream
 from studies.detection.pool import SPEEDS, free_pool
 from studies.detection.severity_rows import NOTE, severity_rows
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.arrays import Array
 from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
 from tauguard.detectors.calibration.nominal import nominal_design
@@ -117,7 +117,7 @@ class Judged:
     severity: TrueSeverity | None = None
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """Rows of the studies that :data:`NOTES` names."""
     size = QUICK if quick else FULL
     # Arms and streams of seeds that nothing was tuned on.
@@ -312,7 +312,7 @@ def cost_row(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Row
     diagnoser = Diagnoser.of(trained.detector.arm, surface)
     looked = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace)
     after = looked.at(alarm.start)
-    times: dict[str, Any] = measure(
+    times: dict[str, Any] = time_in_turn(
         {
             "diagnosis_us": lambda: diagnoser.explain(alarm, after),
             "aftermath_us": lambda: looked.at(alarm.start),

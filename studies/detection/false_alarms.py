@@ -17,8 +17,7 @@ from studies.detection import known_tails
 from studies.detection.arm_scores import Arm, Extent, arm_scores
 from studies.detection.fleet import Training
 from studies.detection.threshold_laws import LAWS, judged, price_row, rate_row
-from studies.kept import Kept
-from studies.workers import Workers
+from studies.framework import JobCache, Workers
 from tauguard.report import Row
 from tauguard.report.charts import errorbars
 
@@ -69,13 +68,13 @@ def arms_of(
     Arms that the folder ``keep`` holds are read.
     """
     seeds = [51_000 + 100 * seed + k for k in range(size.arms)]
-    kept = Kept.of(keep, "false_alarms", seed, size.extent)
+    kept = JobCache.of(keep, "false_alarms", seed, size.extent)
     with Workers(workers) as each:
         jobs = [(size.extent, seed, arm) for arm in seeds]
         return list(kept.over(each, "arm")(arm_scores, jobs))
 
 
-def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
+def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     """Rows ``known``, ``arms`` and ``price``: of every law and rate asked for."""
     size = QUICK if quick else FULL
     arms = arms_of(size, seed, keep=keep)

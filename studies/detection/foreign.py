@@ -20,8 +20,7 @@ from studies.detection.arm_scores import Extent, arm_scores
 from studies.detection.fleet import Training
 from studies.detection.pool import Conditions
 from studies.detection.threshold_laws import ArmOutcome, judged
-from studies.kept import Kept
-from studies.workers import Workers
+from studies.framework import JobCache, Workers
 from tauguard.detectors import poisson_rate
 from tauguard.detectors.evaluation.metrics import HEADLINE, delay_figures
 from tauguard.models import cura6_drive, load_arm
@@ -71,7 +70,7 @@ def run(names: Sequence[str], quick: bool, seed: int, keep: str | None = None) -
     extent = QUICK if quick else FULL
     with _descriptions(keep) as folder, Workers() as each:
         unders = [conditions(name, folder) for name in names]
-        kept = Kept.of(keep, "detection_robots", seed, (extent, unders))
+        kept = JobCache.of(keep, "detection_robots", seed, (extent, unders))
         jobs = [
             (replace(extent, under=under), seed, 61_000 + 100 * seed + k)
             for k, under in enumerate(unders)

@@ -34,8 +34,7 @@ from studies.detection.thresholds import (
     operated,
 )
 from studies.detection.variations import CURA6_STRIDE, every
-from studies.kept import Kept
-from studies.workers import Workers
+from studies.framework import JobCache, Workers
 from tauguard.datasets.plans import TRAINING_PAYLOADS
 from tauguard.detectors import (
     CollisionAlarm,
@@ -153,10 +152,10 @@ QUICK = Size(1, (30.0,), 1, 0.015, Training(slices=4, free=4, free_seconds=15.0)
 Found = dict[str, dict[float, Tally]]
 
 
-def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
+def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     """Rows ``ladder``: one a rung, all arms and speeds together."""
     size = QUICK if quick else FULL
-    kept = Kept.of(keep, "detection_ladder", seed, (size, RUNGS))
+    kept = JobCache.of(keep, "detection_ladder", seed, (size, RUNGS))
     seeds = [71_000 + 100 * seed + k for k in range(size.arms)]
     jobs = [(size, seed, arm, scene) for arm in seeds for scene in range(len(SCENES))]
     with Workers() as each:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.arrays import Array
 from tauguard.report import Row
 
@@ -151,7 +151,7 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
         "peer": rollout_call(Simulation(episode).motion),
     }
     with one_core(), threadpool_limits(1):
-        taken = measure(calls, repeats, time.process_time)
+        taken = time_in_turn(calls, repeats, time.process_time)
         found = alarm.detect(replace(trace))
     us = {k: {n: 1e6 * v / len(trace.t) for n, v in t.items()} for k, t in taken.items()}
     rest = {n: us["detection"][n] - us["observer"]["median"] for n in ("median", "low", "high")}
@@ -248,7 +248,7 @@ def _one_window(model: KernelMachine, slices: list[Array]) -> Callable[[int], ob
     return lambda k: kernel.rows(slices[k], out, 1)
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """Rows ``real time`` (scene to alarm), ``step`` (methods), ``kernel`` (fewer vectors)."""
     from tauguard.detectors import DETECTORS, SrqSvr, held_out, make_detector, train
     from tauguard.detectors.calibration.nominal import nominal_design

@@ -17,9 +17,7 @@ from studies.detection.arm_scores import Arm, Extent, scored
 from studies.detection.fleet import TEST, Training, fitted, stream
 from studies.detection.pool import free_pool
 from studies.detection.threshold_laws import judged, price_row, rate_row
-from studies.harness import measure
-from studies.kept import Kept
-from studies.workers import Workers
+from studies.framework import JobCache, Workers, time_in_turn
 from tauguard.arrays import Array
 from tauguard.detectors import ArmModel, FittedDetector, SrqSvr
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
@@ -122,10 +120,10 @@ FEW = (WHOLE, "payload tracking")
 QUICK = Size(1, 30.0, Extent(FEW, Training(slices=2, free=4, free_seconds=12.0), 0.02, 0.02, 0))
 
 
-def run(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
+def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
     """Rows ``parts``: one for every part that is left out."""
     size = QUICK if quick else FULL
-    kept = Kept.of(keep, "detection_parts", seed, size)
+    kept = JobCache.of(keep, "detection_parts", seed, size)
     seeds = [61_000 + 100 * seed + k for k in range(size.arms)]
     with Workers() as each:
         training = [(size.extent, seed, arm) for arm in seeds]
@@ -173,7 +171,7 @@ def relative(detectors: Forms, trace: Trace) -> dict[str, dict[str, float]]:
     """
     samples = list(zip(trace.q[:TIMED], trace.qd[:TIMED], trace.current[:TIMED], strict=True))
     calls = {name: partial(_stream, one, samples) for name, one in detectors.items()}
-    found = measure(calls, REPEATS, time.process_time)
+    found = time_in_turn(calls, REPEATS, time.process_time)
     whole = found[WHOLE]["median"]
     return {name: {k: v / whole for k, v in own.items()} for name, own in found.items()}
 

@@ -35,9 +35,7 @@ from studies.detection.pool import (
     struck_pool,
 )
 from studies.detection.thresholds import Fleet, Free, operated
-from studies.harness import Incomplete
-from studies.kept import Each, Kept
-from studies.workers import Workers
+from studies.framework import Each, Incomplete, JobCache, Workers
 from tauguard.detectors import FittedDetector, make_detector
 from tauguard.envs import simulate
 from tauguard.report import Row
@@ -132,7 +130,7 @@ QUICK = Size(
 )
 
 
-def run(
+def measure(
     quick: bool,
     seed: int,
     detector: str | None = None,
@@ -156,12 +154,14 @@ def run(
     if detector is not None and detector not in size.detectors:
         make_detector(detector)  # names what is wrong before anything is simulated
         size = replace(size, detectors=(*size.detectors, detector))
-    return study(size, seed, kept=Kept.of(keep, "detection", seed, size))
+    return study(size, seed, kept=JobCache.of(keep, "detection", seed, size))
 
 
-def study(size: Size, seed: int, workers: int | None = None, kept: Kept | None = None) -> list[Row]:
+def study(
+    size: Size, seed: int, workers: int | None = None, kept: JobCache | None = None
+) -> list[Row]:
     """Train, judge, report; the result does not depend on the number of ``workers``."""
-    kept = kept or Kept(None)
+    kept = kept or JobCache(None)
     arms = [1000 * (seed + 1) + k for k in range(size.arms)]
     with Workers(workers) as each:
         trained = _trained(size, seed, arms, kept.over(each, "train"))
@@ -260,7 +260,7 @@ def _judge(job: tuple[tuple[Size, int, float, int], Mapping[int, Fleet]]) -> Tal
     )
 
 
-def shown(rows: list[Row]) -> list[Row]:
+def table(rows: list[Row]) -> list[Row]:
     """See :func:`studies.detection_table.shown`."""
     return detection_table.shown(rows)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from studies.real_arm.arms import ARMS, available, nominal, recordings
+from studies.real_arms.arms import ARMS, available, nominal, recordings
 from studies.small_detector import thinned, trained
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import CollisionAlarm

@@ -56,7 +56,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """A row a rate, and one for each stage of a sample."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -151,7 +151,7 @@ class Tally:
         }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """All rows."""
     rng = np.random.default_rng([seed, 15])
     rows: list[Row] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from studies.harness import timed
+from studies.framework import timed
 from tauguard.report import Row
 
 METHODS = ("abfme", "sat", "auto")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from studies.rigid.convex import nanoseconds, take
 from tauguard.arrays import Array
 from tauguard.report import Row
@@ -48,7 +48,7 @@ def in_motion(
     """
     found = call()
     n = len(found.toi)
-    spent = measure({"": call}, 3, time.process_time)[""]
+    spent = time_in_turn({"": call}, 3, time.process_time)[""]
     row: Row = {"pairs": n, "hits": int(found.hit.sum()), "us": nanoseconds(spent, 1000 * n)}
     left, right = sides
     if left is None or right is None:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from oracles.convex_bodies import HARD, KINDS
 from oracles.convex_impact import exact_toi
 from oracles.convex_overlap import truth
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.report import Row, rate
 from tauguard.rigid import Motion, PlaneCache, coal_peer
 from tauguard.rigid.queries import native_overlap, native_sweep, portable
@@ -121,7 +121,7 @@ def static_row(pair: tuple[str, str], outcome: str, a: Bodies, b: Bodies, coal_p
     n, expected = len(a), outcome == "collision"
     _ = (a.packed, b.packed)
     calls = {name: partial(native_overlap, a, b, method) for name, method in METHODS.items()}
-    ns = {name: nanoseconds(t, n) for name, t in measure(calls, clock=process_time).items()}
+    ns = {name: nanoseconds(t, n) for name, t in time_in_turn(calls, clock=process_time).items()}
     wrong = {
         name: int((native_overlap(a, b, method)[0] != expected).sum())
         for name, method in METHODS.items()
@@ -191,7 +191,8 @@ def dynamic_rows(
             name: partial(native_sweep, ca, cb, cd, name, points=False) for name in ("sat", "abfme")
         }
         ns = {
-            name: nanoseconds(t, len(index)) for name, t in measure(calls, 3, process_time).items()
+            name: nanoseconds(t, len(index))
+            for name, t in time_in_turn(calls, 3, process_time).items()
         }
         rows.append(
             {
@@ -247,7 +248,9 @@ def batch_rows(rng: np.random.Generator, n: int) -> list[Row]:
         "two_threads": lambda: overlap_boxes_native(a, b, 2, hit),
     }
     one = {name: call for name, call in calls.items() if name != "two_threads"}
-    times = measure(one, clock=process_time) | measure({"two_threads": calls["two_threads"]})
+    times = time_in_turn(one, clock=process_time) | time_in_turn(
+        {"two_threads": calls["two_threads"]}
+    )
     ns = {name: nanoseconds(t, n) for name, t in times.items()}
     left = overlap_boxes_native(a, b, 1, hit)
     return [

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from oracles.convex_bodies import HARD, KINDS
 from oracles.convex_distance import exact_distance, extent
-from studies.harness import measure
+from studies.framework import time_in_turn
 from studies.rigid.convex import nanoseconds, take
 from tauguard.report import Row, rate
 from tauguard.rigid import coal_peer, distance
@@ -46,7 +46,9 @@ def gap_row(pair: str, outcome: str, a: Bodies, b: Bodies, exact: int) -> Row:
     """Times a pair, and errors relative to the pair's extent over the first ``exact`` rows."""
     got = distance(a, b).distance
     hit = native_overlap(a, b, "exact")[0]
-    ns = nanoseconds(measure({"ours": partial(distance, a, b)}, 3, process_time)["ours"], len(got))
+    ns = nanoseconds(
+        time_in_turn({"ours": partial(distance, a, b)}, 3, process_time)["ours"], len(got)
+    )
     known = range(min(exact, len(got)))
     truth = np.array([exact_distance(a, b, i) for i in known])
     size = np.array([extent(a, b, i) for i in known])

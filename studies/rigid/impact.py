@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from oracles.convex_impact import AxisGap, bracket
-from studies.harness import measure
+from studies.framework import time_in_turn
 from studies.rigid.convex import take
 from studies.rigid.mesh import scaled
 from tauguard.arrays import Array
@@ -96,7 +96,7 @@ def our_row(
         calls[name], count[name] = partial(time_of_impact, *part), len(index)
     us = {
         name: scaled(t, 1e6 / count[name])
-        for name, t in measure(calls, clock=time.process_time).items()
+        for name, t in time_in_turn(calls, clock=time.process_time).items()
     }
     return {
         "study": "time of impact",

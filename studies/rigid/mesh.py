@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.report import Row, rate
 from tauguard.rigid import MeshTree, Motion, coal_peer
 from tauguard.rigid.mesh import Volume
@@ -154,7 +154,7 @@ def build_rows(mesh: Mesh, peer: Peer | None, repeats: int) -> list[Row]:
             "coal_obbrss_ms": "coal is not installed" if coal is None else coal,
             "times_faster": coal / (1e3 * seconds["median"]) if coal else None,
         }
-        for volume, seconds in measure(calls, repeats, time.process_time).items()
+        for volume, seconds in time_in_turn(calls, repeats, time.process_time).items()
     ]
 
 
@@ -174,7 +174,7 @@ def static_rows(
     for outcome in (True, False):
         chosen = poses[hit == outcome]
         calls = {v: partial(tree.overlap, tree, chosen) for v, tree in trees.items()}
-        times = measure(calls, repeats, time.process_time)
+        times = time_in_turn(calls, repeats, time.process_time)
         for volume, tree in trees.items():
             mean = times[volume]["median"] / len(chosen) * 1e6
             wrong = int((hits[volume] != (hit if peer is None else peer.hit)).sum())
@@ -244,7 +244,7 @@ def dynamic_rows(
         for outcome in (True, False):
             chosen = np.flatnonzero(found.hit == outcome)
             part = Motion(start[chosen], move[chosen], angular[chosen])
-            seconds = measure(
+            seconds = time_in_turn(
                 {"toi": partial(tree.time_of_impact, tree, part)}, 2, time.process_time
             )["toi"]
             rows.append(

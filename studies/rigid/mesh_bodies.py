@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from studies.rigid.coal_motion import Shapes, coal_shapes, in_motion
 from studies.rigid.convex import nanoseconds, shifted
 from studies.rigid.mesh import Mesh, load
@@ -37,7 +37,7 @@ def mesh_row(rng: np.random.Generator, mesh: Mesh, tree: MeshTree, kind: str, n:
         "overlap": partial(overlap, tree, solid),
         "distance": partial(distance, tree, solid),
     }
-    spent = measure(calls, 3, time.process_time)
+    spent = time_in_turn(calls, 3, time.process_time)
     row: Row = {
         "study": "mesh and convex",
         "mesh": mesh.name,

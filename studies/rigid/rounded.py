@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from oracles.convex_distance import exact_distance, exactly_meet, extent
 from oracles.convex_overlap import exact_vertices
-from studies.harness import measure
+from studies.framework import time_in_turn
 from studies.rigid.coal_motion import coal_shapes, in_motion
 from studies.rigid.convex import nanoseconds
 from studies.rigid.gap import worst
@@ -73,7 +73,7 @@ def static_row(rng: np.random.Generator, kinds: tuple[str, str], n: int, known: 
     """Overlap and distance of one kind of pair; boxes take seconds each: a hundredth is known."""
     a, b = (bodies(rng, kind, n, 0.8, 1.0) for kind in kinds)
     hit, gap = overlap(a, b).hit, distance(a, b).distance
-    spent = measure(
+    spent = time_in_turn(
         {"overlap": partial(overlap, a, b), "distance": partial(distance, a, b)},
         3,
         time.process_time,

@@ -51,7 +51,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """The rows of every part, and what was asked of them beside what they measured."""
     parts = (*PARTS, rigid_gap, rigid_rounded, rigid_mesh_bodies)
     rows = [row for part in parts for row in part.run(quick, seed)]

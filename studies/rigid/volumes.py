@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from scipy.spatial.transform import Rotation
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from studies.rigid.mesh import Mesh, load, scaled
 from tauguard.arrays import Array
 from tauguard.report import Row, rate
@@ -154,7 +154,7 @@ class Hull:
 def hull_row(hulls: Hull, poses: Array, pairs: NDArray[np.int64], repeats: int) -> Row:
     """The hull itself: the tightest convex volume."""
     a, b = hulls.sides(poses, pairs)
-    times = measure(
+    times = time_in_turn(
         {
             "build": hulls.build,
             "update": partial(hulls.place, poses),
@@ -203,7 +203,7 @@ def volume_row(
     solid = np.flatnonzero(hulls.volume > 0)[:: max(1, len(bodies) // 200)]
     ratio = [size(name, numbers[i]) / hulls.volume[i] for i in solid]
     found = np.empty(len(pairs), dtype=np.bool_)
-    times = measure(
+    times = time_in_turn(
         {
             "build": volume.fit,
             "update": partial(volume.place, poses),

@@ -53,7 +53,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int, robot: str = "") -> list[Row]:
+def measure(quick: bool, seed: int, robot: str = "") -> list[Row]:
     """A row an arm; arms whose model is not at hand have a row that says so.
 
     Args:

@@ -13,7 +13,7 @@ from gymnasium.vector import SyncVectorEnv
 from mujoco import rollout
 from mujoco.batch import Batch
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from studies.simulation.reactions import reactions, trained_detector
 from tauguard.contacts import registered
 from tauguard.envs.adapters.reactions import REACTIONS
@@ -48,7 +48,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """Rows of three studies, ``step``, ``vector`` and ``reaction``, and what was asked of them.
 
     The full run trains a detector first, on the motions of ``tauguard demo``.
@@ -113,7 +113,7 @@ def steps(count: int, repeats: int, seed: int) -> list[Row]:
     }
     for name in registered():
         calls[f"checker {name}"] = acting(made(seed, checkers=(name,)), actions, seed)
-    taken = measure(calls, repeats, time.process_time)  # of one thread's work
+    taken = time_in_turn(calls, repeats, time.process_time)  # of one thread's work
     rollout_time, base = taken[ROLLOUT]["median"], taken[PHYSICS]["median"]
     whole = taken[WHOLE]["median"]
     return [
@@ -232,7 +232,7 @@ def vectors(count: int, repeats: int, seed: int) -> list[Row]:
     for name, env in forms.items():
         calls[name]()
         last[name] = env.step(rows[0])[0]
-    taken = measure(calls, repeats)
+    taken = time_in_turn(calls, repeats)
     base = taken["SyncVectorEnv"]["median"]
     return [
         {

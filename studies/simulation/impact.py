@@ -59,7 +59,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """Rows of the studies ``rail`` and ``arm``; nothing is drawn at random, ``seed`` is unused."""
     del seed
     regions = ("face", "hand", "chest", "back") if quick else tuple(BODY_REGIONS)

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.harness import measure
-from studies.workers import Workers
+from studies.framework import Workers, time_in_turn
 from tauguard.datasets.demo import SPEEDS, TRAINING_SPEEDS
 from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
 from tauguard.detectors import SrqSvr, figures, matchings, train
@@ -87,7 +86,7 @@ def plan(size: Size, seed: int) -> Plan:
     )
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """A row for the whole simulation and one for each part that is left out."""
     size = QUICK if quick else FULL
     episodes = plan(size, seed)
@@ -104,7 +103,7 @@ def costs(episode: Episode, parts: Sequence[str], repeats: int) -> dict[str, dic
         part: functools.partial(_simulated, (episode,), "" if part == "nothing" else part)
         for part in ("nothing", *parts)
     }
-    taken = measure(calls, repeats, time.process_time)
+    taken = time_in_turn(calls, repeats, time.process_time)
     whole = taken["nothing"]["median"]
     return {part: {key: s / whole for key, s in one.items()} for part, one in taken.items()}
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
-from studies.harness import measure
+from studies.framework import time_in_turn
 from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import Motion, SimulationLoop, random_motion
 from tauguard.envs.episodes.simulate import workspace
@@ -44,7 +44,7 @@ NOTES = {
 }
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """Rows of two studies: ``cost`` (what a thing adds) and ``timestep`` (error against cost)."""
     seconds = 5.0 if quick else 60.0
     bare = compose(SceneSpec(labels=False))
@@ -74,7 +74,7 @@ def costs(motion: Motion, repeats: int) -> list[Row]:
     calls: dict[str, Any] = {"mujoco.rollout, torques given": rollout_call(motion)}
     for name, (spec, parts) in scenes.items():
         calls[name] = loop_call(replace(compose(spec), drive=parts), motion)
-    taken = measure(calls, repeats)
+    taken = time_in_turn(calls, repeats)
     steps = len(motion.t)
     base = taken["mujoco.rollout, torques given"]["median"]
     return [
@@ -123,7 +123,7 @@ def timesteps(seed: int, seconds: float) -> list[Row]:
     for timestep in (2e-4, 5e-4, 1e-3, 2e-3):
         scene, motion = moved(seed, seconds, timestep)
         call = loop_call(scene, motion)
-        taken = measure({"loop": call}, 3)["loop"]
+        taken = time_in_turn({"loop": call}, 3)["loop"]
         got = follow(seed, seconds, timestep)
         coarse, fine = round(2e-3 / timestep), round(2e-3 / REFERENCE)
         n = min(len(got[::coarse]), len(reference[::fine]))

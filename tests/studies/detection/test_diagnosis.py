@@ -90,7 +90,7 @@ def test_a_clamping_must_still_press_at_the_end_of_the_look():
 def test_a_small_run_fills_every_table(monkeypatch):
     size = diagnosis.Size(1, (30.0,), Training(1, 2, 3, 12.0), 0.004, 1, 1, 1)
     monkeypatch.setattr(diagnosis, "QUICK", size)
-    rows = diagnosis.run(True, 3)
+    rows = diagnosis.measure(True, 3)
     studies = {row["study"] for row in rows}
     assert studies == set(diagnosis.NOTES)
     assert {row["method"] for row in rows if row["study"] == "link"} == set(diagnosis.METHODS)

@@ -10,7 +10,7 @@ from studies.detection.arm_scores import Arm, Blow, Extent
 from studies.detection.fleet import Training
 from studies.detection.known_tails import TAILS
 from studies.detection.threshold_laws import LAWS, judged, price_row, rate_row
-from studies.kept import read
+from studies.framework.jobs import read
 from tauguard.detectors import FreeScores
 from tauguard.detectors.thresholds.speed_levels import SpeedLevels
 from tauguard.envs import Episode, simulate
@@ -111,7 +111,7 @@ def test_arms_are_kept_and_not_made_again(tmp_path, monkeypatch):
     (path,) = tmp_path.rglob("*.npz")
     assert read(path).seed == one.seed
     monkeypatch.setattr(false_alarms, "arm_scores", None)
-    rows = false_alarms.run(True, 3, str(tmp_path))
+    rows = false_alarms.measure(True, 3, str(tmp_path))
     assert {row["study"] for row in rows} == {"arms", "known"}
     assert "usual tail" in table(rows, notes=false_alarms.NOTES)
     figure = pytest.importorskip("matplotlib.figure").Figure()

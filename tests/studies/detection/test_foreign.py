@@ -39,9 +39,9 @@ def test_the_packages_arms_and_descriptions_are_taken_as_they_are(arm, tmp_path)
     with pytest.raises(FileNotFoundError, match="no such file or name"):
         foreign.conditions("nobody", tmp_path)
     with pytest.raises(ValueError, match="one of them"):
-        study.run(True, 0, detector="cusum", robot="cura6")
+        study.measure(True, 0, detector="cusum", robot="cura6")
     with pytest.raises(ValueError, match="two arms are called 'arm'; expected different"):
-        study.run(True, 0, robot=f"{arm}, other/arm.urdf")
+        study.measure(True, 0, robot=f"{arm}, other/arm.urdf")
 
 
 def test_a_row_judges_the_harder_collisions_by_the_arms_share():
@@ -52,4 +52,4 @@ def test_a_row_judges_the_harder_collisions_by_the_arms_share():
     assert row["all"]["n"] == 2
     assert row["alarms_per_hour"]["value"] == 4
     study.draw([row], matplotlib.figure.Figure())
-    assert study.shown([row]) == [row]
+    assert study.table([row]) == [row]

@@ -68,9 +68,9 @@ def test_a_small_run_prints_a_row_for_every_rung(monkeypatch, tmp_path):
     monkeypatch.setattr(ladder, "SCENES", ladder.SCENES[3:])
     monkeypatch.setattr(ladder, "RUNGS", tuple(replace(r, scene=0) for r in ladder.RUNGS))
     monkeypatch.setattr(ladder, "Workers", lambda: _in_place())
-    rows = ladder.run(True, 0, str(tmp_path))
+    rows = ladder.measure(True, 0, str(tmp_path))
     assert [row["change"] for row in rows] == [rung.change for rung in ladder.RUNGS]
-    assert rows == ladder.run(True, 0, str(tmp_path))
+    assert rows == ladder.measure(True, 0, str(tmp_path))
     for row in rows:
         assert row["from 32 N m"]["n"] <= row["from 16 N m"]["n"] <= row["from 4 N m"]["n"]
         assert row["from 4 N m"]["n"] > 0
@@ -79,6 +79,6 @@ def test_a_small_run_prints_a_row_for_every_rung(monkeypatch, tmp_path):
 
 
 def _in_place():
-    from studies.workers import Workers
+    from studies.framework import Workers
 
     return Workers(1)

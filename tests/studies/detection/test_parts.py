@@ -44,7 +44,7 @@ def test_a_small_run_prints_a_row_for_every_part(monkeypatch, tmp_path):
     extent = replace(parts.QUICK.extent, names=names, training=little, calibration_hours=0.001)
     size = replace(parts.QUICK, extent=replace(extent, hours=0.001))
     monkeypatch.setattr(parts, "QUICK", size)
-    rows = parts.run(True, 0, str(tmp_path))
+    rows = parts.measure(True, 0, str(tmp_path))
     assert [row["without"] for row in rows] == [*names, parts.LEVELS]
     times = [row["time"] for row in rows]
     assert times[0]["median"] == 1.0
@@ -56,6 +56,6 @@ def test_a_small_run_prints_a_row_for_every_part(monkeypatch, tmp_path):
 
 
 def parts_in_place():
-    from studies.workers import Workers
+    from studies.framework import Workers
 
     return Workers(1)

@@ -48,7 +48,7 @@ from studies.detection.thresholds import (
     operated,
 )
 from studies.detection.variations import every
-from studies.harness import Incomplete
+from studies.framework import Incomplete
 from tauguard.detectors import CollisionAlarm, FreeScores
 from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.thresholds.free_scores import PIECE
@@ -350,10 +350,10 @@ def test_a_detector_of_ones_own_is_judged_beside_ours(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     asked = []
     monkeypatch.setattr(detection_study, "study", lambda size, *_, **__: asked.append(size) or [])
-    detection_study.run(True, 0, "mine:Size")
+    detection_study.measure(True, 0, "mine:Size")
     assert asked[0].detectors == (*detection_study.QUICK.detectors, "mine:Size")
     with pytest.raises(ValueError, match="no_such_module"):
-        detection_study.run(True, 0, "no_such_module:Size")
+        detection_study.measure(True, 0, "no_such_module:Size")
     little = Training(slices=1, collisions=1, free=1, free_seconds=4.0)
     own = train(0, 7, ("mine:Size",), little)
     free = calibration_scores(0, 7, own, 30.0, 0.001)

@@ -4,16 +4,11 @@ import matplotlib.figure
 import numpy as np
 import pytest
 
-from studies import STUDIES
 from studies.simulation import environments
 from studies.simulation.reactions import SPEEDS, reactions
 from tauguard.report import table
 
 KNOWN = {"contact": None, "observer": "observer"}
-
-
-def test_it_is_listed():
-    assert "environments" in STUDIES
 
 
 def test_the_bare_loop_makes_the_same_motion():

@@ -1,36 +1,16 @@
-"""Error against microseconds: one panel a question, peers as points of their own."""
+"""Error against microseconds: one figure a question, peers as marks of their own."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from studies.framework.rows import Point
 from tauguard.report.charts import COLOURS
 
 #: Colours of our points and of the peers'.
 OURS, PEER = COLOURS[:2]
-
-
-@dataclass(frozen=True)
-class Point:
-    """One method: its cost [us] and its error, in the panel's unit."""
-
-    label: str
-    cost: float
-    error: float
-    peer: bool = False
-
-
-@dataclass(frozen=True)
-class Panel:
-    """Points that answer one question, with the names of both axes."""
-
-    title: str
-    cost: str
-    error: str
-    points: tuple[Point, ...]
 
 
 def front(points: Sequence[Point]) -> list[Point]:
@@ -42,49 +22,50 @@ def front(points: Sequence[Point]) -> list[Point]:
     return best
 
 
-def svg(panel: Panel) -> str:
-    """The panel as an SVG picture, readable at half of a page's width."""
+def svg(points: Sequence[Point]) -> str:
+    """The points of one question as an SVG picture, readable at half of a page's width."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    labels = list(dict.fromkeys(p.label for p in sorted(panel.points, key=lambda p: p.cost)))
-    with plt.rc_context({"font.size": 10, "svg.hashsalt": panel.title}):
+    labels = list(dict.fromkeys(p.method for p in sorted(points, key=lambda p: p.cost)))
+    with plt.rc_context({"font.size": 10, "svg.hashsalt": points[0].question}):
         height = 3.4 + 0.19 * ((len(labels) + 1) // 2)
         figure, axes = plt.subplots(figsize=(5.6, height), layout="constrained")
-        _draw(panel, labels, figure, axes)
+        _draw(points, labels, figure, axes)
         out = io.StringIO()
         figure.savefig(out, format="svg", metadata={"Date": None})
         plt.close(figure)
     return out.getvalue()
 
 
-def _draw(panel: Panel, labels: list[str], figure: Any, axes: Any) -> None:
+def _draw(points: Sequence[Point], labels: list[str], figure: Any, axes: Any) -> None:
     """Points numbered by label; the numbers are explained below the axes."""
     for number, label in enumerate(labels, 1):
-        own = [point for point in panel.points if point.label == label]
-        colour, marker = (PEER, "s") if own[0].peer else (OURS, "o")
+        own = [point for point in points if point.method == label]
+        colour, marker = (PEER, "s") if own[0].role == "peer" else (OURS, "o")
         at = [p.cost for p in own], [p.error for p in own]
         axes.plot(*at, marker, color=colour, ms=6, label=f"{number}  {label}")
         for point in own:
             shown = str(number)
             place = (point.cost, point.error)
             axes.annotate(shown, place, (4, 4), textcoords="offset points", fontsize=9)
-    best = front(panel.points)
+    best = front(points)
     axes.plot([p.cost for p in best], [p.error for p in best], "-", color="0.7", lw=1, zorder=0)
-    _scale(panel, axes)
-    axes.set(title=panel.title, xlabel=panel.cost, ylabel=panel.error)
+    _scale(points, axes)
+    one = points[0]
+    axes.set(title=one.question, xlabel=one.cost_axis, ylabel=one.error_axis)
     axes.grid(alpha=0.25)
     figure.legend(loc="outside lower left", ncols=2, fontsize=8, frameon=False)
 
 
-def _scale(panel: Panel, axes: Any) -> None:
+def _scale(points: Sequence[Point], axes: Any) -> None:
     """Logarithmic in cost, and in error where it spans more than a factor of 20."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     axes.set_xscale("log")
-    costs = [p.cost for p in panel.points]
+    costs = [p.cost for p in points]
     decades = max(costs) > 8 * min(costs)
     if max(costs) < 1e3 * min(costs):
         axes.xaxis.set_major_locator(
@@ -92,7 +73,7 @@ def _scale(panel: Panel, axes: Any) -> None:
         )
     axes.xaxis.set_major_formatter("{x:,.10g}")
     axes.xaxis.set_minor_locator(NullLocator())
-    above = [p.error for p in panel.points if p.error > 0]
+    above = [p.error for p in points if p.error > 0]
     if above and max(above) > 20 * min(above):
         axes.set_yscale("symlog", linthresh=min(above))
     axes.margins(x=0.1, y=0.12)

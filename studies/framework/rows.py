@@ -1,24 +1,42 @@
-"""What studies share: timings with spread, and the lines of a closing summary."""
+"""What parts share: timings with their spread, lines of the summary, points of the first page."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from tauguard.report import Row
 
+T = TypeVar("T")
+
 
 class Incomplete(RuntimeError):
-    """A part of a study failed; ``rows`` holds what the other parts found."""
+    """Some of a part's measurements failed; ``rows`` holds the others."""
 
     def __init__(self, rows: list[Row], reasons: Mapping[str, BaseException]) -> None:
-        """Keep the rows; ``reasons`` is by part."""
+        """Keep the rows; ``reasons`` is by measurement."""
         lines = (f"{part}: {type(error).__name__}: {error}" for part, error in reasons.items())
         super().__init__("parts of the study failed, the others are kept; " + "; ".join(lines))
         self.rows = rows
         self.__cause__ = next(iter(reasons.values()))
+
+
+@dataclass(frozen=True)
+class Point:
+    """Time and error of one method: a mark of a figure and a line of the report's first page."""
+
+    question: str  #: the figure's title
+    method: str
+    cost: float  #: [us], or what ``cost_axis`` says
+    error: float  #: in the unit of ``error_axis``; NaN: in the table alone
+    error_text: str = ""  #: for the table
+    role: str = ""  #: "ours": tauguard's in the table; "peer": beside it; "": in the figure alone
+    cost_axis: str = "microseconds"
+    error_axis: str = "error"
 
 
 def timed(met: bool, quick: bool) -> bool | str:
@@ -27,7 +45,7 @@ def timed(met: bool, quick: bool) -> bool | str:
 
 
 def answer(question: str, asked: str, measured: str, met: bool | str | None = None) -> Row:
-    """A line of a study's closing summary; ``met`` is ``None`` where a figure has no bar."""
+    """A line of a summary; ``met`` is ``None`` where nothing was asked of the figure."""
     return {
         "study": "summary",
         "question": question,
@@ -37,14 +55,14 @@ def answer(question: str, asked: str, measured: str, met: bool | str | None = No
     }
 
 
-def measure(
+def time_in_turn(
     calls: Mapping[str, Callable[[], object]],
     repeats: int = 5,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, dict[str, float]]:
     """Seconds of each call, the calls taken in turn (A B A B ...) after one warm-up each.
 
-    Taking turns lets a drift of the machine's speed hit every competitor alike. Work of a single
+    Taking turns lets a drift of the machine's speed affect every method alike. Work of a single
     thread may be timed by ``time.process_time``, which leaves out what other programs take.
 
     Returns:
@@ -62,3 +80,23 @@ def measure(
         name: {"median": float(np.median(t)), "low": min(t), "high": max(t)}
         for name, t in times.items()
     }
+
+
+def table_rows(rows: Sequence[Row], name: str) -> list[Row]:
+    """The rows of one table."""
+    return [row for row in rows if row.get("study") == name]
+
+
+def groups(rows: Sequence[T], key: Callable[[T], str]) -> dict[str, list[T]]:
+    """Rows with the same key, in the order of their first appearance."""
+    found: dict[str, list[T]] = {}
+    for row in rows:
+        found.setdefault(key(row), []).append(row)
+    return found
+
+
+def number(value: object) -> float | None:
+    """A plain number, or the middle of a rate or of a time; ``None`` for what is neither."""
+    if isinstance(value, Mapping):
+        value = value.get("median", value.get("value"))
+    return float(value) if isinstance(value, int | float) else None

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.real_arm import arms, study
+from studies.real_arms import arms, study
 from tauguard.traces import Trace
 
 
@@ -16,7 +16,7 @@ def trace(seconds=10.0, dt=0.01):
 def test_says_so_where_there_are_no_logs(tmp_path, monkeypatch):
     monkeypatch.setenv("TAUGUARD_DATA", str(tmp_path))
     monkeypatch.setattr(study.trained_with, "rows", lambda quick, seed: [])
-    (row,) = study.run(quick=True, seed=0)
+    (row,) = study.measure(quick=True, seed=0)
     assert "TAUGUARD_DATA" in row["log"]
 
 

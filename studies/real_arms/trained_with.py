@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from studies.real_arm.arms import available, nominal, recordings
-from studies.real_arm.simulated import drawn_arm
-from studies.real_arm.smallest_push import smallest_pushes
+from studies.real_arms.arms import available, nominal, recordings
+from studies.real_arms.simulated import drawn_arm
+from studies.real_arms.smallest_push import smallest_pushes
 from tauguard.detectors import ArmModel, poisson_rate
 from tauguard.detectors.calibration.recording import Recording, cut
 from tauguard.detectors.evaluation.events import find_alarms

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from studies.real_arm import trained_with
-from studies.real_arm.smallest_push import smallest_pushes
-from studies.real_arm.trained_with import first_seconds
+from studies.real_arms import trained_with
+from studies.real_arms.smallest_push import smallest_pushes
+from studies.real_arms.trained_with import first_seconds
 from tauguard.detectors import ArmModel
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.detectors.methods.free_motion import FreeMotion

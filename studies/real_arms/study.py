@@ -9,7 +9,7 @@ The rules: ``plain observer``, thresholds of 1.5 times the largest residual of a
 with the gains of the preset and no friction; ``1 A`` and ``10 N m``, a fixed threshold on what the
 same calibration as ours leaves, in amperes at the motor and in torque at the joint.
 
-A second table trains with less: :mod:`~studies.real_arm.trained_with`.
+A second table trains with less: :mod:`~studies.real_arms.trained_with`.
 
 What is optimistic: the constants (:mod:`~tauguard.detectors.features.free_bound`,
 ``src/regimes.hpp``) were chosen on these logs of all three real arms. Compared on them were: the
@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from studies.real_arm import trained_with
-from studies.real_arm.arms import (
+from studies.real_arms import trained_with
+from studies.real_arms.arms import (
     ArmData,
     Push,
     available,
@@ -84,7 +84,7 @@ class Tally:
     chance: dict[bool, float] = field(default_factory=lambda: {True: 0.0, False: 0.0})
 
 
-def run(quick: bool, seed: int) -> list[Row]:
+def measure(quick: bool, seed: int) -> list[Row]:
     """All rows; one that says so where the data are absent."""
     arms = available()
     found: list[Row] = []

@@ -1,4 +1,4 @@
-"""Results of jobs, kept as they are made: a study that was broken off goes on where it was.
+"""Jobs over processes, and the cache of their results: a run that was stopped goes on there.
 
 A result is text, numbers, arrays, lists, tuples, dictionaries and dataclasses of these. Its file
 holds arrays and JSON; nothing in it is code, and a class is built only if it is one of ours or of a
@@ -11,29 +11,57 @@ import functools
 import hashlib
 import importlib
 import json
+import multiprocessing
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tauguard.atomic_write import atomic_file
-from tauguard.datasets.code_identity import detection_sources
-from tauguard.detectors.registry import file_type
 from tauguard.report import versions
 
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
 
+class Workers:
+    """A context manager that gives a map over processes, in this one if one worker is asked for.
+
+    Each process has one thread; answers come in the order of the jobs.
+    """
+
+    def __init__(self, count: int | None = None) -> None:
+        """Keep the number of processes (default: one a processor)."""
+        self._count = count or os.cpu_count() or 1
+        self._processes: Any = None
+
+    def __enter__(self) -> Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]:
+        """Start the processes; the map takes a function of a module and its jobs."""
+        if self._count == 1:
+            return lambda call, jobs: map(call, jobs)
+        context = multiprocessing.get_context("spawn")
+        # One thread a process: more of both than processors slows linear algebra many times over.
+        self._processes = context.Pool(self._count, threadpool_limits, (1,))
+        imap: Callable[..., Iterator[Any]] = self._processes.imap
+        return imap
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the processes."""
+        if self._processes is not None:
+            self._processes.terminate()
+
+
 @dataclass(frozen=True)
-class Kept:
-    """The results of one run of a study in a folder; without a folder nothing is kept."""
+class JobCache:
+    """The results of one part's jobs in a folder; without a folder nothing is kept."""
 
     folder: Path | None
 
     @classmethod
-    def of(cls, keep: str | None, study: str, seed: int, size: object) -> Kept:
+    def of(cls, keep: str | None, study: str, seed: int, size: object) -> JobCache:
         """One folder a seed, size and build.
 
         A build is the versions of the libraries and the sources of simulation and detectors. A
@@ -44,6 +72,8 @@ class Kept:
         """
         if keep is None:
             return cls(None)
+        from tauguard.datasets.code_identity import detection_sources
+
         build = (versions(), *detection_sources())
         digest = hashlib.sha256(repr((size, build)).encode()).hexdigest()[:8]
         folder = Path(keep) / f"{study}-seed{seed}-{digest}"
@@ -158,7 +188,9 @@ def _together(content: Any, arrays: Any) -> Any:
 
 def _class(name: str) -> Any:
     module, _, own = name.partition(":")
-    if not module.startswith("tauguard."):
+    if module.partition(".")[0] not in ("tauguard", "studies"):
+        from tauguard.detectors.registry import file_type
+
         return file_type(name)
     kind = getattr(importlib.import_module(module), own)
     if not (isinstance(kind, type) and is_dataclass(kind)):

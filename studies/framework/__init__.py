@@ -1,0 +1,30 @@
+"""The frame that every study uses: what a part is, timings, the summary, processes, job cache."""
+
+from studies.framework.jobs import Each, JobCache, Workers
+from studies.framework.rows import (
+    Incomplete,
+    Point,
+    answer,
+    groups,
+    number,
+    table_rows,
+    time_in_turn,
+    timed,
+)
+from studies.framework.study import Part, Study
+
+__all__ = [
+    "Each",
+    "Incomplete",
+    "JobCache",
+    "Part",
+    "Point",
+    "Study",
+    "Workers",
+    "answer",
+    "groups",
+    "number",
+    "table_rows",
+    "time_in_turn",
+    "timed",
+]

@@ -1,0 +1,186 @@
+"""``tauguard bench NAME``: parts of a study, measured, judged, printed and drawn."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any
+
+import tyro
+
+from studies import STUDIES
+from studies.framework.rows import Incomplete
+from studies.framework.study import Part, all_parts, find, package
+from tauguard.atomic_write import atomic_file
+from tauguard.report import Row, measured, table, write_json
+from tauguard.report.charts import STYLE
+from tauguard.report.machine import load, load_line
+
+
+def command(
+    name: Annotated[str, tyro.conf.Positional] = "all",
+    /,
+    part: str | None = None,
+    quick: bool = False,
+    seed: int = 0,
+    detector: str | None = None,
+    robot: str | None = None,
+    keep: Path | None = None,
+    json: Path | None = None,
+    figure: Path | None = None,
+    out: Path = Path("bench"),
+) -> None:
+    """Run a study of speed against error, or one part of it, and print its tables.
+
+    `tauguard bench all` runs every part of every study and leaves figures and tables in a folder;
+    parts that it holds already are not run again. `tauguard report` makes one page of the folder.
+
+    Args:
+        name: a study, or a part by its own name: `tauguard bench list` names them; or `all`.
+        part: of the study, alone.
+        quick: a shorter run, 60 s or less a part on 2 cores (the full one takes up to 30 minutes).
+        seed: of every random input.
+        detector: a method of your own as module:Class, beside those of the study `detection`.
+        robot: arms by name or file, parted by commas, for the parts that take any arm.
+        keep: folder of the job cache; jobs that it holds are not run again. Results of other
+            versions, or of other sources of simulation and detectors, are not used.
+        json: write the rows here as JSON.
+        figure: write the figure here (PNG; the default is bench-NAME.png in the working folder).
+        out: the folder of all studies.
+    """
+    if name == "list":
+        _print_list()
+        return
+    if name == "all":
+        from studies.framework.collect import collect
+
+        if part or detector or robot or keep or json or figure:
+            raise ValueError("bench all takes --quick, --seed and --out alone")
+        if collect(out, all_parts(), quick=quick, seed=seed):
+            raise SystemExit(1)
+        return
+    options = {"detector": detector, "robot": robot, "keep": str(keep) if keep else None}
+    given = {option: value for option, value in options.items() if value is not None}
+    chosen = _taking(find(name, part), given, name)
+    for full, one in chosen.items():
+        run_part(
+            full,
+            one,
+            quick=quick,
+            seed=seed,
+            json_path=_own_path(json, full, chosen),
+            figure_path=_own_path(figure, full, chosen) or Path(f"bench-{full}.png"),
+            options={key: value for key, value in given.items() if key in one.options},
+        )
+
+
+def _print_list() -> None:
+    for study in STUDIES:
+        own = package(study).STUDY
+        print(f"{study}: {own.line}")
+        for name, one in own.parts.items():
+            alias = f" ({one.alias})" if one.alias not in ("", name) else ""
+            print(f"  {name}{alias}  {one.line}")
+
+
+def _taking(parts: Mapping[str, Part], given: Mapping[str, str], name: str) -> Mapping[str, Part]:
+    """The parts to run: with ``--detector`` or ``--robot`` only those that take it."""
+    for option in given:
+        taking = {full: part for full, part in parts.items() if option in part.options}
+        if not taking:
+            names = [full for full, part in all_parts().items() if option in part.options]
+            raise ValueError(f"--{option} goes with {', '.join(names)}, not with {name}")
+        if option != "keep":
+            parts = taking
+    return parts
+
+
+def _own_path(path: Path | None, full: str, parts: Mapping[str, Part]) -> Path | None:
+    """The file of one part: where there are several, its name is added."""
+    if path is None or len(parts) == 1:
+        return path
+    return path.with_stem(f"{path.stem}-{full.partition('-')[2]}")
+
+
+def run_part(
+    name: str,
+    part: Part,
+    *,
+    quick: bool,
+    seed: int,
+    json_path: Path | None,
+    figure_path: Path,
+    options: Mapping[str, str],
+) -> None:
+    """Run one part: print its tables, draw its figure, write its JSON.
+
+    Raises:
+        ValueError: bad input, or no folder to write the figure or the JSON into.
+        Incomplete: some measurements failed; what the others found was printed and written.
+        RuntimeError: the part failed by a defect.
+    """
+    for path in (figure_path, json_path):
+        if path is not None and not path.parent.is_dir():
+            raise ValueError(f"{path}: no folder {path.parent}; make it first")
+    module, before = part.load(), load()
+    rows, broken = _measured(module, quick, seed, options)
+    print(table(printed(module, rows), notes=module.NOTES))
+    print(load_line(before, load()))
+    with atomic_file(figure_path) as stream:
+        stream.write(chart(module, rows, figure_path.suffix[1:] or "png"))
+    print(f"figure: {figure_path}")
+    if json_path is not None:
+        incomplete = {"incomplete": str(broken)} if broken else {}
+        write_json(json_path, measured(name, rows, quick, seed) | incomplete)
+        print(f"json: {json_path}")
+    if broken is not None:
+        raise broken
+
+
+def _measured(
+    module: ModuleType, quick: bool, seed: int, options: Mapping[str, str]
+) -> tuple[list[Row], Incomplete | None]:
+    """The part's rows with its summary, and why there are not all of them."""
+    try:
+        rows, broken = module.measure(quick=quick, seed=seed, **options), None
+    except Incomplete as stop:
+        rows, broken = stop.rows, stop
+    except ValueError as error:
+        if _of_our_own(error):
+            raise  # bad input, in our words
+        raise RuntimeError(f"{type(error).__name__}: {error}") from error
+    return (rows + module.judge(rows) if hasattr(module, "judge") else rows), broken
+
+
+def _of_our_own(error: BaseException) -> bool:
+    """Whether our code raised it, in this process: workers start when the input is known to do."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    module = trace.tb_frame.f_globals.get("__name__", "") if trace is not None else ""
+    remote = type(error.__cause__).__name__ == "RemoteTraceback"
+    return not remote and module.partition(".")[0] in ("tauguard", "studies")
+
+
+def printed(module: ModuleType, rows: list[Row]) -> list[Row]:
+    """What is printed of a part's rows."""
+    own: Callable[[list[Row]], list[Row]] = getattr(module, "table", list)
+    return own(rows)
+
+
+def chart(module: Any, rows: list[Row], kind: str = "png") -> bytes:
+    """The figure of a part's rows as a file of ``kind``, in the style of all figures."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    out = io.BytesIO()
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=getattr(module, "SIZE", None), layout="constrained")
+        module.draw(rows, figure)
+        figure.savefig(out, format=kind)
+        plt.close(figure)
+    return out.getvalue()

@@ -1,0 +1,334 @@
+"""``tauguard report``: the parts of a folder and the hard cases in one HTML file."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from html import escape
+from pathlib import Path
+from typing import Any, TypeVar
+
+from studies import STUDIES
+from studies.framework.bench import chart, printed
+from studies.framework.collect import collect, read_rows
+from studies.framework.pareto import svg
+from studies.framework.rows import Point, groups
+from studies.framework.study import Part, all_parts, find, package
+from tauguard.atomic_write import write_atomic
+from tauguard.report import Row, write_json
+from tauguard.report.page import folded, page, picture, tables
+
+#: Other JSON files that the folder of a report holds.
+BESIDE = ("hard-cases.json", "wrong.json")
+#: Units of time and how many microseconds each is.
+UNITS = (("s", 1e6), ("ms", 1e3), ("µs", 1.0), ("ns", 1e-3))
+#: Characters of a line about something that is missing.
+LENGTH = 300
+
+T = TypeVar("T")
+
+
+def command(
+    out: Path,
+    quick: bool = False,
+    seed: int = 0,
+    study: tuple[str, ...] = (),
+    bound: bool = False,
+    mistakes: bool = True,
+) -> None:
+    """Run the studies that the folder does not hold yet, and write `index.html` of all of them.
+
+    A run that was stopped goes on where it was. The page opens offline. It also links to
+    recordings of what the detector of `tauguard demo` gets wrong: `tauguard replay --web OUT`
+    opens them. What cannot be shown is named on the page and here, with exit code 1.
+
+    Args:
+        out: the folder of the page and of each part's rows (JSON) and figure.
+        quick: shorter runs, all of them together five to six minutes on 2 idle cores (full ones
+            take up to 30 minutes each).
+        seed: of every random input.
+        study: these studies or parts only (default: all that `tauguard bench list` names).
+        bound: run no study and no hard case, write the page of what the folder holds.
+        mistakes: train the detector of `tauguard demo` and record its mistakes, where the folder
+            does not hold them of this build.
+    """
+    from studies.framework import mistakes as recorded
+    from tauguard.hard_cases import adapters, load_cases, run
+
+    asked = {full for name in study for full in find(name)} or set(all_parts())
+    failed: Mapping[str, str] = {}
+    missing, kept = Missing(), out / "hard-cases.json"
+    if not bound:
+        failed = collect(out, [n for n in all_parts() if n in asked], quick=quick, seed=seed)
+        write_json(kept, {"name": kept.stem, "rows": run(load_cases(), adapters())})
+    elif not out.is_dir():
+        raise ValueError(f"--bound --out {out}: no such folder")
+    cases: list[Row] = []
+    if kept.exists():
+        cases = missing.attempt("hard cases", lambda: json.loads(kept.read_text())["rows"], cases)
+    links = (
+        missing.attempt("mistakes", lambda: recorded.mistakes(out, seed), "") if mistakes else ""
+    )
+    print(f"report: {Report(out, failed, missing).write(cases, links)}")
+    for line in missing.lines:
+        print(f"not shown, or not whole: {line}", file=sys.stderr)
+    if failed or missing.lines:
+        raise SystemExit(1)
+
+
+class Missing:
+    """What the page cannot show, and why: a line each."""
+
+    def __init__(self) -> None:
+        """Nothing is missing yet."""
+        self.lines: list[str] = []
+
+    def add(self, what: str, why: str) -> None:
+        """Name a part and why it is not there; control characters of foreign text are left out."""
+        text = " ".join(f"{what}: {why}".split())
+        self.lines.append("".join(c if c.isprintable() else "?" for c in text)[:LENGTH])
+
+    def attempt(self, what: str, make: Callable[[], T], instead: T) -> T:
+        """What ``make`` returns; ``instead``, and a line, where the rows are not as it expects.
+
+        A file may be of another build or of somebody else: any error is possible, and is named.
+        """
+        try:
+            return make()
+        except KeyError as error:
+            self.add(what, f"no {error} in its rows")
+        except Exception as error:
+            self.add(what, f"{type(error).__name__}: {error}")
+        return instead
+
+
+class Report:
+    """The page of a folder: files that are damaged or of another program are named on it."""
+
+    def __init__(self, folder: Path, failed: Mapping[str, str], missing: Missing) -> None:
+        """Read the files; ``failed`` says why a part has none, ``missing`` gets what is not shown.
+
+        Args:
+            folder: what :func:`~.collect.collect` has written, or anything else.
+            failed: by the parts' full names.
+            missing: for the page and the command.
+        """
+        self.folder, self.failed, self.missing = folder, failed, missing
+        self.parts = all_parts()
+        self.found = dict(self._read())
+
+    def _read(self) -> Iterable[tuple[str, Mapping[str, Any]]]:
+        for name in self.parts:
+            path = self.folder / f"{name}.json"
+            if name in self.failed or not path.exists():
+                continue
+            try:
+                one = read_rows(path, name)
+            except (OSError, ValueError) as error:
+                self.missing.add(name, str(error))
+                continue
+            if not one["rows"]:
+                self.missing.add(name, "its file has no rows")
+            if "incomplete" in one:
+                self.missing.add(name, f"incomplete: {one['incomplete']}")
+            yield name, one
+
+    def write(self, cases: Sequence[Row], mistakes: str) -> Path:
+        """Write ``index.html`` with these rows of the hard cases and links to mistakes (HTML)."""
+        points, attempt = self._of_studies("points"), self.missing.attempt
+        bodies = {name: self._part(name, self.parts[name]) for name in self.found}
+        sections = {
+            "How fast, how wrong, beside whom": attempt("first table", lambda: _beside(points), ""),
+            "Collisions found, false alarms": _detections(self._of_studies("detections")),
+            "Error against microseconds": self._figures(points),
+            "Asked and not reached": self._not_reached(),
+            "Hard cases": attempt("hard cases", lambda: _cases(cases), "") if cases else "",
+            "Mistakes to look at": mistakes,
+            "What was measured": self._runs(),
+            **{f"Study: {name}": body for name, body in bodies.items()},
+        }
+        target = self.folder / "index.html"
+        write_atomic(target, page("tauguard: speed against error", sections, self._lead()))
+        return target
+
+    def _of_studies(self, function: str) -> list[Any]:
+        """What a function of every study's package makes of the rows of all its parts."""
+        found: list[Any] = []
+        for study in STUDIES:
+            names = [name for name in self.found if name.startswith(f"{study}-")]
+            rows = [row for name in names for row in self.found[name]["rows"]]
+            make = getattr(package(study), function, None)
+            if make and rows:
+                nothing: list[Any] = []
+                found += self.missing.attempt(
+                    f"first page, {study}", partial(_listed, make, rows), nothing
+                )
+        return found
+
+    def _figures(self, points: Sequence[Point]) -> str:
+        drawn = []
+        shown = [point for point in points if not math.isnan(point.error)]
+        for question, own in groups(shown, lambda point: point.question).items():
+            code = self.missing.attempt(f"figure {question!r}", partial(svg, own), "")
+            drawn.append(picture(code.encode(), "svg+xml", question) if code else "")
+        return (
+            "<p>Left is fast, low is right. The grey line joins what nothing else beats in both. "
+            "Circles are tauguard's, squares are peers of the same run.</p>"
+            f'<div class="figures">{"".join(drawn)}</div>'
+        )
+
+    def _not_reached(self) -> str:
+        """Every line of a summary whose figure was not reached."""
+        judged = [
+            {
+                "part": name,
+                "what": row.get("question") or row.get("claim") or row.get("what"),
+                "asked": row["asked"],
+                "measured": row.get("measured"),
+                "met": row["met"],
+            }
+            for name, one in self.found.items()
+            for row in one["rows"]
+            if "asked" in row and isinstance(row.get("met"), bool)
+        ]
+        lost = [{k: v for k, v in row.items() if k != "met"} for row in judged if not row["met"]]
+        met = len(judged) - len(lost)
+        return f"<p>{met} of {len(judged)} asked figures are met.</p>" + tables(lost, {})
+
+    def _runs(self) -> str:
+        runs = [
+            {
+                "part": name,
+                "question": self.parts[name].line,
+                "run": "quick" if one["quick"] else "full",
+                "seed": one["seed"],
+                "rows": len(one["rows"]),
+                "load": one["machine"].get("load"),
+            }
+            for name, one in self.found.items()
+        ]
+        absent = [
+            name + (f" ({self.failed[name]})" if name in self.failed else "")
+            for name in self.parts
+            if name not in self.found
+        ]
+        known = {f"{name}.json" for name in self.parts} | set(BESIDE)
+        others = sorted(p.name for p in self.folder.glob("*.json") if p.name not in known)
+        lost, beside = ", ".join(absent), ", ".join(others)
+        return (
+            "<p>A quick run shows the form of the answers, a full run their size. Of all quick "
+            "parts two run at a time: their times are those of a busy machine. load: programs that "
+            "wanted to run when the part ended; above the number of cores its times are too long."
+            "</p>"
+            + tables(runs, {})
+            + (f"<p>Not in this report: {escape(lost)}.</p>" if lost else "")
+            + (f"<p>Files of no study, not read: {escape(beside)}.</p>" if beside else "")
+        )
+
+    def _part(self, name: str, part: Part) -> str:
+        one, module = self.found[name], part.load()
+        rows, nothing = one["rows"], "<p>Not shown: see the top of this page.</p>"
+        with warnings.catch_warnings(record=True) as raised:
+            warnings.simplefilter("always", UserWarning)
+            figure = self.missing.attempt(
+                f"figure of {name}",
+                lambda: picture(chart(module, rows), "png", f"figure of {name}"),
+                nothing,
+            )
+        for line in dict.fromkeys(str(warning.message) for warning in raised):
+            self.missing.add(f"figure of {name}", line)  # matplotlib draws an empty panel
+        text = self.missing.attempt(
+            f"tables of {name}", lambda: tables(printed(module, rows), module.NOTES), nothing
+        )
+        run = f"{'quick' if one['quick'] else 'full'} run, seed {one['seed']}"
+        stopped = f"; incomplete: {one['incomplete']}" if "incomplete" in one else ""
+        return (
+            f"<p>{escape(part.line)} ({escape(run + stopped)}).</p>"
+            f"<figure>{figure}</figure>" + folded("Tables", text)
+        )
+
+    def _lead(self) -> str:
+        """Machines and versions, a paragraph each, and what the page does not show."""
+        machines: dict[str, list[str]] = {}
+        for name, one in self.found.items():
+            on = one["machine"]
+            versions = ", ".join(f"{package} {v}" for package, v in one["versions"].items())
+            text = f"{on['processor']}, {on['cores']} cores, {on['system']}: {versions}"
+            machines.setdefault(text, []).append(name)
+        quick = {one["quick"] for one in self.found.values()}
+        kinds = " and ".join("quick" if one else "full" for one in sorted(quick))
+        many = len(machines) > 1
+        lines = [
+            f"<p>{escape(text + (' (' + ', '.join(names) + ')' if many else ''))}.</p>"
+            for text, names in machines.items()
+        ]
+        items = "".join(f"<li>{escape(line)}</li>" for line in self.missing.lines)
+        absent = f'<div class="no"><p>Not shown, or not whole:</p><ul>{items}</ul></div>'
+        return (
+            f"<p>{len(self.found)} of {len(self.parts)} parts of studies, {kinds} runs. "
+            "Every time stands beside its error.</p>" + "".join(lines) + (absent if items else "")
+        )
+
+
+def _listed(make: Callable[[list[Row]], Iterable[Any]], rows: list[Row]) -> list[Any]:
+    return list(make(rows))
+
+
+def time_text(us: float) -> str:
+    """A time with its unit, three digits."""
+    unit, size = next(((u, s) for u, s in UNITS if us >= s), UNITS[-1])
+    return f"{us / size:.3g} {unit}"
+
+
+def _beside(points: Sequence[Point]) -> str:
+    """Every question's line: tauguard's time and error, the peer's, and the ratio of the times."""
+    lines = [
+        {
+            "what": ours.question,
+            "tauguard takes": time_text(ours.cost),
+            "tauguard's error": ours.error_text,
+            "peer": peer.method,
+            "peer takes": time_text(peer.cost),
+            "peer's error": peer.error_text,
+            "peer / tauguard": f"{peer.cost / ours.cost:.3g}",
+        }
+        for own in groups(points, lambda point: point.question).values()
+        for ours in own
+        if ours.role == "ours"
+        for peer in own
+        if peer.role == "peer" and peer.error_text
+    ]
+    return (
+        "<p>Time and error of each kernel and of a peer in the same run, one thread. "
+        "A ratio above 1 says that tauguard is faster.</p>"
+        + (tables(lines, {}) or "<p>None of these studies is in this report.</p>")
+    )
+
+
+def _detections(lines: Sequence[Row]) -> str:
+    return (
+        "<p>Collisions of arms that no threshold was set on, each figure with its 95 % interval. "
+        "Simulated: thresholds that aim at 0.25 false alarms an hour. Real: pushes on a UR5.</p>"
+        + (tables(lines, {}) or "<p>None of these studies is in this report.</p>")
+    )
+
+
+def _cases(rows: Sequence[Row]) -> str:
+    from tauguard.hard_cases.verdicts import by_library
+
+    full = ("case", "library", "expected", "answer", "right", "why", "origin")
+    columns = ("case", "expected", "answer", "why", "explained")
+    wrong = [row for row in rows if not row["right"] and row["library"] == "tauguard"]
+    ours = tables([{key: row[key] for key in columns} for row in wrong], {})
+    return (
+        "<p>Named cases with exact answers, put to every library that is installed; "
+        "<code>tauguard hard-cases</code> runs them, on other libraries too. "
+        "Right answers of those asked:</p>"
+        + tables(by_library(rows), {})
+        + (f"<p>What tauguard answers wrongly:</p>{ours}" if wrong else "")
+        + folded(f"All {len(rows)} answers", tables([{k: r[k] for k in full} for r in rows], {}))
+    )

@@ -1,0 +1,91 @@
+"""What a study is: named parts, and how the command line finds them."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import ModuleType
+
+from studies import SLOW_TESTS, STUDIES
+
+
+@dataclass(frozen=True)
+class Part:
+    """One question of a study, answered by the functions of a module.
+
+    The module has ``measure(quick, seed, **options)``, which returns rows (flat dictionaries, each
+    with its table's name under ``study``), ``draw(rows, figure)`` with a figure of matplotlib, and
+    ``NOTES``: what the columns of each table mean. Where it needs them it also has
+    ``judge(rows)``, which returns the rows of the summary, ``table(rows)``, which returns what is
+    printed instead of all rows, and ``SIZE``, of the figure [in].
+    """
+
+    module: str  #: within ``studies``
+    line: str  #: the question, for ``tauguard bench list``
+    options: tuple[str, ...] = ()  #: of the command line, passed on to ``measure``
+    alias: str = ""  #: another name of the part that ``tauguard bench`` takes
+
+    def load(self) -> ModuleType:
+        """The module."""
+        return importlib.import_module(f"studies.{self.module}")
+
+
+@dataclass(frozen=True)
+class Study:
+    """The parts of a study.
+
+    The package may also have ``points(rows)``, which returns the :class:`~.rows.Point` s of the
+    report's first page from the rows of all its parts, and ``detections(rows)``, which returns
+    lines of the report's table of collisions found.
+    """
+
+    line: str
+    parts: Mapping[str, Part]
+
+
+def package(study: str) -> ModuleType:
+    """The package of a study, which is light to import."""
+    return importlib.import_module(f"studies.{study}")
+
+
+def all_parts() -> dict[str, Part]:
+    """Every part under its full name, ``STUDY-PART``."""
+    return {
+        f"{study}-{name}": part
+        for study in STUDIES
+        for name, part in package(study).STUDY.parts.items()
+    }
+
+
+def find(name: str, part: str | None = None) -> dict[str, Part]:
+    """The parts of a study, one of them, or the part with this full name or alias.
+
+    Raises:
+        ValueError: there is none; the message names the nearest, or all.
+    """
+    parts = all_parts()
+    if name in STUDIES:
+        own = {full: one for full, one in parts.items() if full.startswith(f"{name}-")}
+        if part is None:
+            return own
+        if f"{name}-{part}" in own:
+            return {f"{name}-{part}": own[f"{name}-{part}"]}
+        names = ", ".join(full.partition("-")[2] for full in own)
+        raise ValueError(f"{name} has no part {part!r}: there are {names}")
+    found = {full: one for full, one in parts.items() if name in (full, one.alias)}
+    if found and part is None:
+        return found
+    if found:
+        raise ValueError(f"--part goes with a whole study: {', '.join(STUDIES)}")
+    if name in SLOW_TESTS:
+        hint = f"run `pytest -m slow -k {SLOW_TESTS[name]}` in a checkout"
+        raise ValueError(f"{name} is a slow test now: {hint}")
+    known = [*STUDIES, *(one.alias for one in parts.values() if one.alias), *parts]
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
+    if near:
+        hint = f"did you mean {near[0]}? (`tauguard bench list` has all)"
+    else:
+        hint = f"there are {', '.join(STUDIES)}"
+    raise ValueError(f"no study {name!r}: {hint}")

@@ -1,1 +1,0 @@
-"""The study of logs of a real arm."""

@@ -1,0 +1,39 @@
+"""Logs of real arms: pushes found, delays and false alarms, beside three simple rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from studies.framework import Part, Study, table_rows
+from tauguard.report import Row, cell
+
+STUDY = Study(
+    "logs of real arms: pushes found, delays and false alarms, beside three simple rules",
+    {
+        "logs": Part(
+            "real_arms.study",
+            "logs of real arms: pushes found, delays and false alarms, beside three simple rules",
+            alias="real_arm",
+        ),
+    },
+)
+
+
+def detections(rows: Sequence[Row]) -> Iterator[Row]:
+    """Pushes on the UR5 and the collision-free minutes of all real arms."""
+    free: dict[str, list[float]] = {}
+    for row in table_rows(rows, "false alarms"):
+        sums = free.setdefault(row["detector"], [0.0, 0.0])
+        sums[0] += row["alarms"]
+        sums[1] += row["minutes"]
+    for row in table_rows(rows, "pushes"):
+        (alarms, minutes), found = free.get(row["detector"], (0.0, 0.0)), row["found"]
+        delay = row["median delay ms"]
+        yield {
+            "tried on": f"{row['arm']}, {row['state']}",
+            "detector": row["detector"],
+            "found": f"{round(found['value'] * found['n'])} of {found['n']} ({cell(found)})",
+            "found by chance": row["by chance"],
+            "median delay": "-" if delay is None else f"{delay:.0f} ms",
+            "false alarms on all arms": f"{alarms:.0f} in {minutes:.0f} min",
+        }
