@@ -8,17 +8,19 @@ if TYPE_CHECKING:
     from tauguard.datasets.columns import PRESETS, ColumnMap
     from tauguard.datasets.configuration import Configuration, Split
     from tauguard.datasets.configuration import load as load_configuration
-    from tauguard.datasets.demo import SPEEDS, DemoPlan, demo_plan
-    from tauguard.datasets.generate import simulate_all, write_dataset
     from tauguard.datasets.generation import generate_dataset
     from tauguard.datasets.logs import Log, read_log
     from tauguard.datasets.plans import (
+        SPEEDS,
         TRAINING_PAYLOADS,
+        DemoPlan,
         collision_plans,
+        demo_plan,
         free_episodes,
         struck_episodes,
     )
     from tauguard.datasets.reader import read
+    from tauguard.datasets.recordings import simulate_all, write_dataset
 
 __all__ = [
     "PRESETS",

@@ -1,7 +1,6 @@
-"""What others need to find and use a dataset: a Hugging Face card and Croissant metadata.
+"""A dataset's card for the Hugging Face hub, and its Croissant metadata.
 
-Both are derived from ``dataset.json`` and the manifest alone, so that the same dataset has the same
-card.
+Both are computed from ``dataset.json`` and the manifest alone: one dataset, one card.
 """
 
 from __future__ import annotations
@@ -45,17 +44,17 @@ was recorded.
 |---|---|---|---|---|---|
 {splits}
 
-An episode is a run of one arm. Splits share no motion; `unseen` in `dataset.json` says what else a
-split does not share with the first one.
+An episode is a run of one arm. No motion occurs in two splits; `unseen` in `dataset.json` lists the
+properties of which a split has no value in common with the first split.
 
 ## Files
 
-* `data/SPLIT-NNNNNN.parquet`: a row a sample, an episode a row group.
-* `manifest/SPLIT-NNNNNN.jsonl`: a line an episode (arm, speed, payload, seed, collisions, outcome,
-  everything needed to simulate it again); the last line is a checksum of the others.
-* `arms/NAME.xml`: the nominal arm, what an observer may believe; the simulated ones differ from it.
-  `arms/NAME.drive.json`: its drive's numbers, where the arm is not one of tauguard's own.
-* `dataset.json`: the whole configuration, versions, what was planned.
+* `data/SPLIT-NNNNNN.parquet`: one row a sample, one row group an episode.
+* `manifest/SPLIT-NNNNNN.jsonl`: one line an episode (arm, speed, payload, seed, collisions,
+  outcome, everything needed to simulate it again); the last line is a checksum of the others.
+* `arms/NAME.xml`: the nominal arm, whose numbers an observer may use; simulated arms differ.
+  `arms/NAME.drive.json`: the numbers of its drive, for an arm that is not part of tauguard.
+* `dataset.json`: configuration, versions, planned counts.
 
 ## Columns
 
@@ -67,8 +66,8 @@ Joint signals have one column a joint, `q_1` to `q_{joints}`.
 
 A collision begins at the first sample (of the physics, at 1 kHz) with a contact force above 0 N and
 ends at the last one; contacts less than 0.5 s apart are one. Its kind, link, point, force and peak
-torque are in the manifest, and `collision` says which rows belong to which. Episodes in which other
-collisions happened than were planned are kept; their `outcome` says so.
+torque are in the manifest; the column `collision` gives its index. Episodes with other collisions
+than planned are kept, and their `outcome` says so.
 
 ## How it was made
 
@@ -78,7 +77,7 @@ By tauguard {tauguard} on MuJoCo {mujoco}, from the configuration with the SHA-2
 
 
 def write_cards(folder: Path) -> None:
-    """Write both into the dataset's folder, where their content is not there already."""
+    """Write both files into the dataset's folder; a file with the right content is left alone."""
     configuration = configuration_in(folder)
     summary = summarised(folder)
     _write(folder / CARD, card(configuration, read_head(folder), summary))
@@ -139,7 +138,7 @@ def _column_rows(configuration: Configuration) -> str:
 
 
 def _size(rows: int) -> str:
-    """The hub's class of this many rows."""
+    """The hub's size category for this many rows."""
     names = "1K", "10K", "100K", "1M", "10M", "100M", "1B", "10B", "100B", "1T"
     power = next((i for i in range(len(names)) if rows < 10 ** (i + 3)), len(names) - 1)
     return f"{names[power - 1]}<n<{names[power]}" if power else "n<1K"

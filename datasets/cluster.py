@@ -1,4 +1,4 @@
-"""Shards as tasks of a Ray cluster (extra ``distributed``): one task a shard, on one core."""
+"""Shards computed by a Ray cluster (extra ``distributed``): one task a shard, one core a task."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-#: Tasks that wait for a core beside each that works; what is not yet handed out costs nothing.
+#: Tasks submitted for each core; more would only fill the cluster's memory.
 WAITING = 2
 
 

@@ -1,4 +1,4 @@
-"""Which code computes a dataset: versions, sources, and the bits that it computes here."""
+"""Identity of the code that computes a dataset: versions, sources, and bits of a short episode."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from importlib.resources.abc import Traversable
 
 import numpy as np
 
-#: What an episode's bytes depend on, beside native code, which :func:`computed_bits` tries.
-_ROOMS = ("models", "envs")
+#: Sources that decide an episode's bytes. :func:`computed_bits` covers the native code.
+_PACKAGES = ("models", "envs")
 _FILES = {
     "traces": ("trace.py", "severity.py"),
     "datasets": (
@@ -29,38 +29,38 @@ _LIBRARIES = ("mujoco", "numpy", "pin", "pyarrow")
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Of tauguard and of the libraries whose change may change the bytes."""
+    """Versions of tauguard and of the libraries that can change an episode's bytes."""
     return {name: importlib.metadata.version(name) for name in ("tauguard", *_LIBRARIES)}
 
 
 @functools.cache
 def sources() -> str:
-    """SHA-256 over the source text that decides what an episode is."""
+    """SHA-256 of the sources that decide an episode's bytes."""
     digest = hashlib.sha256()
-    for room in _ROOMS:
-        _add_tree(digest, files(f"tauguard.{room}"), room)
-    for room, names in _FILES.items():
+    for package in _PACKAGES:
+        _add_tree(digest, files(f"tauguard.{package}"), package)
+    for package, names in _FILES.items():
         for name in names:
-            _add(digest, f"{room}/{name}", files(f"tauguard.{room}").joinpath(name))
+            _add(digest, f"{package}/{name}", files(f"tauguard.{package}").joinpath(name))
     return digest.hexdigest()
 
 
 def detection_sources() -> tuple[str, str]:
-    """What the sources of simulation and detectors are, which decide a detector's answers."""
+    """SHA-256 of the sources of the simulation, and of those of the detectors."""
     return sources(), tree_digest("detectors")
 
 
 @functools.cache
-def tree_digest(room: str) -> str:
+def tree_digest(package: str) -> str:
     """SHA-256 over the Python and XML sources of one folder of the package."""
     digest = hashlib.sha256()
-    _add_tree(digest, files(f"tauguard.{room}"), room)
+    _add_tree(digest, files(f"tauguard.{package}"), package)
     return digest.hexdigest()
 
 
 @functools.cache
 def computed_bits() -> str:
-    """SHA-256 of a short episode as this machine computes it: other processors may round apart."""
+    """SHA-256 of a short episode on this machine; another processor may round differently."""
     from tauguard.detectors import RobotNumbers, observe
     from tauguard.envs import Episode, Simulation
     from tauguard.models import Mismatch, pin_model
@@ -77,7 +77,7 @@ def computed_bits() -> str:
 
 @functools.cache
 def code() -> str:
-    """One hash of it all."""
+    """SHA-256 of versions, sources and bits together."""
     text = "\n".join([*(f"{k} {v}" for k, v in versions().items()), sources(), computed_bits()])
     return hashlib.sha256(text.encode()).hexdigest()
 

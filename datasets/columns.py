@@ -1,4 +1,4 @@
-"""Which column of a log holds what: maps from the columns of a CSV file to a trace's signals."""
+"""Column maps: from the columns of a CSV file to the signals of a trace."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ class ColumnMap:
     time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
     current_scale: float | tuple[float, ...] = 1.0  #: amperes in one unit, a number or one a joint
     separator: str = ","
-    joint_names: tuple[str, ...] = ()  #: what the joints are called, if the map knows
-    width: int | None = None  #: how many columns every row has, if the map knows
-    headerless: bool = False  #: its files have no header line; one that has is refused
+    joint_names: tuple[str, ...] = ()  #: empty: not known
+    width: int | None = None  #: number of columns of every row; None: not known
+    headerless: bool = False  #: files have no header line; one with a header is refused
     repair: frozenset[str] = field(default_factory=frozenset)
     """Faults whose rows may be dropped, of "repeat" (a row with the time of the one before), "tail"
     (a last row that is cut off) and "nan" (a row with a number that is missing or not finite)."""
@@ -71,7 +71,7 @@ class ColumnMap:
             raise ValueError(f"columns.repair: {sorted(unknown)}; known: repeat, tail, nan")
 
     def _check_types(self) -> None:
-        """A text such as "false" for a flag would be taken for true."""
+        """Refuse wrong types: the text "false" would count as true."""
         columns = [self.t, *(c for name in SIGNALS for c in getattr(self, name))]
         for column in columns:
             if isinstance(column, bool) or not isinstance(column, str | int):
@@ -154,7 +154,7 @@ def presets_of_width(width: int) -> list[str]:
 
 
 def column_map(columns: str | None) -> ColumnMap | str | None:
-    """A preset's name as it is; a map from a JSON file.
+    """The name of a preset unchanged, or the map in a JSON file.
 
     Raises:
         ValueError: no such file, or not the fields of a :class:`ColumnMap`.

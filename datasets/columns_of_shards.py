@@ -1,4 +1,4 @@
-"""The columns of a dataset's Parquet files: a row a sample, an episode a row group."""
+"""The columns of a dataset's Parquet files: one row a sample, one row group an episode."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from tauguard.traces import Collision, Trace, Truth
 JOINT_SIGNALS = ("q", "qd", "current", "q_des", "qd_des", "qdd_des", "tau_ext")
 #: The momentum observer's estimate, where the configuration asks for it.
 RESIDUAL = "residual"
-#: Step that a signal is rounded to, a power of two so that float32 holds it: far below what the
-#: sensors resolve (2e-6 rad, 5e-4 rad/s, 2.24 mA), and a third of the bytes less. Other signals are
-#: single precision as it is.
+#: Step to which a signal is rounded. It is a power of two, so float32 holds it exactly, and far
+#: below the resolution of the sensors (2e-6 rad, 5e-4 rad/s, 2.24 mA); files get a third smaller.
+#: Other signals are stored in single precision without rounding.
 RESOLUTION = {
     "q": 2.0**-22,
     "qd": 2.0**-18,
@@ -46,13 +46,13 @@ MEANING = {
     "contact_link": "link of the largest contact force, 1-based, 0 for none",
     "contact_x": "its point, world frame [m], null where there is none (also _y, _z)",
     "force_x": "its force on the arm, world frame [N] (also _y, _z)",
-    "payload": "mass carried and not told to the observer [kg]",
+    "payload": "mass carried, not known to the observer [kg]",
     "collision": "index into the episode's collisions in the manifest, -1 for none",
 }
 
 
 def schema(joints: int, residual: bool) -> pa.Schema:
-    """Of every shard; an arm with fewer joints leaves the last columns null."""
+    """Schema of every shard; columns of joints that an arm lacks are null."""
     signals = (*JOINT_SIGNALS, RESIDUAL) if residual else JOINT_SIGNALS
     single = ("contact_force", *POINT, *FORCE, "payload")
     return pa.schema(
@@ -68,10 +68,10 @@ def schema(joints: int, residual: bool) -> pa.Schema:
 
 
 def stored(trace: Trace, every: int) -> Trace:
-    """What a shard keeps of a trace: every ``every``-th sample, signals in single precision.
+    """The part of a trace that a shard stores: every ``every``-th sample in single precision.
 
-    The labels of the collisions are those of the whole trace. Poses of obstacles and contacts of
-    checkers are left out: an MCAP recording of the episode has them.
+    Collision labels keep the physics' rate. Poses of obstacles and contacts of checkers are left
+    out; an MCAP recording of the episode has them.
     """
     rows = slice(None, None, every)
 
@@ -147,7 +147,7 @@ def table(trace: Trace, number: int, residual: Array | None, like: pa.Schema) ->
 
 
 def trace_of(rows: pa.Table, line: Mapping[str, Any], attachments: Mapping[str, str]) -> Trace:
-    """The trace that :func:`table` was given.
+    """The inverse of :func:`table`.
 
     Args:
         rows: of one episode.
@@ -193,7 +193,7 @@ def collision_index(t: Array, collisions: tuple[Collision, ...]) -> NDArray[np.i
 
 
 def collision_line(one: Collision) -> dict[str, Any]:
-    """A collision as JSON values; :func:`collision_of` gives the same one back."""
+    """A collision as JSON values; :func:`collision_of` is the inverse."""
     return {
         "kind": one.kind,
         "onset": one.onset,
@@ -206,7 +206,7 @@ def collision_line(one: Collision) -> dict[str, Any]:
 
 
 def collision_of(values: Mapping[str, Any]) -> Collision:
-    """What :func:`collision_line` wrote."""
+    """The inverse of :func:`collision_line`."""
     arrays = {name: np.array(values[name], np.float64) for name in ("point", "force")}
     return Collision(**{**values, **arrays})
 

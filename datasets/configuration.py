@@ -1,4 +1,4 @@
-"""What a dataset holds, described in TOML: checked whole before anything is simulated."""
+"""The description of a dataset in TOML, checked completely before anything is simulated."""
 
 from __future__ import annotations
 
@@ -28,32 +28,32 @@ NAMED = ("tauguard-collisions-v1", "cura6-twin")
 
 @dataclass(frozen=True)
 class Split:
-    """A part of a dataset that is used for one purpose; every episode belongs to one split."""
+    """A part of a dataset, such as training or test; every episode belongs to one split."""
 
     name: str
-    episodes: int  #: how many there are
-    quick_episodes: int  #: the first of them that ``--quick`` makes
+    episodes: int  #: number of episodes
+    quick_episodes: int  #: number with ``--quick``: the first ones
     seconds: float  #: length of an episode [s]
-    arms: tuple[str, ...]  #: designs, gone through in turn like everything that is listed below
-    individuals: tuple[int, ...]  #: seeds of how an arm differs from its design; -1: not at all
+    arms: tuple[str, ...]  #: designs; this and every list below is cycled
+    individuals: tuple[int, ...]  #: seeds of the mismatch to the design; -1: none
     speeds: tuple[float, ...]  #: percent of the largest joint speeds
-    payloads_g: tuple[float, ...]  #: carried and not told to the observer [g]
-    struck: float  #: share of the episodes that hold collisions
+    payloads_g: tuple[float, ...]  #: carried, not known to the observer [g]
+    struck: float  #: fraction of the episodes that have collisions
     collisions: int  #: planned in each of those
-    kinds: tuple[str, ...]  #: of collisions; a kind that is listed twice comes twice as often
-    links: tuple[int, ...]  #: that are struck, 1-based
+    kinds: tuple[str, ...]  #: of collisions; a kind listed twice occurs twice as often
+    links: tuple[int, ...]  #: that collisions act on, 1-based
     severities: tuple[tuple[float, float], ...]  #: wanted peak |tau_ext| of joints 1-4 [N m]
     temperature: tuple[float, float]  #: of the gears, drawn between these [degC]
-    picks: float  #: share of collision-free episodes in which a payload is taken up half-way
-    unseen: tuple[str, ...]  #: what the first split shares nothing of: "arm", "individual", ...
+    picks: float  #: fraction of collision-free episodes with a payload picked up
+    unseen: tuple[str, ...]  #: properties without a value of the first split: "arm", ...
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """A whole dataset; :func:`load` makes one."""
+    """The description of a dataset; :func:`load` reads one."""
 
     name: str
-    seed: int  #: of everything that is drawn
+    seed: int  #: of every random draw
     rate: int  #: rows a second [Hz]; the physics runs at 1000
     episodes_per_shard: int
     residual: bool  #: whether the momentum observer's estimate of tau_ext is stored
@@ -81,12 +81,12 @@ class Configuration:
 
     @property
     def sha256(self) -> str:
-        """Of the JSON text; where on this machine an arm's file lies does not count."""
+        """Of the JSON text without the paths of the arms' files."""
         nowhere = replace(self, robots=tuple(replace(r, source="") for r in self.robots))
         return hashlib.sha256(nowhere.to_json().encode()).hexdigest()
 
     def anywhere(self) -> Configuration:
-        """The same with the names of the arms' files instead of their places on this machine."""
+        """A copy with the file names of the arms instead of their paths on this machine."""
         return replace(self, robots=tuple(robot.anywhere() for robot in self.robots))
 
     def joints_of(self, arm: str) -> tuple[str, ...]:
@@ -94,28 +94,28 @@ class Configuration:
         return next((r.joints for r in self.robots if r.name == arm), cura6.JOINTS)
 
     def source_of(self, arm: str) -> str:
-        """What :func:`tauguard.models.load_arm` makes the arm from."""
+        """The name or file that :func:`tauguard.models.load_arm` takes for this arm."""
         return next((r.source for r in self.robots if r.name == arm), arm)
 
     def with_source(self, arm: str, source: str) -> Configuration:
-        """The same with an arm's file at ``source``."""
+        """A copy with an arm's file at ``source``."""
         moved = (replace(r, source=source) if r.name == arm else r for r in self.robots)
         return replace(self, robots=tuple(moved))
 
     @property
     def most_joints(self) -> int:
-        """Of any of the arms."""
+        """Largest number of joints of any arm."""
         return max(len(self.joints_of(arm)) for split in self.splits for arm in split.arms)
 
     def quick(self) -> Configuration:
-        """The first episodes of every split, with the same bytes as in the whole dataset."""
+        """The first episodes of every split; their bytes are those in the full dataset."""
         return replace(
             self, splits=tuple(replace(s, episodes=s.quick_episodes) for s in self.splits)
         )
 
     @functools.cached_property
     def identity(self) -> str:
-        """The same for the whole dataset and for its quick part, which share their episodes."""
+        """A hash that is equal for the full dataset and for its quick part."""
         return self.quick().sha256
 
     @property
@@ -128,8 +128,8 @@ def load(source: str | Path) -> Configuration:
     """The configuration in a TOML file, or the one that ships under that name.
 
     Raises:
-        ValueError: not TOML, an unknown key, a value out of its range, or splits that share what
-            they must not; the message names key, value and what would work.
+        ValueError: not TOML, an unknown key, a value out of its range, or a split with a value
+            that it calls unseen; the message names key, value and what would work.
         OSError: no such file.
     """
     path = Path(source)
@@ -190,14 +190,14 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
 
 
 TABLES = ("mismatch", "episodes", "splits")
-#: A collision's slot and the time before the first and after the last one [s].
+#: Length of a collision's slot; time before the first and after the last slot together [s].
 SLOT, MARGIN = 3.0, 3.5
 
 
 def _named_arms(
     where: str, asked: tuple[str, ...], folder: Path, robots: dict[str, RobotSource]
 ) -> tuple[str, ...]:
-    """The arms' names in the dataset; those that are not the package's own go into ``robots``."""
+    """Names of the arms in the dataset; arms from files are added to ``robots``."""
     names = []
     for arm in asked:
         if arm in cura6.NAMES:
@@ -238,7 +238,7 @@ def _split(where: str, values: dict[str, Any], joints: int) -> Split:
 
 
 def _check_splits(splits: list[Split]) -> None:
-    """Names that differ, and nothing shared that a split says is unseen in the first."""
+    """Refuse equal names, and values of the first split that another split calls unseen."""
     names = [split.name for split in splits]
     if len(set(names)) < len(names):
         refuse("splits", names, "a name of its own for every split")
@@ -246,7 +246,7 @@ def _check_splits(splits: list[Split]) -> None:
     for number, split in enumerate(splits):
         where = f"splits[{number}].unseen"
         if number == 0 and split.unseen:
-            refuse(where, split.unseen, "nothing: the first split is what the others are held to")
+            refuse(where, split.unseen, "nothing: the others are compared with the first split")
         for what in split.unseen:
             shared = values_of(first, what) & values_of(split, what)
             if shared:

@@ -1,4 +1,4 @@
-"""The keys of a dataset's configuration: type, range, default, and errors that name them."""
+"""The keys of a dataset's description: type, range, default, and errors that name them."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Read = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Key:
-    """What a key takes."""
+    """The values that a key accepts."""
 
-    read: Read  #: the value as it is stored; ``ValueError`` where it is out of range
-    expected: str  #: what would work, for messages and documentation
+    read: Read  #: converts the value; ``ValueError`` if out of range
+    expected: str  #: accepted values, for messages and documentation
     default: Any = REQUIRED
 
 
@@ -32,7 +32,7 @@ def refuse(key: str, value: Any, expected: str) -> NoReturn:
 
 
 def closest(word: str, known: Iterable[str]) -> str:
-    """A hint at the known word that is most like ``word``."""
+    """A hint that names the most similar known word; empty if none is similar."""
     near = difflib.get_close_matches(word, list(known), n=1)
     return f" (did you mean {near[0]}?)" if near else ""
 
@@ -44,8 +44,8 @@ def checked_table(
 
     Args:
         where: the table's name.
-        values: what the file has.
-        keys: those that there are.
+        values: of the file.
+        keys: that are known.
         partial: required keys may be missing.
 
     Raises:
@@ -85,7 +85,7 @@ def number(low: float, high: float, above: bool = False) -> Read:
     return read
 
 
-def whole(low: int, high: int) -> Read:
+def integer(low: int, high: int) -> Read:
     """A whole number in [low, high]."""
 
     def read(value: Any) -> int:
@@ -160,8 +160,8 @@ def flag(value: Any) -> bool:
 
 
 def rows_a_second(value: Any) -> int:
-    """A rate at which every row is a step of the physics."""
-    rate = int(whole(1, 1000)(value))
+    """A rate that divides the physics' 1000 Hz."""
+    rate = int(integer(1, 1000)(value))
     if 1000 % rate:
         raise ValueError
     return rate
@@ -171,9 +171,9 @@ _LARGEST = {f.name: 0.09 if f.name == "com" else 0.5 for f in fields(Mismatch) i
 _DEFAULT = Mismatch(seed=0)
 SPLIT = {
     "name": Key(split_name, "letters, digits, - and _, at most 40"),
-    "episodes": Key(whole(1, 10_000_000), "a whole number, 1 to 10,000,000"),
+    "episodes": Key(integer(1, 10_000_000), "a whole number, 1 to 10,000,000"),
     "quick_episodes": Key(
-        lambda v: None if v is None else whole(1, 10_000_000)(v), "a whole number from 1", None
+        lambda v: None if v is None else integer(1, 10_000_000)(v), "a whole number from 1", None
     ),
     "seconds": Key(number(1, 600), "seconds, 1 to 600", 60.0),
     "arms": Key(
@@ -181,25 +181,25 @@ SPLIT = {
         f"a list of {', '.join(cura6.NAMES)}, names of `tauguard robot` or robot files",
     ),
     "individuals": Key(
-        several(whole(-1, 2**31), distinct=True), "a list of different seeds, -1 for no mismatch"
+        several(integer(-1, 2**31), distinct=True), "a list of different seeds, -1 for no mismatch"
     ),
     "speeds": Key(several(number(0, 100, above=True)), "a list of percentages above 0 to 100"),
     "payloads_g": Key(several(number(0, 20_000)), "a list of grams, 0 to 20,000", (0.0,)),
-    "struck": Key(number(0, 1), "a share, 0 to 1", 0.5),
+    "struck": Key(number(0, 1), "a fraction, 0 to 1", 0.5),
     "collisions": Key(
-        lambda v: None if v is None else whole(1, 200)(v), "a whole number, 1 to 200", None
+        lambda v: None if v is None else integer(1, 200)(v), "a whole number, 1 to 200", None
     ),
     "kinds": Key(
         several(one_of(*KINDS)),
         f"a list of {', '.join(KINDS)}",
         ("strike", "pulse", "strike", "clamp"),
     ),
-    "links": Key(several(whole(1, 40)), "a list of links, counted from 1", None),
+    "links": Key(several(integer(1, 40)), "a list of links, counted from 1", None),
     "severities": Key(
         several(span(0.1, 500, equal=False)), "a list of [low, high] in N m, 0.1 to 500", STRATA
     ),
     "temperature": Key(span(-10, 80, equal=True), "[low, high] in degC, -10 to 80", (25.0, 45.0)),
-    "picks": Key(number(0, 1), "a share, 0 to 1", 0.0),
+    "picks": Key(number(0, 1), "a fraction, 0 to 1", 0.0),
     "unseen": Key(
         several(one_of("arm", "individual", "payload", "speed"), least=0, distinct=True),
         "a list of arm, individual, payload, speed",
@@ -209,9 +209,9 @@ SPLIT = {
 KEYS: dict[str, dict[str, Key]] = {
     "top": {
         "name": Key(text, "the dataset's name"),
-        "seed": Key(whole(0, 2**62), "a whole number, 0 to 2^62"),
+        "seed": Key(integer(0, 2**62), "a whole number, 0 to 2^62"),
         "rate": Key(rows_a_second, "rows a second that divide 1000", 1000),
-        "episodes_per_shard": Key(whole(1, 1000), "a whole number, 1 to 1000", 10),
+        "episodes_per_shard": Key(integer(1, 1000), "a whole number, 1 to 1000", 10),
         "residual": Key(flag, "true or false", False),
     },
     "mismatch": {

@@ -1,4 +1,4 @@
-"""A dataset's folder: what says which dataset it is, and who may write there."""
+"""A dataset's folder: its head file, its shards, and the lock of its one writer."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from tauguard.datasets.robots import check_unchanged, nominal_texts
 from tauguard.datasets.schedule import stated_balance
 from tauguard.datasets.shard import fault, manifest_path, read_lines
 
-#: Of the folder's layout; a reader refuses newer ones.
+#: Version of the folder's layout; readers refuse newer ones.
 FORMAT = 2
 HEAD = "dataset.json"
-#: Of an arm's files in ``arms``, by what they are called beside a trace.
+#: Endings of an arm's files in ``arms``, by the name of the trace's attachment.
 _ENDINGS = {"arm.xml": ".xml", "drive.json": ".drive.json"}
 
 
 def read_head(folder: Path) -> dict[str, Any]:
-    """What ``dataset.json`` says.
+    """The content of ``dataset.json``.
 
     Raises:
         ValueError: no dataset, a damaged one, or one of a newer version (its number is named).
@@ -79,7 +79,7 @@ def shards(configuration: Configuration) -> Iterator[tuple[str, int]]:
 
 
 def lines(folder: Path, splits: tuple[str, ...] | None = None) -> Iterator[dict[str, Any]]:
-    """The lines of the manifest that there are, split by split, a shard at a time.
+    """The manifest's lines, one an episode, split by split; shards that are missing are skipped.
 
     Raises:
         ValueError: a damaged file of the manifest.
@@ -91,14 +91,16 @@ def lines(folder: Path, splits: tuple[str, ...] | None = None) -> Iterator[dict[
 
 
 def faults(folder: Path) -> Iterator[tuple[str, int, str | None]]:
-    """Every shard, and what is wrong with it (None: nothing); reads every byte."""
+    """Split, number and fault (None: intact) of every shard; reads every byte."""
     for split, number in shards(configuration_in(folder)):
         yield split, number, fault(folder, split, number)
 
 
 @contextlib.contextmanager
 def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
-    """``folder`` holds this dataset (begun, if it was empty), and nobody else writes there.
+    """In this block ``folder`` belongs to this dataset and this process is its only writer.
+
+    An empty folder is begun: head, arms and subfolders are written.
 
     Raises:
         ValueError: it holds something else.
@@ -121,7 +123,7 @@ def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
     finally:
         if made:
             with contextlib.suppress(OSError):
-                folder.rmdir()  # only if nothing came of it
+                folder.rmdir()  # succeeds only if it is empty
 
 
 def head_of(configuration: Configuration) -> dict[str, Any]:
@@ -151,7 +153,7 @@ def arm_xml(folder: Path, arm: str) -> str:
 
 
 def arm_texts(folder: Path, arm: str) -> dict[str, str]:
-    """What goes with every trace of an arm, see ``Scene.nominal_texts``; from the folder alone.
+    """The attachments of every trace of an arm (``Scene.nominal_texts``), read from the folder.
 
     Raises:
         ValueError: a file is missing or not the one that was written.

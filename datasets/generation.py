@@ -1,4 +1,4 @@
-"""Generation of a dataset: shard by shard, on processes or a Ray cluster, resumed at will."""
+"""Generation of a dataset shard by shard, on processes or a Ray cluster; a run can be resumed."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from tauguard.datasets.workers import terminable, writing
 
 @dataclass
 class Built:
-    """What a run did."""
+    """Counts of one run."""
 
     made: int = 0  #: shards
-    kept: int = 0  #: shards that were whole already
+    kept: int = 0  #: shards that were intact already
     episodes: int = 0  #: in all shards
     seconds: float = 0.0  #: simulated in this run [s]
 
@@ -36,10 +36,12 @@ def generate_dataset(
     workers: int | None = None,
     ray: str | None = None,
 ) -> Built:
-    """Write the dataset, or what is missing of it; the bytes do not depend on who computes them.
+    """Write the dataset, or the missing part of it.
+
+    The bytes are the same for any number of workers and for a cluster.
 
     Args:
-        configuration: what it holds.
+        configuration: of the dataset.
         folder: made if it does not exist; if it does, it is empty or holds this dataset.
         workers: processes (default: the processors there are); 1 stays in this process.
         ray: address of a Ray cluster to work on instead ("local" starts one here).

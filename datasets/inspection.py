@@ -1,4 +1,4 @@
-"""What is in a dataset, in numbers: counts, balance, outcomes, leakage, and damage."""
+"""Counts, balance, outcomes, leakage and damage of a dataset."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from tauguard.datasets.shard import PHYSICS_RATE, data_path, manifest_path, simu
 from tauguard.envs import Episode
 from tauguard.traces import Trace, stratum
 
-#: Of collisions, what is counted from the labels.
+#: Properties of collisions that are counted from the labels.
 ACHIEVED = ("kind", "link", "severity")
-#: A class is off balance where it misses what was planned by this share, and this many collisions.
+#: A class is off balance if it differs from the plan by this fraction and this many collisions.
 SLACK, SLACK_COUNT = 0.25, 10
 
 
 @dataclass
 class SplitSummary:
-    """What one split holds."""
+    """Counts of one split."""
 
     episodes: int = 0
     hours: float = 0.0
@@ -52,7 +52,7 @@ class SplitSummary:
 
 
 def summarised(folder: Path) -> dict[str, SplitSummary]:
-    """What the manifest says, split by split; planned classes are those of the episodes there.
+    """Counts from the manifest, split by split; planned classes are of the episodes that exist.
 
     Raises:
         ValueError: no dataset, one of a newer version, or a damaged manifest.
@@ -119,7 +119,7 @@ def _count(into: dict[str, Counter[str]], what: dict[str, Counter[str]]) -> None
 
 
 def leaks(configuration: Configuration, found: dict[str, SplitSummary]) -> list[str]:
-    """What splits share that they must not: motion seeds, and what a split calls unseen."""
+    """Leaks between splits: equal motion seeds, and values that a split calls unseen."""
     lines = []
     names = list(found)
     for i, a in enumerate(names):
@@ -136,7 +136,7 @@ def leaks(configuration: Configuration, found: dict[str, SplitSummary]) -> list[
 
 
 def missing(folder: Path) -> list[str]:
-    """Shards that are not there yet."""
+    """Shards that do not exist yet."""
     return [
         data_path(split, number)
         for split, number in shards(configuration_in(folder))
@@ -160,7 +160,7 @@ def verified(folder: Path) -> list[tuple[str, str]]:
 
 
 def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
-    """Classes of which there is not what was stated: planned otherwise, or achieved by far."""
+    """Classes whose planned count is not the stated one, or whose achieved count is far off."""
     lines = []
     for name, classes in stated.items():
         if {k: v for k, v in classes.items() if v} != dict(one.planned.get(name, {})):
@@ -174,7 +174,7 @@ def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
 
 
 def report(folder: Path) -> dict[str, Any]:
-    """All of it as plain values."""
+    """Everything that `tauguard inspect` shows, as plain values."""
     head = read_head(folder)
     configuration = configuration_in(folder)
     found = summarised(folder)
@@ -221,7 +221,7 @@ def line_of(folder: Path, name: str) -> dict[str, Any]:
 def same_again(
     folder: Path, line: dict[str, Any], robot: str | Path | None = None
 ) -> tuple[Trace | None, bool]:
-    """The episode simulated from its line alone, and whether its samples are those stored.
+    """Simulate an episode from its line; the trace, and whether it equals the stored samples.
 
     Args:
         folder: of the dataset.

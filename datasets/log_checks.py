@@ -1,7 +1,7 @@
-"""Faults of a log that no single number shows: gaps, units, order of columns, saturation.
+"""Faults of a log as a whole: gaps, units, order of columns, saturation.
 
-What a detector can live with is said in a note; what would make its figures mean something else is
-refused, with the row.
+A fault that a detector tolerates gives a note. A fault that would change the meaning of its results
+is an error that names the row.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from tauguard.traces.trace import Trace
 
 #: A pause longer than this many samples, and this many seconds, is a gap.
 GAP_SAMPLES, GAP_SECONDS = 5.0, 0.05
-#: No arm's joint turns further than two turns [rad]: degrees do.
+#: No joint turns further than two turns [rad]; positions in degrees exceed this.
 FURTHEST = 4 * np.pi
-#: Seconds over which velocities are summed to be held against the change of position.
+#: Velocities are integrated over this time and compared with the change of position [s].
 SPAN = 0.1
-#: Samples in a row at the largest current that are called saturated, and how far it must stand out
-#: from the median.
+#: A current is saturated if it stays at its largest value for so many samples in a row, and that
+#: value is so many times the median.
 PLATEAU, ABOVE = 5, 3.0
 
 Where = Callable[[int], str]
 
 
 def checked(trace: Trace, where: Where) -> tuple[str, ...]:
-    """Notes on what is odd in a log but usable.
+    """Notes on faults that a detector tolerates.
 
     Args:
         trace: as read.
-        where: names a row of it for a reader, such as "line 12".
+        where: text for a row's number, such as "line 12".
 
     Raises:
         ValueError: a gap, degrees, velocities that are not those of the positions.
@@ -82,7 +82,7 @@ def _refuse_degrees(trace: Trace, where: Where) -> None:
 
 
 def travelled(trace: Trace) -> tuple[Array, Array]:
-    """Change of position, and summed velocity, over pieces of ``SPAN`` s, each (pieces, n)."""
+    """Change of position, and integrated velocity, over pieces of ``SPAN``, each (pieces, n)."""
     count = max(1, round(SPAN / trace.dt))
     steps = np.diff(trace.t)[:, None] * (trace.qd[1:] + trace.qd[:-1]) / 2
     whole = np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
@@ -110,7 +110,7 @@ def _refuse_strange_velocities(trace: Trace) -> None:
 
 
 def _meaning(ratio: float, name: str) -> str:
-    """What a wrong ratio of position's change to velocity says."""
+    """The likely cause of a wrong ratio of change of position to velocity."""
     if 40 < ratio < 80:
         return f"{name}: positions in degrees, velocities in rad/s"
     if 1 / 80 < ratio < 1 / 40:

@@ -21,7 +21,7 @@ from tauguard.untrusted_input import reading
 
 @dataclass(frozen=True)
 class Log:
-    """A log as a trace, and what had to be done to read it."""
+    """A log as a trace, and the repairs that reading it took."""
 
     trace: Trace
     notes: tuple[str, ...]  #: one line for each repair, empty if there was none
@@ -37,7 +37,7 @@ def read_log(
     Args:
         path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
             system whose ``JointState`` messages hold the motor currents in ``effort``.
-            Where they are joint torques, ``meta["effort"]`` of the trace is to say "torque".
+            If they are joint torques, set ``meta["effort"]`` of the trace to "torque".
         columns: for CSV, a map or the name of a preset (see ``PRESETS``); without one the header
             line must be that of a preset.
         joint_names: what the joints are called, in the order of the columns (default: the map's
@@ -145,10 +145,10 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
     return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")))
 
 
-#: What is said of a log without velocities.
+#: Note on a log without velocities.
 DIFFERENTIATED = (
-    "no velocities: positions are differentiated over three samples, which comes 1.5 samples late "
-    "and raises noise; bounds get larger by what that costs"
+    "no velocities: positions are differentiated over three samples, which adds a delay of 1.5 "
+    "samples and noise; bounds get larger accordingly"
 )
 
 
@@ -182,7 +182,7 @@ def named(names: Sequence[str], joints: int) -> tuple[str, ...]:
 
 
 def number(cell: str) -> float | None:
-    """A cell as a number, None if it is none."""
+    """A cell as a number, or None."""
     try:
         return float(cell)
     except ValueError:

@@ -24,7 +24,7 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
     """A trace from the first topic of type JointState; its ``effort`` is taken as current.
 
     Raises:
-        ValueError: no such topic, messages without velocity or effort, other joints on the way.
+        ValueError: no such topic, messages without velocity or effort, joints that change.
     """
     from mcap.exceptions import McapError
 
@@ -52,8 +52,8 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
 def _messages(content: bytes) -> tuple[str, list[tuple[int, bytes]]]:
     """The first topic of the type, and its log times and messages.
 
-    They are read from the data and not by the index at the file's end: what a damaged index leaves
-    out would be missing without a word.
+    They are read from the data, not by the index at the file's end: messages that a damaged index
+    leaves out would be lost without an error.
     """
     from mcap.reader import NonSeekingReader, make_reader
 

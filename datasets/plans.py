@@ -1,10 +1,10 @@
-"""What to simulate: training slices, judged collisions and collision-free pools, from one seed."""
+"""Episodes to simulate, drawn from a seed: with collisions, without, and those of the demo."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,9 +16,9 @@ from tauguard.traces import STRATA
 TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757, 2757, 4039, 4039)
 #: Half strikes, a quarter pulses, a quarter clamps.
 KIND_CYCLE = ("strike", "pulse", "strike", "clamp")
-#: A detector settles in the first seconds of a run: no collision before [s].
+#: No collision before this time, as a detector settles first [s].
 BEGIN = 3.0
-#: Seconds that one collision gets, and where in them it begins.
+#: Length of a collision's slot, and its onset within the slot [s].
 SLOT, OFFSET = 3.0, 0.9
 
 
@@ -33,12 +33,12 @@ def collision_plans(
     """``count`` collisions, one a slot, spread over kinds, links and strata.
 
     Args:
-        rng: shuffles which kind meets which link and stratum.
-        count: how many.
+        rng: shuffles the combinations of kind, link and stratum.
+        count: number of collisions.
         begin: start of the first slot [s].
-        strata: severities to go through in turn [N m].
-        kinds: to go through in turn.
-        links: to go through in turn, 1-based.
+        strata: severities, cycled [N m].
+        kinds: cycled.
+        links: cycled, 1-based.
     """
     kind_of = rng.permutation([kinds[i % len(kinds)] for i in range(count)])
     link_of = rng.permutation([links[i % len(links)] for i in range(count)])
@@ -66,11 +66,11 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
     return begin + SLOT * collisions + 0.5
 
 
-def torque_share(robot: str) -> float:
-    """What severities and loads are multiplied by on this robot, at most 1.
+def torque_scale(robot: str) -> float:
+    """Factor on severities and loads for this robot, at most 1.
 
-    With 1 the hardest severities of :data:`~tauguard.traces.STRATA` begin below the robot's largest
-    torque limit.
+    The factor brings the lower end of the highest severity of :data:`~tauguard.traces.STRATA` to
+    the robot's largest torque limit.
 
     Raises:
         ValueError: a robot that cannot be used.
@@ -80,10 +80,10 @@ def torque_share(robot: str) -> float:
 
 
 def pairing(i: int, speeds: Sequence[float], payloads: Sequence[float]) -> tuple[float, float]:
-    """Speed and payload of episode ``i``: both are gone through in turn, and every pair comes.
+    """Speed and payload of episode ``i``: both lists are cycled, and every pair occurs.
 
-    Where the two lengths have a common factor the payloads move on by one each time the pairs
-    would repeat; otherwise a speed would always carry the same payloads.
+    If the two lengths have a common factor, the payloads shift by one each time the pairs would
+    repeat; otherwise a speed would always occur with the same payloads.
     """
     pairs = math.lcm(len(speeds), len(payloads))
     moved = i // pairs % math.gcd(len(speeds), len(payloads))
@@ -101,15 +101,15 @@ def struck_episodes(
 ) -> list[Episode]:
     """Episodes with ``collisions`` each; speeds [%] and payloads [g] as :func:`pairing` has it.
 
-    The collisions' severities are those of the robot's :func:`torque_share`, its payloads as given.
+    The collisions' severities are those of the robot's :func:`torque_scale`, its payloads as given.
 
     Raises:
         ValueError: a robot that cannot be used.
         FileNotFoundError: no such robot.
     """
-    joints, share = len(load_arm(robot).joints), torque_share(robot)
+    joints, scale = len(load_arm(robot).joints), torque_scale(robot)
     links = range(min(2, joints), joints + 1)
-    strata = [(share * low, share * high) for low, high in STRATA]
+    strata = [(scale * low, scale * high) for low, high in STRATA]
     children = np.random.SeedSequence([seed, 1]).spawn(count)
     episodes = []
     for i, child in enumerate(children):
@@ -160,3 +160,47 @@ def free_episodes(
             episode = replace(episode, payload_g=0.0, picks=(change,))
         episodes.append(episode)
     return episodes
+
+
+#: Percent of the maximum joint speed that the demo is judged at.
+SPEEDS = (10.0, 30.0, 60.0)
+#: Percent of the maximum joint speed that it is trained at.
+TRAINING_SPEEDS = (10.0, 30.0, 60.0, 20.0, 45.0)
+
+
+@dataclass(frozen=True)
+class DemoPlan:
+    """Every episode of a demo: one arm; no seed is used twice."""
+
+    train: list[Episode]
+    judge_struck: list[Episode]  #: with collisions, to test on
+    judge_free: list[Episode]  #: without collisions, to test on
+    showcase: Episode  #: for the replay
+
+    @property
+    def seconds(self) -> float:
+        """Simulated for training and judging [s]."""
+        return sum(e.seconds for e in (*self.train, *self.judge_struck, *self.judge_free))
+
+
+def demo_plan(seed: int, robot: str = "cura6") -> DemoPlan:
+    """75 collisions to train on; 72 collisions and 10 collision-free minutes to test on.
+
+    The showcase has nine collisions of all kinds, then a payload that the observer does not know.
+    """
+    arm, scale = Mismatch(seed=seed), torque_scale(robot)
+    base = 4 * seed
+    loads = [scale * load for load in TRAINING_PAYLOADS]
+    struck = struck_episodes(base, len(loads), 5, TRAINING_SPEEDS, loads, arm, robot)
+    free = free_episodes(base, 20, 40.0, TRAINING_SPEEDS, loads[::2], arm, robot=robot)
+    payloads = [scale * load for load in (0.0, 1016.0, 4039.0, 2298.0, 782.0)]
+    show = struck_episodes(base + 3, 1, 9, (30.0,), (0.0,), arm, robot)[0]
+    pick = PayloadPick(show.seconds + 1.0, scale * 1016.0)
+    judge_struck = struck_episodes(base + 1, 9, 8, SPEEDS, payloads, arm, robot)
+    judge_free = free_episodes(base + 2, 12, 50.0, SPEEDS, payloads[:4], arm, robot=robot)
+    return DemoPlan(
+        train=[*struck, *free],
+        judge_struck=judge_struck,
+        judge_free=judge_free,
+        showcase=replace(show, seconds=show.seconds + 4.0, picks=(pick,)),
+    )

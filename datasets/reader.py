@@ -1,19 +1,23 @@
-"""Traces from wherever they are: a generated dataset, a folder of recordings, a log."""
+"""Traces of a generated dataset, of a folder of recordings, or of one log."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyarrow.parquet as pq
 
 from tauguard.datasets.columns_of_shards import trace_of
-from tauguard.datasets.dataset_folder import HEAD, arm_texts, configuration_in, shards
+from tauguard.datasets.dataset_folder import HEAD, arm_texts, arm_xml, configuration_in, shards
 from tauguard.datasets.dataset_folder import arms_of as arms_in
 from tauguard.datasets.logs import read_log
 from tauguard.datasets.shard import data_path, manifest_path, read_lines
 from tauguard.traces import Trace
+
+if TYPE_CHECKING:
+    from tauguard.detectors import RobotNumbers
 
 #: Files that :func:`read` takes for recordings.
 ENDINGS = (".mcap", ".csv", ".parquet")
@@ -37,9 +41,9 @@ def read(
         arm: of a dataset, only this arm's episodes.
 
     Yields:
-        Traces; those of a dataset have their truth and the nominal arm with them, whose file need
-            not be there any more (``arm.xml``, and ``drive.json`` of arms that are not the
-            package's own).
+        Traces. Those of a dataset have truth, and the nominal arm as attachments: ``arm.xml``, and
+            ``drive.json`` for an arm that is not the package's own. The arm's own file is not
+            needed.
 
     Raises:
         ValueError: nothing there to read, a damaged shard (it is named), an unknown split or arm, a
@@ -115,3 +119,58 @@ def episodes_of(folder: Path, wanted: Sequence[dict[str, Any]]) -> Iterator[Trac
             f"{path}: damaged ({' '.join(str(error).split())[:120]}); the same `tauguard generate` "
             "that made the dataset makes this shard again"
         ) from None
+
+
+def training_episodes(folder: Path, arm: str | None) -> list[Trace]:
+    """One arm's episodes of the first split, the one to train on.
+
+    Raises:
+        ValueError: the split has several arms and ``arm`` is None, or it has no such arm.
+    """
+    first = (configuration_in(folder).splits[0].name,)
+    arms = arms_of(folder, first)
+    if arm is None and len(arms) > 1:
+        raise ValueError(
+            f"{folder}: its split {first[0]!r} has {len(arms)} arms and a detector knows one: "
+            f"choose with --arm {{{','.join(arms)}}}"
+        )
+    return list(read(folder, first, arm))
+
+
+def episodes_of_splits(
+    folder: Path, robot: RobotNumbers, splits: Sequence[str]
+) -> Iterator[tuple[str, Iterator[Trace]]]:
+    """Names of splits, and their episodes of the arm that a detector was trained for.
+
+    Args:
+        folder: of the dataset.
+        robot: the detector's numbers of its arm.
+        splits: by name (default: those whose name begins with "test").
+
+    Raises:
+        ValueError: no split has that arm.
+    """
+    every = [split.name for split in configuration_in(folder).splits]
+    chosen = splits_of(folder, splits or [s for s in every if s.startswith("test")])
+    arm = same_arm(folder, robot)
+    there = [split for split in chosen if arm in arms_of(folder, [split])]
+    if not there:
+        raise ValueError(
+            f"{folder}: the model is of {arm or 'no arm of this dataset'}; {', '.join(chosen)} "
+            f"have {', '.join(arms_of(folder, chosen))}"
+        )
+    for split in there:
+        yield split, read(folder, [split], arm)
+
+
+def same_arm(folder: Path, robot: RobotNumbers) -> str | None:
+    """The arm of the dataset that has the detector's geometry and rotor inertias, if one has."""
+    from tauguard.detectors import RobotNumbers
+    from tauguard.models import pin_model
+
+    for arm in arms_of(folder):
+        own = RobotNumbers.from_pin(pin_model(arm_xml(folder, arm)))
+        parts = ("translation", "axis", "armature")  # masses are identified in training
+        if all(np.array_equal(getattr(own, name), getattr(robot, name)) for name in parts):
+            return arm
+    return None

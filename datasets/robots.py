@@ -1,4 +1,4 @@
-"""Arms of a dataset that are not the package's own: where each comes from, and what it was."""
+"""Arms of a dataset that come from files or other packages: source and identity of each."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ import numpy as np
 
 from tauguard.models import Robot, Scene, SceneSpec, compose, cura6
 
-#: What a dataset calls an arm is part of a file's name.
+#: An arm's name in a dataset is part of file names.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}")
 
 
 @dataclass(frozen=True)
 class RobotSource:
-    """An arm by name or file, as it was when the dataset was described."""
+    """An arm by name or file, and its identity when the dataset was described."""
 
-    name: str  #: what the dataset calls it: the name asked for, or the file's without its ending
+    name: str  #: in the dataset: the given name, or the file's without ending
     source: str
     """A name that :func:`tauguard.models.load_arm` knows, or a file's whole path; in a dataset's
     folder the file's name alone."""
     joints: tuple[str, ...]
-    sha256: str  #: of all that its simulation depends on
+    sha256: str  #: of everything that its simulation depends on
 
     def anywhere(self) -> RobotSource:
         """With the file's name instead of its place on this machine."""
@@ -56,7 +56,7 @@ def find_robot(asked: str, folder: Path) -> RobotSource:
 
 
 def nominal_texts(name: str, robots: Sequence[RobotSource]) -> dict[str, str]:
-    """The nominal arm, what an observer may believe: see ``Scene.nominal_texts``."""
+    """The nominal arm, whose numbers an observer may use; see ``Scene.nominal_texts``."""
     for robot in robots:
         if robot.name == name:
             return _scene(robot.source).nominal_texts
@@ -64,7 +64,7 @@ def nominal_texts(name: str, robots: Sequence[RobotSource]) -> dict[str, str]:
 
 
 def check_unchanged(name: str, robots: Sequence[RobotSource]) -> None:
-    """Check that an arm is what it was when the dataset was described.
+    """Check that an arm's file has not changed since the dataset was described.
 
     Raises:
         ValueError: its file is another, or is not there.
@@ -100,7 +100,7 @@ def _composed(source: str, changed: tuple[int, ...]) -> Scene:
 
 
 def _digest(scene: Scene) -> str:
-    """Over the nominal arm, its shapes included, and every number that its file does not have."""
+    """SHA-256 of the nominal arm with its shapes, and of the numbers that are not in its file."""
     facts = scene.facts
     rest = {key: value for key, value in asdict(facts).items() if key not in ("name", "sources")}
     text = json.dumps(rest, sort_keys=True, default=_plain)

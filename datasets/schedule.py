@@ -1,8 +1,8 @@
 """The episodes of a configuration, each a pure function of the configuration and its number.
 
-A value that is gone through in turn (arm, individual, speed, payload, struck or not; kind, link and
-severity of a collision) comes from a deck that is shuffled anew every round, each by itself, so
-that any stretch of a split is balanced to within one round and no two values go together.
+Each property (arm, individual, speed, payload, collisions or none; kind, link and severity of a
+collision) is dealt from a deck of its own that is shuffled every round. Any stretch of a split is
+balanced to within one round, and no two properties are correlated.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Planned:
     arm: str
     individual: int  #: seed of its mismatch, -1 for none
     episode: Episode
-    source: str = ""  #: what the arm is made from; "": its name
+    source: str = ""  #: name or file of the arm; "": its name
 
     @property
     def name(self) -> str:
@@ -44,7 +44,7 @@ class Planned:
         return f"{self.split}/{self.number}"
 
     def key(self, configuration: Configuration, code: str) -> str:
-        """What the episode's bytes depend on, hashed: configuration, number and code."""
+        """SHA-256 of all that decides the episode's bytes: configuration, number and code."""
         text = "\n".join((configuration.identity, self.name, self.episode.config_hash, code))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -62,8 +62,8 @@ def planned(configuration: Configuration, split: Split, number: int) -> Planned:
     arm = dealt(split.arms, [*seed, 1], number)
     individual = dealt(split.individuals, [*seed, 2], number)
     payload = dealt(split.payloads_g, [*seed, 4], number)
-    struck = dealt(_share(split.struck), [*seed, 5], number)
-    picked = not struck and payload > 0 and dealt(_share(split.picks), [*seed, 6], number)
+    struck = dealt(_fraction(split.struck), [*seed, 5], number)
+    picked = not struck and payload > 0 and dealt(_fraction(split.picks), [*seed, 6], number)
     picks = (PayloadPick(split.seconds / 2, payload),) if picked else ()
     widths = dict(configuration.mismatch)
     episode = Episode(
@@ -95,9 +95,9 @@ def dealt(values: Sequence[T], seed: list[int], number: int) -> T:
     return values[int(order[place])]
 
 
-def _share(share: float) -> tuple[bool, ...]:
-    """A deck with that share of True, of at most 20 cards."""
-    part = Fraction(share).limit_denominator(20)
+def _fraction(fraction: float) -> tuple[bool, ...]:
+    """A deck of at most 20 cards with this fraction of True."""
+    part = Fraction(fraction).limit_denominator(20)
     yes, no = part.numerator, part.denominator - part.numerator
     return (True,) * yes + (False,) * no
 
@@ -105,8 +105,8 @@ def _share(share: float) -> tuple[bool, ...]:
 def _collisions(
     split: Split, seed: list[int], number: int, rng: np.random.Generator
 ) -> tuple[CollisionPlan, ...]:
-    """The collisions of a struck episode; their classes are dealt on from the one before."""
-    before = _dealt_counts(_share(split.struck), [*seed, 5], number)[True]
+    """The collisions of an episode; dealing continues from the episode with collisions before."""
+    before = _dealt_counts(_fraction(split.struck), [*seed, 5], number)[True]
     cards = range(before * split.collisions, (before + 1) * split.collisions)
     return collision_plans(
         rng,
@@ -122,14 +122,14 @@ Balance = dict[str, dict[str, int]]
 
 
 def stated_balance(configuration: Configuration) -> dict[str, Balance]:
-    """What will be planned in every split, counted by class, without drawing every episode."""
+    """Planned counts by class in every split, without drawing every episode."""
     return {split.name: _stated(configuration, split) for split in configuration.splits}
 
 
 def _stated(configuration: Configuration, split: Split) -> Balance:
     seed = [configuration.seed, zlib.crc32(split.name.encode())]
     count = split.episodes
-    struck = _dealt_counts(_share(split.struck), [*seed, 5], count)[True]
+    struck = _dealt_counts(_fraction(split.struck), [*seed, 5], count)[True]
     found: dict[str, Counter[Any]] = {
         "arm": _dealt_counts(split.arms, [*seed, 1], count),
         "speed": _dealt_counts([f"{v:g}" for v in split.speeds], [*seed, 3], count),

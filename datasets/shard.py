@@ -33,7 +33,7 @@ from tauguard.envs.plant import untimed
 from tauguard.models import Drive, pin_model
 from tauguard.traces import Trace
 
-#: Rate of the momentum observer [1/s], and slope of the nominal friction at standstill [rad/s].
+#: Gain of the momentum observer [1/s]; speed over which nominal friction changes sign [rad/s].
 OBSERVER_GAIN, STANDSTILL = 50.0, 0.05
 #: Of the physics [Hz].
 PHYSICS_RATE = 1000
@@ -43,33 +43,33 @@ ZSTD_LEVEL = 3
 
 @dataclass(frozen=True)
 class ShardTask:
-    """What a worker is sent."""
+    """The work of one worker process."""
 
     folder: str  #: of the dataset
     configuration: str  #: as JSON
     split: str
     number: int  #: of the shard within the split
-    code: str  #: which code must compute it
+    code: str  #: hash of the code that must compute it
 
 
 @dataclass(frozen=True)
 class Done:
-    """What became of a shard."""
+    """Result of a task."""
 
     split: str
     number: int
     episodes: int
     seconds: float  #: simulated [s]
-    kept: bool  #: it was there already, whole
+    kept: bool  #: it existed already, intact
 
 
 def data_path(split: str, number: int) -> str:
-    """Where a shard's samples are, in the dataset's folder."""
+    """Path of a shard's samples in the dataset's folder."""
     return f"data/{split}-{number:06d}.parquet"
 
 
 def manifest_path(split: str, number: int) -> str:
-    """Where a shard's episodes are listed, a JSON line each; written when its samples are there."""
+    """Path of a shard's list of episodes, one JSON line each; written after the samples."""
     return f"manifest/{split}-{number:06d}.jsonl"
 
 
@@ -80,7 +80,7 @@ def numbers_in(configuration: Configuration, split: Split, shard: int) -> range:
 
 
 def make_shard(task: ShardTask) -> Done:
-    """Simulate and write a shard, unless it is there and whole.
+    """Simulate and write a shard, unless it exists and is intact.
 
     Raises:
         ValueError: this machine or this installation computes other bytes than the dataset's.
@@ -106,7 +106,7 @@ def make_shard(task: ShardTask) -> Done:
 
 
 def fault(folder: Path, split: str, number: int) -> str | None:
-    """What is wrong with a shard: None if it is whole, byte for byte."""
+    """The fault of a shard, or None if every byte is as written."""
     data, listed = folder / data_path(split, number), folder / manifest_path(split, number)
     if not listed.is_file():
         return "missing" if not data.exists() else "not listed in the manifest"

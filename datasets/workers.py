@@ -1,4 +1,4 @@
-"""Processes that do tasks: none outlives the command, and none that dies goes unnoticed."""
+"""Worker processes: none outlives the command, and the death of one is an error."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Terminated(KeyboardInterrupt):
 
 @contextlib.contextmanager
 def terminable() -> Iterator[None]:
-    """In this block SIGTERM raises :class:`Terminated`, so that what must be tidied up is."""
+    """In this block SIGTERM raises :class:`Terminated`, so that ``finally`` blocks run."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -54,7 +54,7 @@ def writing(
 ) -> Iterator[Generator[Result]]:
     """The results of tasks that write files into ``folder``, see :func:`in_processes`.
 
-    However the block ends, by SIGTERM too, no worker and no part of a file is left.
+    When the block ends, also by SIGTERM, no worker is left and no partly written file.
     """
     with terminable():
         results = in_processes(work, tasks, workers)
@@ -71,7 +71,7 @@ def in_processes(
     """The results of ``work`` in the order in which they are ready.
 
     Args:
-        work: a function of a module (it is sent to the workers by its name).
+        work: a function of a module; workers import it by its name.
         tasks: taken one by one, when a worker is free.
         workers: processes; 1 stays in this process.
 
@@ -112,8 +112,10 @@ def _hire(work: Callable[[Any], Any]) -> tuple[Connection, BaseProcess]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
-    resource_tracker.ensure_running()  # where start() has to begin it, it unblocks Ctrl-C again
-    with _ctrl_c_blocked():  # inherited: Ctrl-C reaches this process alone, which ends the others
+    resource_tracker.ensure_running()  # start() would begin it and unblock Ctrl-C
+    with (
+        _ctrl_c_blocked()
+    ):  # inherited, so Ctrl-C reaches this process only, which ends the workers
         process.start()
     theirs.close()
     return ours, process
@@ -150,7 +152,7 @@ def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent was killed stops at once: another run may be at work soon."""
+    """Stop at once if the parent was killed: another run may begin soon."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     wait([parent.sentinel])

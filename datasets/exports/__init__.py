@@ -1,1 +1,1 @@
-"""Datasets for other libraries: what they read, from what is there."""
+"""Datasets in the formats of other libraries."""

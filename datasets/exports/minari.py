@@ -1,4 +1,4 @@
-"""Minari datasets (extra ``export``): what a policy or a detector would see, a step a sample."""
+"""Minari datasets (extra ``export``): one step a sample."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""The arrays that every room speaks of."""
+"""Types of arrays that every package uses."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Numbers with units; shapes stand in the docstrings.
+#: Numbers; docstrings give units and shapes.
 Array = NDArray[np.float64]
-#: Marks, one an element.
+#: One mark for each element.
 Bools = NDArray[np.bool_]

@@ -20,11 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.framework import Workers
-from tauguard.datasets.arm_splits import episodes_of_splits
 from tauguard.datasets.configuration import Configuration, load
 from tauguard.datasets.generation import generate_dataset
-from tauguard.datasets.labelled import labelled
-from tauguard.datasets.reader import arms_of
+from tauguard.datasets.reader import arms_of, episodes_of_splits
+from tauguard.datasets.recordings import labelled
 from tauguard.datasets.schedule import all_planned
 from tauguard.datasets.shard import simulated
 from tauguard.detectors import (

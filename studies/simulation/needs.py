@@ -17,8 +17,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from studies.framework import Workers, time_in_turn
-from tauguard.datasets.demo import SPEEDS, TRAINING_SPEEDS
-from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
+from tauguard.datasets.plans import (
+    SPEEDS,
+    TRAINING_PAYLOADS,
+    TRAINING_SPEEDS,
+    free_episodes,
+    struck_episodes,
+)
 from tauguard.detectors import SrqSvr, figures, matchings, train
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs import Episode, simulate

@@ -115,8 +115,8 @@ def test_recordings_of_our_own_pass_the_same_checks(tmp_path):
 
 
 def test_a_gap_in_a_labelled_recording_is_no_watched_time(tmp_path):
-    from tauguard.datasets.labelled import labelled
     from tauguard.datasets.plans import free_episodes
+    from tauguard.datasets.recordings import labelled
     from tauguard.envs import simulate
 
     trace = simulate(free_episodes(0, 1, 2.0, (30.0,), (0.0,), None)[0])

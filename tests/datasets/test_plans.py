@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tauguard.datasets.demo import demo_plan
-from tauguard.datasets.plans import pairing, struck_episodes, torque_share
+from tauguard.datasets.plans import demo_plan, pairing, struck_episodes, torque_scale
 from tauguard.envs import simulate
 from tauguard.traces import STRATA
 
@@ -43,9 +42,9 @@ def tiny(tmp_path_factory):
 
 
 def test_a_small_arm_of_four_joints_gets_collisions_and_loads_of_its_size(tiny):
-    share = torque_share(tiny)
+    share = torque_scale(tiny)
     assert share == pytest.approx(3 / 64)
-    assert torque_share("cura6") == 1
+    assert torque_scale("cura6") == 1
     (episode,) = struck_episodes(0, 1, 5, (30.0,), (100.0,), robot=tiny)
     assert {plan.link for plan in episode.collisions} <= {2, 3, 4}
     assert {plan.severity for plan in episode.collisions} <= {

@@ -21,7 +21,7 @@ COMMANDS = {
     "calibrate": "friction, inertia and drive gains of a real arm from collision-free logs",
     "detect": "look for collisions in the log of a real arm",
     "generate": "a labelled dataset from its description, on all cores or a Ray cluster",
-    "inspect": "what a generated dataset holds, and whether it is whole",
+    "inspect": "the content of a generated dataset, and whether it is intact",
     "export": "a generated dataset in the format of another library",
     "robot": "what is known and assumed about an arm, number by number",
     "simulate": "labelled episodes of the arm at work, as many as asked",

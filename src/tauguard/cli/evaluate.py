@@ -42,8 +42,8 @@ def command(
             --episode` takes.
         late: with --events, a collision found later than this is an event [s].
     """
-    from tauguard.datasets.arm_splits import episodes_of_splits
-    from tauguard.datasets.labelled import labelled
+    from tauguard.datasets.reader import episodes_of_splits
+    from tauguard.datasets.recordings import labelled
     from tauguard.detectors import load_model
     from tauguard.detectors.evaluation.metrics_page import diagnosis_text, draw, text
     from tauguard.detectors.registry import make_detector

@@ -1,4 +1,4 @@
-"""``tauguard inspect``: what a dataset holds, and whether it is whole."""
+"""``tauguard inspect``: the content of a dataset, and whether it is intact."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def command(
     mcap: Path | None = None,
     robot: Path | None = None,
 ) -> None:
-    """Show what a generated dataset holds; with --verify read every byte of it.
+    """Show the content of a generated dataset; with --verify read every byte of it.
 
     Exit code 1: --verify found damaged or missing shards, or splits share what they must not. The
     command that generated the dataset makes such shards again, and only those.

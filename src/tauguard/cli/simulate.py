@@ -35,8 +35,8 @@ def command(
         episodes: how many.
         collisions: injected into each episode; 0 gives collision-free ones.
         seconds: length of a collision-free episode (struck ones are as long as they need).
-        speeds: percent of the maximum joint speed, gone through in turn.
-        payloads_g: grams at the flange that the observer does not know, gone through in turn
+        speeds: percent of the maximum joint speed, cycled.
+        payloads_g: grams at the flange that the observer does not know, cycled
             (default: 0, 1016 and 4039, less on an arm whose torque limits are below 64 N m).
         seed: of everything that is drawn.
         mismatch_seed: which arm: how its masses, gains and friction differ from the nominal ones;
@@ -48,7 +48,7 @@ def command(
         json: write what was simulated here as JSON.
     """
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
-    from tauguard.datasets.plans import torque_share
+    from tauguard.datasets.plans import torque_scale
     from tauguard.models import Mismatch
     from tauguard.report import write_json
 
@@ -57,8 +57,8 @@ def command(
     if collisions < 0:
         raise ValueError(f"--collisions {collisions}: expected 0 or more")
     if payloads_g is None:
-        share = torque_share(robot)
-        payloads_g = tuple(share * load for load in LOADS)
+        scale = torque_scale(robot)
+        payloads_g = tuple(scale * load for load in LOADS)
     first = 10_000  # smaller seeds are the demo's, whose model may be judged on these episodes
     arm = None if mismatch_seed is None else Mismatch(seed=mismatch_seed)
     planned = (

@@ -114,7 +114,7 @@ def labelled_motion(
     arm: str | None = None,
 ) -> None:
     """Train on labelled recordings."""
-    from tauguard.datasets.labelled import labelled
+    from tauguard.datasets.recordings import labelled
     from tauguard.detectors import make_detector, save_model, with_guarantee
     from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.detectors.thresholds.guarantee import check_guarantee

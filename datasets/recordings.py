@@ -1,19 +1,23 @@
-"""Generation of labelled episodes: parallel, in order, resumable."""
+"""Folders of labelled recordings, one MCAP file an episode: simulated, resumed, read."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from tqdm import tqdm
 
 from tauguard.atomic_write import remove_parts
+from tauguard.datasets.log_checks import checked
+from tauguard.datasets.reader import is_dataset, training_episodes
 from tauguard.datasets.workers import in_processes, terminable
 from tauguard.envs import Episode, simulate
 from tauguard.traces import Trace, read_mcap, write_mcap
+from tauguard.untrusted_input import reading
 
 
 def simulate_all(
@@ -22,14 +26,14 @@ def simulate_all(
     label: str = "simulate",
     checkers: Sequence[str] = (),
 ) -> Generator[Trace]:
-    """The traces of ``episodes`` in their order, whatever the number of workers.
+    """The traces of ``episodes``, in their order for any number of workers.
 
     Args:
         episodes: what to simulate.
         workers: processes (default: the processors there are); 1 stays in this process.
         label: of the progress bar.
-        checkers: names of contact checkers whose answers go into ``Trace.contacts``. One that is
-            not among ours must be registered where a worker imports it, or ``workers`` be 1.
+        checkers: names of contact checkers that fill ``Trace.contacts``. A checker of your own
+            must be registered where a worker process imports it, or ``workers`` must be 1.
     """
     workers = min(workers or os.cpu_count() or 1, max(len(episodes), 1))
     bar = tqdm(total=len(episodes), desc=label, unit="episode", disable=None, leave=False)
@@ -57,7 +61,7 @@ def write_dataset(
     workers: int | None = None,
     checkers: Sequence[str] = (),
 ) -> list[Path]:
-    """Write one MCAP an episode into ``folder``; whole files of the same episodes are kept.
+    """Write one MCAP file an episode into ``folder``; files of the same episodes are kept.
 
     Args:
         episodes: what to simulate.
@@ -70,7 +74,7 @@ def write_dataset(
         ValueError: an unknown checker; a file of that name holds another episode or other checkers
             (nothing is overwritten).
     """
-    from tauguard.contacts import registered  # and its room, which takes long to import
+    from tauguard.contacts import registered  # here, as it takes long to import
 
     for name in checkers:
         if name not in registered():
@@ -103,3 +107,38 @@ def _holds(path: Path, episode: Episode, checkers: Sequence[str]) -> bool:
             f"{', '.join(checkers) or 'no checker'}; choose another folder or remove it"
         )
     return True
+
+
+def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
+    """The labelled recordings in a folder, in the order of their file names.
+
+    Args:
+        folder: of MCAP recordings, or a dataset of `tauguard generate`, of which the first split is
+            read.
+        arm: in a dataset with several arms, the one whose episodes are read.
+
+    Returns:
+        Traces with truth; ``meta["log"]`` is the file's name.
+
+    Raises:
+        ValueError: no recordings there, or one without truth; the message names it.
+        FileNotFoundError: no such folder.
+    """
+    if not folder.is_dir():
+        raise FileNotFoundError(f"{folder}: no such folder; `tauguard simulate --out` makes one")
+    if is_dataset(folder):
+        return training_episodes(folder, arm)
+    if arm is not None:
+        raise ValueError(f"--arm {arm}: {folder} is no dataset, so its recordings are of one arm")
+    paths = sorted(folder.glob("*.mcap"))
+    if not paths:
+        raise ValueError(f"{folder}: no .mcap files; `tauguard simulate --out` writes some")
+    traces = []
+    for path in tqdm(paths, desc="read", unit="file", disable=None, leave=False):
+        trace, _ = read_mcap(path)
+        if trace.truth is None:
+            raise ValueError(f"{path}: no truth in it; simulated recordings have one")
+        with reading(path):  # as for logs: a gap is not counted as time without an alarm
+            checked(trace, lambda row: f"sample {row}")
+        traces.append(replace(trace, meta={**trace.meta, "log": path.name}))
+    return traces
