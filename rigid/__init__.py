@@ -1,13 +1,18 @@
 """Overlap and time of impact of convex bodies and rigid meshes, on plain arrays."""
 
-from tauguard.rigid.gap import Gaps
 from tauguard.rigid.impact import time_of_impact
 from tauguard.rigid.mesh import MeshContacts, MeshOverlap, MeshTree
-from tauguard.rigid.mesh_bodies import MeshGaps
 from tauguard.rigid.motion import Motion
 from tauguard.rigid.plane_cache import PlaneCache
 from tauguard.rigid.queries import sweep
-from tauguard.rigid.results import Impacts, MeshImpacts, Overlap, Witness
+from tauguard.rigid.results import (
+    Distances,
+    Impacts,
+    MeshDistances,
+    MeshImpacts,
+    Overlap,
+    Witness,
+)
 from tauguard.rigid.rounded import Capsules, Rounded, Spheres
 from tauguard.rigid.shapes import Boxes, Hulls, Parallelepipeds, Polygons, Tetrahedra
 from tauguard.rigid.solids_and_meshes import distance, overlap
@@ -15,11 +20,11 @@ from tauguard.rigid.solids_and_meshes import distance, overlap
 __all__ = [
     "Boxes",
     "Capsules",
-    "Gaps",
+    "Distances",
     "Hulls",
     "Impacts",
     "MeshContacts",
-    "MeshGaps",
+    "MeshDistances",
     "MeshImpacts",
     "MeshOverlap",
     "MeshTree",

@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.geometry import thread_count
-from tauguard.rigid.gap import Gaps
 from tauguard.rigid.mesh import MeshOverlap, MeshTree
 from tauguard.rigid.motion import Motion, common_length
 from tauguard.rigid.queries import native
-from tauguard.rigid.results import MeshImpacts
+from tauguard.rigid.results import MeshDistances, MeshImpacts
 from tauguard.rigid.rounded import Solid, solid_parts
 
 #: Coordinates and radii beyond this are refused beside a mesh, whose own bound it is.
 MOST_COORDINATE = 1e30
-
-
-@dataclass(frozen=True, eq=False)
-class MeshGaps(Gaps):
-    """Signed distance of a mesh and convex bodies, row by row.
-
-    Below zero it is that of the triangle that is deepest in the body: how far the body is to move
-    to leave that triangle, not the whole mesh.
-
-    Attributes:
-        face: The triangle nearest to the body, or deepest in it. Shape (N,).
-    """
-
-    face: NDArray[np.int32]
 
 
 def mesh_beside(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[MeshTree, Solid, bool] | None:
@@ -66,15 +50,15 @@ def overlap(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshOv
     return MeshOverlap(face >= 0, faces_of(face, swapped))
 
 
-def distance(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshGaps:
+def distance(mesh: MeshTree, solid: Solid, swapped: bool, threads: int) -> MeshDistances:
     """How far the surface is from each body."""
     bodies = bodies_of(_other(swapped), solid)
     out, face = np.empty((len(solid), 10)), np.empty(len(solid), dtype=np.int32)
-    mesh._mesh.gaps(*bodies, out, face, thread_count(threads))
+    mesh._mesh.distances(*bodies, out, face, thread_count(threads))
     first, second, normal = out[:, 1:4], out[:, 4:7], out[:, 7:10]
     if swapped:
         first, second, normal = second, first, -normal
-    return MeshGaps(out[:, 0], first, second, normal, face)
+    return MeshDistances(out[:, 0], first, second, normal, face)
 
 
 def first_contact(

@@ -70,3 +70,42 @@ class MeshImpacts(Impacts):
     """
 
     faces: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Signed distance of two bodies, row by row: ``(point_b - point_a) . normal``.
+
+    Attributes:
+        distance: Above zero the length of the shortest path between the bodies, zero where they
+            touch, below zero minus the penetration: the length of the shortest path that separates
+            them. Shape (N,).
+        point_a: The point of a nearest to b; in each other, a's deepest point along the normal.
+            Shape (N, 3).
+        point_b: Likewise of b. Shape (N, 3).
+        normal: Unit, from a to b: the direction in which b leaves a. Where bodies without
+            thickness touch, any normal of what they span. Shape (N, 3).
+    """
+
+    distance: NDArray[np.float64]
+    point_a: NDArray[np.float64]
+    point_b: NDArray[np.float64]
+    normal: NDArray[np.float64]
+
+    def within(self, min_distance: float) -> NDArray[np.bool_]:
+        """Which pairs are no further apart than ``min_distance``. Shape (N,)."""
+        return self.distance <= min_distance
+
+
+@dataclass(frozen=True, eq=False)
+class MeshDistances(Distances):
+    """Signed distance of a mesh and convex bodies, row by row.
+
+    Below zero it is that of the triangle that is deepest in the body: how far the body is to move
+    to leave that triangle, not the whole mesh.
+
+    Attributes:
+        face: The triangle nearest to the body, or deepest in it. Shape (N,).
+    """
+
+    face: NDArray[np.int32]

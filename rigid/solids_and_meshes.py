@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Literal, cast, get_args, overload
 
 from tauguard.rigid import mesh_bodies
-from tauguard.rigid.gap import Gaps, solid_gaps
 from tauguard.rigid.mesh import MeshOverlap, MeshTree
-from tauguard.rigid.mesh_bodies import MeshGaps
 from tauguard.rigid.queries import sharp_overlap
-from tauguard.rigid.results import Overlap
+from tauguard.rigid.results import Distances, MeshDistances, Overlap
 from tauguard.rigid.rounded import Solid
-from tauguard.rigid.rounded_overlap import rounded_overlap
 from tauguard.rigid.shapes import Bodies
+from tauguard.rigid.solid_queries import rounded_overlap, solid_distances
 
 OverlapMethod = Literal["abfme", "sat", "gjk", "auto"]
 
@@ -66,12 +64,12 @@ def overlap(
 
 
 @overload
-def distance(a: Solid, b: Solid, threads: int = 1) -> Gaps: ...
+def distance(a: Solid, b: Solid, threads: int = 1) -> Distances: ...
 @overload
-def distance(a: MeshTree, b: Solid, threads: int = 1) -> MeshGaps: ...
+def distance(a: MeshTree, b: Solid, threads: int = 1) -> MeshDistances: ...
 @overload
-def distance(a: Solid, b: MeshTree, threads: int = 1) -> MeshGaps: ...
-def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Gaps:
+def distance(a: Solid, b: MeshTree, threads: int = 1) -> MeshDistances: ...
+def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Distances:
     """Signed distance, nearest points and normal of the convex bodies ``a[i]`` and ``b[i]``.
 
     The sign is never wrong, degenerate bodies included: it is that of :func:`overlap`, and 0
@@ -92,4 +90,4 @@ def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Gaps
     """
     if beside := mesh_bodies.mesh_beside(a, b):
         return mesh_bodies.distance(*beside, threads)
-    return solid_gaps(cast(Solid, a), cast(Solid, b), threads)
+    return solid_distances(cast(Solid, a), cast(Solid, b), threads)

@@ -77,14 +77,14 @@ void impact_of_meshes(const Mesh& a, const Mesh& b, Poses pose_a, Vectors linear
 
 }  // namespace
 
-void bind_gaps(nb::module_& m);
+void bind_distances(nb::module_& m);
 void bind_bodies(nb::class_<Mesh>& mesh);
 void bind_volumes(nb::module_& m);
 
 NB_MODULE(_rigid_mesh, m) {
   m.doc() = "Meshes and rigid motion over batches of poses. Arguments are checked in Python.";
   tauguard::geometry::bind_interrupts();
-  bind_gaps(m);
+  bind_distances(m);
   bind_volumes(m);
   nb::class_<Mesh> mesh(m, "Mesh");
   bind_bodies(mesh);

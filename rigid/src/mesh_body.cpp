@@ -139,8 +139,8 @@ bool beyond(const Triangle& t, const RoundedBody& body, const Vec& n, double mar
     const double x = dot(n, q - from);
     b_lo = std::min(b_lo, x), b_hi = std::max(b_hi, x), size = std::max(size, norm(q - from));
   }
-  const double gap = std::max(a_lo - b_hi, b_lo - a_hi) - 0x1p-46 * size * norm(n);
-  return gap > (margin + body.rounding) * norm(n) * (1 + 0x1p-46);
+  const double separation = std::max(a_lo - b_hi, b_lo - a_hi) - 0x1p-46 * size * norm(n);
+  return separation > (margin + body.rounding) * norm(n) * (1 + 0x1p-46);
 }
 
 Vec normal_of(const Triangle& t) {
@@ -163,19 +163,19 @@ std::int32_t first_overlap(const Mesh& mesh, const RoundedBody& body) {
   return face;
 }
 
-FaceGap nearest_face(const Mesh& mesh, const RoundedBody& body) {
-  FaceGap best{{INFINITY, {}, {}, {}}, -1};
+FaceDistance nearest_face(const Mesh& mesh, const RoundedBody& body) {
+  FaceDistance best{{INFINITY, {}, {}, {}}, -1};
   double margin = INFINITY;
   each_near(mesh, body, margin, [&](int i) {
     const Triangle& t = mesh.tree.triangles[i];
     const std::int32_t face = mesh.tree.id[i];
     if (best.face >= 0 &&
-        (beyond(t, body, best.gap.normal, margin) || beyond(t, body, normal_of(t), margin)))
+        (beyond(t, body, best.at.normal, margin) || beyond(t, body, normal_of(t), margin)))
       return false;
-    const Gap gap = gap_of(as_body(t), body.bodies, 0, 0, body.rounding);
-    const double old = best.gap.distance;
-    if (gap.distance < old || (gap.distance == old && face < best.face)) best = {gap, face};
-    margin = std::max(best.gap.distance, 0.0);
+    const SignedDistance at = signed_distance(as_body(t), body.bodies, 0, 0, body.rounding);
+    const double old = best.at.distance;
+    if (at.distance < old || (at.distance == old && face < best.face)) best = {at, face};
+    margin = std::max(best.at.distance, 0.0);
     return false;
   });
   return best;

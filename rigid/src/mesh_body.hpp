@@ -3,8 +3,8 @@
 #pragma once
 
 #include "first_touch.hpp"
-#include "gap.hpp"
 #include "mesh_pieces.hpp"
+#include "signed_distance.hpp"
 
 namespace tauguard::rigid {
 
@@ -31,11 +31,11 @@ std::int32_t first_overlap(const Mesh& mesh, const RoundedBody& body);
 
 // The least signed distance of a triangle of the mesh (a) to the body (b), and that triangle, the
 // first of several: where they meet it is that of the triangle that is deepest in the body.
-struct FaceGap {
-  Gap gap;
+struct FaceDistance {
+  SignedDistance at;
   std::int32_t face;
 };
-FaceGap nearest_face(const Mesh& mesh, const RoundedBody& body);
+FaceDistance nearest_face(const Mesh& mesh, const RoundedBody& body);
 
 // `face` gets the triangle that is touched first, -1 where none is.
 FirstTouch mesh_body_impact(const Mesh& mesh, const RoundedBody& body, const RigidMotion& of_mesh,

@@ -1,165 +1,121 @@
-// The expanding polytope algorithm (van den Bergen 2001) on a - b: a point q of its boundary
-// nearest to the origin is the shortest translation of b that separates the cores. The polytope
-// need not hold the origin yet: its faces expand in the order of their signed distance, those with
-// the origin outside first.
+#include "expanding_polytope.hpp"
 #include "tauguard/rigid/distance.hpp"
-
-#include <algorithm>
-#include <array>
-#include <utility>
-#include <vector>
 
 namespace tauguard::rigid {
 namespace {
 
-constexpr int most_vertices = 200;
-// Depths are exact for polytopes; curved cores stop at this share of their size.
+constexpr int most_faces = 396;  // those of a polytope of 200 corners
+// Depths are exact for polytopes; curved cores stop at this fraction of their size.
 constexpr double resolution = 1e-7;
 
-struct Vertex {
-  Vec q, a, b;  // q = a - b
-};
-
-struct Face {
-  std::array<int, 3> v;
-  Vec n;
-  double offset;
-};
-
-class Polytope {
+// The differences b - a of two shapes, by their support functions.
+class ShapeDifferences {
  public:
-  Polytope(const SupportShape& a, const SupportShape& b)
+  struct Source {
+    Vec a, b;
+  };
+
+  ShapeDifferences(const SupportShape& a, const SupportShape& b)
       : a_(a), b_(b), size_(a.reach() + b.reach()) {}
 
-  Vertex along(const Vec& d) const {
-    Vertex p;
-    p.a = a_.support(d), p.b = b_.support(-1.0 * d);
-    p.q = p.a - p.b;
-    return p;
-  }
+  Vec at(const Source& s) const { return s.b - s.a; }
+  Source farthest(const Vec& n) const { return {a_.support(-1.0 * n), b_.support(n)}; }
 
-  // A tetrahedron of support points; false where a - b is flat to rounding, with its normal in
-  // `flat`.
-  bool start(Vec* flat) {
+  bool span(std::array<Vec, 4>* y, std::array<Source, 4>* from, Vec* normal, bool*) const {
     const double small = 1e-9 * size_;
-    const Vec x = {1, 0, 0};
-    vertices_ = {along(x), along(-1.0 * x)};
-    for (int axis = 1; axis < 3 && !(norm(edge(1)) > small); ++axis) {
+    const auto take = [&](int k, const Vec& d) { (*y)[k] = at((*from)[k] = farthest(-1.0 * d)); };
+    const auto edge = [&](int k) { return (*y)[k] - (*y)[0]; };
+    for (int axis = 0; axis < 3 && (axis == 0 || !(norm(edge(1)) > small)); ++axis) {
       Vec d{};
       d[axis] = 1;
-      vertices_ = {along(d), along(-1.0 * d)};
+      take(0, d), take(1, -1.0 * d);
     }
+    const auto add_off = [&](int k, const Vec& d, const auto& off) {
+      for (const double sign : {1.0, -1.0}) {
+        take(k, sign * d);
+        if (off(edge(k))) return true;
+      }
+      return false;
+    };
     const Vec e = edge(1);
     Vec side{};
     side[std::fabs(e[0]) < std::fabs(e[1]) ? (std::fabs(e[0]) < std::fabs(e[2]) ? 0 : 2)
                                            : (std::fabs(e[1]) < std::fabs(e[2]) ? 1 : 2)] = 1;
     const Vec u = cross(e, side), w = cross(e, u);
-    *flat = u;
-    if (!add_off(u, [&](const Vec& y) { return norm(cross(e, y)) > small * norm(e); }) &&
-        !add_off(w, [&](const Vec& y) { return norm(cross(e, y)) > small * norm(e); }))
-      return false;
+    *normal = u;
+    const auto off_line = [&](const Vec& x) { return norm(cross(e, x)) > small * norm(e); };
+    if (!add_off(2, u, off_line) && !add_off(2, w, off_line)) return false;
     const Vec n = cross(e, edge(2));
-    *flat = n;
-    if (!add_off(n, [&](const Vec& y) { return std::fabs(dot(n, y)) > small * norm(n); }))
-      return false;
-    inside_ = 0.25 * (vertices_[0].q + vertices_[1].q + vertices_[2].q + vertices_[3].q);
-    for (const auto& v :
-         {std::array{0, 1, 2}, std::array{0, 1, 3}, std::array{0, 2, 3}, std::array{1, 2, 3}})
-      add_face(v[0], v[1], v[2]);
-    return true;
+    *normal = n;
+    return add_off(3, n, [&](const Vec& x) { return std::fabs(dot(n, x)) > small * norm(n); });
   }
 
-  const Face& nearest() const {
-    return *std::min_element(faces_.begin(), faces_.end(),
-                             [](const Face& p, const Face& q) { return p.offset < q.offset; });
+  bool is_final(double excess, double square, const Source&) const {
+    return excess <= resolution * size_ * std::sqrt(square);
   }
-
-  // True where the face was not final: the polytope grew.
-  bool expand(const Face& face) {
-    const Vertex p = along(face.n);
-    if (dot(face.n, p.q) - face.offset <= resolution * size_ ||
-        static_cast<int>(vertices_.size()) >= most_vertices)
-      return false;
-    const int fresh = static_cast<int>(vertices_.size());
-    std::vector<std::pair<int, int>> horizon;
-    std::vector<Face> kept;
-    for (const Face& f : faces_) {
-      if (dot(f.n, p.q) - f.offset <= 1e-14 * size_) {
-        kept.push_back(f);
-        continue;
-      }
-      for (int k = 0; k < 3; ++k) {
-        const std::pair<int, int> e = std::minmax(f.v[k], f.v[(k + 1) % 3]);
-        const auto twin = std::find(horizon.begin(), horizon.end(), e);
-        twin == horizon.end() ? horizon.push_back(e) : static_cast<void>(horizon.erase(twin));
-      }
-    }
-    if (horizon.empty() || kept.size() == faces_.size()) return false;
-    vertices_.push_back(p);
-    faces_ = std::move(kept);
-    for (const auto& [i, j] : horizon) add_face(i, j, fresh);
-    return true;
-  }
-
-  // The point of the face nearest to the origin, as one point on each core.
-  void points(const Face& f, Vec* on_a, Vec* on_b) const {
-    const Vertex &p = vertices_[f.v[0]], &q = vertices_[f.v[1]], &r = vertices_[f.v[2]];
-    const Vec e = q.q - p.q, g = r.q - p.q, n = cross(e, g), o = f.offset * f.n - p.q;
-    const double nn = dot(n, n);
-    double s = nn > 0 ? dot(cross(o, g), n) / nn : 0, t = nn > 0 ? dot(cross(e, o), n) / nn : 0;
-    s = std::clamp(s, 0.0, 1.0), t = std::clamp(t, 0.0, 1.0 - s);
-    *on_a = (1 - s - t) * p.a + s * q.a + t * r.a;
-    *on_b = (1 - s - t) * p.b + s * q.b + t * r.b;
+  bool sees(double excess, double square) const {
+    return excess > 0 && excess * excess > 1e-28 * size_ * size_ * square;
   }
 
  private:
-  Vec edge(int i) const { return vertices_[i].q - vertices_[0].q; }
-
-  template <class Test>
-  bool add_off(const Vec& d, Test&& off) {
-    for (const double sign : {1.0, -1.0}) {
-      const Vertex p = along(sign * d);
-      if (off(p.q - vertices_[0].q)) return vertices_.push_back(p), true;
-    }
-    return false;
-  }
-
-  void add_face(int i, int j, int k) {
-    const Vec &p = vertices_[i].q, &q = vertices_[j].q, &r = vertices_[k].q;
-    Vec n = cross(q - p, r - p);
-    const double length = norm(n);
-    if (!(length > 0)) return;
-    n = (1 / length) * n;
-    if (dot(n, p - inside_) < 0) n = -1.0 * n;
-    faces_.push_back({{i, j, k}, n, dot(n, p)});
-  }
-
   const SupportShape &a_, &b_;
   double size_;
-  Vec inside_{};
-  std::vector<Vertex> vertices_;
-  std::vector<Face> faces_;
 };
+
+using Polytope = ExpandingPolytope<double, ShapeDifferences>;
+
+// A point in the plane of a face, by the weights of its corners.
+struct Barycentric {
+  std::array<int, 3> corner;
+  double weight[3], least;
+  // To the face, where the point lies outside.
+  void clamp() {
+    weight[1] = std::clamp(weight[1], 0.0, 1.0);
+    weight[2] = std::clamp(weight[2], 0.0, 1.0 - weight[1]);
+    weight[0] = 1 - weight[1] - weight[2];
+  }
+};
+
+Barycentric weights(const Polytope& polytope, const Polytope::Face& face, const Vec& x) {
+  const Vec &p = polytope.point(face.corner[0]), e = polytope.point(face.corner[1]) - p,
+            g = polytope.point(face.corner[2]) - p;
+  const Vec n = cross(e, g), o = x - p;
+  const double nn = dot(n, n), s = nn > 0 ? dot(cross(o, g), n) / nn : 0,
+               t = nn > 0 ? dot(cross(e, o), n) / nn : 0;
+  return {face.corner, {1 - s - t, s, t}, std::min({1 - s - t, s, t})};
+}
 
 }  // namespace
 
 void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
-  Polytope polytope(a, b);
-  Vec flat{};
-  if (!polytope.start(&flat)) {
-    const double length = norm(flat);
-    d->n = length > 0 ? (1 / length) * flat : Vec{0, 0, 1};
+  Polytope polytope(ShapeDifferences(a, b));
+  const bool flat = polytope.solve(most_faces) == Polytope::Answer::flat;
+  const Vec& normal = polytope.nearest.normal;
+  const double length = norm(normal);
+  if (flat) {
+    d->n = length > 0 ? (1 / length) * normal : Vec{0, 0, 1};
     if (dot(d->n, b.middle() - a.middle()) < 0) d->n = -1.0 * d->n;
     d->lower = 0;
     return;
   }
-  Face face = polytope.nearest();
-  while (polytope.expand(face)) face = polytope.nearest();
-  // b moved by offset * n leaves a: seen from a, b lies on the other side.
-  d->n = face.n;
-  d->lower = -std::max(0.0, face.offset);
-  Vec on_a, on_b;
-  polytope.points(face, &on_a, &on_b);
+  // b - a moved against the outward normal by the face's distance no longer holds the origin.
+  d->n = (-1 / length) * normal;
+  d->lower = -std::max(0.0, polytope.nearest.offset / length);
+  const Vec foot = d->lower * d->n;
+  Barycentric best = weights(polytope, polytope.nearest, foot);
+  // Triangles of one plane are equally near: the one that has the foot tells the points.
+  for (const auto& face : polytope.faces()) {
+    if (best.least >= 0) break;
+    if (!(dot(face.normal, normal) > (1 - 1e-12) * length * norm(face.normal))) continue;
+    const Barycentric other = weights(polytope, face, foot);
+    if (other.least > best.least) best = other;
+  }
+  best.clamp();
+  Vec on_a{}, on_b{};
+  for (int k = 0; k < 3; ++k) {
+    const auto& source = polytope.source(best.corner[k]);
+    on_a = on_a + best.weight[k] * source.a, on_b = on_b + best.weight[k] * source.b;
+  }
   d->on_a = d->on_b = 0.5 * (on_a + on_b);
 }
 

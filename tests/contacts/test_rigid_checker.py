@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.contacts import State, checker, geom_kinds
+from tauguard.rigid import Boxes, distance
 
 SHAPES = {
     "sphere": 'size=".1"',
@@ -267,3 +268,26 @@ def test_a_state_that_does_not_fit_is_named():
         check.check(good, replace(good, xpos=xpos))
     with pytest.raises(ValueError, match=r"before.xmat: shape \(2, 9\), the model has \(3, 9\)"):
         check.check(replace(good, xmat=good.xmat[:2]), good)
+
+
+def test_the_point_of_boxes_in_each_other_is_the_middle_of_their_overlap():
+    # The kernel's own distance, certified on exact arithmetic, is the truth.
+    rng, half = np.random.default_rng(9), np.array([[0.1, 0.07, 0.05]])
+    model = scene(("box", SHAPES["box"]), ("box", SHAPES["box"]))
+    rigid, seen = checker("rigid", model), 0
+    for _ in range(200):
+        quat = rng.normal(size=(2, 4))
+        at = np.concatenate([[*rng.uniform(-0.06, 0.06, 3), *q / np.linalg.norm(q)] for q in quat])
+        here, there = states(model, at, at + 1e-6)
+        found = rigid.check(here, there)
+        bodies = [
+            Boxes(here.geom_xpos[[g]], half, here.geom_xmat[g].reshape(1, 3, 3)) for g in (0, 1)
+        ]
+        truth = distance(*bodies)
+        if truth.distance[0] > -1e-4:
+            continue
+        assert found.distance[0] == pytest.approx(truth.distance[0], abs=1e-12)
+        middle = 0.5 * (truth.point_a + truth.point_b)[0]
+        np.testing.assert_allclose(found.point[0], middle, atol=1e-6)
+        seen += 1
+    assert seen > 100

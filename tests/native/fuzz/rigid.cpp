@@ -123,7 +123,8 @@ void grown(Input& in) {
   const double ra = std::fabs(in.number(far)), rb = std::fabs(in.number(far));
   const bool exact = hit_of(p.a, p.b, Method::exact);
   require(meet(p.a.rows, p.b.rows, 0, 0, 0) == exact, "meet differs from exact");
-  const Gap bare = gap_of(p.a.rows, p.b.rows, 0, 0, 0), gap = gap_of(p.a.rows, p.b.rows, 0, ra, rb);
+  const SignedDistance bare = signed_distance(p.a.rows, p.b.rows, 0, 0, 0),
+                       gap = signed_distance(p.a.rows, p.b.rows, 0, ra, rb);
   require((bare.distance <= 0) == exact, "a distance has the wrong sign");
   require((gap.distance <= 0) == meet(p.a.rows, p.b.rows, 0, ra, rb), "the sign of a grown pair");
   require(!exact || gap.distance <= 0, "a radius parts bodies");
@@ -184,8 +185,8 @@ void mesh_and_body(Input& in) {
   const Body body(in, Kind(in.choice(4)), far_mesh);
   const RoundedBody rounded(body.rows, 0, std::fabs(in.number(far_mesh)));
   const std::int32_t face = first_overlap(a.mesh, rounded);
-  const FaceGap nearest = nearest_face(a.mesh, rounded);
-  require((face >= 0) == (nearest.gap.distance <= 0), "a mesh's distance has the wrong sign");
+  const FaceDistance nearest = nearest_face(a.mesh, rounded);
+  require((face >= 0) == (nearest.at.distance <= 0), "a mesh's distance has the wrong sign");
   require(nearest.face >= 0, "no nearest face");
   const Moved ma(in, far_mesh), mb(in, far_mesh);
   std::int32_t touched = -2;

@@ -1,4 +1,4 @@
-"""Overlap of bodies with radii and its witness."""
+"""Distance and overlap of convex bodies, with or without radii."""
 
 from __future__ import annotations
 
@@ -7,10 +7,19 @@ from numpy.typing import NDArray
 
 from tauguard.geometry import thread_count
 from tauguard.rigid import _rigid_mesh
-from tauguard.rigid.gap import solid_gaps
 from tauguard.rigid.queries import find_witness, native, rows
-from tauguard.rigid.results import Overlap, Witness
+from tauguard.rigid.results import Distances, Overlap, Witness
 from tauguard.rigid.rounded import Solid, solid_parts
+
+
+def solid_distances(a: Solid, b: Solid, threads: int = 1) -> Distances:
+    """Signed distances of convex bodies, as the public query gives them."""
+    (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
+    out = np.empty((rows(core_a, core_b), 10))
+    _rigid_mesh.distances(
+        *native(core_a), radius_a, *native(core_b), radius_b, out, thread_count(threads)
+    )
+    return Distances(out[:, 0], out[:, 1:4], out[:, 4:7], out[:, 7:10])
 
 
 def rounded_overlap(a: Solid, b: Solid, threads: int = 1) -> Overlap:
@@ -27,7 +36,7 @@ def rounded_overlap(a: Solid, b: Solid, threads: int = 1) -> Overlap:
 def rounded_witness(a: Solid, b: Solid, hit: NDArray[np.bool_], threads: int = 1) -> Witness:
     """A common point or a separating plane of each row, to rounding."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
-    cores = solid_gaps(core_a, core_b, threads)
+    cores = solid_distances(core_a, core_b, threads)
     # Where the cores meet they have a common point; else it lies on the way between them.
     point = find_witness(core_a, core_b, cores.distance <= 0, threads).point
     way = np.maximum(cores.distance, 0.0)

@@ -1,9 +1,9 @@
-#include "gap.hpp"
+#include "signed_distance.hpp"
 
 #include <algorithm>
 
 #include "convex_contact.hpp"
-#include "exact_gap.hpp"
+#include "exact_nearest.hpp"
 #include "facet_depth.hpp"
 #include "tauguard/rigid/distance.hpp"
 
@@ -51,15 +51,15 @@ double top(const Points<double>& points, const Vec& n) {
 }
 double bottom(const Points<double>& points, const Vec& n) { return -top(points, -1.0 * n); }
 
-Gap apart(const Vec& point_a, const Vec& point_b) {
+SignedDistance apart(const Vec& point_a, const Vec& point_b) {
   const Vec between = point_b - point_a;
   const double distance = norm(between);
   return {distance, point_a, point_b, (1 / distance) * between};
 }
 
 // Bodies in each other come apart by `depth` along n: where they touch then.
-Gap together(const Points<double>& a, const Points<double>& b, const Vec& n, double depth,
-             double size) {
+SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec& n,
+                        double depth, double size) {
   Points<double> moved = b;
   for (auto& p : moved) p = p + depth * n;
   Vec point;
@@ -70,7 +70,7 @@ Gap together(const Points<double>& a, const Points<double>& b, const Vec& n, dou
 // The way between close faces is short, and rounding turns it: their normal is the better
 // direction, and the nearest points are the feet of the origin on the triangle of differences.
 bool between_faces(const Points<double>& a, const Points<double>& b, const Nearest& ends,
-                   double size, Gap* out) {
+                   double size, SignedDistance* out) {
   Vec w[3], at_a{}, at_b{};
   for (int i = 0; i < 3; ++i) w[i] = b[ends.corner[i][1]] - a[ends.corner[i][0]];
   const Vec c = cross(w[1] - w[0], w[2] - w[0]);
@@ -86,7 +86,8 @@ bool between_faces(const Points<double>& a, const Points<double>& b, const Neare
   return norm((at_b - at_a) - out->distance * n) <= 0x1p-44 * size;
 }
 
-bool certified_apart(const Points<double>& a, const Points<double>& b, double size, Gap* out) {
+bool certified_apart(const Points<double>& a, const Points<double>& b, double size,
+                     SignedDistance* out) {
   const Nearest ends = nearest(a, b);
   *out = apart(ends.a, ends.b);
   if (!(out->distance > near * size)) return false;
@@ -106,11 +107,12 @@ bool certified_depth(const Points<double>& a, const Points<double>& b, const Bod
       return *way > near * size;
     }
   }
-  NearestFacet<double> search(a, b);
-  if (search.solve(2000) != NearestFacet<double>::Answer::facet) return false;
-  const double length = norm(search.normal), depth = search.offset / length;
+  using Polytope = ExpandingPolytope<double, PointDifferences<double>>;
+  Polytope polytope(PointDifferences<double>(a, b));
+  if (polytope.solve(2000) != Polytope::Answer::facet) return false;
+  const double length = norm(polytope.nearest.normal), depth = polytope.nearest.offset / length;
   if (!(depth > near * size)) return false;
-  *n = (-1 / length) * search.normal;
+  *n = (-1 / length) * polytope.nearest.normal;
   *way = top(a, *n) - bottom(b, *n);  // certainly enough to come free
   return *way - depth <= certain * size;
 }
@@ -129,13 +131,13 @@ double power(double x, std::int64_t e) {
   return std::ldexp(x, static_cast<int>(std::clamp<std::int64_t>(e, -5000, 5000)));
 }
 
-struct ExactGap {
-  Gap gap;
+struct ExactDistance {
+  SignedDistance at;
   int sign;  // of the distance less both radii
 };
 
-ExactGap exact_apart(const ExactNearest<Dyadic>& nearest, const Points<double>& a,
-                     const Dyadic& radii) {
+ExactDistance exact_apart(const ExactNearest<Dyadic>& nearest, const Points<double>& a,
+                          const Dyadic& radii) {
   const std::int64_t e = exponent(nearest.numerator), d = nearest.denominator.floor_log2();
   const Vec v = scaled(nearest.numerator, e);
   const double length = norm(v), denominator = nearest.denominator.scaled(-d).to_double();
@@ -150,29 +152,32 @@ ExactGap exact_apart(const ExactNearest<Dyadic>& nearest, const Points<double>& 
           (inner(nearest.numerator, nearest.numerator) - reach * reach).sign()};
 }
 
-ExactGap exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y, const Points<double>& a,
-                        const Points<double>& b, const Dyadic& radii, double size) {
-  NearestFacet<Dyadic> search(x, y);
-  const auto answer = search.solve(1 << 30);
+ExactDistance exact_together(const Points<Dyadic>& x, const Points<Dyadic>& y,
+                             const Points<double>& a, const Points<double>& b, const Dyadic& radii,
+                             double size) {
+  using Polytope = ExpandingPolytope<Dyadic, PointDifferences<Dyadic>>;
+  Polytope polytope(PointDifferences<Dyadic>(x, y));
+  const auto answer = polytope.solve(1 << 30);
+  Vector<Dyadic> facet = polytope.nearest.normal;
   const int sign = radii.is_zero() ? 0 : -1;
-  if (is_zero(search.normal)) search.normal = {Dyadic(), Dyadic(), Dyadic(1.0)};
-  const std::int64_t e = exponent(search.normal);
-  const Vec normal = scaled(search.normal, e);
+  if (is_zero(facet)) facet = {Dyadic(), Dyadic(), Dyadic(1.0)};
+  const std::int64_t e = exponent(facet);
+  const Vec normal = scaled(facet, e);
   const double length = norm(normal);
   const Vec n = (-1 / length) * normal;
-  if (answer == NearestFacet<Dyadic>::Answer::flat) {
+  if (answer == Polytope::Answer::flat) {
     const Vec point = middle_point(a, b);
     return {{0.0, point, point, n}, sign};
   }
-  if (search.offset.is_zero()) return {together(a, b, n, 0.0, size), sign};
-  const std::int64_t o = search.offset.floor_log2();
-  const double depth = power(search.offset.scaled(-o).to_double() / length, o - e);
+  if (polytope.nearest.offset.is_zero()) return {together(a, b, n, 0.0, size), sign};
+  const std::int64_t o = polytope.nearest.offset.floor_log2();
+  const double depth = power(polytope.nearest.offset.scaled(-o).to_double() / length, o - e);
   return {together(a, b, n, depth, size), -1};
 }
 
-ExactGap exact_gap(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
-                   const Points<double>& a, const Points<double>& b, const Dyadic& radii,
-                   double size) {
+ExactDistance exact_distance(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
+                             const Points<double>& a, const Points<double>& b, const Dyadic& radii,
+                             double size) {
   const auto x = vertices_of<Dyadic>(bodies_a, row), y = vertices_of<Dyadic>(bodies_b, row);
   const ExactNearest<Dyadic> nearest(x, y);
   if (!is_zero(nearest.numerator)) return exact_apart(nearest, a, radii);
@@ -180,7 +185,7 @@ ExactGap exact_gap(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t r
 }
 
 // Grown by balls; `sign`, where it is known, is the distance's.
-Gap grown(Gap g, double radius_a, double radius_b, int sign, bool known) {
+SignedDistance grown(SignedDistance g, double radius_a, double radius_b, int sign, bool known) {
   g.point_a = g.point_a + radius_a * g.normal;
   g.point_b = g.point_b - radius_b * g.normal;
   g.distance -= radius_a + radius_b;
@@ -192,13 +197,13 @@ Gap grown(Gap g, double radius_a, double radius_b, int sign, bool known) {
 
 }  // namespace
 
-Gap gap_of(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, double radius_a,
-           double radius_b) {
+SignedDistance signed_distance(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
+                               double radius_a, double radius_b) {
   const double* p = bodies_a.row(row);
   const Vec origin = {p[0], p[1], p[2]};
   const auto a = local_points(bodies_a, row, origin), b = local_points(bodies_b, row, origin);
   const double size = size_of(a, b), radii = radius_a + radius_b;
-  Gap g;
+  SignedDistance g;
   bool known = false;
   int sign = 0;
   bool quick = false;
@@ -211,8 +216,8 @@ Gap gap_of(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row, doub
   }
   if (!quick || (radii > 0 && std::fabs(g.distance - radii) <= near * (size + radii))) {
     const auto exact =
-        exact_gap(bodies_a, bodies_b, row, a, b, Dyadic(radius_a) + Dyadic(radius_b), size);
-    if (!quick) g = exact.gap;
+        exact_distance(bodies_a, bodies_b, row, a, b, Dyadic(radius_a) + Dyadic(radius_b), size);
+    if (!quick) g = exact.at;
     sign = exact.sign, known = true;
   }
   g = grown(g, radius_a, radius_b, sign, known);

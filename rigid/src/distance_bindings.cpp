@@ -12,24 +12,24 @@ using tauguard::geometry::LongCall;
 
 namespace {
 
-using Gaps = nb::ndarray<double, nb::shape<-1, 10>, nb::c_contig, nb::device::cpu>;
+using DistanceRows = nb::ndarray<double, nb::shape<-1, 10>, nb::c_contig, nb::device::cpu>;
 using Hits = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using FaceRows = nb::ndarray<std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // A row of distance, point of a, point of b, normal.
-void store(const Gap& g, double* row) {
+void store(const SignedDistance& g, double* row) {
   row[0] = g.distance;
   for (int k = 0; k < 3; ++k)
     row[1 + k] = g.point_a[k], row[4 + k] = g.point_b[k], row[7 + k] = g.normal[k];
 }
 
-void gaps(int kind_a, Packed a, Offsets offsets_a, Radii radius_a, int kind_b, Packed b,
-          Offsets offsets_b, Radii radius_b, Gaps out, int threads) {
+void distances(int kind_a, Packed a, Offsets offsets_a, Radii radius_a, int kind_b, Packed b,
+               Offsets offsets_b, Radii radius_b, DistanceRows out, int threads) {
   const LongCall call;
   const Bodies x = view(kind_a, a, offsets_a), y = view(kind_b, b, offsets_b);
   interruptible_for(out.shape(0), threads, 64, [&](auto begin, auto end, auto) {
     for (auto i = begin; i < end; ++i)
-      store(gap_of(x, y, i, at(radius_a, i), at(radius_b, i)), out.data() + 10 * i);
+      store(signed_distance(x, y, i, at(radius_a, i), at(radius_b, i)), out.data() + 10 * i);
   });
 }
 
@@ -72,12 +72,12 @@ void mesh_meets(const Mesh& mesh, int kind, Packed data, Offsets offsets, Radii 
             [&](auto i, const RoundedBody& body) { faces.data()[i] = first_overlap(mesh, body); });
 }
 
-void mesh_gaps(const Mesh& mesh, int kind, Packed data, Offsets offsets, Radii radius, Gaps out,
-               FaceRows faces, int threads) {
+void mesh_distances(const Mesh& mesh, int kind, Packed data, Offsets offsets, Radii radius,
+                    DistanceRows out, FaceRows faces, int threads) {
   each_body(view(kind, data, offsets), radius, faces.shape(0), threads,
             [&](auto i, const RoundedBody& body) {
-              const FaceGap nearest = nearest_face(mesh, body);
-              store(nearest.gap, out.data() + 10 * i), faces.data()[i] = nearest.face;
+              const FaceDistance nearest = nearest_face(mesh, body);
+              store(nearest.at, out.data() + 10 * i), faces.data()[i] = nearest.face;
             });
 }
 
@@ -94,8 +94,8 @@ void mesh_impacts(const Mesh& mesh, int kind, Packed data, Offsets offsets, Radi
 
 }  // namespace
 
-void bind_gaps(nb::module_& m) {
-  m.def("gaps", &gaps, "kind_a"_a, "a"_a, "offsets_a"_a, "radius_a"_a, "kind_b"_a, "b"_a,
+void bind_distances(nb::module_& m) {
+  m.def("distances", &distances, "kind_a"_a, "a"_a, "offsets_a"_a, "radius_a"_a, "kind_b"_a, "b"_a,
         "offsets_b"_a, "radius_b"_a, "out"_a, "threads"_a);
   m.def("meets", &meets, "kind_a"_a, "a"_a, "offsets_a"_a, "radius_a"_a, "kind_b"_a, "b"_a,
         "offsets_b"_a, "radius_b"_a, "hit"_a, "threads"_a);
@@ -107,8 +107,8 @@ void bind_gaps(nb::module_& m) {
 void bind_bodies(nb::class_<Mesh>& mesh) {
   mesh.def("meets", &mesh_meets, "kind"_a, "bodies"_a, "offsets"_a, "radius"_a, "faces"_a,
            "threads"_a);
-  mesh.def("gaps", &mesh_gaps, "kind"_a, "bodies"_a, "offsets"_a, "radius"_a, "out"_a, "faces"_a,
-           "threads"_a);
+  mesh.def("distances", &mesh_distances, "kind"_a, "bodies"_a, "offsets"_a, "radius"_a, "out"_a,
+           "faces"_a, "threads"_a);
   mesh.def("time_of_impact_of_bodies", &mesh_impacts, "kind"_a, "bodies"_a, "offsets"_a, "radius"_a,
            "pose_mesh"_a, "linear_mesh"_a, "angular_mesh"_a, "pose_body"_a, "linear_body"_a,
            "angular_body"_a, "out"_a, "faces"_a, "threads"_a);

@@ -1,0 +1,107 @@
+// The nearest points of two hulls of points by signs of polynomials alone: with Dyadic the answer
+// is exact.
+#pragma once
+
+#include "expanding_polytope.hpp"
+
+namespace tauguard::rigid {
+
+// Nearest point of the hull of differences to the origin (Wolfe 1976; Gilbert, Johnson and Keerthi
+// 1988): sum weight_k y_k / denominator, as numerator / denominator.
+template <class Number>
+class ExactNearest {
+ public:
+  using Pair = typename PointDifferences<Number>::Source;
+
+  ExactNearest(const Points<Number>& a, const Points<Number>& b) : y_(a, b) {
+    take({0, 0});
+    keep();
+    while (!is_zero(numerator)) {
+      geometry::poll_interrupt();
+      const Vector<Number> back = {-numerator[0], -numerator[1], -numerator[2]};
+      const Pair next = y_.farthest(back);
+      const Vector<Number> w = y_.at(next);
+      // numerator . (w - numerator / denominator) >= 0: no difference is nearer.
+      if (!(inner(numerator, w) * denominator < inner(numerator, numerator))) return;
+      take(next);
+      keep();
+    }
+  }
+
+  std::vector<Pair> pairs;      // at most four
+  std::vector<Number> weights;  // of `pairs`, over `denominator`
+  Vector<Number> numerator;
+  Number denominator;
+
+ private:
+  void take(const Pair& p) { pairs.push_back(p), points_.push_back(y_.at(p)); }
+
+  // The face of the simplex that holds its point nearest to the origin: the one whose point has
+  // weights above zero and no other corner before it.
+  void keep() {
+    const int m = static_cast<int>(points_.size());
+    for (int mask = 1; mask < 1 << m; ++mask) {
+      std::vector<int> face;
+      for (int k = 0; k < m; ++k)
+        if (mask >> k & 1) face.push_back(k);
+      if (!weigh(face) || !is_nearest()) continue;
+      std::vector<Pair> kept;
+      std::vector<Vector<Number>> points;
+      for (const int k : face) kept.push_back(pairs[k]), points.push_back(points_[k]);
+      pairs = kept, points_ = points;
+      return;
+    }
+  }
+
+  bool is_nearest() const {
+    const Number square = inner(numerator, numerator);
+    for (const auto& p : points_)
+      if (inner(numerator, p) * denominator < square) return false;
+    return true;
+  }
+
+  // Weights of the point of the face's affine hull nearest to the origin, by Cramer's rule.
+  bool weigh(const std::vector<int>& face) {
+    const Vector<Number>& y0 = points_[face[0]];
+    Vector<Number> e[3];
+    for (std::size_t k = 1; k < face.size(); ++k) e[k - 1] = minus(points_[face[k]], y0);
+    weights.assign(face.size(), Number());
+    if (face.size() == 1) {
+      denominator = Number(1.0);
+    } else if (face.size() == 2) {
+      denominator = inner(e[0], e[0]);
+      weights[1] = -inner(e[0], y0);
+    } else if (face.size() == 3) {
+      const Number aa = inner(e[0], e[0]), ab = inner(e[0], e[1]), bb = inner(e[1], e[1]);
+      const Number x = -inner(e[0], y0), y = -inner(e[1], y0);
+      denominator = aa * bb - ab * ab;
+      weights[1] = x * bb - y * ab, weights[2] = y * aa - x * ab;
+    } else {
+      denominator = inner(e[0], outer(e[1], e[2]));
+      weights[1] = -inner(y0, outer(e[1], e[2]));
+      weights[2] = -inner(y0, outer(e[2], e[0]));
+      weights[3] = -inner(y0, outer(e[0], e[1]));
+      if (!positive(denominator)) {
+        denominator = -denominator;
+        for (auto& w : weights) w = -w;
+      }
+    }
+    if (!positive(denominator)) return false;
+    weights[0] = denominator;
+    for (std::size_t k = 1; k < face.size(); ++k) weights[0] = weights[0] - weights[k];
+    for (const auto& w : weights)
+      if (!positive(w)) return false;
+    for (int c = 0; c < 3; ++c) {
+      numerator[c] = denominator * y0[c];
+      for (std::size_t k = 1; k < face.size(); ++k)
+        numerator[c] = numerator[c] + weights[k] * e[k - 1][c];
+    }
+    if (face.size() == 4) numerator = {Number(), Number(), Number()};
+    return true;
+  }
+
+  const PointDifferences<Number> y_;
+  std::vector<Vector<Number>> points_;
+};
+
+}  // namespace tauguard::rigid

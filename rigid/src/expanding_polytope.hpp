@@ -1,0 +1,232 @@
+// The facet of a convex set of differences b - a that is nearest to the origin: the expanding
+// polytope of van den Bergen 2001, without a simplex that holds the origin to start from. Where the
+// origin is inside, that is the least path on which the bodies come free of each other. Signs of
+// polynomials decide alone: with Dyadic every answer is right; with double it is a proposal that
+// the caller certifies, or rounded as for support shapes.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "tauguard/geometry/interrupt.hpp"
+#include "tauguard/rigid/bodies.hpp"
+
+namespace tauguard::rigid {
+
+template <class Number>
+using Vector = std::array<Number, 3>;
+
+template <class Number>
+Vector<Number> minus(const Vector<Number>& x, const Vector<Number>& y) {
+  return {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
+}
+template <class Number>
+Number inner(const Vector<Number>& x, const Vector<Number>& y) {
+  return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+}
+template <class Number>
+Vector<Number> outer(const Vector<Number>& x, const Vector<Number>& y) {
+  return {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]};
+}
+template <class Number>
+bool positive(const Number& x) {
+  return Number() < x;
+}
+template <class Number>
+bool is_zero(const Vector<Number>& x) {
+  return x[0] == Number() && x[1] == Number() && x[2] == Number();
+}
+
+// Is x, the square of a volume, nothing but rounding beside `scale`?
+inline bool negligible(double x, double scale) { return !(x > 1e-20 * scale); }
+inline bool negligible(const Dyadic& x, const Dyadic&) { return x.is_zero(); }
+
+// The differences b_j - a_i of two lists of points.
+template <class Number>
+class PointDifferences {
+ public:
+  using Source = std::array<std::size_t, 2>;  // rows of a and of b
+
+  PointDifferences(const Points<Number>& a, const Points<Number>& b) : a_(a), b_(b) {}
+
+  Vector<Number> at(const Source& p) const { return minus(b_[p[1]], a_[p[0]]); }
+  Source farthest(const Vector<Number>& n) const {
+    Source best{0, 0};
+    Number low = inner(n, a_[0]), high = inner(n, b_[0]);
+    for (std::size_t i = 1; i < a_.size(); ++i) {
+      const Number x = inner(n, a_[i]);
+      if (x < low) low = x, best[0] = i;
+    }
+    for (std::size_t j = 1; j < b_.size(); ++j) {
+      const Number x = inner(n, b_[j]);
+      if (high < x) high = x, best[1] = j;
+    }
+    return best;
+  }
+
+  // Four differences that span space: the farthest from the first, from the line, from the plane.
+  // False where there are none; `normal` is then one of what they span, zero for a point.
+  bool span(std::array<Vector<Number>, 4>* y, std::array<Source, 4>* from, Vector<Number>* normal,
+            bool* thin) const {
+    const Vector<Number> y0 = at({0, 0});
+    std::vector<Vector<Number>> e;
+    std::vector<Source> sources;
+    for (std::size_t i = 1; i < a_.size(); ++i) sources.push_back({i, 0});
+    for (std::size_t j = 1; j < b_.size(); ++j) sources.push_back({0, j});
+    for (const Source& s : sources) e.push_back(minus(at(s), y0));
+    Number most{};
+    const auto best = [&](const auto& measure, int corner) {
+      most = Number();
+      std::size_t kept = 0;
+      for (std::size_t i = 0; i < e.size(); ++i) {
+        const Number m = measure(e[i]);
+        if (most < m) most = m, kept = i;
+      }
+      if (!positive(most)) return false;
+      (*from)[corner] = sources[kept];
+      for (int c = 0; c < 3; ++c) (*y)[corner][c] = y0[c] + e[kept][c];
+      return true;
+    };
+    const auto edge = [&](int corner) { return at((*from)[corner]); };
+    (*y)[0] = y0, (*from)[0] = {0, 0};
+    if (!best([](const auto& x) { return inner(x, x); }, 1)) return false;
+    const Vector<Number> line = minus(edge(1), y0);
+    *normal = across(line);
+    const auto area = [&](const auto& x) { return inner(outer(line, x), outer(line, x)); };
+    if (!best(area, 2)) return false;
+    const Vector<Number> n = outer(line, minus(edge(2), y0));
+    *normal = n;
+    if (!best([&](const auto& x) { return inner(n, x) * inner(n, x); }, 3)) return false;
+    *thin = negligible(most, inner(n, n) * inner(line, line));
+    return true;
+  }
+
+  // Whether a facet is one of the whole hull's, the farthest point being `excess` beyond it.
+  // Rounding alone brings a point in twice, and there are fewer points than pairs.
+  bool is_final(const Number& excess, const Number&, const Source& farthest) {
+    return !positive(excess) || !taken_.insert(farthest).second;
+  }
+  bool sees(const Number& excess, const Number&) const { return positive(excess); }
+
+ private:
+  static Vector<Number> across(const Vector<Number>& e) {
+    if (e[0] == Number() && e[1] == Number()) return {Number(1.0), Number(), Number()};
+    return {-e[1], e[0], Number()};
+  }
+
+  const Points<Number>&a_, &b_;
+  std::set<Source> taken_;
+};
+
+// Grows a polytope of differences at its face nearest to the origin until that is final.
+template <class Number, class Differences>
+class ExpandingPolytope {
+ public:
+  using Source = typename Differences::Source;
+  enum class Answer { facet, flat, gave_up };
+  struct Face {
+    std::array<int, 3> corner;
+    Vector<Number> normal;  // outward; where `flat` any normal of what they span, zero for a point
+    Number offset, square;  // normal . y <= offset for every difference; normal . normal
+  };
+
+  explicit ExpandingPolytope(Differences differences) : differences_(std::move(differences)) {}
+
+  Answer solve(int most_faces) {
+    std::array<Vector<Number>, 4> y;
+    std::array<Source, 4> from;
+    if (!differences_.span(&y, &from, &nearest.normal, &broken_)) return Answer::flat;
+    points_.assign(y.begin(), y.end()), sources_.assign(from.begin(), from.end());
+    for (int c = 0; c < 3; ++c) inside4_[c] = y[0][c] + y[1][c] + y[2][c] + y[3][c];
+    add(0, 1, 2), add(0, 1, 3), add(0, 2, 3), add(1, 2, 3);
+    while (static_cast<int>(faces_.size()) < most_faces) {
+      geometry::poll_interrupt();
+      if (broken_) return Answer::gave_up;
+      std::size_t best = 0;
+      for (std::size_t f = 1; f < faces_.size(); ++f)
+        if (nearer(faces_[f], faces_[best])) best = f;
+      nearest = faces_[best];
+      const Source next = differences_.farthest(nearest.normal);
+      const Vector<Number> w = differences_.at(next);
+      if (differences_.is_final(inner(nearest.normal, w) - nearest.offset, nearest.square, next))
+        return Answer::facet;
+      sources_.push_back(next);
+      if (!grow(w, best)) return Answer::gave_up;
+    }
+    return Answer::gave_up;
+  }
+
+  Face nearest{};  // to the origin, as far as the polytope grew
+  const std::vector<Face>& faces() const { return faces_; }
+  const Vector<Number>& point(int corner) const { return points_[corner]; }
+  const Source& source(int corner) const { return sources_[corner]; }
+
+ private:
+  void add(int i, int j, int k) {
+    Face f{{i, j, k},
+           outer(minus(points_[j], points_[i]), minus(points_[k], points_[i])),
+           Number(),
+           Number()};
+    f.offset = inner(f.normal, points_[i]);
+    f.square = inner(f.normal, f.normal);
+    if (!positive(f.square)) broken_ = true;
+    const Number side = inner(f.normal, inside4_) - Number(4.0) * f.offset;
+    if (negligible(side * side, f.square * inner(inside4_, inside4_))) broken_ = true;
+    if (positive(side)) {
+      for (int c = 0; c < 3; ++c) f.normal[c] = -f.normal[c];
+      f.offset = -f.offset;
+    }
+    faces_.push_back(f);
+  }
+
+  // offset / |normal|, negative where the origin is outside.
+  static bool nearer(const Face& f, const Face& g) {
+    const bool f_out = f.offset < Number(), g_out = g.offset < Number();
+    if (f_out != g_out) return f_out;
+    const Number x = f.offset * f.offset * g.square, y = g.offset * g.offset * f.square;
+    return f_out ? y < x : x < y;
+  }
+
+  // Replaces the faces that see w by the cone from w over their rim.
+  bool grow(const Vector<Number>& w, std::size_t seen) {
+    std::vector<std::pair<int, int>> edges;
+    std::vector<Face> rest;
+    for (std::size_t f = 0; f < faces_.size(); ++f) {
+      const Face& face = faces_[f];
+      if (f != seen && !differences_.sees(inner(face.normal, w) - face.offset, face.square)) {
+        rest.push_back(face);
+        continue;
+      }
+      for (int k = 0; k < 3; ++k)
+        edges.push_back(std::minmax<int>({face.corner[k], face.corner[(k + 1) % 3]}));
+    }
+    const int apex = static_cast<int>(points_.size());
+    points_.push_back(w);
+    faces_ = std::move(rest);
+    std::sort(edges.begin(), edges.end());
+    std::vector<int> degree(points_.size(), 0);
+    int rim = 0;
+    for (std::size_t i = 0, count; i < edges.size(); i += count) {
+      for (count = 1; i + count < edges.size() && edges[i + count] == edges[i];) ++count;
+      if (count > 2) return false;
+      if (count == 2) continue;
+      ++rim, ++degree[edges[i].first], ++degree[edges[i].second];
+      add(edges[i].first, edges[i].second, apex);
+    }
+    for (const int count : degree)
+      if (count != 0 && count != 2) return false;
+    return rim >= 3;
+  }
+
+  Differences differences_;
+  std::vector<Vector<Number>> points_;
+  std::vector<Source> sources_;
+  std::vector<Face> faces_;
+  Vector<Number> inside4_{};
+  bool broken_ = false;
+};
+
+}  // namespace tauguard::rigid
