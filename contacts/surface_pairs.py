@@ -60,7 +60,7 @@ class SurfacePairs:
             if impact.hit[0]:
                 rows.append((a, b, impact))
         return Contacts(
-            time=np.array([impact.toi[0] for *_, impact in rows]),
+            time=np.array([impact.time_of_impact[0] for *_, impact in rows]),
             geom=np.array([(a, b) for a, b, _ in rows], dtype=np.int32).reshape(-1, 2),
             flex=np.full((len(rows), 2), -1, dtype=np.int32),
             feature=np.array([i.faces[0] for *_, i in rows], dtype=np.int32).reshape(-1, 2),

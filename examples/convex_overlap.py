@@ -22,8 +22,8 @@ for height, hit, point, normal, offset in zip(
     print(f"{height:.1f}     {hit!s:5}  {point if hit else (normal, round(float(offset), 3))}")
 
 drop = sweep(table, parts, displacement=[0, 0, -0.25])  # the parts fall by 0.25 within the step
-for height, toi, normal in zip(heights, drop.toi, drop.normal, strict=True):
-    print(f"from {height:.1f}: toi {toi:.3f}, normal {normal}")
+for height, time, normal in zip(heights, drop.time_of_impact, drop.normal, strict=True):
+    print(f"from {height:.1f}: time of impact {time:.3f}, normal {normal}")
 
 cache = PlaneCache(len(parts))  # frame after frame: the last planes first
 for frame in range(3):

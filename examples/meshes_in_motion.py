@@ -25,10 +25,10 @@ first = tree.overlap(tree, poses)
 print("balls 0.2 m across, at", poses[:, 0, 3], "hit", first.hit)
 
 contacts = tree.contacts(tree, poses[1])
-print(f"{len(contacts)} pairs of triangles meet; deepest {contacts.depth.max():.4f} m")
+print(f"{len(contacts)} pairs of triangles meet; deepest {contacts.penetration.max():.4f} m")
 
 fall = tree.sweep(tree, poses[2], displacement=[-0.05, 0, 0])  # straight, t in [0, 1]
-print(f"straight: toi {fall.toi[0]:.3f} at {fall.point[0].round(3)}")
+print(f"straight: time of impact {fall.time_of_impact[0]:.3f} at {fall.point[0].round(3)}")
 
 # Bodies that also turn: a rod swings onto a box from above.
 rod = Boxes([[0.25, 0, 0]], [[0.25, 0.01, 0.01]], [np.eye(3)])  # its end is the origin of its pose
@@ -38,4 +38,5 @@ lifted[:3, 3] = [-0.4, 0, 0.3]
 swing = Motion(pose_t0=lifted, linear=[0, 0, -0.1], angular=[0, 0.6, 0])
 rest = Motion(np.eye(4), linear=[0, 0, 0], angular=[0, 0, 0])
 touch = time_of_impact(rod, block, swing, rest)
-print(f"swinging: toi {touch.toi[0]:.6f} at {touch.point[0].round(4)}, normal {touch.normal[0]}")
+time, point, normal = touch.time_of_impact[0], touch.point[0].round(4), touch.normal[0]
+print(f"swinging: time of impact {time:.6f} at {point}, normal {normal}")

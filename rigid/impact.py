@@ -38,9 +38,9 @@ def time_of_impact(
     """When do moving bodies first touch, t in [0, 1]?
 
     The bodies' numbers are coordinates of their own frame, which the motion moves. The answer is
-    conservative: at every time before ``toi`` the bodies are apart, rounding included. Advancement
-    along separating directions (after Mirtich 1996 and Zhang, Lee and Kim 2006) with a bound on the
-    second derivative: it converges quadratically, from below.
+    conservative: at every time before ``time_of_impact`` the bodies are apart, rounding included.
+    Advancement along separating directions (after Mirtich 1996 and Zhang, Lee and Kim 2006) with a
+    bound on the second derivative: it converges quadratically, from below.
 
     Args:
         a: N convex bodies of one kind, rounded or not, or one; or a mesh, whose surface counts (not
@@ -51,9 +51,9 @@ def time_of_impact(
         threads: 0 means all processors; the answer does not depend on it.
 
     Returns:
-        ``hit``, ``toi``, ``point`` and ``normal`` (world frame, from a to b); meshes also tell
-        the ``faces``. Where two bodies overlap at t = 0 the toi is 0 and the normal NaN; the point
-        is common to both then too.
+        ``hit``, ``time_of_impact``, ``point`` and ``normal`` (world frame, from a to b), with
+        meshes also the ``faces``. Where two bodies overlap at t = 0, the time is 0, the normal NaN
+        and the point common to both.
 
     Raises:
         ValueError: lengths that do not match, no motion, polygons, or a coordinate beyond 1e100,

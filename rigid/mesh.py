@@ -39,15 +39,15 @@ class MeshContacts:
         faces: Face of this mesh and face of the other. Shape (M, 2).
         point: The middle of what the two triangles share, in this mesh's frame. Shape (M, 3).
         normal: Unit, from this mesh to the other: the direction in which the other's triangle comes
-            free of this one over the shortest way. Shape (M, 3).
-        depth: That way's length, 0 where they just touch. Shape (M,), m.
+            free of this one over the shortest path. Shape (M, 3).
+        penetration: That path's length, 0 where they just touch. Shape (M,), m.
     """
 
     pose: NDArray[np.int32]
     faces: NDArray[np.int32]
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
-    depth: NDArray[np.float64]
+    penetration: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -150,7 +150,7 @@ class MeshTree:
     def contacts(
         self, other: MeshTree, pose: ArrayLike, threads: int = 1, limit: int = 10_000_000
     ) -> MeshContacts:
-        """All pairs of triangles that meet, with points, normals and depths; see :meth:`overlap`.
+        """All pairs of triangles that meet: points, normals, penetrations; see :meth:`overlap`.
 
         Asking the other way round (the inverse pose) gives the same contacts with the normals
         turned about, and moving both meshes together moves the contacts with them, to rounding.

@@ -75,11 +75,12 @@ def sweep(
         displacement: Over the step t in [0, 1]. Shape (N, 3) or (3,).
         method: ``abfme`` eliminates the separating plane with t as one more unknown and casts
             separating axes for the time of hits only; ``sat`` casts them in any case; ``auto`` is
-            the faster of both. ``hit`` is exact for each, ``toi`` never late.
+            the faster of both. ``hit`` is exact for each, ``time_of_impact`` never late.
         threads: 0 means all processors; the answer does not depend on it.
 
     Returns:
-        ``hit``, ``toi``, ``point`` and ``normal`` (from a to b; NaN where they overlap at t = 0).
+        ``hit``, ``time_of_impact``, ``point`` and ``normal`` (from a to b; NaN where they overlap
+        at t = 0).
 
     Raises:
         ValueError: lengths or shapes that do not match, an entry that is not finite, an unknown
@@ -106,7 +107,7 @@ def native_sweep(
     threads: int = 1,
     points: bool = True,
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64], int]:
-    """``hit`` (N,), rows of toi, point, normal (N, 7), how many rows needed exact arithmetic."""
+    """``hit`` (N,); time of impact, point and normal (N, 7); rows left to exact arithmetic."""
     count = rows(a, b)
     moves = np.ascontiguousarray(np.broadcast_to(displacement, (count, 3)))
     hit, out = np.empty(count, dtype=np.uint8), np.empty((count, 7))

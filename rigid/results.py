@@ -48,14 +48,14 @@ class Impacts:
 
     Attributes:
         hit: True where they touch within the step. Shape (N,).
-        toi: Time of impact in [0, 1] of the step; inf where there is no hit. Shape (N,).
+        time_of_impact: In [0, 1] of the step; inf where there is no hit. Shape (N,).
         point: A common point at that time, world frame; NaN where there is no hit. Shape (N, 3).
         normal: Unit contact normal from a to b at that time; NaN where there is none, or where the
             bodies overlap from the start and no normal is defined. Shape (N, 3).
     """
 
     hit: NDArray[np.bool_]
-    toi: NDArray[np.float64]
+    time_of_impact: NDArray[np.float64]
     point: NDArray[np.float64]
     normal: NDArray[np.float64]
 

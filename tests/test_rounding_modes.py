@@ -46,7 +46,7 @@ def rigid_meshes():
     def asked():
         touch = tree.time_of_impact(tree, motion)
         assert touch.hit.any()
-        return tree.overlap(tree, pose).hit, touch.hit, touch.toi
+        return tree.overlap(tree, pose).hit, touch.hit, touch.time_of_impact
 
     return asked
 

@@ -17,11 +17,11 @@ class Ours:
 
     def vertex_face(self, x_t0: Any, x_t1: Any) -> float | None:
         """The method ab2pf."""
-        return _toi(vertex_face([x_t0], [x_t1]))
+        return _first(vertex_face([x_t0], [x_t1]).toi)
 
     def edge_edge(self, x_t0: Any, x_t1: Any) -> float | None:
         """The method ab2pf."""
-        return _toi(edge_edge([x_t0], [x_t1]))
+        return _first(edge_edge([x_t0], [x_t1]).toi)
 
     def convex_overlap(self, a: Any, b: Any) -> bool:
         """Convex hulls, the method ``auto``."""
@@ -29,11 +29,12 @@ class Ours:
 
     def convex_sweep(self, a: Any, b: Any, displacement: Any) -> float | None:
         """Convex hulls, the method ``auto``."""
-        return _toi(sweep(_hull(a), _hull(b), displacement))
+        return _first(sweep(_hull(a), _hull(b), displacement).time_of_impact)
 
     def convex_motion(self, a: Any, b: Any, motion_a: Any, motion_b: Any) -> float | None:
         """Convex hulls at constant linear and angular velocity."""
-        return _toi(time_of_impact(_hull(a), _hull(b), _motion(motion_a), _motion(motion_b)))
+        found = time_of_impact(_hull(a), _hull(b), _motion(motion_a), _motion(motion_b))
+        return _first(found.time_of_impact)
 
     def scene(self, mjcf: str, seconds: float) -> float:
         """MuJoCo's steps under the guard."""
@@ -67,5 +68,5 @@ def _motion(given: Any) -> Motion:
     return Motion(pose, given["linear"], given["angular"])
 
 
-def _toi(impacts: Any) -> float | None:
-    return float(impacts.toi[0]) if impacts.hit[0] else None
+def _first(times: Any) -> float | None:
+    return float(times[0]) if np.isfinite(times[0]) else None

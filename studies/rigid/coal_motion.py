@@ -47,28 +47,28 @@ def in_motion(
             frames [m]. Shape (n,).
     """
     found = call()
-    n = len(found.toi)
+    n = len(found.time_of_impact)
     spent = time_in_turn({"": call}, 3, time.process_time)[""]
     row: Row = {"pairs": n, "hits": int(found.hit.sum()), "us": nanoseconds(spent, 1000 * n)}
     left, right = sides
     if left is None or right is None:
         return {**row, "coal_us": "coal is not installed"}
     gap = CoalGap(left, right, motions)
-    end = np.where(found.hit, found.toi, 1.0)
+    end = np.where(found.hit, found.time_of_impact, 1.0)
     before = [gap(np.arange(n), share * end) for share in np.linspace(0, 0.999, 24)]
-    at = np.abs(gap(np.arange(n), end))[found.hit & (found.toi > 0)]
+    at = np.abs(gap(np.arange(n), end))[found.hit & (found.time_of_impact > 0)]
     speed = np.linalg.norm(motions[0].linear - motions[1].linear, axis=1)
     speed += lever * np.maximum(*(np.linalg.norm(m.angular, axis=1) for m in motions))
     toi, seconds, steps = advanced(gap, speed, n)
-    both = np.isfinite(toi) & found.hit & (found.toi > 0)
+    both = np.isfinite(toi) & found.hit & (found.time_of_impact > 0)
     return {
         **row,
-        "passed_before": passed_before(np.min(before, axis=0), found.toi),
+        "passed_before": passed_before(np.min(before, axis=0), found.time_of_impact),
         "gap_at_toi": float(at.max(initial=0.0)),
         "coal_us": 1e6 * seconds / n,
         "coal_steps": steps / n,
         "coal_disagrees": int((np.isfinite(toi) != found.hit).sum()),
-        "toi_differs_most": float(np.abs(toi[both] - found.toi[both]).max(initial=0.0)),
+        "toi_differs_most": float(np.abs(toi[both] - found.time_of_impact[both]).max(initial=0.0)),
     }
 
 

@@ -89,7 +89,7 @@ def our_row(
     kind: str, a: Bodies, b: Bodies, ma: Motion, mb: Motion, early: Array, touch: Array
 ) -> Row:
     """Time per pair and errors of ``time_of_impact``."""
-    toi = time_of_impact(a, b, ma, mb).toi
+    toi = time_of_impact(a, b, ma, mb).time_of_impact
     calls, count = {}, {}
     for name, index in groups(early, touch).items():
         part = take(a, index), take(b, index), take(ma, index), take(mb, index)

@@ -240,7 +240,7 @@ def dynamic_rows(
     for kind, angular in (("sweep", np.zeros_like(move)), ("linear and angular", turn)):
         motion = Motion(start, move, angular)
         found = tree.time_of_impact(tree, motion)
-        late, early = judged(tree, peer, motion, found.toi)
+        late, early = judged(tree, peer, motion, found.time_of_impact)
         for outcome in (True, False):
             chosen = np.flatnonzero(found.hit == outcome)
             part = Motion(start[chosen], move[chosen], angular[chosen])
@@ -255,7 +255,7 @@ def dynamic_rows(
                     "outcome": "collision" if outcome else "non-collision",
                     "pairs": len(chosen),
                     "us": scaled(seconds, 1e6 / max(1, len(chosen))),
-                    **advancement(mesh, peer, motion, found.toi, chosen[:ADVANCED]),
+                    **advancement(mesh, peer, motion, found.time_of_impact, chosen[:ADVANCED]),
                     "late_or_missed": late,
                     "not_touching_1e-7_later": early,
                 }

@@ -58,10 +58,10 @@ def rigid(threads):
     boxes = Boxes(np.zeros((50, 3)), np.full((50, 3), 0.25), np.tile(np.eye(3), (50, 1, 1)))
     rest = Motion(np.eye(4), np.zeros(3), np.zeros(3))
     moving = Motion(turns, 3 * exact(rng, 50, 3), 2 * exact(rng, 50, 3))
-    yield time_of_impact(boxes, boxes, moving, rest, threads=threads).toi
+    yield time_of_impact(boxes, boxes, moving, rest, threads=threads).time_of_impact
     tree = MeshTree(exact(rng, 60, 3), rng.permutation(60).reshape(-1, 3))
     contacts = tree.contacts(tree, np.eye(4), threads=threads)
-    yield from (contacts.faces, contacts.point, contacts.depth)
+    yield from (contacts.faces, contacts.point, contacts.penetration)
 
 
 def geometry(threads):

@@ -69,13 +69,15 @@ def test_never_late_never_missed_and_close(kind):
     found = np.isfinite(truth)
     assert found.sum() > 40
     assert ours.hit[found].all()
-    assert (ours.toi[found] <= truth[found] + 1e-13).all()
-    assert (truth[found] - ours.toi[found] <= 1e-7).mean() > 0.99  # a graze between two samples
-    start = ours.toi == 0
+    assert (ours.time_of_impact[found] <= truth[found] + 1e-13).all()
+    assert (
+        truth[found] - ours.time_of_impact[found] <= 1e-7
+    ).mean() > 0.99  # a graze between two samples
+    start = ours.time_of_impact == 0
     np.testing.assert_array_equal(start, truth <= 0)
     later = ours.hit & ~start
     np.testing.assert_allclose(np.linalg.norm(ours.normal[later], axis=1), 1.0)
-    assert np.isinf(ours.toi[~ours.hit]).all()
+    assert np.isinf(ours.time_of_impact[~ours.hit]).all()
     assert np.isnan(ours.point[~ours.hit]).all()
 
 
@@ -84,7 +86,7 @@ def test_a_cube_falls_on_a_cube():
     pose = np.eye(4)
     pose[2, 3] = 2.0
     got = time_of_impact(box, box, REST, Motion(pose, [0, 0, -4.0], np.zeros(3)))
-    np.testing.assert_allclose(got.toi, 0.25, atol=1e-12)
+    np.testing.assert_allclose(got.time_of_impact, 0.25, atol=1e-12)
     np.testing.assert_allclose(got.normal, [[0, 0, 1]], atol=1e-12)
     np.testing.assert_allclose(got.point[0, 2], 0.5, atol=1e-12)
 
@@ -95,14 +97,17 @@ def test_a_spinning_rod_hits_at_the_angle_that_geometry_says():
     spin = Motion(np.eye(4), np.zeros(3), [0, 0, 2.0])
     rod = Hulls(np.array([[x, 0.0, z] for x in (0.0, 1.0) for z in (-0.1, 0.1)]), np.array([0, 4]))
     got = time_of_impact(rod, post, spin, REST)
-    np.testing.assert_allclose(got.toi, 0.5, atol=1e-9)
+    np.testing.assert_allclose(got.time_of_impact, 0.5, atol=1e-9)
 
 
 def test_touching_at_the_start_is_a_hit_at_zero():
     box = Boxes(np.zeros((1, 3)), np.full((1, 3), 0.5), np.eye(3)[None])
     pose = np.eye(4)
     pose[0, 3] = 1.0
-    assert time_of_impact(box, box, REST, Motion(pose, [1.0, 0, 0], np.zeros(3))).toi[0] == 0
+    assert (
+        time_of_impact(box, box, REST, Motion(pose, [1.0, 0, 0], np.zeros(3))).time_of_impact[0]
+        == 0
+    )
 
 
 def repeated(motion, i, n):
@@ -140,7 +145,7 @@ def test_meshes_touch_when_the_first_of_all_their_triangles_do(distance, linear,
     turn = angular * rng.uniform(-1, 1, (2, 8, 3))
     ma, mb = Motion(pose[0], np.full((8, 3), 0.2), turn[0]), Motion(pose[1], aim, turn[1])
     truth = [
-        time_of_impact(a, b, repeated(ma, k, len(i)), repeated(mb, k, len(i))).toi.min()
+        time_of_impact(a, b, repeated(ma, k, len(i)), repeated(mb, k, len(i))).time_of_impact.min()
         for k in range(8)
     ]
     assert np.isfinite(truth).sum() >= 3
@@ -148,9 +153,9 @@ def test_meshes_touch_when_the_first_of_all_their_triangles_do(distance, linear,
     for volume in ("obb", "aabb", "k_dop", "sphere"):
         x, y = (MeshTree(c.reshape(-1, 3), faces, volume) for c in corners)
         found = time_of_impact(x, y, ma, mb)
-        np.testing.assert_allclose(found.toi, truth, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(found.time_of_impact, truth, rtol=0, atol=1e-10)
         # Never late, to the rounding of either search.
-        assert (found.toi <= np.array(truth) + 1e-12).all()
+        assert (found.time_of_impact <= np.array(truth) + 1e-12).all()
 
 
 def test_meshes_give_the_time_of_their_hulls_and_of_sweeps():
@@ -159,15 +164,15 @@ def test_meshes_give_the_time_of_their_hulls_and_of_sweeps():
     box = Boxes(np.zeros((1, 3)), np.full((1, 3), 0.5), np.eye(3)[None])
     ma, mb = motions(rng, 150, 1.3), motions(rng, 150, 1.3)
     convex, mesh = time_of_impact(box, box, ma, mb), time_of_impact(tree, tree, ma, mb)
-    free = ~(convex.toi == 0)  # a cube inside a cube has no common surface
+    free = ~(convex.time_of_impact == 0)  # a cube inside a cube has no common surface
     np.testing.assert_array_equal(mesh.hit[free], convex.hit[free])
     hit = free & convex.hit
     assert hit.sum() > 5
-    np.testing.assert_allclose(mesh.toi[hit], convex.toi[hit], atol=1e-9)
+    np.testing.assert_allclose(mesh.time_of_impact[hit], convex.time_of_impact[hit], atol=1e-9)
     pose = np.eye(4)
     pose[:3, 3] = [2.0, 0.1, 0.2]
     swept = tree.sweep(tree, pose, [-4.0, 0, 0])
-    np.testing.assert_allclose(swept.toi, 0.25, atol=1e-12)
+    np.testing.assert_allclose(swept.time_of_impact, 0.25, atol=1e-12)
     assert not tree.sweep(tree, pose, [4.0, 0, 0]).hit[0]
     assert tree.sweep(tree, pose, [4.0, 0, 0]).faces.tolist() == [[-1, -1]]
 
@@ -189,10 +194,10 @@ def test_every_hit_has_a_point_of_both_bodies(kind):
     n = 300
     a, b, ma, mb = bodies(kind, rng, n), bodies(kind, rng, n), motions(rng, n), motions(rng, n)
     got = time_of_impact(a, b, ma, mb)
-    start = got.toi == 0
+    start = got.time_of_impact == 0
     assert min(start.sum(), (got.hit & ~start).sum()) > 10
     assert np.isnan(got.point[~got.hit]).all()
-    t = np.where(got.hit, got.toi, 0.0)
+    t = np.where(got.hit, got.time_of_impact, 0.0)
     for body, motion in ((a, ma), (b, mb)):
         assert inside(body, motion, t, got.point)[got.hit].min() > -1e-8
 
@@ -209,7 +214,7 @@ def test_flat_hulls_that_meet_in_their_plane(k, j):
     pose[:, :2, 3] = rng.uniform(-2, 2, (n, 2))
     linear, angular = rng.uniform(-2, 2, (2, n, 3)) * [[[1, 1, 0]], [[0, 0, 1]]]
     got = time_of_impact(*hulls, REST, Motion(pose, linear, angular))
-    later = np.flatnonzero(got.hit & (got.toi > 0))
+    later = np.flatnonzero(got.hit & (got.time_of_impact > 0))
     assert len(later) > 3
     np.testing.assert_array_equal(got.point[got.hit, 2], 0.0)
     np.testing.assert_allclose(np.linalg.norm(got.normal[later, :2], axis=1), 1.0)
@@ -221,9 +226,9 @@ def test_flat_hulls_that_meet_in_their_plane(k, j):
         return overlap(Hulls(a, np.array([0, k])), Hulls(b, np.array([0, j]))).hit[0]
 
     for i in later:
-        assert not touching(i, got.toi[i] - 1e-9)
+        assert not touching(i, got.time_of_impact[i] - 1e-9)
         # A point lies on a segment to the last bit only by chance.
-        assert k * j == 2 or touching(i, got.toi[i] + 1e-7)
+        assert k * j == 2 or touching(i, got.time_of_impact[i] + 1e-7)
 
 
 def test_thread_count_changes_nothing():
@@ -235,7 +240,7 @@ def test_thread_count_changes_nothing():
         first = time_of_impact(x, y, ma, mb)
         for threads in (2, 5, 0):
             again = time_of_impact(x, y, ma, mb, threads=threads)
-            for name in ("hit", "toi", "point", "normal", *extra):
+            for name in ("hit", "time_of_impact", "point", "normal", *extra):
                 assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
 
 

@@ -158,7 +158,7 @@ def test_contacts_of_a_cube_dipped_into_another():
     assert len(c) > 0
     assert top.any()
     np.testing.assert_allclose(c.normal[top, 2], 1.0)
-    np.testing.assert_allclose(c.depth[top], 0.1, atol=1e-12)
+    np.testing.assert_allclose(c.penetration[top], 0.1, atol=1e-12)
     np.testing.assert_allclose(c.point[:, 2], 0.5, atol=1e-12)
     assert (np.abs(c.point[:, :2]) <= 0.25 + 1e-12).all()
 
@@ -176,7 +176,7 @@ def test_contacts_are_the_same_seen_from_either_side_and_from_anywhere():
     np.testing.assert_array_equal(back.faces[order][:, ::-1], c.faces)
     r = pose[:3, :3]
     np.testing.assert_allclose(back.point[order] @ r.T + pose[:3, 3], c.point, atol=1e-12)
-    np.testing.assert_allclose(back.depth[order], c.depth, atol=1e-12)
+    np.testing.assert_allclose(back.penetration[order], c.penetration, atol=1e-12)
     np.testing.assert_allclose(back.normal[order] @ r.T, -c.normal, atol=1e-9)
     # Both meshes moved together by `world`.
     world = random_poses(rng, 1, 5.0)[0]
@@ -184,7 +184,7 @@ def test_contacts_are_the_same_seen_from_either_side_and_from_anywhere():
     np.testing.assert_array_equal(moved.faces, c.faces)
     np.testing.assert_allclose(moved.point, transform(world, c.point), atol=1e-11)
     np.testing.assert_allclose(moved.normal, c.normal @ world[:3, :3].T, atol=1e-9)
-    np.testing.assert_allclose(moved.depth, c.depth, atol=1e-11)
+    np.testing.assert_allclose(moved.penetration, c.penetration, atol=1e-11)
 
 
 def test_a_contact_comes_free_along_its_normal():
@@ -198,10 +198,10 @@ def test_a_contact_comes_free_along_its_normal():
             continue
         seen += 1
         np.testing.assert_allclose(np.linalg.norm(c.normal), 1.0)
-        out = (c.depth[0] + 1e-9) * c.normal[0]
-        inside = (c.depth[0] - 1e-6) * c.normal[0]
+        out = (c.penetration[0] + 1e-9) * c.normal[0]
+        inside = (c.penetration[0] - 1e-6) * c.normal[0]
         assert not triangles_meet(x, y + out)
-        assert c.depth[0] < 1e-6 or triangles_meet(x, y + inside)
+        assert c.penetration[0] < 1e-6 or triangles_meet(x, y + inside)
     assert seen > 5
 
 
@@ -215,7 +215,7 @@ def test_thread_count_changes_nothing(volume):
     contacts = [tree.contacts(tree, poses, threads=n) for n in (1, 2, 5)]
     for n in (1, 2):
         np.testing.assert_array_equal(faces[n], faces[0])
-        for name in ("pose", "faces", "point", "normal", "depth"):
+        for name in ("pose", "faces", "point", "normal", "penetration"):
             ours, first = (getattr(c, name) for c in (contacts[n], contacts[0]))
             assert ours.tobytes() == first.tobytes()
 

@@ -81,20 +81,20 @@ def test_a_mesh_is_touched_when_the_first_of_its_triangles_is(kind, reach, speed
 
     table = time_of_impact(
         triangles, Rounded(clouds, radius), repeated(mesh_motion), repeated(motion)
-    ).toi.reshape(n, m)
+    ).time_of_impact.reshape(n, m)
     truth = table.min(axis=1)
     got = time_of_impact(tree, body, mesh_motion, motion)
     assert np.isfinite(truth).sum() >= 5
-    np.testing.assert_allclose(got.toi, truth, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(got.time_of_impact, truth, rtol=0, atol=1e-9)
     hit = np.flatnonzero(got.hit)
     np.testing.assert_allclose(table[hit, got.faces[hit, 0]], truth[hit], atol=1e-9)
     assert (got.faces[:, 1] == -1).all()
     back = time_of_impact(body, tree, motion, mesh_motion)
-    np.testing.assert_array_equal(back.toi, got.toi)
+    np.testing.assert_array_equal(back.time_of_impact, got.time_of_impact)
     np.testing.assert_array_equal(back.faces, got.faces[:, ::-1])
     np.testing.assert_array_equal(back.normal, -got.normal)
     many = time_of_impact(tree, body, mesh_motion, motion, threads=3)
-    assert many.toi.tobytes() == got.toi.tobytes()
+    assert many.time_of_impact.tobytes() == got.time_of_impact.tobytes()
 
 
 def test_inside_a_closed_mesh_the_surface_counts():
@@ -108,7 +108,7 @@ def test_inside_a_closed_mesh_the_surface_counts():
     np.testing.assert_allclose(got[:2], [0.5, 0.0])
     assert 0 < got[2] < 1e-15
     move = Motion(np.eye(4), [2.0, 0, 0], np.zeros(3))
-    toi = time_of_impact(tree, Spheres([[0, 0, 0]], 0.5), REST, move).toi
+    toi = time_of_impact(tree, Spheres([[0, 0, 0]], 0.5), REST, move).time_of_impact
     np.testing.assert_allclose(toi, 0.25, atol=1e-12)
 
 

@@ -156,11 +156,13 @@ def test_time_of_impact_is_never_late_never_missed_and_close(kinds):
     hit = np.isfinite(truth)
     assert hit.sum() >= 10
     assert got.hit[hit].all()
-    assert (got.toi[hit] <= truth[hit] + 1e-11).all()
-    assert (truth[hit] - got.toi[hit] <= 1e-9).mean() > 0.95  # a graze between two samples
-    np.testing.assert_array_equal(got.toi == 0, truth <= 0)
-    t = np.where(got.hit, got.toi, 0.0)
-    later = got.hit & (got.toi > 0)
+    assert (got.time_of_impact[hit] <= truth[hit] + 1e-11).all()
+    assert (
+        truth[hit] - got.time_of_impact[hit] <= 1e-9
+    ).mean() > 0.95  # a graze between two samples
+    np.testing.assert_array_equal(got.time_of_impact == 0, truth <= 0)
+    t = np.where(got.hit, got.time_of_impact, 0.0)
+    later = got.hit & (got.time_of_impact > 0)
     np.testing.assert_allclose(np.linalg.norm(got.normal[later], axis=1), 1.0)
     # Up to there they are apart, by less than the rest of the way.
     left = distance(placed(a, ma, t), placed(b, mb, t))
@@ -186,7 +188,7 @@ def test_balls_on_straight_ways_by_formula():
     root = (-b - np.sqrt(np.maximum(disc, 0))) / a
     want = np.where(c <= 0, 0.0, np.where((disc >= 0) & (root >= 0) & (root <= 1), root, np.inf))
     assert np.isfinite(want).sum() > 30
-    np.testing.assert_allclose(got.toi, want, atol=1e-9)
+    np.testing.assert_allclose(got.time_of_impact, want, atol=1e-9)
 
 
 def test_a_spinning_capsule_reaches_a_ball_at_the_angle_that_geometry_says():
@@ -197,16 +199,16 @@ def test_a_spinning_capsule_reaches_a_ball_at_the_angle_that_geometry_says():
     ball = Spheres([[np.cos(1), np.sin(1), 0]], 0.25)
     got = time_of_impact(rod, ball, spin, REST)
     want = brentq(lambda t: np.sin(1 - 2 * t) - 0.375, 0, 0.5)
-    np.testing.assert_allclose(got.toi, want, atol=1e-12)
+    np.testing.assert_allclose(got.time_of_impact, want, atol=1e-12)
 
 
 def test_motions_that_touch_overlap_or_stand_still():
     one, rest = Spheres([[0, 0, 0]], 1.0), REST
     two = Spheres([[2, 0, 0]], 1.0)
     away = Motion(np.eye(4), [1.0, 0, 0], np.zeros(3))
-    assert time_of_impact(one, two, rest, away).toi[0] == 0  # touching at the start
+    assert time_of_impact(one, two, rest, away).time_of_impact[0] == 0  # touching at the start
     same = time_of_impact(one, one, rest, rest)
-    assert same.toi[0] == 0
+    assert same.time_of_impact[0] == 0
     assert np.isnan(same.normal).all()
     assert np.isfinite(same.point).all()
     apart = Spheres([[2 + 1e-9, 0, 0]], 1.0)
@@ -214,11 +216,13 @@ def test_motions_that_touch_overlap_or_stand_still():
     assert not time_of_impact(one, apart, rest, away).hit[0]
     point = Spheres([[3, 0, 0]], 0.0)  # a ball of no radius is a point
     toward = Motion(np.eye(4), [-4.0, 0, 0], np.zeros(3))
-    np.testing.assert_allclose(time_of_impact(one, point, rest, toward).toi, 0.5, atol=1e-12)
+    np.testing.assert_allclose(
+        time_of_impact(one, point, rest, toward).time_of_impact, 0.5, atol=1e-12
+    )
     tiny = Rounded(Hulls([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [0, 3]), 1e-13)
     drop = Motion(np.eye(4), [0, 0, -4.0], np.zeros(3))
     got = time_of_impact(tiny, Spheres([[0.2, 0.2, 2]], 0.0), rest, drop)
-    np.testing.assert_allclose(got.toi, 0.5, atol=1e-10)
+    np.testing.assert_allclose(got.time_of_impact, 0.5, atol=1e-10)
 
 
 def test_radius_zero_is_the_core_and_threads_change_nothing():
@@ -226,11 +230,11 @@ def test_radius_zero_is_the_core_and_threads_change_nothing():
     a, b = (rounded("boxes", rng, 100) for _ in range(2))
     ma, mb = motions(rng, 100, 1.5), motions(rng, 100, 1.5)
     sharp, zero = time_of_impact(a, b, ma, mb), time_of_impact(Rounded(a, 0.0), b, ma, mb)
-    for name in ("hit", "toi", "point", "normal"):
+    for name in ("hit", "time_of_impact", "point", "normal"):
         assert getattr(sharp, name).tobytes() == getattr(zero, name).tobytes()
     c = rounded("capsules", rng, 100)
     one = time_of_impact(c, b, ma, mb), overlap(c, b).hit
     for threads in (2, 5):
         many = time_of_impact(c, b, ma, mb, threads=threads), overlap(c, b, threads=threads).hit
-        assert one[0].toi.tobytes() == many[0].toi.tobytes()
+        assert one[0].time_of_impact.tobytes() == many[0].time_of_impact.tobytes()
         np.testing.assert_array_equal(one[1], many[1])

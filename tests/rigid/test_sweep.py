@@ -29,12 +29,14 @@ def check(a, b, d, tolerance, methods=("abfme", "sat", "auto")):
     for method in methods:
         got = sweep(a, b, d, method=method)
         np.testing.assert_array_equal(got.hit, expected, err_msg=method)
-        assert np.isinf(got.toi[~expected]).all()
+        assert np.isinf(got.time_of_impact[~expected]).all()
         assert np.isnan(got.point[~expected]).all()
         assert np.isnan(got.normal[~expected]).all()
         for i in np.flatnonzero(expected):
-            assert got.toi[i] <= truth[i] or truth[i] == 0, f"{method} is late in row {i}"
-            assert truth[i] - got.toi[i] <= tolerance, f"{method} is early in row {i}"
+            assert got.time_of_impact[i] <= truth[i] or truth[i] == 0, (
+                f"{method} is late in row {i}"
+            )
+            assert truth[i] - got.time_of_impact[i] <= tolerance, f"{method} is early in row {i}"
     return np.array([np.inf if t is None else float(t) for t in truth])
 
 
@@ -72,7 +74,7 @@ def test_any_finite_tetrahedra(values):
     for method in ("abfme", "sat"):
         got = sweep(a, b, d, method=method)
         assert got.hit[0] == (expected is not None), method
-        assert expected is None or got.toi[0] <= expected or expected == 0
+        assert expected is None or got.time_of_impact[0] <= expected or expected == 0
 
 
 def test_grid_motions_touch_at_once_or_slide_past():
@@ -114,9 +116,9 @@ def test_point_is_common_and_normal_separates(kind_a, kind_b):
     d = rng.uniform(-4, 4, (n, 3))
     a, b = KINDS[kind_a](rng, n), moved(KINDS[kind_b](rng, n), -0.5 * d)
     result = sweep(a, b, d)
-    hit = result.hit & (result.toi > 0)
+    hit = result.hit & (result.time_of_impact > 0)
     (va, _), (vb, _) = float_bodies(a, n), float_bodies(b, n)
-    vb = vb + (np.where(result.hit, result.toi, 0)[:, None] * d)[:, None]
+    vb = vb + (np.where(result.hit, result.time_of_impact, 0)[:, None] * d)[:, None]
     va, vb, normal, point = va[hit], vb[hit], result.normal[hit], result.point[hit]
     assert len(va) > 30
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, rtol=1e-12)
@@ -141,7 +143,7 @@ def test_hulls_by_exact_advancement():
     hulls = [Hulls(t.vertices.reshape(-1, 3), 4 * np.arange(n + 1)) for t in (a, b)]
     want, got = sweep(a, b, d), sweep(*hulls, d)
     np.testing.assert_array_equal(got.hit, want.hit)
-    np.testing.assert_allclose(got.toi, want.toi, rtol=1e-9)
+    np.testing.assert_allclose(got.time_of_impact, want.time_of_impact, rtol=1e-9)
 
 
 def test_overlap_from_the_start_has_no_normal():
@@ -149,7 +151,7 @@ def test_overlap_from_the_start_has_no_normal():
     a = KINDS["boxes"](rng, 50)
     result = sweep(a, a, np.ones((50, 3)))
     assert result.hit.all()
-    assert (result.toi == 0).all()
+    assert (result.time_of_impact == 0).all()
     assert np.isnan(result.normal).all()
     assert np.isfinite(result.point).all()
 

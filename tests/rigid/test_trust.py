@@ -155,7 +155,11 @@ def test_a_box_that_turns_thousands_of_times_a_step_hits_only_what_it_reaches():
             falling = spinning(angle, [0.5 + reach + gap, 0, 0], [-gap - 0.1, 0, 0])
             got = time_of_impact(bar, bar, falling, REST)
             assert got.hit.all()
-            assert gap / (gap + 0.1) <= got.toi[0] < (gap + 0.02) / (gap + 0.1) + np.pi / angle
+            assert (
+                gap / (gap + 0.1)
+                <= got.time_of_impact[0]
+                < (gap + 0.02) / (gap + 0.1) + np.pi / angle
+            )
             # The bar beside the other's axis of length: only its own half width decides.
             slim = spinning(angle, [0, 0.1 + np.hypot(0.1, 0.1) + gap, 0], axis=(1.0, 0, 0))
             assert not time_of_impact(bar, bar, slim, REST).hit.any(), (angle, gap)
