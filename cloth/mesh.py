@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.cloth import _mesh
 from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
-from tauguard.cloth.impacts import Impacts, check_loose, checked_distance, method_number
+from tauguard.cloth.impacts import Impacts, checked_distance, method_number
 from tauguard.cloth.loose import Loose
 from tauguard.cloth.topology import Topology
 from tauguard.geometry import finite, frozen, frozen_indices, thread_count
@@ -49,8 +49,7 @@ class MeshCCD:
         groups: Which parts meet; ``None``: everything meets everything, itself included.
         volume: One of :data:`VOLUMES`. Any of them finds the same collisions; they differ in cost.
         edges: Edges of no face (rods, wires), shape (L, 2); those that a face has change nothing.
-        points: Vertices of no face or edge that take part (particles), shape (P,). Methods other
-            than ab2pf and exact have no queries of points.
+        points: Vertices of no face or edge that take part (particles), shape (P,).
 
     Attributes:
         method, threads, volume: As given, ``threads`` with 0 as the number of processors.
@@ -80,12 +79,12 @@ class MeshCCD:
         points: ArrayLike = (),
     ) -> None:
         """Check the faces and number the edges; the hierarchy waits for positions."""
-        method_number(method)  # raises where there is none
+        self._check_method(method)
         if not isinstance(volume, str) or volume not in VOLUMES:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
         k, moving = VOLUMES[volume]
         self._method, self._volume, self._threads = method, volume, thread_count(threads)
-        faces, loose = _checked_parts(faces, edges, points, groups, method)
+        faces, loose = self._checked_parts(faces, edges, points, groups)
         rows = np.concatenate([faces, loose.rows()])
         self._mesh = _mesh.Mesh(rows, *_group_arrays(groups), k, moving, self._threads)
         self._topology = Topology(faces, loose, frozen(self._mesh.edges()), groups)
@@ -152,9 +151,8 @@ class MeshCCD:
             ValueError: as :meth:`candidates`.
         """
         start = time.perf_counter()
-        vf, ee, stats = self._mesh.find(
+        vf, ee, stats = self._collisions(
             *self._checked_step(x_t0, x_t1),
-            method_number(self.method),
             checked_distance(min_distance, self.method),
             _checked_flag(fresh),
             _checked_limit(limit),
@@ -278,11 +276,31 @@ class MeshCCD:
         groups = before.groups if groups is None else groups
         edges = before.loose.edges if edges is None else edges
         points = before.loose.points if points is None else points
-        checked, loose = _checked_parts(faces, edges, points, groups, self.method)
+        checked, loose = self._checked_parts(faces, edges, points, groups)
         rows = np.concatenate([checked, loose.rows()])
         change = self._mesh.update_topology(rows, *_group_arrays(groups))
         self._topology = Topology(checked, loose, frozen(change.pop("edge_rows")), groups)
         return change
+
+    def _check_method(self, method: str) -> None:
+        method_number(method)
+
+    def _collisions(
+        self,
+        x_t0: NDArray[np.float64],
+        x_t1: NDArray[np.float64],
+        min_distance: float,
+        fresh: bool,
+        limit: int,
+    ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+        number = method_number(self.method)
+        return self._mesh.find(x_t0, x_t1, number, min_distance, fresh, limit)
+
+    def _checked_parts(
+        self, faces: ArrayLike, edges: ArrayLike, points: ArrayLike, groups: Groups | None
+    ) -> tuple[NDArray[np.int32], Loose]:
+        checked = _checked_faces(faces, groups)
+        return checked, Loose.of(checked, edges, points, groups)
 
     def _checked_step(
         self, x_t0: ArrayLike, x_t1: ArrayLike
@@ -313,16 +331,6 @@ def _impacts(found: dict[str, Any]) -> Impacts:
 
 def _group_arrays(groups: Groups | None) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     return _NO_GROUPS if groups is None else (groups.ids, groups.meets.astype(np.uint8))
-
-
-def _checked_parts(
-    faces: ArrayLike, edges: ArrayLike, points: ArrayLike, groups: Groups | None, method: str
-) -> tuple[NDArray[np.int32], Loose]:
-    checked = _checked_faces(faces, groups)
-    loose = Loose.of(checked, edges, points, groups)
-    if loose.points.size:
-        check_loose(method)
-    return checked, loose
 
 
 def _checked_faces(faces: ArrayLike, groups: Groups | None) -> NDArray[np.int32]:

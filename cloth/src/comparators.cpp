@@ -1,11 +1,22 @@
 #include "comparators.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
+
+#include "batch.hpp"
+#include "query.hpp"
+#include "tauguard/geometry/interrupt.hpp"
+#include "tauguard/geometry/scratch.hpp"
 
 namespace tauguard::cloth {
 namespace {
 
-// Slack of the barycentric weights at a root: what the published codes use, about.
+constexpr std::size_t block = 512;  // queries at a time
+constexpr double never = std::numeric_limits<double>::infinity();
+
+// Tolerance of the barycentric weights at a root, of the size that the published codes use.
 constexpr double inside_tolerance = 1e-10;
 
 int variations(const double* a) {
@@ -45,16 +56,14 @@ bool inside(const Query& k, double t, bool vf) {
   return v >= low && w >= low && (vf ? v + w <= high : v <= high && w <= high);
 }
 
-}  // namespace
-
-bool filtered_out(const Cubic& c, Method method) {
+bool filtered_out(const Cubic& c, Comparator comparator) {
   double a[4];
-  switch (method) {
-    case Method::dnf:
+  switch (comparator) {
+    case Comparator::dnf:
       return one_sign(c, 0) != 0;
-    case Method::vcd:
+    case Comparator::vcd:
       return variations(c.b) == 0 && c.b[0] != 0 && c.b[3] != 0;
-    case Method::scd: {
+    case Comparator::scd: {
       powers(c.b, a);
       if (variations(a) == 0 && a[0] != 0) return true;
       const double reversed[4] = {c.b[3], c.b[2], c.b[1], c.b[0]};
@@ -66,10 +75,11 @@ bool filtered_out(const Cubic& c, Method method) {
   }
 }
 
-double first_root_inside(const Query& k, const Cubic& c, Method method, bool vf) {
+// The first root at which the features meet, or never.
+double first_root_inside(const Query& k, const Cubic& c, Comparator comparator, bool vf) {
   double cut[4] = {0, 1, 1, 1};
   int cuts = 1;
-  if (!(method == Method::vcd && variations(c.b) == 1)) {
+  if (!(comparator == Comparator::vcd && variations(c.b) == 1)) {
     // Split where the derivative vanishes: every piece is monotone.
     double a[4];
     powers(c.b, a);
@@ -93,7 +103,61 @@ double first_root_inside(const Query& k, const Cubic& c, Method method, bool vf)
     }
     if (b[3] == 0 && inside(k, cut[i + 1], vf)) return cut[i + 1];
   }
-  return std::numeric_limits<double>::infinity();
+  return never;
+}
+
+Query query_of(const Group& g, int lane) {
+  const auto vector = [&](int f) {
+    return Vec3{g.value[f][lane], g.value[f + 1][lane], g.value[f + 2][lane]};
+  };
+  Query k{};
+  for (int e = 0; e < 2; ++e) {
+    k.p[e] = vector(Group::p + 3 * e);
+    k.q[e] = vector(Group::q + 3 * e);
+    k.r[e] = vector(Group::r + 3 * e);
+  }
+  return k;
+}
+
+template <bool vf>
+void compare(const Ends& x, const std::int32_t* rows, std::size_t n, Comparator comparator,
+             std::uint8_t* hit, ImpactArrays out, Stats& stats) {
+  geometry::Scratch<std::array<Group, block / width>> scratch;
+  Group* groups = scratch->data();
+  for (std::size_t first = 0; first < n; first += block) {
+    geometry::poll_interrupt();
+    const int count = static_cast<int>(std::min(block, n - first));
+    const std::int32_t* part = rows + 4 * first;
+    batch_kernels().gather(vf, x, part, count, groups);
+    for (int i = 0; i < count; ++i) {
+      const Group& g = groups[i / width];
+      const int lane = i % width;
+      Cubic whole;
+      for (int j = 0; j < 4; ++j) whole.b[j] = g.value[Group::cubic + j][lane];
+      double toi = never;
+      if (filtered_out(whole, comparator)) {
+        ++stats.cubic_sign;
+      } else {
+        toi = first_root_inside(query_of(g, lane), whole, comparator, vf);
+        stats.roots += !(toi <= 1);
+      }
+      hit[first + i] = toi <= 1;
+      if (!hit[first + i]) continue;
+      out.toi[first + i] = toi;
+      describe<vf>(x, part + 4 * i, toi, out, first + i);
+    }
+  }
+}
+
+}  // namespace
+
+void compare_vf(const Ends& x, const std::int32_t* rows, std::size_t n, Comparator comparator,
+                std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
+  compare<true>(x, rows, n, comparator, hit, impacts, stats);
+}
+void compare_ee(const Ends& x, const std::int32_t* rows, std::size_t n, Comparator comparator,
+                std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
+  compare<false>(x, rows, n, comparator, hit, impacts, stats);
 }
 
 }  // namespace tauguard::cloth

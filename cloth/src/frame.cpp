@@ -93,6 +93,19 @@ Collisions sorted(const std::vector<Part>& parts) {
 
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, double min_distance,
                            std::size_t limit) {
+  const auto solve = kind == MeshCcd::Kind::vf ? solve_vf : solve_ee;
+  // Volumes that move have compared x, y and z already.
+  const AxisFilter axes{!ccd.volume().moving};
+  return find_collisions(
+      ccd, kind,
+      [=](const Ends& x, const std::int32_t* rows, std::size_t n, std::uint8_t* hit,
+          ImpactArrays impacts,
+          Stats& stats) { solve(x, rows, n, method, min_distance, hit, impacts, stats, axes); },
+      limit);
+}
+
+Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& narrow_phase,
+                           std::size_t limit) {
   std::vector<Part> parts(ccd.chunks(kind));
   std::atomic<std::size_t> found{0};
   const auto start = std::chrono::steady_clock::now();
@@ -103,10 +116,10 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, doub
     Part& part = parts[chunk];
     const std::size_t before = part.rows.size();
     const auto begin = std::chrono::steady_clock::now();
-    const auto solve = kind == MeshCcd::Kind::vf ? solve_vf : solve_ee;
-    solve(ccd.ends(), block.rows.data(), block.size, method, min_distance, answers.hit.data(),
-          {answers.toi.data(), answers.point.data(), answers.normal.data(), answers.weights.data()},
-          part.stats, {!ccd.volume().moving});  // what moves has been seen from x, y and z
+    narrow_phase(
+        ccd.ends(), block.rows.data(), block.size, answers.hit.data(),
+        {answers.toi.data(), answers.point.data(), answers.normal.data(), answers.weights.data()},
+        part.stats);
     for (std::size_t i = 0; i < block.size; ++i) {
       if (!answers.hit[i]) continue;
       Row& row = part.rows.emplace_back();

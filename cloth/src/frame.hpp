@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "mesh_ccd.hpp"
@@ -19,8 +20,15 @@ struct Collisions {
   std::size_t size() const { return toi.size(); }
 };
 
+// Decides a block of candidates, rows (n, 4) of vertices, as solve_vf does. Called from several
+// threads.
+using NarrowPhase = std::function<void(const Ends& x, const std::int32_t* rows, std::size_t n,
+                                       std::uint8_t* hit, ImpactArrays impacts, Stats& stats)>;
+
 // After ccd.prepare. Throws TooMany where there are more than `limit`.
 Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, Method method, double min_distance,
+                           std::size_t limit);
+Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& narrow_phase,
                            std::size_t limit);
 
 }  // namespace tauguard::cloth

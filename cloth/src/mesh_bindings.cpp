@@ -9,6 +9,7 @@
 
 #include "apart.hpp"
 #include "batch.hpp"
+#include "comparators.hpp"
 #include "frame.hpp"
 #include "mesh_ccd.hpp"
 #include "tauguard/geometry/call_lock.hpp"
@@ -162,17 +163,20 @@ nb::dict arrays_of(Collisions c, const BroadCounts& broad) {
   return d;
 }
 
-nb::typed<nb::tuple, Named, Named, Named> find(Mesh& mesh, Positions x_t0, Positions x_t1,
-                                               int method, double min_distance, bool fresh,
-                                               std::size_t limit) {
+using Found = nb::typed<nb::tuple, Named, Named, Named>;
+
+// Collisions of both kinds that search(kind) finds, and statistics.
+template <class Search>
+Found found_by(Mesh& mesh, Positions x_t0, Positions x_t1, double min_distance, bool fresh,
+               std::size_t limit, Search search) {
   Collisions vf, ee;
   BroadStats broad;
   std::size_t bytes = 0;
   {
     const Call call(mesh);
     mesh.ccd.prepare(x_t0.data(), x_t1.data(), x_t0.shape(0), min_distance, fresh, limit);
-    vf = find_collisions(mesh.ccd, MeshCcd::Kind::vf, Method(method), min_distance, limit);
-    ee = find_collisions(mesh.ccd, MeshCcd::Kind::ee, Method(method), min_distance, limit);
+    vf = search(MeshCcd::Kind::vf);
+    ee = search(MeshCcd::Kind::ee);
     broad = mesh.ccd.stats();
     bytes = mesh.ccd.bytes();
   }
@@ -183,6 +187,71 @@ nb::typed<nb::tuple, Named, Named, Named> find(Mesh& mesh, Positions x_t0, Posit
   seconds["ee_narrow"] = ee.narrow_s;
   return nb::make_tuple(arrays_of(std::move(vf), broad.vf), arrays_of(std::move(ee), broad.ee),
                         stats);
+}
+
+Found find(Mesh& mesh, Positions x_t0, Positions x_t1, int method, double min_distance, bool fresh,
+           std::size_t limit) {
+  return found_by(mesh, x_t0, x_t1, min_distance, fresh, limit, [&](MeshCcd::Kind kind) {
+    return find_collisions(mesh.ccd, kind, Method(method), min_distance, limit);
+  });
+}
+
+Found compare(Mesh& mesh, Positions x_t0, Positions x_t1, int comparator, bool fresh,
+              std::size_t limit) {
+  return found_by(mesh, x_t0, x_t1, 0, fresh, limit, [&](MeshCcd::Kind kind) {
+    const auto solve = kind == MeshCcd::Kind::vf ? compare_vf : compare_ee;
+    const auto narrow_phase = [=](const Ends& x, const std::int32_t* rows, std::size_t n,
+                                  std::uint8_t* hit, ImpactArrays impacts, Stats& stats) {
+      solve(x, rows, n, Comparator(comparator), hit, impacts, stats);
+    };
+    return find_collisions(mesh.ccd, kind, narrow_phase, limit);
+  });
+}
+
+using Rows4 = nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
+using Hits = nb::ndarray<std::uint8_t, nb::shape<-1>, nb::c_contig>;
+using Times = nb::ndarray<double, nb::shape<-1>, nb::c_contig>;
+using Vectors = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig>;
+using Weights = nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig>;
+
+Named solve(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int method, double min_distance,
+            Hits hit, Times toi, Vectors point, Vectors normal, Weights weights) {
+  Stats stats;
+  {
+    const LongCall call;
+    const tauguard::geometry::RoundToNearest guard;
+    const Ends ends = Ends::of(x_t0.data(), x_t1.data());
+    Projection points;
+    AxisFilter axes;
+    // Queries a vertex: to project a vertex costs 18 ns and saves 6 ns a query.
+    constexpr std::size_t pays = 4;
+    if (Method(method) == Method::ab2pf && min_distance == 0 &&
+        rows.shape(0) >= pays * x_t0.shape(0)) {
+      points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
+      axes.points = &points;
+    }
+    (vf ? solve_vf : solve_ee)(
+        ends, rows.data(), rows.shape(0), Method(method), min_distance, hit.data(),
+        {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
+  }
+  Named counts;
+  add_counts(counts, stats);
+  return counts;
+}
+
+Named solve_compared(bool vf, Positions x_t0, Positions x_t1, Rows4 rows, int comparator, Hits hit,
+                     Times toi, Vectors point, Vectors normal, Weights weights) {
+  Stats stats;
+  {
+    const LongCall call;
+    const tauguard::geometry::RoundToNearest guard;
+    (vf ? compare_vf : compare_ee)(
+        Ends::of(x_t0.data(), x_t1.data()), rows.data(), rows.shape(0), Comparator(comparator),
+        hit.data(), {toi.data(), point.data(), normal.data(), weights.data()}, stats);
+  }
+  Named counts;
+  add_counts(counts, stats);
+  return counts;
 }
 
 Named update_topology(Mesh& mesh, Faces faces, Ids ids, Table meets) {
@@ -226,41 +295,12 @@ NB_MODULE(_mesh, m) {
            })
       .def("candidates", &candidates, "x_t0"_a, "x_t1"_a, "min_distance"_a, "fresh"_a, "limit"_a)
       .def("find", &find, "x_t0"_a, "x_t1"_a, "method"_a, "min_distance"_a, "fresh"_a, "limit"_a)
+      .def("compare", &compare, "x_t0"_a, "x_t1"_a, "comparator"_a, "fresh"_a, "limit"_a)
       .def("update_topology", &update_topology, "faces"_a, "ids"_a, "meets"_a);
-  m.def(
-      "solve",
-      [](bool vf, Positions x_t0, Positions x_t1,
-         nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu> rows,
-         int method, double min_distance,
-         nb::ndarray<std::uint8_t, nb::shape<-1>, nb::c_contig> hit,
-         nb::ndarray<double, nb::shape<-1>, nb::c_contig> toi,
-         nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> point,
-         nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig> normal,
-         nb::ndarray<double, nb::shape<-1, 4>, nb::c_contig> weights) {
-        Stats stats;
-        {
-          const LongCall call;
-          const tauguard::geometry::RoundToNearest guard;
-          const Ends ends = Ends::of(x_t0.data(), x_t1.data());
-          Projection points;
-          AxisFilter axes;
-          constexpr std::size_t pays =
-              4;  // queries a vertex: one costs 18 ns to project, a query saves 6
-          if (Method(method) == Method::ab2pf && min_distance == 0 &&
-              rows.shape(0) >= pays * x_t0.shape(0)) {
-            points.set(ends, x_t0.shape(0), seven_axes, 0, 1);
-            axes.points = &points;
-          }
-          (vf ? solve_vf : solve_ee)(
-              ends, rows.data(), rows.shape(0), Method(method), min_distance, hit.data(),
-              {toi.data(), point.data(), normal.data(), weights.data()}, stats, axes);
-        }
-        Named counts;
-        add_counts(counts, stats);
-        return counts;
-      },
-      "vf"_a, "x_t0"_a, "x_t1"_a, "rows"_a, "method"_a, "min_distance"_a, "hit"_a, "toi"_a,
-      "point"_a, "normal"_a, "weights"_a);
+  m.def("solve", &solve, "vf"_a, "x_t0"_a, "x_t1"_a, "rows"_a, "method"_a, "min_distance"_a,
+        "hit"_a, "toi"_a, "point"_a, "normal"_a, "weights"_a);
+  m.def("solve_compared", &solve_compared, "vf"_a, "x_t0"_a, "x_t1"_a, "rows"_a, "comparator"_a,
+        "hit"_a, "toi"_a, "point"_a, "normal"_a, "weights"_a);
   m.def(
       "force_batch_kernels",
       [](const std::string& name) { return force_batch_kernels(name.c_str()); }, "name"_a,

@@ -11,8 +11,8 @@
 #include <limits>
 
 #include "batch.hpp"
-#include "comparators.hpp"
 #include "exact.hpp"
+#include "impact.hpp"
 #include "integer_contact.hpp"
 #include "intervals.hpp"
 #include "query.hpp"
@@ -28,58 +28,6 @@ constexpr int batch = 128,
               block =
                   512;  // queries at a time, after and before those apart on an axis are left out
 constexpr double never = std::numeric_limits<double>::infinity();
-
-Vec3 at(const Ends& x, std::int32_t v, double t) { return mix(x(false, v), x(true, v), t); }
-
-// Weights of a face without area: of the point on its longest edge that is next to `a`.
-void on_longest_edge(Vec3 a, Vec3 b, Vec3 c, Vec3 d, double* w) {
-  const Vec3 ends[3][2] = {{b, c}, {b, d}, {c, d}};
-  constexpr int weight[3][2] = {{1, 2}, {1, 3}, {2, 3}};
-  int longest = 0;
-  const auto length = [&](int i) { return largest(ends[i][1] - ends[i][0]); };
-  for (int i = 1; i < 3; ++i)
-    if (length(i) > length(longest)) longest = i;
-  const Vec3 from = ends[longest][0];
-  const double size = length(longest), scale = size > 0 ? 1 / size : 0;
-  const Vec3 e = scale * (ends[longest][1] - from);
-  const double ee = dot(e, e), s = ee > 0 ? dot(scale * (a - from), e) / ee : 0;
-  w[1] = w[2] = w[3] = 0;
-  w[weight[longest][1]] = std::clamp(s, 0.0, 1.0);
-  w[weight[longest][0]] = 1 - w[weight[longest][1]];
-}
-
-// Where, along which normal and with which weights the two features meet at time t.
-template <bool vf>
-void describe(const Ends& x, const std::int32_t* row, double t, ImpactArrays out, std::size_t i) {
-  const Vec3 a = at(x, row[0], t), b = at(x, row[1], t), c = at(x, row[2], t), d = at(x, row[3], t);
-  const Vec3 q = vf ? c - b : b - a, r = vf ? d - b : d - c, p = vf ? a - b : c - a;
-  Vec3 n = cross(q, r);
-  const double nn = dot(n, n);
-  double* w = out.weights + 4 * i;
-  Vec3 point = a;
-  if (vf) {
-    const double v1 = nn > 0 ? dot(cross(p, r), n) / nn : 0,
-                 v2 = nn > 0 ? dot(cross(q, p), n) / nn : 0;
-    w[0] = 1;
-    w[2] = std::clamp(v1, 0.0, 1.0);
-    w[3] = std::clamp(v2, 0.0, 1.0 - w[2]);
-    w[1] = 1 - w[2] - w[3];
-    if (!(nn > 0)) on_longest_edge(a, b, c, d, w);
-  } else {
-    const double s = nn > 0 ? std::clamp(dot(cross(p, r), n) / nn, 0.0, 1.0) : 0;
-    const double e = nn > 0 ? std::clamp(dot(cross(p, q), n) / nn, 0.0, 1.0) : 0;
-    w[0] = 1 - s;
-    w[1] = s;
-    w[2] = 1 - e;
-    w[3] = e;
-    point = a + s * q;
-  }
-  const double length = std::sqrt(nn);
-  n = length > 0 ? (1 / length) * n : Vec3{0, 0, 0};
-  const double pt[] = {point.x, point.y, point.z}, nl[] = {n.x, n.y, n.z};
-  std::copy(pt, pt + 3, out.point + 3 * i);
-  std::copy(nl, nl + 3, out.normal + 3 * i);
-}
 
 // Exactly one root: the ends have different signs and the coefficients between them one variation.
 bool one_root(const double* b, double error) {
@@ -297,41 +245,6 @@ void one_by_one(const Ends& x, const std::int32_t* rows, int n, Method method, d
   }
 }
 
-Query query_of(const Group& g, int lane) {
-  const auto vector = [&](int f) {
-    return Vec3{g.value[f][lane], g.value[f + 1][lane], g.value[f + 2][lane]};
-  };
-  Query k{};
-  for (int e = 0; e < 2; ++e) {
-    k.p[e] = vector(Group::p + 3 * e);
-    k.q[e] = vector(Group::q + 3 * e);
-    k.r[e] = vector(Group::r + 3 * e);
-  }
-  return k;
-}
-
-// The comparators, on the same differences and cubics.
-template <bool vf>
-void compare(const Ends& x, const std::int32_t* rows, int n, Method method, double* toi,
-             Stats& stats) {
-  geometry::Scratch<std::array<Group, block / width>> scratch;
-  Group* groups = scratch->data();
-  batch_kernels().gather(vf, x, rows, n, groups);
-  for (int i = 0; i < n; ++i) {
-    const Group& g = groups[i / width];
-    const int lane = i % width;
-    Cubic whole;
-    for (int j = 0; j < 4; ++j) whole.b[j] = g.value[Group::cubic + j][lane];
-    toi[i] = never;
-    if (filtered_out(whole, method)) {
-      ++stats.cubic_sign;
-    } else {
-      toi[i] = first_root_inside(query_of(g, lane), whole, method, vf);
-      stats.roots += !(toi[i] <= 1);
-    }
-  }
-}
-
 template <bool vf>
 void solve(const Ends& x, const std::int32_t* rows, std::size_t n, Method method, double distance,
            std::uint8_t* hit, ImpactArrays out, Stats& stats, AxisFilter axes) {
@@ -342,10 +255,8 @@ void solve(const Ends& x, const std::int32_t* rows, std::size_t n, Method method
     const std::int32_t* part = rows + 4 * first;
     if (method == Method::ab2pf && distance == 0) {
       in_batches<vf>(x, part, count, axes, toi, stats);
-    } else if (method == Method::ab2pf || method == Method::exact) {
-      one_by_one<vf>(x, part, count, method, distance, toi, stats);
     } else {
-      compare<vf>(x, part, count, method, toi, stats);
+      one_by_one<vf>(x, part, count, method, distance, toi, stats);
     }
     for (int i = 0; i < count; ++i) {
       hit[first + i] = toi[i] <= 1;

@@ -6,19 +6,14 @@
 #include <cstdint>
 
 #include "ends.hpp"
+#include "impact.hpp"
 #include "k_dop.hpp"
 
 namespace tauguard::cloth {
 
-// ab2pf is right and so is exact, its reference in exact arithmetic throughout; the others are
-// comparators (comparators.hpp). Only ab2pf knows a minimum distance, where it is conservative.
-enum class Method : int { ab2pf = 0, naive, iccd, dnf, scd, vcd, exact };
-
-// Row i is written where hit[i] is not 0. Weights are those of the four vertices of the row: (1, w
-// of the face's vertices), or (1 - s, s, 1 - t, t) of the two edges.
-struct ImpactArrays {
-  double *toi, *point, *normal, *weights;  // (n), (n, 3), (n, 3), (n, 4)
-};
+// Both are exact for the doubles given. `exact` uses exact arithmetic throughout and is ab2pf's
+// reference. Only ab2pf has a minimum distance, where it is conservative.
+enum class Method : int { ab2pf = 0, exact };
 
 // How many queries each filter removed (apart on an axis; no root of the cubic; no contact at its
 // roots); how many touch at the start of the step; how many were decided while sliding on a plane;

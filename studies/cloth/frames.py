@@ -16,7 +16,8 @@ from studies.cloth.peer import load_ipctk
 from studies.cloth.scaling import CLOTHS, Step, bound, scaled, step_at
 from studies.framework import time_in_turn
 from tauguard.cloth import Frame as FrameAnswer
-from tauguard.cloth import Groups, MeshCCD
+from tauguard.cloth import Groups
+from tauguard.cloth.comparators import ComparedMeshCCD as MeshCCD
 from tauguard.cloth.scenes import SCENES, load_sequence
 from tauguard.report import Row
 

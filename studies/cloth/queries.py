@@ -20,8 +20,8 @@ from studies.cloth.frames import Frame
 from studies.cloth.peer import load_ipctk
 from studies.cloth.scaling import bound
 from studies.framework import time_in_turn
-from tauguard.cloth import MeshCCD, _mesh
-from tauguard.cloth.impacts import METHODS
+from tauguard.cloth import MeshCCD
+from tauguard.cloth.comparators import METHODS, solve
 from tauguard.report import Row, rate
 
 #: Neighbours in the list of candidates that a peer is asked about.
@@ -65,7 +65,7 @@ def solver(queries: Queries, method: str) -> Callable[[], Answer]:
     point, normal, weights = (np.empty((n, k)) for k in (3, 3, 4))
 
     def call() -> Answer:
-        counts = _mesh.solve(*queries, METHODS[method], 0.0, hit, toi, point, normal, weights)
+        counts = solve(*queries, method, hit, toi, point, normal, weights)
         return Answer(hit.astype(bool), toi, counts)
 
     return call

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.cloth.frames import compare, lateness
-from tauguard.cloth import MeshCCD
-from tauguard.cloth.impacts import METHODS
+from tauguard.cloth.comparators import METHODS
+from tauguard.cloth.comparators import ComparedMeshCCD as MeshCCD
 from tauguard.cloth.scenes import load_sequence
 from tauguard.report import Row
 

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 
 from oracles import all_pairs
 from oracles.recorded_collisions import load_frame
-from tauguard.cloth import MeshCCD, edge_edge, vertex_face
-from tauguard.cloth.impacts import METHODS
+from tauguard.cloth import Impacts, MeshCCD, edge_edge, vertex_face
+from tauguard.cloth.comparators import METHODS, ComparedMeshCCD, solve
 from tauguard.cloth.scenes import SCENES
 from tests.cloth.test_candidates import as_set, sheet, small_meshes
 from tests.cloth.test_topology import split_face, tear
@@ -21,6 +21,17 @@ def one_by_one(faces, x_t0, x_t1, method="ab2pf", min_distance=0.0):
     vf_hit = vertex_face(x_t0[vf_rows], x_t1[vf_rows], method=method, min_distance=min_distance).hit
     ee_hit = edge_edge(x_t0[ee_rows], x_t1[ee_rows], method=method, min_distance=min_distance).hit
     return vf[vf_hit], ee[ee_hit]
+
+
+def answers(vertex, x_t0, x_t1, rows, method):
+    """Each query with positions of its own, by any narrow phase."""
+    n = len(rows)
+    hit = np.zeros(n, dtype=np.uint8)
+    out = [np.full(n, np.inf), *(np.full((n, k), np.nan) for k in (3, 3, 4))]
+    start, end = x_t0[rows].reshape(-1, 3), x_t1[rows].reshape(-1, 3)
+    own = np.arange(4 * n, dtype=np.int32).reshape(-1, 4)
+    solve(vertex, start, end, own, method, hit, *out)
+    return Impacts(hit.astype(bool), *out)
 
 
 def assert_same(a, b):
@@ -69,15 +80,15 @@ def test_folded_sheet_has_the_collisions_of_all_pairs(volume, offset):
 @pytest.mark.parametrize("method", METHODS)
 def test_impacts_are_those_of_single_queries(method):
     faces, x_t0, x_t1 = sheet(8, np.random.default_rng(1))
-    ccd = MeshCCD(faces, method)
+    ccd = ComparedMeshCCD(faces, method)
     frame = ccd.find(x_t0, x_t1)
     vf_rows = np.concatenate([frame.vf[:, :1], faces[frame.vf[:, 1]]], axis=1)
     ee_rows = np.concatenate([ccd.edges[frame.ee[:, 0]], ccd.edges[frame.ee[:, 1]]], axis=1)
     assert len(vf_rows) > 5
     assert len(ee_rows) > 5
     one_by_one = (
-        vertex_face(x_t0[vf_rows], x_t1[vf_rows], method=method),
-        edge_edge(x_t0[ee_rows], x_t1[ee_rows], method=method),
+        answers(True, x_t0, x_t1, vf_rows, method),
+        answers(False, x_t0, x_t1, ee_rows, method),
     )
     for have, want in zip((frame.vf_impacts, frame.ee_impacts), one_by_one, strict=True):
         for field in FIELDS:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from oracles.point_contact import point_edge_time, point_point_time
 from tauguard.cloth import Groups, MeshCCD, edge_edge, point_edge, point_point, vertex_face
+from tauguard.cloth.comparators import ComparedMeshCCD
 from tauguard.cloth.scenes.recorded import read_mesh
 
 KINDS = {"pe": (point_edge, 3, point_edge_time), "pp": (point_point, 2, point_point_time)}
@@ -75,9 +76,9 @@ def test_a_minimum_distance_is_conservative(kind):
 
 
 @pytest.mark.parametrize("query", [point_edge, point_point])
-def test_comparators_and_bad_shapes_are_refused(query):
+def test_other_methods_and_bad_shapes_are_refused(query):
     n = 3 if query is point_edge else 2
-    with pytest.raises(ValueError, match="queries of points"):
+    with pytest.raises(ValueError, match="there are ab2pf, exact"):
         query(np.zeros((1, n, 3)), np.zeros((1, n, 3)), method="vcd")
     with pytest.raises(ValueError, match="x_t0: shape"):
         query(np.zeros((1, 4, 3)), np.zeros((1, 4, 3)))
@@ -187,7 +188,7 @@ def test_groups_keep_loose_parts_apart():
         ({"edges": [[0, 1, 2]]}, "edges: shape"),
         ({"points": [[1]]}, "points: shape"),
         ({"points": [0.5]}, "points: dtype"),
-        ({"points": [7], "method": "vcd"}, "method 'vcd' has no queries of points"),
+        ({"points": [7], "method": "vcd"}, "method 'vcd': there are ab2pf, exact"),
     ],
 )
 def test_bad_loose_parts_are_named(kw, message):
@@ -232,3 +233,11 @@ def test_an_obj_with_vertices_of_no_face_is_named(tmp_path):
     with pytest.warns(UserWarning, match="1 of 4 vertices belong to no face"):
         vertices, _ = read_mesh(file)
     assert len(vertices) == 4
+
+
+def test_comparators_have_no_queries_of_points():
+    with pytest.raises(ValueError, match="method 'vcd' has no queries of points"):
+        ComparedMeshCCD([[0, 1, 2]], "vcd", points=[7])
+    ccd = ComparedMeshCCD([[0, 1, 2]], "vcd")
+    with pytest.raises(ValueError, match="method 'vcd' has no queries of points"):
+        ccd.update_topology([[0, 1, 2]], points=[7])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tauguard.cloth import MeshCCD
+from tauguard.cloth.comparators import ComparedMeshCCD
 from tauguard.cloth.scenes import SCENES, load_sequence
 
 
@@ -132,7 +133,7 @@ def test_faces_that_slide_on_each_other_are_all_found():
     scene = SCENES["packed_cubes"](400, 1)
     step = scene.positions(0.8), scene.positions(0.85)
     found = {
-        method: MeshCCD(scene.faces, method, groups=scene.groups).find(*step)
+        method: ComparedMeshCCD(scene.faces, method, groups=scene.groups).find(*step)
         for method in ("ab2pf", "exact", "iccd")
     }
     assert found["ab2pf"].vf.tobytes() == found["exact"].vf.tobytes()
