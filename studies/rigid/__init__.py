@@ -1,4 +1,4 @@
-"""Rigid bodies: overlap, meshes and time of impact, beside coal."""
+"""Rigid bodies: overlap, bounding volumes, meshes, distance and time of impact, beside coal."""
 
 from __future__ import annotations
 
@@ -9,15 +9,22 @@ from studies.framework import Part, Point, Study, groups, number, table_rows
 from tauguard.report import Row
 
 STUDY = Study(
-    "convex bodies and meshes: overlap, bounding volumes, time of impact",
+    "convex bodies and meshes: overlap, bounding volumes, distance, time of impact, beside coal",
     {
-        "kernels": Part(
-            "rigid.study",
-            "convex overlap by elimination (ABFME) and axes, meshes, time of impact, beside coal",
+        "convex": Part(
+            "rigid.convex",
+            "Table 2.1: convex overlap by elimination (ABFME) against separating axes; hard cases",
         ),
+        "mesh": Part(
+            "rigid.mesh",
+            "Table 2.2: bounding volumes of the bunny's tree, first hit and motion",
+        ),
+        "volumes": Part("rigid.volumes", "Figure 1.1: cost and tightness of bounding volumes"),
+        "motion": Part("rigid.motion", "time of impact of bodies that turn: speed against error"),
+        "distance": Part("rigid.distance", "signed distance: speed against error"),
     },
 )
-#: Methods of the table of convex bodies, and the columns of their times and wrong answers.
+#: Methods of Table 2.1: the columns of their times and wrong answers, and their role.
 CONVEX = {
     "abfme": ("abfme_ns", "abfme_wrong", ""),
     "sat": ("sat_ns", "sat_wrong", ""),
@@ -28,10 +35,27 @@ CONVEX = {
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """Convex bodies, time of impact, meshes."""
-    yield from _convex(table_rows(rows, "table 2.1 static"))
-    yield from _impacts(table_rows(rows, "time of impact"))
-    yield from _meshes(table_rows(rows, "table 2.2 static"))
+    """Convex bodies (means over all cells), time of impact, meshes."""
+    convex = table_rows(rows, "table 2.1 static")
+    for method, (time, errors, role) in CONVEX.items():
+        times = [value for row in convex if (value := number(row.get(time))) is not None]
+        wrong, of = _count([row.get(errors) for row in convex])
+        if times and of:
+            cost, text = 1e-3 * sum(times) / len(times), f"{wrong:,} wrong of {of:,}"
+            axes = "microseconds a pair, mean over kinds", "fraction of wrong answers"
+            yield Point("overlap of two convex bodies", method, cost, wrong / of, text, role, *axes)
+    for row in table_rows(rows, "time of impact"):
+        missed, of = _count([row["missed"]])
+        error, role = row["toi_error_max"], "ours" if row["method"] == "tauguard" else "peer"
+        question = f"time of impact of two turning {row['bodies']}"
+        text = f"{missed} missed of {of:,}; time within {error:.0e}"
+        axes = "microseconds a pair that meets", "largest error of the time [steps]"
+        yield Point(question, row["method"], number(row["us_hit"]) or 0.0, error, text, role, *axes)
+    meshes = groups(table_rows(rows, "table 2.2 static"), lambda row: str(row["volume"]))
+    for volume, own in meshes.items():
+        yield _mesh(own, volume, "batch_mean_us", "ours" if volume == "obb" else "")
+    if "obb" in meshes:
+        yield _mesh(meshes["obb"], "coal, OBBRSS", "coal_mean_us", "peer")
 
 
 def _count(rates: Sequence[Any]) -> tuple[int, int]:
@@ -40,61 +64,11 @@ def _count(rates: Sequence[Any]) -> tuple[int, int]:
     return round(sum(r["value"] * r["n"] for r in known)), sum(r["n"] for r in known)
 
 
-def _convex(rows: Sequence[Row]) -> Iterator[Point]:
-    """Each method's mean over the pairs of kinds of bodies: time and share of wrong answers."""
-    for method, (time, errors, role) in CONVEX.items():
-        times = [number(row.get(time)) for row in rows]
-        known = [t for t in times if t is not None]
-        wrong, of = _count([row.get(errors) for row in rows])
-        if known and of:
-            yield Point(
-                "overlap of two convex bodies",
-                method,
-                1e-3 * sum(known) / len(known),
-                wrong / of,
-                f"{wrong:,} wrong of {of:,}",
-                role,
-                "microseconds a pair, mean over kinds",
-                "share of wrong answers",
-            )
-
-
-def _impacts(rows: Sequence[Row]) -> Iterator[Point]:
-    for row in rows:
-        missed, of = _count([row["missed"]])
-        yield Point(
-            f"time of impact of two turning {row['bodies']}",
-            str(row["method"]),
-            number(row["us_hit"]) or 0.0,
-            row["toi_error_max"],
-            f"{missed} missed of {of:,}; time within {row['toi_error_max']:.0e}",
-            "ours" if row["method"] == "tauguard" else "peer",
-            "microseconds a pair that meets",
-            "largest error of the time [steps]",
-        )
-
-
-def _meshes(rows: Sequence[Row]) -> Iterator[Point]:
-    """Each volume's mean over the poses of the generated mesh, and coal's."""
-    coal: list[Row] = []
-    for volume, own in groups(rows, lambda row: str(row["volume"])).items():
-        yield from _mesh(own, volume, "batch_mean_us", "ours" if volume == "obb" else "")
-        coal = coal or [row for row in own if row.get("coal_mean_us") is not None]
-    if coal:
-        yield from _mesh(coal, "coal, OBBRSS", "coal_mean_us", "peer")
-
-
-def _mesh(rows: Sequence[Row], method: str, time: str, role: str) -> Iterator[Point]:
+def _mesh(rows: Sequence[Row], method: str, time: str, role: str) -> Point:
+    """One volume's mean over all poses."""
     poses = sum(row["poses"] for row in rows)
     cost = sum((number(row[time]) or 0.0) * row["poses"] for row in rows) / poses
     differ, of = _count([rows[0]["disagree"]])
-    yield Point(
-        "overlap of two meshes",
-        method,
-        cost,
-        number(rows[0]["disagree"]) or 0.0,
-        f"{differ:,} answers differ of {of:,}",
-        role,
-        "microseconds a pose",
-        "share of answers that differ",
-    )
+    text, axes = f"{differ:,} answers differ of {of:,}", "fraction of answers that differ"
+    question = "overlap of two meshes"
+    return Point(question, method, cost, differ / of, text, role, "microseconds a pose", axes)

@@ -1,40 +1,43 @@
 """Table 2.1: elimination (ABFME) against separating axes on random convex bodies, beside coal.
 
 "Cubes" of the published table are random parallelepipeds, *static* is one pose, *dynamic* a
-constant relative translation over t in [0, 1]. Its two dynamic collision entries 2.58 and 1.37
-stand un-inverted in their source: there they mean that elimination is 2.58 and 1.37 times *slower*
-than separating axes.
+constant relative translation over t in [0, 1]. Its two dynamic collision entries 2.58 and 1.37 are
+not inverted in their source: there elimination is 2.58 and 1.37 times *slower* than separating
+axes.
 
-Textbook SAT is all face normals, then all edge pairs, every vertex projected, exit at the first
-separating axis, without error bounds; it shares data layout, compiler flags and the loop with ours.
-
-Times are the processor's, one thread each, so that other programs on the machine do not count.
+Textbook SAT tests all face normals, then all edge pairs, projects every vertex, and ends at the
+first separating axis, without error bounds; it shares data layout, compiler flags and the loop with
+ours. Times are the processor's, of one thread.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from functools import partial
 from time import process_time
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from oracles.convex_bodies import HARD, KINDS
-from oracles.convex_impact import exact_toi
+from oracles.convex_impact import sweep_errors
 from oracles.convex_overlap import truth
-from studies.framework import time_in_turn
+from oracles.convex_pairs import pairs_by_outcome, shifted, take
+from studies.framework import table_rows, time_in_turn
+from studies.rigid import peer
+from studies.rigid.bars import count, error, faster, per, within
 from tauguard.report import Row, rate
-from tauguard.rigid import Motion, PlaneCache, coal_peer
+from tauguard.rigid import PlaneCache
 from tauguard.rigid.queries import native_overlap, native_sweep, portable
 from tauguard.rigid.queries import overlap_boxes as overlap_boxes_native
-from tauguard.rigid.rounded import Solid
 from tauguard.rigid.shapes import Bodies, Boxes
 
-Batch = TypeVar("Batch", bound=Solid | Motion)
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
+#: The figure's size [in].
+SIZE = (11.0, 5.0)
 #: Published static ratios of separating axes to elimination (collision, non-collision).
 PUBLISHED = {
     ("parallelepipeds", "parallelepipeds"): (1.39, 2.01),
@@ -43,77 +46,58 @@ PUBLISHED = {
 }
 PAIRS = [*PUBLISHED, ("boxes", "boxes"), ("boxes", "tetrahedra")]
 METHODS = {"textbook": "sat_textbook", "sat": "sat", "abfme": "abfme", "auto": "auto"}
-UN_INVERTED = (
-    "the published dynamic collision entries 2.58 and 1.37 stand un-inverted in their source: "
-    "elimination was that much slower"
-)
+NOTES = {
+    "table 2.1 static": "ns a pair in one pose, one thread. coal_net: without the loop and the "
+    "call; a_vs_b: b's time over a's; published: the printed ratio; wrong: of all pairs.",
+    "table 2.1 dynamic": "ns a pair that moves by a constant translation; a_vs_b: b's time over "
+    "a's. The published collision entries 2.58 and 1.37 are not inverted in their source: "
+    "elimination was that much slower.",
+    "batched box-box": "ns a pair; wrong: of all pairs; exact_rows: left to exact arithmetic.",
+    "coherent frames": "ns a pair of slowly moving bodies: with separating planes cached from "
+    "frame to frame, and asked anew.",
+    "hard cases": "false_hit and false_clear count wrong answers; exact_share: left to exact "
+    "arithmetic.",
+}
 
 
-def run(quick: bool, seed: int) -> list[Row]:
-    """Static cells, dynamic cells, the batch path and the hard cases."""
+def measure(quick: bool, seed: int) -> list[Row]:
+    """Static and dynamic cells, batched boxes, coherent frames, hard cases, and the summary."""
     rng = np.random.default_rng(seed)
-    per_cell, exact_sample, coal_pairs = (
-        (10_000, 100, 500) if quick else (1_000_000, 10_000, 20_000)
-    )
+    per_cell, exact, coal_pairs = (10_000, 100, 500) if quick else (1_000_000, 10_000, 20_000)
     rows: list[Row] = []
     for pair in PAIRS:
-        for outcome, a, b in static_cells(rng, pair, per_cell, exact_sample):
+        for outcome, a, b in pairs_by_outcome(rng, pair, per_cell, exact):
             rows.append(static_row(pair, outcome, a, b, coal_pairs))
     for pair in PUBLISHED:
-        rows += dynamic_rows(rng, pair, per_cell // 5, exact_sample // 4)
-    rows += batch_rows(rng, 200_000 if quick else 1_000_000)
-    rows += coherent_rows(rng, 10_000 if quick else 100_000, 4 if quick else 20)
+        rows += dynamic_rows(rng, pair, per_cell // 5, exact // 4)
+    rows.append(batch_row(rng, 200_000 if quick else 1_000_000))
+    for kind in ("tetrahedra", "boxes"):
+        rows.append(coherent_row(rng, kind, *((10_000, 4) if quick else (100_000, 20))))
     rows += [hard_row(name, rng, 500 if quick else 20_000) for name in HARD]
-    return rows
+    return rows + summary(rows, quick)
 
 
-def take(batch: Batch, index: NDArray[Any]) -> Batch:
-    """The chosen rows of a batch of bodies or of motions."""
-    fields = [
-        getattr(batch, field.name)[index] for field in dataclasses.fields(batch) if field.init
-    ]
-    return type(batch)(*fields)
-
-
-def join(parts: list[Bodies]) -> Bodies:
-    """One batch of several of the same kind."""
-    kind = type(parts[0])
-    names = [field.name for field in dataclasses.fields(kind) if field.init]
-    return kind(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-
-def static_cells(
-    rng: np.random.Generator, pair: tuple[str, str], per_cell: int, exact_sample: int
-) -> list[tuple[str, Bodies, Bodies]]:
-    """``per_cell`` pairs that collide and as many that do not, by an independent reference."""
-    found: dict[bool, list[tuple[Bodies, Bodies]]] = {True: [], False: []}
-    have = {True: 0, False: 0}
-    chunk = min(per_cell, 100_000)
-    while min(have.values()) < per_cell:
-        a, b = KINDS[pair[0]](rng, chunk), KINDS[pair[1]](rng, chunk)
-        # The code under test guesses which pairs the cells still need; the truth alone places them.
-        guess = native_overlap(a, b, "auto")[0]
-        wanted = [np.flatnonzero(guess == k)[: per_cell - have[k]] for k in (True, False)]
-        a, b = (take(side, np.concatenate(wanted)) for side in (a, b))
-        hit = truth(a, b, sample=(exact_sample * len(a) // (2 * per_cell), 0))
-        for outcome in (True, False):
-            index = np.flatnonzero(hit == outcome)[: per_cell - have[outcome]]
-            if len(index):
-                found[outcome].append((take(a, index), take(b, index)))
-                have[outcome] += len(index)
+def summary(rows: list[Row], quick: bool) -> list[Row]:
+    """Wrong answers of every method; ratios of times to the published ones, to SAT and to coal."""
+    static, hard = table_rows(rows, "table 2.1 static"), table_rows(rows, "hard cases")
+    found = []
+    for method in ("abfme", "sat", "auto"):
+        wrong = [count(row[f"{method}_wrong"]) for row in static]
+        wrong += [row[f"{method}_{kind}"] for row in hard for kind in ("false_hit", "false_clear")]
+        found.append(error(f"{method}: wrong answers of a cell or of a hard case", 0, wrong))
+    for row in static:
+        if row["published"]:
+            question = f"abfme over textbook SAT, {row['pair']}, {row['outcome']} (published)"
+            ratios = [row["abfme_vs_textbook"]]
+            found.append(faster(question, row["published"], ratios, quick))
+    batch = table_rows(rows, "batched box-box")[0]
     return [
-        (
-            "collision" if hit else "non-collision",
-            join([a for a, _ in parts]),
-            join([b for _, b in parts]),
-        )
-        for hit, parts in found.items()
+        *found,
+        faster("auto over tuned SAT, every cell", 1, [r["auto_vs_sat"] for r in static], quick),
+        faster("auto over coal, every cell", 6, [r["auto_vs_coal_net"] for r in static], quick),
+        within("batched boxes, ns a pair", 10, [batch["vectors_ns"]["median"]], quick),
+        error("batched boxes: wrong answers", 0, [count(batch["wrong"])]),
     ]
-
-
-def nanoseconds(seconds: dict[str, float], count: int) -> dict[str, float]:
-    """A measured time as nanoseconds per pair."""
-    return {name: value / count * 1e9 for name, value in seconds.items()}
 
 
 def static_row(pair: tuple[str, str], outcome: str, a: Bodies, b: Bodies, coal_pairs: int) -> Row:
@@ -121,55 +105,29 @@ def static_row(pair: tuple[str, str], outcome: str, a: Bodies, b: Bodies, coal_p
     n, expected = len(a), outcome == "collision"
     _ = (a.packed, b.packed)
     calls = {name: partial(native_overlap, a, b, method) for name, method in METHODS.items()}
-    ns = {name: nanoseconds(t, n) for name, t in time_in_turn(calls, clock=process_time).items()}
+    ns = {name: per(t, n) for name, t in time_in_turn(calls, clock=process_time).items()}
     wrong = {
         name: int((native_overlap(a, b, method)[0] != expected).sum())
         for name, method in METHODS.items()
     }
-    coal = coal_cell(take(a, np.arange(min(n, coal_pairs))), take(b, np.arange(min(n, coal_pairs))))
+    few = np.arange(min(n, coal_pairs))
+    coal_hit, coal_ns, net = peer.overlap(take(a, few), take(b, few))
     published = PUBLISHED.get(pair)
     median = {name: value["median"] for name, value in ns.items()}
-    net = coal["net_ns"]
     return {
         "study": "table 2.1 static",
         "pair": "-".join(pair),
         "outcome": outcome,
         "pairs": n,
         **{f"{name}_ns": value for name, value in ns.items()},
-        "coal_ns": coal["ns"],
+        "coal_ns": coal_ns,
         "coal_net_ns": net,
         "abfme_vs_textbook": median["textbook"] / median["abfme"],
         "published": published[0 if expected else 1] if published else None,
         "auto_vs_sat": median["sat"] / median["auto"],
-        "auto_vs_coal_net": net / median["auto"] if net else None,
+        "auto_vs_coal_net": net / median["auto"],
         **{f"{name}_wrong": rate(count, n) for name, count in wrong.items()},
-        "coal_wrong": rate(int((coal["hit"] != expected).sum()), len(coal["hit"])),
-    }
-
-
-def coal_cell(a: Bodies, b: Bodies) -> dict[str, Any]:
-    """coal's boolean answers, its time per pair in this loop, and net of the loop and the call.
-
-    The overhead is that of the same loop on two spheres far apart, the fastest query there is.
-    """
-    try:
-        coal = coal_peer.coal_module()
-    except ValueError:
-        return {"ns": "coal is not installed", "net_ns": None, "hit": np.zeros(0, dtype=bool)}
-    left, right = coal_peer.geometries(a), coal_peer.geometries(b)
-    sphere, far = coal.Sphere(0.1), coal.Transform3s(np.eye(3), np.array([9.0, 0, 0]))
-    trivial = [(sphere, coal.Transform3s.Identity())] * len(a), [(sphere, far)] * len(a)
-    times: dict[str, list[float]] = {"query": [], "call": []}
-    hit: list[bool] = []
-    for _ in range(3):
-        hit, seconds = coal_peer.collide_all(left, right)
-        times["query"].append(seconds / len(a) * 1e9)
-        times["call"].append(coal_peer.collide_all(*trivial)[1] / len(a) * 1e9)
-    query = float(np.median(times["query"]))
-    return {
-        "ns": {"median": query, "low": min(times["query"]), "high": max(times["query"])},
-        "net_ns": query - float(np.median(times["call"])),
-        "hit": np.array(hit),
+        "coal_wrong": rate(int((coal_hit != expected).sum()), len(few)),
     }
 
 
@@ -190,10 +148,7 @@ def dynamic_rows(
         calls = {
             name: partial(native_sweep, ca, cb, cd, name, points=False) for name in ("sat", "abfme")
         }
-        ns = {
-            name: nanoseconds(t, len(index))
-            for name, t in time_in_turn(calls, 3, process_time).items()
-        }
+        ns = {name: per(t, len(index)) for name, t in time_in_turn(calls, 3, process_time).items()}
         rows.append(
             {
                 "study": "table 2.1 dynamic",
@@ -207,33 +162,12 @@ def dynamic_rows(
                 "wrong_of_sample": rate(wrong, exact_sample),
                 "late_of_sample": rate(late, exact_sample),
                 "toi_error_max": error,
-                "note": UN_INVERTED if expected else "",
             }
         )
     return rows
 
 
-def sweep_errors(
-    a: Bodies,
-    b: Bodies,
-    d: NDArray[np.float64],
-    hit: NDArray[np.bool_],
-    toi: NDArray[np.float64],
-    count: int,
-) -> tuple[int, int, float]:
-    """Late times, wrong hits and the largest error of the first ``count`` rows, by rationals."""
-    late = wrong = 0
-    error = 0.0
-    for i in range(count):
-        exact = exact_toi(a, b, d, i)
-        wrong += (exact is not None) != hit[i]
-        if exact is not None and hit[i]:
-            late += toi[i] > exact
-            error = max(error, abs(float(exact - type(exact)(float(toi[i])))))
-    return late, wrong, error
-
-
-def batch_rows(rng: np.random.Generator, n: int) -> list[Row]:
+def batch_row(rng: np.random.Generator, n: int) -> Row:
     """The batch path of boxes: the vector path against the portable one, and what packing costs."""
     a, b = KINDS["boxes"](rng, n), KINDS["boxes"](rng, n)
     assert isinstance(a, Boxes)
@@ -248,21 +182,18 @@ def batch_rows(rng: np.random.Generator, n: int) -> list[Row]:
         "two_threads": lambda: overlap_boxes_native(a, b, 2, hit),
     }
     one = {name: call for name, call in calls.items() if name != "two_threads"}
-    times = time_in_turn(one, clock=process_time) | time_in_turn(
-        {"two_threads": calls["two_threads"]}
-    )
-    ns = {name: nanoseconds(t, n) for name, t in times.items()}
+    times = time_in_turn(one, clock=process_time)
+    times |= time_in_turn({"two_threads": calls["two_threads"]})
+    ns = {name: per(t, n) for name, t in times.items()}
     left = overlap_boxes_native(a, b, 1, hit)
-    return [
-        {
-            "study": "batched box-box",
-            "pairs": n,
-            **{f"{name}_ns": value for name, value in ns.items()},
-            "packing_ns_per_box": packing,
-            "wrong": rate(int((hit.view(np.bool_) != truth(a, b)).sum()), n),
-            "exact_rows": left,
-        }
-    ]
+    return {
+        "study": "batched box-box",
+        "pairs": n,
+        **{f"{name}_ns": value for name, value in ns.items()},
+        "packing_ns_per_box": packing,
+        "wrong": rate(int((hit.view(np.bool_) != truth(a, b)).sum()), n),
+        "exact_rows": left,
+    }
 
 
 def without_vectors(a: Boxes, b: Boxes, hit: NDArray[np.uint8]) -> None:
@@ -271,56 +202,39 @@ def without_vectors(a: Boxes, b: Boxes, hit: NDArray[np.uint8]) -> None:
         overlap_boxes_native(a, b, 1, hit)
 
 
-def coherent_rows(rng: np.random.Generator, n: int, frames: int) -> list[Row]:
-    """Cached planes on slowly moving tetrahedra and boxes, about one pair in eight in contact."""
-    rows: list[Row] = []
-    for kind in ("tetrahedra", "boxes"):
-        a, b = KINDS[kind](rng, n), KINDS[kind](rng, n)
-        velocity = rng.normal(0, 0.01, (n, 3))
-        offset = rng.uniform(-2, 2, (n, 3))
-        cache = PlaneCache(n)
-        seconds: dict[str, list[float]] = {"cached": [], "auto": [], "abfme": []}
-        wrong = answered = clear = 0
-        for frame in range(frames):
-            moved = shifted(b, offset + frame * velocity)
-            _ = (a.packed, moved.packed, getattr(moved, "blocks", None), getattr(a, "blocks", None))
+def coherent_row(rng: np.random.Generator, kind: str, n: int, frames: int) -> Row:
+    """Cached planes on slowly moving bodies, about one pair in eight in contact."""
+    a, b = KINDS[kind](rng, n), KINDS[kind](rng, n)
+    velocity, offset = rng.normal(0, 0.01, (n, 3)), rng.uniform(-2, 2, (n, 3))
+    cache = PlaneCache(n)
+    seconds: dict[str, list[float]] = {"cached": [], "auto": [], "abfme": []}
+    wrong = answered = clear = 0
+    for frame in range(frames):
+        moved = shifted(b, offset + frame * velocity)
+        _ = (a.packed, moved.packed, getattr(moved, "blocks", None), getattr(a, "blocks", None))
+        start = process_time()
+        hit = cache.overlap(a, moved).hit
+        seconds["cached"].append((process_time() - start) / n * 1e9)
+        for method in ("auto", "abfme"):
             start = process_time()
-            hit = cache.overlap(a, moved).hit
-            seconds["cached"].append((process_time() - start) / n * 1e9)
-            for method in ("auto", "abfme"):
-                start = process_time()
-                fresh, _ = native_overlap(a, moved, method)
-                seconds[method].append((process_time() - start) / n * 1e9)
-            wrong += int((hit != fresh).sum())
-            if frame:
-                answered += cache.answered
-                clear += int((~hit).sum())
-        rows.append(
-            {
-                "study": "coherent frames",
-                "pair": f"{kind}-{kind}",
-                "pairs": n,
-                "hits": float(hit.mean()),
-                **{
-                    f"{name}_ns": {"median": float(np.median(t[1:])), "low": min(t), "high": max(t)}
-                    for name, t in seconds.items()
-                },
-                "answered_by_cache": rate(answered, clear),
-                "differs_from_fresh": rate(wrong, n * frames),
-            }
-        )
-    return rows
-
-
-def shifted(bodies: Batch, by: NDArray[np.float64]) -> Batch:
-    """The same bodies moved by ``by``, shape (N, 3) or (3,)."""
-    places = {"center": by, "start": by, "end": by, "vertices": by[..., None, :]}
-    moved = {
-        name: getattr(bodies, name) + way for name, way in places.items() if hasattr(bodies, name)
+            fresh, _ = native_overlap(a, moved, method)
+            seconds[method].append((process_time() - start) / n * 1e9)
+        wrong += int((hit != fresh).sum())
+        if frame:
+            answered += cache.answered
+            clear += int((~hit).sum())
+    return {
+        "study": "coherent frames",
+        "pair": f"{kind}-{kind}",
+        "pairs": n,
+        "hits": float(hit.mean()),
+        **{
+            f"{name}_ns": {"median": float(np.median(t[1:])), "low": min(t), "high": max(t)}
+            for name, t in seconds.items()
+        },
+        "answered_by_cache": rate(answered, clear),
+        "differs_from_fresh": rate(wrong, n * frames),
     }
-    if not moved:
-        raise ValueError(f"bodies: {type(bodies).__name__}, which have no place of their own")
-    return dataclasses.replace(bodies, **moved)
 
 
 def hard_row(name: str, rng: np.random.Generator, n: int) -> Row:
@@ -339,9 +253,9 @@ def hard_row(name: str, rng: np.random.Generator, n: int) -> Row:
     return row
 
 
-def draw(rows: list[Row], axes: Any) -> None:
+def draw(rows: list[Row], figure: Figure) -> None:
     """Ratios to textbook SAT per static cell, with the published ones as marks."""
-    cells = [row for row in rows if row.get("study") == "table 2.1 static"]
+    axes, cells = figure.subplots(), table_rows(rows, "table 2.1 static")
     labels = [
         f"{row['pair']}\n{row['outcome']}".replace("parallelepipeds", "cubes") for row in cells
     ]

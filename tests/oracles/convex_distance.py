@@ -7,6 +7,7 @@ from itertools import combinations
 from math import isqrt, lcm
 
 import numpy as np
+from numpy.typing import NDArray
 
 from oracles.convex_overlap import Vector, Vectors, cross, dot, exact_vertices, sub
 from tauguard.rigid.rounded import Solid, parts
@@ -120,3 +121,16 @@ def extent(a: Solid, b: Solid, i: int) -> float:
     points = [*exact_vertices(parts(a)[0], i)[0], *exact_vertices(parts(b)[0], i)[0]]
     span = [float(max(p[k] for p in points) - min(p[k] for p in points)) for k in range(3)]
     return float(np.linalg.norm(span)) + float(_radii(a, b, i))
+
+
+def relative_error(
+    got: NDArray[np.float64], truth: NDArray[np.float64], size: NDArray[np.float64]
+) -> float | None:
+    """The largest error as a fraction of the pair's size, None where no truth is known.
+
+    Two points at one place have no size: an error between them is infinite.
+    """
+    if not len(truth):
+        return None
+    off = np.abs(got[: len(truth)] - truth)
+    return float(np.divide(off, size, out=np.where(off > 0, np.inf, 0.0), where=size > 0).max())

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from oracles.convex_overlap import cross, dot, exact_vertices, float_bodies
 from tauguard.arrays import Array
+from tauguard.report import Row, rate
 from tauguard.rigid import Boxes, Motion
 from tauguard.rigid.shapes import Bodies
 
@@ -105,3 +106,41 @@ def bracket(a: Bodies, b: Bodies, ma: Motion, mb: Motion) -> tuple[Array, Array]
         begin[1::2] += size
     np.minimum.at(early, row, begin)
     return early, touch
+
+
+def impact_errors(early: Array, touch: Array, toi: Array) -> Row:
+    """Errors of found times (inf: none) against the bracket; rows it cannot tell are set aside."""
+    known = np.isfinite(touch) == np.isfinite(early)
+    truth, found = known & np.isfinite(touch), np.isfinite(toi)
+    later = truth & found & (touch > 0)
+    # The bracket is 1.5e-11 wide; the error is against its far end, so it is not flattered.
+    error = np.abs(touch[later] - toi[later])
+    return {
+        "hits": int(truth.sum()),
+        "undecided": int((~known).sum()),
+        "missed": rate(int((truth & ~found).sum()), int(truth.sum())),
+        "false": rate(int((known & ~truth & found).sum()), int((known & ~truth).sum())),
+        "late": rate(int((truth & found & (toi > touch)).sum()), int(truth.sum())),
+        "toi_error_median": float(np.median(error)) if later.any() else None,
+        "toi_error_max": float(error.max()) if later.any() else None,
+    }
+
+
+def sweep_errors(
+    a: Bodies,
+    b: Bodies,
+    d: NDArray[np.float64],
+    hit: NDArray[np.bool_],
+    toi: NDArray[np.float64],
+    count: int,
+) -> tuple[int, int, float]:
+    """Late times, wrong hits and the largest error of the first ``count`` rows, by rationals."""
+    late = wrong = 0
+    error = 0.0
+    for i in range(count):
+        exact = exact_toi(a, b, d, i)
+        wrong += (exact is not None) != hit[i]
+        if exact is not None and hit[i]:
+            late += toi[i] > exact
+            error = max(error, abs(float(exact - type(exact)(float(toi[i])))))
+    return late, wrong, error

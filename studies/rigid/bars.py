@@ -1,0 +1,39 @@
+"""Lines of the summary: the worst of several figures beside what is asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from studies.framework import answer, timed
+from tauguard.report import Row
+
+
+def faster(question: str, ratio: float, ratios: Sequence[float], quick: bool) -> Row:
+    """The smallest ratio of times reaches the bound; few repeats cannot say no."""
+    least = min(ratios)
+    return answer(question, f"at least {ratio:g}", f"{least:.3g}", timed(least >= ratio, quick))
+
+
+def within(question: str, bound: float, times: Sequence[float], quick: bool) -> Row:
+    """The longest time keeps within the bound; few repeats cannot say no."""
+    most = max(times)
+    return answer(question, f"at most {bound:g}", f"{most:.3g}", timed(most <= bound, quick))
+
+
+def error(question: str, bound: float, values: Iterable[float | None]) -> Row:
+    """The largest error, or count of errors, keeps within the bound."""
+    known = [value for value in values if value is not None]
+    most = max(known, default=None)
+    if most is None:
+        return answer(question, f"at most {bound:g}", "not measured")
+    return answer(question, f"at most {bound:g}", f"{most:.3g}", most <= bound)
+
+
+def count(rate: Row) -> float:
+    """The number behind a rate."""
+    return 0.0 if rate["value"] is None else float(round(rate["value"] * rate["n"]))
+
+
+def per(seconds: dict[str, float], number: int, unit: float = 1e9) -> dict[str, float]:
+    """A measured time for each of ``number`` pairs, in nanoseconds unless ``unit`` is another."""
+    return {name: value * unit / max(1, number) for name, value in seconds.items()}

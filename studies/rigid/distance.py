@@ -1,0 +1,122 @@
+"""Signed distances of convex bodies and of bodies with radii: time beside coal's, error of both.
+
+The truth is rational arithmetic. coal's own tolerance is 1e-6 of the pair's size.
+"""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from operator import itemgetter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from oracles.convex_bodies import HARD, KINDS
+from oracles.convex_distance import exact_distance, exactly_meet, extent, relative_error
+from oracles.convex_pairs import random_bodies, take
+from studies.framework import table_rows, time_in_turn
+from studies.rigid.bars import count, error, faster, per
+from tauguard.report import Row, rate
+from tauguard.rigid import coal_peer, distance, overlap
+from tauguard.rigid.queries import native_overlap
+from tauguard.rigid.rounded import Solid
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAIRS = (("boxes", "boxes"), ("boxes", "tetrahedra"), ("tetrahedra", "tetrahedra"))
+ROUNDED = (
+    ("spheres", "spheres"),
+    ("capsules", "capsules"),
+    ("capsules", "tetrahedra"),
+    ("rounded boxes", "capsules"),
+    ("rounded boxes", "rounded boxes"),
+)
+NOTES = {
+    "distance": "signed distance, ns a pair, coal's with the call of its binding. wrong_sign: of "
+    "all pairs, by the exact overlap; wrong_overlap: of the `known` rows, by rational arithmetic; "
+    "error: of the known distances, as a fraction of the pair's size.",
+}
+
+
+def measure(quick: bool, seed: int) -> list[Row]:
+    """Random pairs apart and in each other, hard cases of tetrahedra, bodies with radii."""
+    rng = np.random.default_rng(seed)
+    # The exact distance of two boxes takes half a minute.
+    n, exact, of_boxes = (1_000, 10, 0) if quick else (20_000, 300, 2)
+    rows: list[Row] = []
+    for kinds in PAIRS:
+        a, b = (KINDS[kind](rng, 4 * n) for kind in kinds)
+        hit = native_overlap(a, b, "auto")[0]
+        known = exact if kinds == ("tetrahedra", "tetrahedra") else of_boxes
+        for outcome, name in ((False, "non-collision"), (True, "collision")):
+            index = np.flatnonzero(hit == outcome)[:n]
+            rows.append(distance_row("-".join(kinds), name, take(a, index), take(b, index), known))
+    for name in HARD:
+        a, b = HARD[name](rng, max(60, exact))
+        tetrahedra = all(hasattr(side, "vertices") for side in (a, b))
+        rows.append(distance_row(name, "hard case", a, b, exact if tetrahedra else 0))
+    for kinds in ROUNDED:
+        bodies = [random_bodies(rng, kind, n, 0.8) for kind in kinds]
+        known = exact // 100 if any("boxes" in kind for kind in kinds) else exact
+        rows.append(distance_row("-".join(kinds), "radii", *bodies, known))
+    return rows + summary(rows, quick)
+
+
+def summary(rows: list[Row], quick: bool) -> list[Row]:
+    """Signs, errors and the time beside coal's."""
+    found = table_rows(rows, "distance")
+    ratios = [
+        row["coal_ns"] / row["distance_ns"]["median"]
+        for row in found
+        if row["outcome"] in ("collision", "non-collision")
+    ]
+    return [
+        error("distance: wrong signs", 0, [count(row["wrong_sign"]) for row in found]),
+        error("overlap: wrong beside exact distances", 0, [r["wrong_overlap"] for r in found]),
+        error("distance: error as a fraction of the size", 3e-14, [row["error"] for row in found]),
+        faster("distance over coal, random pairs", 1, ratios, quick),
+    ]
+
+
+def distance_row(pair: str, outcome: str, a: Solid, b: Solid, exact: int) -> Row:
+    """Times of a pair, and errors relative to its size over the first ``exact`` rows."""
+    got, hit = distance(a, b).distance, overlap(a, b).hit
+    calls = {"distance": partial(distance, a, b), "overlap": partial(overlap, a, b)}
+    spent = time_in_turn(calls, 3, time.process_time)
+    known = range(min(exact, len(got)))
+    truth = np.array([exact_distance(a, b, i) for i in known])
+    size = np.array([extent(a, b, i) for i in known])
+    sides = coal_peer.geometries(a), coal_peer.geometries(b)
+    coal, seconds = min((coal_peer.distance_all(*sides) for _ in range(3)), key=itemgetter(1))
+    return {
+        "study": "distance",
+        "pair": pair,
+        "outcome": outcome,
+        "pairs": len(got),
+        "distance_ns": per(spent["distance"], len(got)),
+        "overlap_ns": per(spent["overlap"], len(got)),
+        "coal_ns": seconds / len(got) * 1e9,
+        "wrong_sign": rate(int(((got <= 0) != hit).sum()), len(got)),
+        "coal_wrong_sign": rate(int(((coal <= 0) != hit).sum()), len(got)),
+        "known": len(truth),
+        "wrong_overlap": sum(exactly_meet(a, b, i) != bool(hit[i]) for i in known),
+        "error": relative_error(got, truth, size),
+        "coal_error": relative_error(coal, truth, size),
+    }
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Error over time of every pair that has an exact distance, ours and coal's."""
+    axes = figure.subplots()
+    known = [row for row in table_rows(rows, "distance") if row["known"]]
+    for name, time_of, error_of in (
+        ("tauguard", lambda row: row["distance_ns"]["median"], "error"),
+        ("coal", lambda row: row["coal_ns"], "coal_error"),
+    ):
+        # An error of exactly zero is drawn at the lower rim, one above the size at the upper.
+        errors = np.clip([row[error_of] for row in known], 1e-18, 1.0)
+        axes.loglog([time_of(row) for row in known], errors, "o", label=name, alpha=0.7)
+    axes.set(xlabel="ns a pair", ylabel="largest error, fraction of the pair's size")
+    axes.legend()

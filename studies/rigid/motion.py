@@ -1,0 +1,139 @@
+"""Time of impact of convex bodies that move and turn, beside advancement over coal's distance.
+
+For boxes and tetrahedra the truth is a bracket that shares nothing with the code under test
+(`oracles.convex_impact`). For bodies with radii coal judges: its distance at the time found and at
+24 moments before it. coal has no continuous query, so the peer is the textbook one: step by the
+distance over the largest speed, the distance from coal.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from oracles.coal_motion import MovingDistance, advanced_times
+from oracles.convex_impact import AxisGap, bracket, impact_errors
+from oracles.convex_pairs import farthest, random_bodies, random_motions, take
+from studies.framework import table_rows
+from studies.rigid import peer
+from studies.rigid.bars import count, error, within
+from studies.rigid.distance import ROUNDED
+from tauguard.report import Row
+from tauguard.rigid import Boxes, Impacts, Motion, Tetrahedra, coal_peer, time_of_impact
+from tauguard.rigid.shapes import Bodies
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NOTES = {
+    "time of impact": "bodies about 2 m apart that move by up to 2 m and turn by less than half a "
+    "turn. us_hit, us_miss: a pair that touches, that stays apart; coal's are its distance calls "
+    "alone. The errors are against a bracket of the first contact; undecided: pairs that come "
+    "closer than the bracket can tell.",
+    "motion of bodies with radii": "both turn; times as above. met_before: "
+    "pairs that coal says meet before the time found; distance_at_toi: coal's largest at that time "
+    "[m]; coal_disagrees: hits that differ (it stops at 1e-6 m).",
+}
+
+
+def measure(quick: bool, seed: int) -> list[Row]:
+    """Two rows a kind of body, ours and the peer's; a row a pair of bodies with radii."""
+    rng = np.random.default_rng(seed)
+    rows: list[Row] = []
+    for kind in ("boxes", "tetrahedra"):
+        rows += impact_rows(rng, kind, 300 if quick else 2_000)
+    rows += [rounded_row(rng, kinds, 20 if quick else 1_000) for kinds in ROUNDED]
+    return rows + summary(rows, quick)
+
+
+def summary(rows: list[Row], quick: bool) -> list[Row]:
+    """Late and missed contacts, errors, and the time of a hit."""
+    own = [row for row in table_rows(rows, "time of impact") if row["method"] == "tauguard"]
+    radii = table_rows(rows, "motion of bodies with radii")
+    late = [count(row[key]) for row in own for key in ("late", "missed")]
+    return [
+        error("time of impact: late or missed", 0, late),
+        error("time of impact: largest error", 1e-7, [row["toi_error_max"] for row in own]),
+        within("time of impact: us a hit", 20, [row["us_hit"]["median"] for row in own], quick),
+        error("bodies with radii: met before, by coal", 0, [row["met_before"] for row in radii]),
+        error("and coal's distance at the time", 1e-6, [row["distance_at_toi"] for row in radii]),
+    ]
+
+
+def pairs(rng: np.random.Generator, kind: str, n: int) -> tuple[Bodies, Bodies, Motion, Motion]:
+    """Bodies about 2 m apart that move by up to 2 m and turn by less than half a turn."""
+
+    def body() -> Bodies:
+        if kind == "tetrahedra":
+            return Tetrahedra(rng.uniform(-1, 1, (n, 4, 3)))
+        rotation = np.tile(np.eye(3), (n, 1, 1))
+        return Boxes(np.zeros((n, 3)), rng.uniform(0.2, 1, (n, 3)), rotation)
+
+    def motion() -> Motion:
+        pose = np.tile(np.eye(4), (n, 1, 1))
+        seed = int(rng.integers(1 << 31))
+        pose[:, :3, :3] = Rotation.random(n, random_state=seed).as_matrix()
+        pose[:, :3, 3] = rng.uniform(-2.5, 2.5, (n, 3))
+        return Motion(pose, rng.uniform(-2, 2, (n, 3)), rng.uniform(-1.8, 1.8, (n, 3)))
+
+    return body(), body(), motion(), motion()
+
+
+def impact_rows(rng: np.random.Generator, kind: str, n: int) -> list[Row]:
+    """Times and errors of ``time_of_impact``, and of advancement over coal's distance."""
+    a, b, ma, mb = pairs(rng, kind, n)
+    early, touch = bracket(a, b, ma, mb)
+
+    def call(index: NDArray[np.intp]) -> Impacts:
+        return time_of_impact(take(a, index), take(b, index), take(ma, index), take(mb, index))
+
+    toi = time_of_impact(a, b, ma, mb).toi
+    shapes = coal_peer.geometries(a), coal_peer.geometries(b)
+    distance = MovingDistance(shapes, (ma, mb), signed=False)
+    coal_toi = advanced_times(distance, np.arange(n), AxisGap(a, b, ma, mb).speed)
+    us = {
+        f"us_{name}": 1e6 * float(distance.seconds[rows].mean()) if len(rows) else None
+        for name, rows in peer.outcomes(touch).items()
+    }
+    base: Row = {"study": "time of impact", "bodies": kind, "pairs": n}
+    over_coal = {"method": "advancement over coal's distance", **us}
+    return [
+        {
+            **base,
+            "method": "tauguard",
+            **peer.times(call, touch),
+            **impact_errors(early, touch, toi),
+        },
+        {**base, **over_coal, **impact_errors(early, touch, coal_toi)},
+    ]
+
+
+def rounded_row(rng: np.random.Generator, kinds: tuple[str, str], n: int) -> Row:
+    """Time of impact of one kind of pair with radii, both turning."""
+    a, b = (random_bodies(rng, kind, n, 0.0) for kind in kinds)
+    ma, mb = random_motions(rng, n, 0.3, 0.3), random_motions(rng, n, 2.5, 2.5)
+    shapes = coal_peer.geometries(a), coal_peer.geometries(b)
+    distance = MovingDistance(shapes, (ma, mb), signed=True)
+
+    def call(rows: NDArray[np.intp]) -> Impacts:
+        return time_of_impact(take(a, rows), take(b, rows), take(ma, rows), take(mb, rows))
+
+    columns = peer.motion_columns(call, distance, farthest(a) + farthest(b))
+    return {"study": "motion of bodies with radii", "pair": "-".join(kinds), **columns}
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Largest error over time per hit."""
+    axes = figure.subplots()
+    for row in table_rows(rows, "time of impact"):
+        us = row["us_hit"]["median"] if isinstance(row["us_hit"], dict) else row["us_hit"]
+        mark = "o" if row["bodies"] == "boxes" else "^"
+        who = "tauguard" if row["method"] == "tauguard" else "over coal"
+        axes.loglog(us, row["toi_error_max"], mark, ms=8, label=f"{who}, {row['bodies']}")
+    axes.axhline(1e-7, color="grey", lw=0.8)
+    axes.axvline(20, color="grey", lw=0.8)
+    axes.set(xlim=(1, 1000), ylim=(1e-13, 1), xlabel="us a hit", ylabel="largest error of the time")
+    axes.legend(fontsize="small", loc="lower right")

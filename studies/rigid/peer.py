@@ -1,0 +1,94 @@
+"""coal beside ours: its overlap net of the call, and advancement over its distance."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oracles.coal_motion import CONTACT, MovingDistance, advanced_times
+from studies.framework import time_in_turn
+from studies.rigid.bars import per
+from tauguard.arrays import Array
+from tauguard.report import Row
+from tauguard.rigid import Impacts, coal_peer
+from tauguard.rigid.shapes import Bodies
+
+
+def overlap(a: Bodies, b: Bodies) -> tuple[NDArray[np.bool_], dict[str, float], float]:
+    """coal's answers, its nanoseconds a pair, and the median net of the loop and the call.
+
+    The overhead is that of the same loop on two spheres far apart, the fastest query there is.
+    """
+    coal, n = coal_peer.coal_module(), len(a)
+    left, right = coal_peer.geometries(a), coal_peer.geometries(b)
+    sphere, far = coal.Sphere(0.1), coal.Transform3s(np.eye(3), np.array([9.0, 0, 0]))
+    apart = [(sphere, coal.Transform3s.Identity())] * n, [(sphere, far)] * n
+    found = [coal_peer.collide_all(left, right) for _ in range(3)]
+    overhead = np.median([coal_peer.collide_all(*apart)[1] for _ in range(3)])
+    seconds = [one[1] for one in found]
+    query = {"median": float(np.median(seconds)), "low": min(seconds), "high": max(seconds)}
+    net = float(query["median"] - overhead) / n * 1e9
+    return np.array(found[0][0]), per(query, n), net
+
+
+def outcomes(toi: Array) -> dict[str, NDArray[np.intp]]:
+    """Rows that first touch within the step, and rows that stay apart."""
+    return {
+        "hit": np.flatnonzero(np.isfinite(toi) & (toi > 0)),
+        "miss": np.flatnonzero(np.isinf(toi)),
+    }
+
+
+def times(
+    call: Callable[[NDArray[np.intp]], Impacts], toi: Array, repeats: int = 3
+) -> dict[str, dict[str, float] | None]:
+    """Processor time of a pair that touches and of one that does not [us]."""
+    chosen = {name: index for name, index in outcomes(toi).items() if len(index)}
+    calls = {name: partial(call, index) for name, index in chosen.items()}
+    spent = time_in_turn(calls, repeats, time.process_time)
+    us = {f"us_{name}": per(spent[name], len(index), 1e6) for name, index in chosen.items()}
+    return {"us_hit": us.get("us_hit"), "us_miss": us.get("us_miss")}
+
+
+def motion_columns(
+    call: Callable[[NDArray[np.intp]], Impacts],
+    distance: MovingDistance,
+    lever: Array | float,
+    most: int | None = None,
+) -> Row:
+    """Time of impact where coal judges: its distance on the path and at the time.
+
+    Args:
+        call: ours, of the chosen rows.
+        distance: coal's, of the same pairs.
+        lever: sum of both bodies' largest distances from the origins of their frames [m].
+        most: advance so many pairs only (default: all).
+    """
+    every = np.arange(distance.n)
+    found = call(every)
+    end, hits = np.where(found.hit, found.toi, 1.0), outcomes(found.toi)["hit"]
+    path = np.min([distance(every, share * end) for share in np.linspace(0, 0.999, 24)], axis=0)
+    early = path < -CONTACT if distance.signed else path <= 0
+    a, b = distance.motions
+    turn = np.maximum(*(np.linalg.norm(m.angular, axis=1) for m in (a, b)))
+    speed = np.broadcast_to(np.linalg.norm(a.linear - b.linear, axis=1) + lever * turn, every.shape)
+    at_toi = np.abs(distance(hits, found.toi[hits])).max(initial=0.0)
+    asked = every if most is None else np.concatenate([hits[:most], outcomes(found.toi)["miss"]])
+    asked = np.sort(asked[: most and 2 * most])
+    toi = advanced_times(distance, asked, speed)
+    both = asked[np.isfinite(toi[asked]) & found.hit[asked] & (found.toi[asked] > 0)]
+    return {
+        "pairs": distance.n,
+        "hits": int(found.hit.sum()),
+        **times(call, found.toi),
+        "coal_us": 1e6 * float(distance.seconds[asked].mean()),
+        "coal_calls": float(distance.calls[asked].mean()),
+        "met_before": int((early & (found.toi > 0)).sum()),
+        "distance_at_toi": float(at_toi),
+        "coal_disagrees": int((np.isfinite(toi[asked]) != found.hit[asked]).sum()),
+        "toi_differs_most": float(np.abs(toi[both] - found.toi[both]).max(initial=0.0)),
+    }
