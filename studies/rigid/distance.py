@@ -6,6 +6,7 @@ The truth is rational arithmetic. coal's own tolerance is 1e-6 of the pair's siz
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ import numpy as np
 from oracles.convex_bodies import HARD, KINDS
 from oracles.convex_distance import exact_distance, exactly_meet, extent, relative_error
 from oracles.convex_pairs import random_bodies, take
-from studies.framework import table_rows, time_in_turn
+from studies.framework import number, table_rows, time_in_turn
 from studies.rigid.bars import count, error, faster, per
 from tauguard.report import Row, rate
 from tauguard.rigid import coal_peer, distance, overlap
@@ -58,9 +59,9 @@ def measure(quick: bool, seed: int) -> list[Row]:
         tetrahedra = all(hasattr(side, "vertices") for side in (a, b))
         rows.append(distance_row(name, "hard case", a, b, exact if tetrahedra else 0))
     for kinds in ROUNDED:
-        bodies = [random_bodies(rng, kind, n, 0.8) for kind in kinds]
+        first, second = (random_bodies(rng, kind, n, 0.8) for kind in kinds)
         known = exact // 100 if any("boxes" in kind for kind in kinds) else exact
-        rows.append(distance_row("-".join(kinds), "radii", *bodies, known))
+        rows.append(distance_row("-".join(kinds), "radii", first, second, known))
     return rows + summary(rows, quick)
 
 
@@ -83,7 +84,10 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
 def distance_row(pair: str, outcome: str, a: Solid, b: Solid, exact: int) -> Row:
     """Times of a pair, and errors relative to its size over the first ``exact`` rows."""
     got, hit = distance(a, b).distance, overlap(a, b).hit
-    calls = {"distance": partial(distance, a, b), "overlap": partial(overlap, a, b)}
+    calls: dict[str, Callable[[], object]] = {
+        "distance": partial(distance, a, b),
+        "overlap": partial(overlap, a, b),
+    }
     spent = time_in_turn(calls, 3, time.process_time)
     known = range(min(exact, len(got)))
     truth = np.array([exact_distance(a, b, i) for i in known])
@@ -111,12 +115,12 @@ def draw(rows: list[Row], figure: Figure) -> None:
     """Error over time of every pair that has an exact distance, ours and coal's."""
     axes = figure.subplots()
     known = [row for row in table_rows(rows, "distance") if row["known"]]
-    for name, time_of, error_of in (
-        ("tauguard", lambda row: row["distance_ns"]["median"], "error"),
-        ("coal", lambda row: row["coal_ns"], "coal_error"),
+    for name, ns, error_of in (
+        ("tauguard", "distance_ns", "error"),
+        ("coal", "coal_ns", "coal_error"),
     ):
         # An error of exactly zero is drawn at the lower rim, one above the size at the upper.
         errors = np.clip([row[error_of] for row in known], 1e-18, 1.0)
-        axes.loglog([time_of(row) for row in known], errors, "o", label=name, alpha=0.7)
+        axes.loglog([number(row[ns]) for row in known], errors, "o", label=name, alpha=0.7)
     axes.set(xlabel="ns a pair", ylabel="largest error, fraction of the pair's size")
     axes.legend()

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from oracles.coal_motion import MovingDistance
 from oracles.convex_pairs import REST, farthest, random_bodies, random_motions, shifted, take
-from oracles.triangle_meshes import bumpy_surface, poses_near
+from oracles.surfaces import bumpy_surface, poses_near
 from studies.framework import table_rows, time_in_turn
 from studies.rigid import peer
 from studies.rigid.bars import count, error, faster, per

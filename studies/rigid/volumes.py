@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from scipy.spatial.transform import Rotation
 
-from oracles.triangle_meshes import pieces
+from oracles.surfaces import pieces
 from studies.framework import table_rows, time_in_turn
 from studies.rigid.bars import count, error, per
 from studies.rigid.mesh import load

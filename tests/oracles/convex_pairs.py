@@ -26,7 +26,7 @@ def take(batch: Batch, index: NDArray[Any]) -> Batch:
     """The chosen rows of a batch of bodies or motions; a batch of one stands for every row."""
     index = np.zeros_like(index) if len(batch) == 1 else index
     fields = [getattr(batch, field.name) for field in dataclasses.fields(batch) if field.init]
-    fields = [take(x, index) if dataclasses.is_dataclass(x) else x[index] for x in fields]
+    fields = [x[index] if isinstance(x, np.ndarray) else take(x, index) for x in fields]
     return type(batch)(*fields)
 
 
