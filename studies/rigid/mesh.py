@@ -200,7 +200,7 @@ def dynamic_rows(
             return tree.time_of_impact(tree, take(motion, index))
 
         coal = MovingDistance((shapes, shapes), (REST, motion), signed=False)
-        toi = tree.time_of_impact(tree, motion).toi
+        toi = tree.time_of_impact(tree, motion).time_of_impact
         hit, end = np.isfinite(toi), np.where(np.isfinite(toi), toi, 1.0)
         before = tree.overlap(tree, motion.at(np.maximum(end - 1e-10, 0))).hit
         after = tree.overlap(tree, motion.at(np.minimum(end + 1e-7, 1))).hit

@@ -90,7 +90,7 @@ def impact_rows(rng: np.random.Generator, kind: str, n: int) -> list[Row]:
     def call(index: NDArray[np.intp]) -> Impacts:
         return time_of_impact(take(a, index), take(b, index), take(ma, index), take(mb, index))
 
-    toi = time_of_impact(a, b, ma, mb).toi
+    toi = time_of_impact(a, b, ma, mb).time_of_impact
     shapes = coal_peer.geometries(a), coal_peer.geometries(b)
     distance = MovingDistance(shapes, (ma, mb), signed=False)
     coal_toi = advanced_times(distance, np.arange(n), AxisGap(a, b, ma, mb).speed)

@@ -70,25 +70,32 @@ def motion_columns(
     """
     every = np.arange(distance.n)
     found = call(every)
-    end, hits = np.where(found.hit, found.toi, 1.0), outcomes(found.toi)["hit"]
+    end, hits = (
+        np.where(found.hit, found.time_of_impact, 1.0),
+        outcomes(found.time_of_impact)["hit"],
+    )
     path = np.min([distance(every, share * end) for share in np.linspace(0, 0.999, 24)], axis=0)
     early = path < -CONTACT if distance.signed else path <= 0
     a, b = distance.motions
     turn = np.maximum(*(np.linalg.norm(m.angular, axis=1) for m in (a, b)))
     speed = np.broadcast_to(np.linalg.norm(a.linear - b.linear, axis=1) + lever * turn, every.shape)
-    at_toi = np.abs(distance(hits, found.toi[hits])).max(initial=0.0)
-    asked = every if most is None else np.concatenate([hits[:most], outcomes(found.toi)["miss"]])
+    at_toi = np.abs(distance(hits, found.time_of_impact[hits])).max(initial=0.0)
+    asked = (
+        every
+        if most is None
+        else np.concatenate([hits[:most], outcomes(found.time_of_impact)["miss"]])
+    )
     asked = np.sort(asked[: most and 2 * most])
     toi = advanced_times(distance, asked, speed)
-    both = asked[np.isfinite(toi[asked]) & found.hit[asked] & (found.toi[asked] > 0)]
+    both = asked[np.isfinite(toi[asked]) & found.hit[asked] & (found.time_of_impact[asked] > 0)]
     return {
         "pairs": distance.n,
         "hits": int(found.hit.sum()),
-        **times(call, found.toi),
+        **times(call, found.time_of_impact),
         "coal_us": 1e6 * float(distance.seconds[asked].mean()),
         "coal_calls": float(distance.calls[asked].mean()),
-        "met_before": int((early & (found.toi > 0)).sum()),
+        "met_before": int((early & (found.time_of_impact > 0)).sum()),
         "distance_at_toi": float(at_toi),
         "coal_disagrees": int((np.isfinite(toi[asked]) != found.hit[asked]).sum()),
-        "toi_differs_most": float(np.abs(toi[both] - found.toi[both]).max(initial=0.0)),
+        "toi_differs_most": float(np.abs(toi[both] - found.time_of_impact[both]).max(initial=0.0)),
     }

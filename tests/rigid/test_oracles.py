@@ -58,7 +58,7 @@ def test_moving_bodies_are_never_late_never_missed_and_close(kind):
         return Motion(pose, rng.uniform(-2, 2, (n, 3)), rng.uniform(-1.8, 1.8, (n, 3)))
 
     given = body(), body(), motion(), motion()
-    row = impact_errors(*bracket(*given), time_of_impact(*given).toi)
+    row = impact_errors(*bracket(*given), time_of_impact(*given).time_of_impact)
     assert row["hits"] > 10
     assert [row[name]["value"] for name in ("missed", "false", "late")] == [0, 0, 0]
     assert row["toi_error_max"] <= 1e-7
