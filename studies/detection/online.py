@@ -135,7 +135,7 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
 
     from threadpoolctl import threadpool_limits
 
-    from studies.simulation.study import rollout_call
+    from oracles.bare_physics import rollout_along
     from tauguard.datasets.plans import free_episodes
     from tauguard.detectors import observe
     from tauguard.envs import Simulation, simulate
@@ -148,7 +148,7 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
         "simulation": lambda: simulate(episode),
         "observer": lambda: observe(arm.robot, trace.t, trace.q, trace.qd, tau, threads=1),
         "detection": lambda: alarm.detect(replace(trace)),  # a copy: estimates are kept by trace
-        "peer": rollout_call(Simulation(episode).motion),
+        "peer": rollout_along(Simulation(episode).motion),
     }
     with one_core(), threadpool_limits(1):
         taken = time_in_turn(calls, repeats, time.process_time)

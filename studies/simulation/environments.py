@@ -3,143 +3,118 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
-import mujoco
 import numpy as np
 from gymnasium.vector import SyncVectorEnv
-from mujoco import rollout
-from mujoco.batch import Batch
 
-from studies.framework import time_in_turn
-from studies.simulation.reactions import reactions, trained_detector
+from oracles.bare_physics import REACH, bare, batched, driven, reach, recorded
+from oracles.reaction_swings import SPEEDS, swing
+from studies.framework import answer, number, table_rows, time_in_turn
 from tauguard.contacts import registered
+from tauguard.datasets import demo_plan, simulate_all
+from tauguard.detectors import CollisionAlarm, make_detector, train
+from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs.adapters.reactions import REACTIONS
-from tauguard.envs.gym.base import ArmEnv
 from tauguard.models import body_region
-from tauguard.report import Row
+from tauguard.report import Row, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-REACH = "tauguard:tauguard/Reach-v0"
-#: Copies in the vector study.
+#: Copies of the vector environments.
 COPIES = 16
 #: The peers of one environment: MuJoCo's own loop with the forces given, and with the drives.
 ROLLOUT, PHYSICS = "mujoco.rollout, forces given", "physics and drives, no environment"
 WHOLE, THREADED = "the environment", "make_vec, 2 threads"
-
-#: What the columns of each table mean.
 NOTES = {
     "step": "processor time of an action (10 ms) of one Reach environment, one thread. The peers: "
     "MuJoCo's rollout of the same scene and forces; the same physics and drives in a bare loop. "
     "added_us: over the environment. q_difference_rad: largest, of rollout's joints. "
-    "Rows below the environment change one thing of it; a checker's price grows with the scene.",
+    "Each row below the environment changes one thing of it.",
     "vector": "wall time of 16 copies; ratio_to_sync: over Gymnasium's SyncVectorEnv; mujoco.batch "
     "alone: physics without drives, observations or rewards; q_difference_rad: of its copies from "
     "mj_step of one. Means little on a loaded machine.",
     "reaction": "swings into the chest, median [least, most] over them; false_alarms: swings with "
-    "an alarm before the touch, left out of the rest. delay_s: from the touch to the reaction; "
-    "farthest_m, end_m: of the tool from where it touched; force_over_limit: of the standard's for "
-    "a transient contact. Known from the contact: no detector is as fast.",
-    "asked": "what was asked of the environments, beside what this run measured.",
+    "an alarm before the contact, left out of the rest. delay_s: from the contact to the reaction; "
+    "stopping_distance_m, end_m: of the tool from where it touched; force_over_limit: of the "
+    "standard's for a transient contact. Known from the contact: no detector is as fast.",
 }
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Rows of three studies, ``step``, ``vector`` and ``reaction``, and what was asked of them.
-
-    The full run trains a detector first, on the motions of ``tauguard demo``.
-    """
-    # Many short blocks in turn: whatever else the machine does hits every competitor alike.
-    rows = steps(50, 5 if quick else 60, seed)
-    rows += vectors(50, 5 if quick else 40, seed)
+    """Tables ``step``, ``vector`` and ``reaction``; the full run trains the demo's detector."""
+    # Many short blocks in turn: whatever else the machine does affects every method alike.
+    rows = steps(50, 5 if quick else 60, seed) + vectors(50, 5 if quick else 40, seed)
     known: dict[str, Any] = {"contact": None, "observer": "observer"}
     if not quick:
         known["trained detector"] = trained_detector(seed)
-    rows += reactions(1 if quick else 10, seed, known)
-    return rows + answers(rows)
+    return rows + reactions(1 if quick else 10, seed, known)
 
 
-def answers(rows: list[Row]) -> list[Row]:
+def judge(rows: list[Row]) -> list[Row]:
     """What an environment must show, beside what was measured."""
-    step = {row["what"]: row for row in rows if row["study"] == "step"}
-    vector = {row["what"]: row for row in rows if row["study"] == "vector"}
-    peaks = {
-        (row["speed_m_s"], row["known_from"], row["reaction"]): row["peak_force_N"]["median"]
-        for row in rows
-        if row["study"] == "reaction"
+    step = {row["what"]: row for row in table_rows(rows, "step")}
+    vector = {row["what"]: row for row in table_rows(rows, "vector")}
+    swings = table_rows(rows, "reaction")
+    on = {
+        row["speed_m_s"]: number(row["peak_force_N"]) or np.nan
+        for row in swings
+        if (row["known_from"], row["reaction"]) == ("contact", "continue")
     }
-    worst = max(
-        force / peaks[speed, "contact", "continue"]
-        for (speed, _, reaction), force in peaks.items()
-        if reaction != "continue" and force is not None
-    )
-    found = [
-        ("an action over that of the physics loop", "<= 1.07", step[WHOLE]["ratio_to_physics"]),
-        ("make_vec over SyncVectorEnv, 2 threads", ">= 2", vector[THREADED]["ratio_to_sync"]),
-        (
-            "vector environments with the bits of the single ones",
-            "all",
-            f"{sum(row['same_bits_as_sync'] is True for row in vector.values())} of 3",
-        ),
-        ("a reaction's peak force over that of going on, worst", "< 1", worst),
-    ]
+    reacted = [(number(r["peak_force_N"]), r) for r in swings if r["reaction"] != "continue"]
+    worst = max(force / on[row["speed_m_s"]] for force, row in reacted if force is not None)
+    same = sum(row["same_bits_as_sync"] is True for row in vector.values())
+    overhead, gain = step[WHOLE]["ratio_to_physics"], vector[THREADED]["ratio_to_sync"]
     return [
-        {"study": "asked", "what": what, "asked": asked, "measured": measured}
-        for what, asked, measured in found
+        answer("an action over that of the physics loop", "<= 1.07", f"{overhead:.3g}"),
+        answer("make_vec over SyncVectorEnv, 2 threads", ">= 2", f"{gain:.3g}"),
+        answer("vector environments with the bits of single ones", "3", f"{same}", same == 3),
+        answer(
+            "peak force of a reaction over no reaction, worst", "< 1", f"{worst:.3g}", worst < 1
+        ),
     ]
-
-
-# -- one environment -------------------------------------------------------------------------------
 
 
 def steps(count: int, repeats: int, seed: int) -> list[Row]:
     """Microseconds an action at 100 Hz: the same motion as bare physics and with ever more."""
-    env = made(seed)
+    env = reach(seed)
     actions = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 6)).astype(np.float32)
     forces, error = recorded(env, actions, seed)
+    variants: dict[str, dict[str, Any]] = {
+        "without labels": {"labels": False},
+        "with an ideal drive": {"ideal_drive": True},
+        "measured observations": {"noise": True},
+        "the observer as detector": {"detector": "observer"},
+    }
+    variants |= {f"checker {name}": {"checkers": (name,)} for name in registered()}
     calls: dict[str, Callable[[], object]] = {
         ROLLOUT: bare(env, forces, seed),
         PHYSICS: driven(env, actions, seed),
         WHOLE: acting(env, actions, seed),
         "through gymnasium.make": acting(gymnasium.make(REACH), actions, seed),
-        "without labels": acting(made(seed, labels=False), actions, seed),
-        "with an ideal drive": acting(made(seed, ideal_drive=True), actions, seed),
-        "measured observations": acting(made(seed, noise=True), actions, seed),
-        "the observer as detector": acting(made(seed, detector="observer"), actions, seed),
     }
-    for name in registered():
-        calls[f"checker {name}"] = acting(made(seed, checkers=(name,)), actions, seed)
-    taken = time_in_turn(calls, repeats, time.process_time)  # of one thread's work
-    rollout_time, base = taken[ROLLOUT]["median"], taken[PHYSICS]["median"]
-    whole = taken[WHOLE]["median"]
+    calls |= {name: acting(reach(seed, **own), actions, seed) for name, own in variants.items()}
+    taken = time_in_turn(calls, repeats, time.process_time)
+    rollout, base, whole = (taken[name]["median"] for name in (ROLLOUT, PHYSICS, WHOLE))
     return [
         {
             "study": "step",
             "what": name,
-            "us_per_action": {k: 1e6 * v / count for k, v in figure.items()},
-            "ratio_to_physics": figure["median"] / base,
-            "ratio_to_rollout": figure["median"] / rollout_time,
-            "added_us": 1e6 * (figure["median"] - whole) / count,
+            "us_per_action": {k: 1e6 * v / count for k, v in seconds.items()},
+            "ratio_to_physics": seconds["median"] / base,
+            "ratio_to_rollout": seconds["median"] / rollout,
+            "added_us": 1e6 * (seconds["median"] - whole) / count,
             "q_difference_rad": error if name == ROLLOUT else None,
         }
-        for name, figure in taken.items()
+        for name, seconds in taken.items()
     ]
 
 
-def made(seed: int, **keywords: Any) -> ArmEnv:
-    """A Reach environment without Gymnasium's own wrappers."""
-    env = gymnasium.make(REACH, **keywords).unwrapped
-    assert isinstance(env, ArmEnv)
-    env.reset(seed=seed)
-    return env
-
-
-def acting(env: gymnasium.Env[Any, Any], actions: np.ndarray, seed: int) -> Callable[[], object]:
-    """An episode with the given actions."""
+def acting(env: Any, actions: np.ndarray, seed: int) -> Callable[[], object]:
+    """An episode with the given actions, of one environment or of many."""
 
     def call() -> None:
         env.reset(seed=seed)
@@ -149,134 +124,73 @@ def acting(env: gymnasium.Env[Any, Any], actions: np.ndarray, seed: int) -> Call
     return call
 
 
-def driven(env: ArmEnv, actions: np.ndarray, seed: int) -> Callable[[], object]:
-    """The bare physics loop: mj_step and the drives, natively; no observation, no reward."""
-    plant, steps = env.batch.plants[0], env.compiled.settings.substeps
-    rows = actions.astype(np.float64)
-
-    def call() -> None:
-        env.reset(seed=seed)
-        for action in rows:
-            plant.begin(action)
-            plant.run(steps)
-
-    return call
-
-
-def recorded(env: ArmEnv, actions: np.ndarray, seed: int) -> tuple[np.ndarray, float]:
-    """The forces that the drives apply at every physics step, and how far a replay strays [rad]."""
-    env.reset(seed=seed)
-    plant, data, found = env.batch.plants[0], env.batch.datas[0], []
-    for action in actions.astype(np.float64):
-        plant.begin(action)
-        for _ in range(env.compiled.settings.substeps):
-            plant.run(1)
-            found.append(data.qfrc_applied.copy())
-        plant.finish()
-    assert not env.batch.metrics["diverged"][0]
-    last = data.qpos[env.compiled.scene.qpos_adr].copy()
-    forces = np.array(found)
-    states, _ = bare(env, forces, seed)()
-    model, adr = env.compiled.scene.model, env.compiled.scene.qpos_adr
-    return forces, float(np.abs(states[0, -1, 1 : 1 + model.nq][adr] - last).max())
-
-
-def bare(env: ArmEnv, forces: np.ndarray, seed: int) -> Callable[[], Any]:
-    """MuJoCo's own compiled loop over the same scene, start and forces."""
-    model = env.compiled.scene.model
-    env.reset(seed=seed)
-    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-    state = np.empty(mujoco.mj_stateSize(model, kind))
-    mujoco.mj_getState(model, env.batch.datas[0], state, kind)
-    data = mujoco.MjData(model)
-    applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-
-    def call() -> Any:
-        env.reset(seed=seed)  # as the others do
-        return rollout.rollout(
-            model, data, initial_state=state, control=forces[None], control_spec=applied
-        )
-
-    return call
-
-
-# -- many environments -----------------------------------------------------------------------------
-
-
 def vectors(count: int, repeats: int, seed: int) -> list[Row]:
-    """Actions a second of :data:`COPIES` environments, beside Gymnasium's and MuJoCo's own form."""
-    sync = SyncVectorEnv([lambda: gymnasium.make(REACH)] * COPIES)
-    native = {
-        threads: gymnasium.make_vec(REACH, num_envs=COPIES, threads=threads) for threads in (1, 2)
+    """Actions a second of many environments, beside Gymnasium's and MuJoCo's own form."""
+    envs: dict[str, Any] = {
+        "SyncVectorEnv": SyncVectorEnv([lambda: gymnasium.make(REACH)] * COPIES)
     }
+    for threads in (1, 2):
+        made = gymnasium.make_vec(REACH, num_envs=COPIES, threads=threads)
+        envs[f"make_vec, {threads} threads"] = made
     actions = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, COPIES, 6))
     rows = actions.astype(np.float32)
-
-    def vector(env: gymnasium.vector.VectorEnv[Any, Any, Any]) -> Callable[[], object]:
-        def call() -> None:
-            env.reset(seed=seed)
-            for action in rows:
-                env.step(action)
-
-        return call
-
-    calls: dict[str, Callable[[], object]] = {"SyncVectorEnv": vector(sync)}
-    for threads, env in native.items():
-        calls[f"make_vec, {threads} threads"] = vector(env)
-    strayed = {}
-    for threads in (1, 2):
-        name = f"mujoco.batch alone, {threads} threads"
-        calls[name], strayed[name] = batched(seed, count, threads)
-    forms = {"SyncVectorEnv": sync} | {f"make_vec, {t} threads": e for t, e in native.items()}
-    last = {}
-    for name, env in forms.items():
+    calls = {name: acting(env, rows, seed) for name, env in envs.items()}
+    last, differs = {}, {}
+    for name, env in envs.items():
         calls[name]()
         last[name] = env.step(rows[0])[0]
+    for threads in (1, 2):
+        name = f"mujoco.batch alone, {threads} threads"
+        calls[name], differs[name] = batched(seed, COPIES, count, threads)
     taken = time_in_turn(calls, repeats)
-    base = taken["SyncVectorEnv"]["median"]
+    base, sync = taken["SyncVectorEnv"]["median"], last["SyncVectorEnv"]
     return [
         {
             "study": "vector",
             "what": name,
             "copies": COPIES,
-            "actions_per_second": COPIES * count / figure["median"],
-            "ratio_to_sync": base / figure["median"],
-            "same_bits_as_sync": bool(np.array_equal(last[name], last["SyncVectorEnv"]))
-            if name in last
-            else None,
-            "q_difference_rad": strayed.get(name),
+            "actions_per_second": COPIES * count / seconds["median"],
+            "ratio_to_sync": base / seconds["median"],
+            "same_bits_as_sync": np.array_equal(last[name], sync) if name in last else None,
+            "q_difference_rad": differs.get(name),
         }
-        for name, figure in taken.items()
+        for name, seconds in taken.items()
     ]
 
 
-def batched(seed: int, count: int, threads: int) -> tuple[Callable[[], object], float]:
-    """Physics alone: every copy of the scene holds the arm with constant forces.
-
-    Returns:
-        The call, and its copies' largest joint difference from ``mj_step`` of one of them [rad].
-    """
-    env = made(seed)
-    model, data = env.compiled.scene.model, env.batch.datas[0]
-    env.step(np.zeros(6))
-    batch = Batch(model, COPIES, threads)
-    start, force = data.qpos.copy(), data.qfrc_applied.copy()
-    substeps = env.compiled.settings.substeps
-
-    def call() -> None:
-        batch.qpos[:], batch.qvel[:], batch.qfrc_applied[:] = start, 0.0, force
-        for _ in range(count):
-            batch.step(nstep=substeps)
-
-    single = mujoco.MjData(model)
-    single.qpos[:], single.qfrc_applied[:] = start, force
-    for _ in range(count * substeps):
-        mujoco.mj_step(model, single)
-    call()
-    return call, float(np.abs(batch.qpos - single.qpos).max())
+def trained_detector(seed: int) -> CollisionAlarm:
+    """The demo's detector; none of its training is a swing of this study."""
+    episodes = list(simulate_all(demo_plan(seed).train, None, "simulate training"))
+    return train(make_detector("srq-svr"), episodes, nominal_arm(episodes), 10.0)
 
 
-# -- the figure ------------------------------------------------------------------------------------
+def reactions(count: int, seed: int, known: Mapping[str, Any]) -> list[Row]:
+    """Each reaction at three speeds; ``known`` names the detectors, None stands for the contact."""
+    rows: list[Row] = []
+    for speed in SPEEDS:
+        for source, detector in known.items():
+            for reaction in REACTIONS:
+                runs = [swing(speed, detector, reaction, seed, seed + k) for k in range(count)]
+                valid = [run for run in runs if not run["delay_s"] < 0]
+                rows.append(
+                    {
+                        "study": "reaction",
+                        "speed_m_s": speed,
+                        "known_from": source,
+                        "reaction": reaction,
+                        "false_alarms": rate(count - len(valid), count),
+                        **{key: spread([run[key] for run in valid]) for key in runs[0]},
+                    }
+                )
+    return rows
+
+
+def spread(values: list[float]) -> dict[str, float | None]:
+    """Median, smallest and largest of those that are finite."""
+    known = [v for v in values if np.isfinite(v)]
+    if not known:
+        return {"median": None, "low": None, "high": None}
+    return {"median": float(np.median(known)), "low": min(known), "high": max(known)}
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
@@ -286,29 +200,17 @@ def draw(rows: list[Row], figure: Figure) -> None:
         (top, "step", "us_per_action", "microseconds an action"),
         (vector, "vector", "actions_per_second", "actions a second"),
     ):
-        chosen = [row for row in rows if row["study"] == study]
-        values = [row[key]["median"] if isinstance(row[key], dict) else row[key] for row in chosen]
-        axes.barh([row["what"] for row in chosen], values, color="C0")
+        chosen = table_rows(rows, study)
+        axes.barh([row["what"] for row in chosen], [number(row[key]) or 0 for row in chosen])
         axes.invert_yaxis()
         axes.set(xlabel=label)
-    limit = body_region("chest").transient_force
-    last = [row["known_from"] for row in rows if row["study"] == "reaction"][-1]
-    for axes, known in ((plain, "contact"), (detected, last)):
+    swings = table_rows(rows, "reaction")
+    for axes, known in ((plain, "contact"), (detected, swings[-1]["known_from"])):
         for reaction in REACTIONS:
-            line = [
-                row
-                for row in rows
-                if row["study"] == "reaction"
-                and row["known_from"] == known
-                and row["reaction"] == reaction
-            ]
-            axes.plot(
-                [row["speed_m_s"] for row in line],
-                [row["peak_force_N"]["median"] for row in line],
-                "o-",
-                label=reaction,
-            )
-        axes.axhline(limit, color="black", lw=0.8, ls="--")
+            line = [r for r in swings if (r["known_from"], r["reaction"]) == (known, reaction)]
+            forces = [row["peak_force_N"]["median"] for row in line]
+            axes.plot([row["speed_m_s"] for row in line], forces, "o-", label=reaction)
+        axes.axhline(body_region("chest").transient_force, color="black", lw=0.8, ls="--")
         axes.set(xlabel="tool speed [m/s]", ylabel="peak force on the chest [N]")
         axes.set_title(f"Reaction known from the {known}")
         axes.legend(fontsize=8)

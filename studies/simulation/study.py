@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
-from mujoco import rollout
 
+from oracles.bare_physics import rollout_along
 from studies.framework import time_in_turn
-from tauguard.detectors import RobotNumbers, inverse_dynamics
 from tauguard.envs import Motion, SimulationLoop, random_motion
 from tauguard.envs.episodes.simulate import workspace
 from tauguard.models import (
@@ -24,14 +22,13 @@ from tauguard.models import (
     Table,
     compose,
     cura6_drive,
-    pin_model,
 )
 from tauguard.report import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Time step that the others are judged against [s].
+#: Time step of the reference [s].
 REFERENCE = 1e-4
 
 #: What the columns of each table mean.
@@ -39,13 +36,13 @@ NOTES = {
     "cost": "wall time of a step of 1 ms along one motion, one thread, median [least, most]. The "
     "peer is MuJoCo's own rollout of the bare arm, given the motion's torques; each other row is "
     "the arm under position control with what it names. Composing the scene is not in it.",
-    "timestep": "largest joint error of the whole drive along one motion, every 2 ms, beside the "
-    "same at 0.1 ms: a difference of time steps, nothing is said of a real arm.",
+    "timestep": "largest joint error of the whole drive along one motion, every 2 ms, against the "
+    "same at 0.1 ms: a difference of time steps, not from a real arm.",
 }
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Rows of two studies: ``cost`` (what a thing adds) and ``timestep`` (error against cost)."""
+    """Tables ``cost`` (what a thing adds) and ``timestep`` (error against cost)."""
     seconds = 5.0 if quick else 60.0
     bare = compose(SceneSpec(labels=False))
     motion = random_motion(np.random.default_rng(seed), workspace(bare), seconds, 30.0)
@@ -71,7 +68,7 @@ def costs(motion: Motion, repeats: int) -> list[Row]:
         "whole drive, labels, table": (SceneSpec(table=Table((2.5, 0, 0.1))), drive),
         "whole drive, labels, cloth 8 x 8": (SceneSpec(cloth=cloth), drive),
     }
-    calls: dict[str, Any] = {"mujoco.rollout, torques given": rollout_call(motion)}
+    calls: dict[str, Any] = {"mujoco.rollout, torques given": rollout_along(motion)}
     for name, (spec, parts) in scenes.items():
         calls[name] = loop_call(replace(compose(spec), drive=parts), motion)
     taken = time_in_turn(calls, repeats)
@@ -86,22 +83,6 @@ def costs(motion: Motion, repeats: int) -> list[Row]:
         }
         for name, figure in taken.items()
     ]
-
-
-def rollout_call(motion: Motion) -> Any:
-    """The peer: MuJoCo's own compiled loop over the bare arm with the same torques applied."""
-    scene = compose(SceneSpec(labels=False))
-    robot = RobotNumbers.from_pin(pin_model(scene.arm_xml))
-    tau = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd)
-    data = mujoco.MjData(scene.model)
-    data.qpos[scene.qpos_adr] = motion.q[0]
-    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-    state = np.empty(mujoco.mj_stateSize(scene.model, kind))
-    mujoco.mj_getState(scene.model, data, state, kind)
-    applied = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-    return lambda: rollout.rollout(
-        scene.model, data, initial_state=state, control=tau[None], control_spec=applied
-    )
 
 
 def loop_call(scene: Scene, motion: Motion) -> Any:
