@@ -1,4 +1,4 @@
-"""Samples from lines of text: what any other program can pipe in."""
+"""Samples from lines of text that another program pipes in."""
 
 from __future__ import annotations
 
@@ -50,9 +50,11 @@ class LineStream(Closing):
             ValueError: a line with another number of columns, or with something else than numbers.
         """
         deadline = time.monotonic() + timeout
+        left = timeout
         while b"\n" not in self._pending:
-            if not self._ready.select(max(0.0, deadline - time.monotonic())):
+            if left < 0 or not self._ready.select(left):
                 return None
+            left = deadline - time.monotonic()
             data = self._file.buffer.raw.read(65536)  # type: ignore[attr-defined]
             if not data:
                 raise StreamClosed("the input has ended")

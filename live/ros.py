@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tauguard.live.stream import Closing, Sample, StreamClosed
+from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
 
 #: Samples that wait to be read; more are lost, and counted.
 WAITING = 1000
@@ -85,7 +85,7 @@ class RosStream(Closing):
         except queue.Full:
             self._lost += 1
             if self._lost == 1:
-                self.events.append("samples are lost: they come faster than they are read")
+                add_event(self.events, "samples are lost: they come faster than they are read")
 
     def read(self, timeout: float) -> Sample | None:
         """The next sample, or None if none came within ``timeout`` seconds.
@@ -104,7 +104,8 @@ class RosStream(Closing):
             raise found
         passed, self._last = found.t - self._last, found.t
         if passed * self.rate > 1.5:
-            self.events.append(f"{round(passed * self.rate) - 1} samples lost before {found.t:.3f}")
+            lost = round(passed * self.rate) - 1
+            add_event(self.events, f"{lost} samples lost before {found.t:.3f}")
         return found
 
     def close(self) -> None:

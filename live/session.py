@@ -1,35 +1,60 @@
-"""The loop from sample to answer, and what is kept of it."""
+"""The loop from sample to answer, and its record.
+
+A clock in a thread of its own watches for silence. The state is a fault as soon as no sample has
+come for 20 ms, even if the stream blocks, reconnects or receives other packets.
+"""
 
 from __future__ import annotations
 
 import gc
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.faults.monitor import FAULT, Answer, Monitor
-from tauguard.detectors.faults.spans import Spans
+from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer, Monitor
+from tauguard.detectors.faults.spans import Span, Spans
 from tauguard.live.lateness import Lateness
 from tauguard.live.stream import RobotStream, Sample, StreamClosed
 from tauguard.traces.trace import Trace
 
-#: Latencies are counted in bins of a microsecond, so many; what takes longer is in one more.
+#: Latencies are counted in so many bins of a microsecond, and one more for longer ones.
 BINS = 100_000
+#: Before the first sample.
+NONE_YET = Answer(FAULT, False, 0.0, "no samples")
+#: Called with every sample and its answer, and during silence with an empty sample.
+Report = Callable[[Sample, Answer], None]
+
+
+@dataclass
+class Silence:
+    """A time without samples that was a fault."""
+
+    after: float  #: robot's time of the sample before [s]; nan: there was none
+    seconds: float  #: by this machine's clock
+
+    @property
+    def reason(self) -> str:
+        """For the screen and the summary."""
+        return f"no samples: nothing for {self.seconds:.3g} s"
 
 
 @dataclass
 class Session:
-    """What was heard so far; its size does not grow with time unless samples are kept."""
+    """The record of a session; its size does not grow with time unless samples are kept."""
 
     joint_names: tuple[str, ...]
-    keep: bool = False  #: keep every sample that could be believed, for a recording
-    samples: int = 0  #: that came, believed or not
-    first: float = np.nan  #: robot's time of the first sample [s]
+    keep: bool = False  #: keep every sample without a fault, for a recording
+    samples: int = 0  #: all that came
+    first: float = np.nan  #: robot's time of the first sample without a fault [s]
     last: float = np.nan  #: and of the last one
-    spans: Spans = field(default_factory=Spans)
+    answer: Answer = NONE_YET  #: the last one
+    spans: Spans = field(default_factory=Spans)  #: collisions, and faults of samples
+    silences: list[Silence] = field(default_factory=list)
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(BINS + 1, np.int64))
     """Samples by their latency from packet to answer, in microseconds."""
     slowest: int = 0  #: [ns]
@@ -37,20 +62,25 @@ class Session:
     scores: list[float] = field(default_factory=list)
     alarms: list[bool] = field(default_factory=list)
     ended: str = ""  #: why it ended
+    lost: bool = False  #: it ended as the robot's connection broke
+    _silence: Silence | None = None  #: the one that lasts
+    _now: float = np.nan  #: robot's time of the last sample, with a fault or without [s]
 
     def add(self, sample: Sample, answer: Answer, latency: int, said: Answer) -> None:
-        """One sample.
+        """Record one sample.
 
         Args:
             sample: as it came.
-            answer: the monitor's; a sample with a reason is not believed, and not kept.
+            answer: the monitor's; a sample with a fault is not kept.
             latency: [ns].
-            said: the answer with the sample's lateness in it.
+            said: the answer, or a fault if the sample was late.
         """
         self.samples += 1
         self.counts[min(latency // 1000, BINS)] += 1
         self.slowest = max(self.slowest, latency)
+        self._silence = None
         t = sample.t
+        self._now = t if np.isfinite(t) else self._now
         if not answer.reason:
             self.first = t if np.isnan(self.first) else self.first
             self.last = t
@@ -58,16 +88,49 @@ class Session:
                 self.rows.append(sample)
                 self.scores.append(answer.score)
                 self.alarms.append(answer.alarm)
+        self.answer = said
         self.spans.add(t, said)
 
-    def silent(self, seconds: float) -> None:
-        """Nothing came for ``seconds``; before the first sample that is no fault."""
-        if np.isnan(self.last):
-            return
-        self.spans.mark(FAULT, True, self.last, f"silent: no sample for {1e3 * seconds:.0f} ms")
+    def silent(self, seconds: float) -> tuple[Sample, Answer]:
+        """Record that nothing has come for ``seconds``.
+
+        Returns:
+            A sample without values at the present time of the robot, and the answer: a fault, or
+            the collision whose alarm was up when the samples ended.
+        """
+        if self._silence is None:
+            self._silence = Silence(self._now, seconds)
+            self.silences.append(self._silence)
+        self._silence.seconds = seconds
+        alarm = self.answer.alarm
+        state = COLLISION if alarm else FAULT
+        self.answer = Answer(state, alarm, self.answer.score, self._silence.reason)
+        nothing = np.full(len(self.joint_names), np.nan)
+        sample = Sample(
+            self._silence.after + seconds, nothing, nothing, nothing, time.monotonic_ns()
+        )
+        return sample, self.answer
+
+    @property
+    def state(self) -> str:
+        """The last state with its reason, such as "free" or "fault: no samples: ..."."""
+        return ": ".join(filter(None, (self.answer.state, self.answer.reason)))
+
+    def faults(self) -> list[Span]:
+        """Faults of samples and silences, in order, by the robot's clock [s].
+
+        A silence before the first sample ends with it; if no sample ever came, it begins at 0.
+        """
+        silent = []
+        for one in self.silences:
+            start = one.after
+            if np.isnan(start):
+                start = 0.0 if np.isnan(self.first) else self.first - one.seconds
+            silent.append(Span(FAULT, start, start + one.seconds, one.reason))
+        return sorted([*self.spans.of(FAULT), *silent], key=lambda span: span.start)
 
     def trace(self) -> Trace:
-        """The believed samples as a trace."""
+        """The kept samples as a trace."""
         rows = self.rows
         return Trace(
             self.joint_names,
@@ -80,7 +143,7 @@ class Session:
     def quantiles(self) -> dict[str, float | None]:
         """Latency from packet to answer [us]: median, p99, p99.9, p99.99 and the largest.
 
-        None: ``BINS`` microseconds or more, which are not told apart.
+        None: ``BINS`` microseconds or more, which are in one bin.
         """
         if not self.samples:
             return {}
@@ -91,47 +154,90 @@ class Session:
         return found | {"max": self.slowest * 1e-3}
 
 
+class _SilenceClock:
+    """A thread that marks a fault when no sample has come for ``most`` seconds.
+
+    It shares the record with the thread that reads the samples; the lock keeps reports in order.
+    """
+
+    def __init__(self, session: Session, most: float, report: Report) -> None:
+        self._session, self._most, self._report = session, most, report
+        self._lock, self._over = threading.Lock(), threading.Event()
+        self._last = time.monotonic()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def heard(self, sample: Sample, answer: Answer, latency: int, said: Answer) -> None:
+        """Record and report one sample."""
+        with self._lock:
+            self._last = time.monotonic()
+            self._session.add(sample, answer, latency, said)
+            self._report(sample, said)
+
+    def _look(self) -> float:
+        """Record and report silence, if it is one; seconds until it may be one (again)."""
+        with self._lock:
+            since = time.monotonic() - self._last
+            if since < self._most:
+                return self._most - since
+            self._report(*self._session.silent(since))
+            return self._most
+
+    def _run(self) -> None:
+        while not self._over.wait(self._look()):
+            pass
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+        self._look()  # a silence lasts until the end of the session
+
+
+def _no_report(sample: Sample, answer: Answer) -> None:
+    pass
+
+
 def listen(
-    source: RobotStream,
+    stream: RobotStream,
     monitor: Monitor,
     seconds: float = np.inf,
-    report: Callable[[Sample, Answer], None] | None = None,
+    report: Report | None = None,
     keep: bool = False,
 ) -> Session:
-    """Ask the monitor about every sample until the source ends, the time is up, or Ctrl-C.
+    """Ask the monitor about every sample until the stream ends, the time is up, or Ctrl-C.
 
     Args:
-        source: read, never commanded.
-        monitor: made for its joints and rate.
+        stream: read, never commanded.
+        monitor: made for the stream's joints and rate.
         seconds: by this machine's clock.
-        report: called after every answer; it must return at once (the latency does not count it).
+        report: called after every answer, and every 20 ms while no sample comes (with a sample of
+            NaN). It must return at once; the latency does not include it. During silence another
+            thread calls it, never two at a time.
         keep: keep the samples, for :meth:`Session.trace`.
     """
-    heard, lateness = Session(source.joint_names, keep), Lateness(1 / source.rate)
+    session, lateness = Session(stream.joint_names, keep), Lateness(1 / stream.rate)
     end = time.monotonic() + seconds
-    last, most = time.monotonic(), lateness.most
     collecting = gc.isenabled()
     gc.disable()  # a collection would come between a packet and its answer
     try:
-        while (now := time.monotonic()) < end:
-            sample = source.read(min(most, end - now))
-            if sample is None:
-                if time.monotonic() - last > most:
-                    heard.silent(time.monotonic() - last)
-                continue
-            answer = monitor.step(sample.t, sample.q, sample.qd, sample.current)
-            latency = time.monotonic_ns() - sample.arrived
-            said = lateness.judge(answer, sample.t, 1e-9 * sample.arrived)
-            heard.add(sample, answer, latency, said)
-            last = time.monotonic()
-            if report is not None:
-                report(sample, said)
-        heard.ended = f"{seconds:g} s are over"
+        with _SilenceClock(session, lateness.most, report or _no_report) as clock:
+            while (now := time.monotonic()) < end:
+                sample = stream.read(min(lateness.most, end - now))
+                if sample is None:
+                    continue
+                answer = monitor.step(sample.t, sample.q, sample.qd, sample.current)
+                latency = time.monotonic_ns() - sample.arrived
+                said = lateness.judge(answer, sample.t, 1e-9 * sample.arrived)
+                clock.heard(sample, answer, latency, said)
+            session.ended = f"{seconds:g} s are over"
     except StreamClosed as closed:
-        heard.ended = str(closed)
+        session.ended, session.lost = str(closed), closed.lost
     except KeyboardInterrupt:
-        heard.ended = "ended by hand"
+        session.ended = "ended by hand"
     finally:
         if collecting:
             gc.enable()
-    return heard
+    return session

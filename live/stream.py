@@ -1,4 +1,4 @@
-"""What every live source gives: one sample at a time, read-only."""
+"""The interface of every robot stream: one sample at a time, read-only."""
 
 from __future__ import annotations
 
@@ -8,9 +8,21 @@ from typing import Protocol, Self
 
 from tauguard.arrays import Array
 
+#: Events of one stream that are kept; a robot that is lost every second has more in an hour.
+MOST_EVENTS = 1000
+
 
 class StreamClosed(Exception):
-    """The source has ended: the log is over, or the robot closed the connection for good."""
+    """The stream has ended.
+
+    Attributes:
+        lost: the connection broke and did not come back; False: the log or the input is over.
+    """
+
+    def __init__(self, why: str, lost: bool = False) -> None:
+        """``why`` it ended, in one line."""
+        super().__init__(why)
+        self.lost = lost
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +39,7 @@ class Sample:
 class RobotStream(Protocol):
     """A robot that is read and never commanded.
 
-    Another robot is one class with these members; see ``docs/howto/live.md``.
+    A class with these members adds another robot; see ``docs/howto/live.md``.
     """
 
     @property
@@ -53,8 +65,16 @@ class RobotStream(Protocol):
         """Let go of the connection; may be called twice."""
 
 
+def add_event(events: list[str], event: str) -> None:
+    """Append an event, up to ``MOST_EVENTS`` of them."""
+    if len(events) < MOST_EVENTS:
+        events.append(event[:200])
+    elif len(events) == MOST_EVENTS:
+        events.append("more events are not listed")
+
+
 class Closing:
-    """``with`` for what is closed: a source, a server."""
+    """``with`` for streams and servers: they are closed at the end of the block."""
 
     def close(self) -> None:
         """Overridden."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import socket
 import struct
+import threading
 import time
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.live import rtde
-from tauguard.live.stream import Closing, Sample, StreamClosed
+from tauguard.live.stream import Closing, Sample, StreamClosed, add_event
 
 #: Joints of every UR arm by the names of UR's own ROS driver, as ``datasets.columns`` has them.
 UR_JOINTS = (
@@ -20,18 +22,22 @@ UR_JOINTS = (
     "wrist_2_joint",
     "wrist_3_joint",
 )
-#: What is asked of the controller, and the types that it has to answer.
+#: The variables that are asked for, and the types that the controller has to answer.
 VARIABLES = {
     "timestamp": "DOUBLE",
     "actual_q": "VECTOR6D",
     "actual_qd": "VECTOR6D",
     "actual_current": "VECTOR6D",
 }
-HANDSHAKE = 3.0  # [s] for each answer of the handshake
+#: Connecting and the handshake together take no longer [s].
+HANDSHAKE = 5.0
+#: An open connection without a data packet for so long is given up: a robot that lost its power
+#: closes nothing [s].
+NO_DATA = 5.0
+#: Seconds between attempts to connect again.
+RETRY = 0.2
 #: Controllers that send 500 samples a second (e-Series, major version 5 and up); older: 125.
 E_SERIES = 5
-#: Events of a connection that are kept; a robot that is lost every second has more in an hour.
-MOST_EVENTS = 1000
 
 
 class UrStream(Closing):
@@ -60,8 +66,10 @@ class UrStream(Closing):
         self.events: list[str] = []
         self._asked = rate
         self._last = np.nan
-        self._socket: socket.socket | None = None
-        self._open()
+        self._lost = ""
+        self._attempt: _Reconnection | None = None
+        self._connection: _Connection | None = _Connection(host, port, rate, HANDSHAKE)
+        self._rate = self._connection.rate
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -76,64 +84,122 @@ class UrStream(Closing):
     def read(self, timeout: float) -> Sample | None:
         """The next sample, or None if none came within ``timeout`` seconds.
 
-        A broken connection is opened again for ``reconnect`` seconds, and ``events`` says so.
+        A broken connection is opened again in the background; None is returned meanwhile.
 
         Raises:
-            StreamClosed: the connection broke and could not be opened again.
+            StreamClosed: the connection broke, and was not back after ``reconnect`` seconds.
         """
         deadline = time.monotonic() + timeout
-        while True:
-            try:
-                found = self._packet(deadline)
-                if found is None:
-                    return None
+        connection = self._connection or self._reconnected(timeout)
+        if connection is None:
+            return None
+        try:
+            while (found := connection.packet(deadline)) is not None:
                 if found.kind == rtde.DATA_PACKAGE:
-                    return self._sample(found.payload)
-            except (OSError, ValueError) as error:
-                self._again(error)
-                return None
-            if found.kind == rtde.TEXT_MESSAGE:
-                self._note(f"the controller says: {rtde.read_text(found.payload)!r}")
+                    return self._sample(connection.values(found.payload))
+                if found.kind == rtde.TEXT_MESSAGE:
+                    message = rtde.read_text(found.payload)
+                    add_event(self.events, f"the controller says: {message!r}")
+                if time.monotonic() >= deadline:
+                    break
+            if time.monotonic() > connection.data_due:
+                raise TimeoutError(f"no data for {NO_DATA:g} s")
+        except (OSError, ValueError) as error:
+            self._lose(error)
+        return None
 
     def close(self) -> None:
-        """Let go of the connection."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+        """Close the connection, and end attempts to open it again."""
+        if self._attempt is not None:
+            self._attempt.stop()
+        if self._connection is not None:
+            self._connection.close()
+        self._attempt = self._connection = None
 
-    # -- the connection ---------------------------------------------------------------------------
+    def _lose(self, error: Exception) -> None:
+        """Drop the connection and begin to open it again.
 
-    def _open(self) -> None:
+        An ``OSError`` broke it; after any other error a packet could not be read, and the
+        connection is dropped here.
+
+        Raises:
+            StreamClosed: no reconnection is asked for.
+        """
+        self.close()
+        broken = isinstance(error, OSError)
+        self._lost = f"connection {'lost' if broken else 'given up'} ({error})"
+        if not self.reconnect > 0:
+            raise StreamClosed(f"{self.host}:{self.port}: {self._lost}", lost=True)
+        self._attempt = _Reconnection(self.host, self.port, self._asked, self.reconnect)
+
+    def _reconnected(self, timeout: float) -> _Connection | None:
+        """The new connection, or None if there is none after ``timeout`` seconds."""
+        attempt = self._attempt
+        if attempt is None:
+            raise StreamClosed(f"{self.host}:{self.port}: closed")
+        self._connection = attempt.wait(timeout)
+        if self._connection is not None:
+            self._attempt = None
+            seconds = time.monotonic() - attempt.began
+            add_event(self.events, f"{self._lost}, back after {seconds:.1f} s")
+        elif attempt.over:
+            self.close()
+            raise StreamClosed(f"{self.host}:{self.port}: {self._lost}", lost=True)
+        return self._connection
+
+    def _sample(self, values: Array) -> Sample:
+        arrived = time.monotonic_ns()
+        t = float(values[0])
+        passed, self._last = t - self._last, t
+        if np.isfinite(passed) and passed * self._rate > 1.5:
+            lost = f"{passed * self._rate - 1:.0f} samples lost before {t:.3f} s"
+            add_event(self.events, lost)
+        return Sample(t, values[1:7], values[7:13], values[13:19], arrived)
+
+
+class _Connection:
+    """An RTDE connection whose data have been started.
+
+    Raises:
+        ConnectionError: no answer in time, another protocol version, or variables that the
+            controller does not have: one line that says which.
+    """
+
+    def __init__(self, host: str, port: int, rate: float | None, within: float) -> None:
+        deadline = time.monotonic() + within
+        self._where = f"{host}:{port}"
         try:
-            self._socket = socket.create_connection((self.host, self.port), timeout=HANDSHAKE)
+            self._socket = socket.create_connection((host, port), timeout=within)
         except OSError as error:
             raise ConnectionError(
-                f"{self.host}:{self.port} does not answer ({error.strerror or error}): is the "
+                f"{self._where} does not answer ({error.strerror or error}): is the "
                 "robot on, and RTDE enabled in its security settings?"
             ) from None
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._reader = rtde.PacketReader()
         try:
-            self._handshake()
+            self._handshake(rate, deadline)
         except (OSError, ValueError, struct.error) as error:
             self.close()
             if isinstance(error, ConnectionError):
                 raise
             raise ConnectionError(
-                f"{self.host}:{self.port} does not speak RTDE version {rtde.VERSION} ({error})"
+                f"{self._where} does not speak RTDE version {rtde.VERSION} ({error})"
             ) from None
+        self.data_due = time.monotonic() + NO_DATA  #: without data until then, it is given up
 
-    def _handshake(self) -> None:
-        answer = self._ask(rtde.REQUEST_PROTOCOL_VERSION, struct.pack(">H", rtde.VERSION))
+    def _handshake(self, rate: float | None, deadline: float) -> None:
+        version = struct.pack(">H", rtde.VERSION)
+        answer = self._ask(deadline, rtde.REQUEST_PROTOCOL_VERSION, version)
         if answer[:1] != b"\x01":
             raise ConnectionError(
-                f"{self.host}:{self.port} refuses RTDE version {rtde.VERSION}: its software is "
+                f"{self._where} refuses RTDE version {rtde.VERSION}: its software is "
                 "older than 3.4; update the controller"
             )
-        major = struct.unpack_from(">I", self._ask(rtde.GET_URCONTROL_VERSION))[0]
-        self._rate = self._asked or (500.0 if major >= E_SERIES else 125.0)
+        major = struct.unpack_from(">I", self._ask(deadline, rtde.GET_URCONTROL_VERSION))[0]
+        self.rate = rate or (500.0 if major >= E_SERIES else 125.0)
         names = ",".join(VARIABLES).encode()
-        answer = self._ask(rtde.SETUP_OUTPUTS, struct.pack(">d", self._rate) + names)
+        answer = self._ask(deadline, rtde.SETUP_OUTPUTS, struct.pack(">d", self.rate) + names)
         types = tuple(answer[1:].decode("ascii", "replace").split(","))
         if types != tuple(VARIABLES.values()):
             wrong = [
@@ -142,37 +208,33 @@ class UrStream(Closing):
                 if want != got
             ] or ["no answer that can be read"]
             raise ConnectionError(
-                f"{self.host}:{self.port} does not give {', '.join(wrong)}: expected a UR "
+                f"{self._where} does not give {', '.join(wrong)}: expected a UR "
                 "controller with software 3.4 or later"
             )
         self._recipe = answer[0]
         self._layout = rtde.Recipe(answer[0], types).layout
-        if self._ask(rtde.START)[:1] != b"\x01":
-            raise ConnectionError(f"{self.host}:{self.port} does not start its data")
+        if self._ask(deadline, rtde.START)[:1] != b"\x01":
+            raise ConnectionError(f"{self._where} does not start its data")
 
-    def _ask(self, kind: int, payload: bytes = b"") -> bytes:
+    def _ask(self, deadline: float, kind: int, payload: bytes = b"") -> bytes:
         """Send one request and wait for the answer of its kind."""
-        assert self._socket is not None
         self._socket.sendall(rtde.packet(kind, payload))
-        deadline = time.monotonic() + HANDSHAKE
-        while True:
-            found = self._packet(deadline)
-            if found is None:
-                raise ValueError("no answer to the handshake")
+        while (found := self.packet(deadline)) is not None and time.monotonic() < deadline:
             if found.kind == kind:
                 return found.payload
+        raise ValueError("no answer to the handshake")
 
-    def _packet(self, deadline: float) -> rtde.Packet | None:
-        """The next packet, None at the deadline.
+    def packet(self, deadline: float) -> rtde.Packet | None:
+        """The next packet, or None if there is none at the deadline.
 
         Raises:
             OSError: the connection is broken.
+            ValueError: the other side does not speak RTDE.
         """
+        left = deadline - time.monotonic()
         while (found := self._reader.next()) is None:
-            if self._socket is None:
-                raise ConnectionResetError("closed")
-            # Look once more after the deadline: this program may have been kept from running.
-            self._socket.settimeout(max(0.0, deadline - time.monotonic()))
+            # Look once even after the deadline: this program may have been kept from running.
+            self._socket.settimeout(max(0.0, left))
             try:
                 data = self._socket.recv(65536)
             except (TimeoutError, BlockingIOError):
@@ -180,46 +242,69 @@ class UrStream(Closing):
             if not data:
                 raise ConnectionResetError("the robot closed the connection")
             self._reader.feed(data)
+            if left < 0:
+                return self._reader.next()
+            left = deadline - time.monotonic()
         return found
 
-    def _again(self, error: Exception) -> None:
-        """Open the connection again, or give up.
+    def values(self, payload: bytes) -> Array:
+        """The numbers in a data packet: time, q, qd, currents.
 
-        An ``OSError`` broke it; any other error is of a packet that cannot be read, and the
-        connection was dropped here.
+        Raises:
+            ValueError: a packet of another recipe or size.
         """
-        lost = isinstance(error, OSError)
-        began = time.monotonic()
-        self.close()
-        while time.monotonic() - began < self.reconnect:
-            try:
-                self._open()
-            except ConnectionError:
-                time.sleep(0.2)
-                continue
-            what = "connection lost" if lost else "connection begun anew"
-            self._note(f"{what} ({error}), back after {time.monotonic() - began:.1f} s")
-            return
-        what = "connection lost" if lost else "connection given up"
-        raise StreamClosed(f"{self.host}:{self.port}: {what} ({error})")
-
-    def _sample(self, payload: bytes) -> Sample:
-        arrived = time.monotonic_ns()
         if len(payload) != self._layout.size or payload[0] != self._recipe:
             raise ValueError(
                 f"a data packet of {len(payload)} bytes, expected {self._layout.size} of recipe "
                 f"{self._recipe}"
             )
-        values = rtde.read_doubles(payload)
-        t = float(values[0])
-        passed, self._last = t - self._last, t
-        if np.isfinite(passed) and passed * self._rate > 1.5:
-            self._note(f"{passed * self._rate - 1:.0f} samples lost before {t:.3f} s")
-        return Sample(t, values[1:7], values[7:13], values[13:19], arrived)
+        self.data_due = time.monotonic() + NO_DATA
+        return rtde.read_doubles(payload)
 
-    def _note(self, event: str) -> None:
-        """Keep an event, a bounded number of them."""
-        if len(self.events) < MOST_EVENTS:
-            self.events.append(event[:200])
-        elif len(self.events) == MOST_EVENTS:
-            self.events.append("more events are not listed")
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class _Reconnection:
+    """Attempts to connect again, in a thread of its own, so that reading keeps its deadlines."""
+
+    def __init__(self, host: str, port: int, rate: float | None, within: float) -> None:
+        self.began = time.monotonic()
+        self._until = self.began + within
+        self._where = (host, port, rate)
+        self._found: _Connection | None = None
+        self._lock, self._done, self._stop = threading.Lock(), threading.Event(), threading.Event()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is up; the thread may still wait for an answer."""
+        return self._done.is_set() or time.monotonic() >= self._until
+
+    def wait(self, timeout: float) -> _Connection | None:
+        """The connection, or None if there is none after ``timeout`` seconds."""
+        self._done.wait(max(0.0, min(timeout, self._until - time.monotonic())))
+        with self._lock:
+            return self._found
+
+    def stop(self) -> None:
+        """End the attempts and close a connection that was not taken."""
+        with self._lock:
+            self._stop.set()
+            if self._found is not None:
+                self._found.close()
+
+    def _run(self) -> None:
+        while not self._stop.is_set() and (left := self._until - time.monotonic()) > 0:
+            try:
+                found = _Connection(*self._where, min(HANDSHAKE, left))
+            except ConnectionError:
+                self._stop.wait(RETRY)
+                continue
+            with self._lock:
+                self._found = found
+                if self._stop.is_set():
+                    found.close()
+            break
+        self._done.set()

@@ -156,7 +156,7 @@ def heard(folder: Path, rate: float) -> Row:
         found = listen(source, Monitor(alarm, alarm.inputs), report=report)
         busy = time.process_time() - busy
         sent, events = received(pipe), len(source.events)
-    late = [s for s in found.spans.of("fault") if s.reason.startswith(("late", "silent"))]
+    late = [s for s in found.faults() if s.reason.startswith(("late", "no samples"))]
     return {
         "study": "listen",
         "rate [Hz]": rate,

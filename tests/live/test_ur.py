@@ -123,12 +123,12 @@ def test_a_data_packet_of_another_size_is_no_lost_connection(reconnect):
         UrStream("127.0.0.1", server.port, reconnect=reconnect) as source,
     ):
         assert source.read(1.0) is not None
-        source._reader.feed(rtde.packet(rtde.DATA_PACKAGE, b"\x01short"))
+        source._connection._reader.feed(rtde.packet(rtde.DATA_PACKAGE, b"\x01short"))
         said = "[(]a data packet of 6 bytes, expected 153 of recipe 1[)]"
         if reconnect:
             while not source.events:
                 source.read(0.5)
-            assert re.match(f"connection begun anew {said}, back after", source.events[0])
+            assert re.match(f"connection given up {said}, back after", source.events[0])
             assert source.read(1.0) is not None
         else:
             with pytest.raises(StreamClosed, match=f"connection given up {said}"):

@@ -41,8 +41,8 @@ def command(
     """Watch a robot as it runs: free, collision or fault, live. Nothing is sent to the robot.
 
     One of --ur, --play, --stdin and --ros names where the samples come from. It ends after
-    --seconds, with
-    Ctrl-C, or when the robot has been gone for --reconnect seconds.
+    --seconds, with Ctrl-C, or when the robot has been gone for --reconnect seconds (exit code 3).
+    When no sample comes for 20 ms the state is `fault: no samples`.
 
     Args:
         model: a detector that `tauguard train` wrote, for this arm and this rate.
@@ -95,16 +95,18 @@ def command(
             for view in views:
                 view.put(sample, answer)
 
-        heard = listen(source, monitor, seconds, show, keep=record is not None)
+        session = listen(source, monitor, seconds, show, keep=record is not None)
         events = list(source.events)
-    result = summary(heard, events, alarm)
+    result = summary(session, events, alarm)
     report(result)
     if record is not None:
-        save(record, heard, alarm)
+        save(record, session, alarm)
     if json is not None:
         from tauguard.report import write_json
 
         write_json(json, result)
+    if session.lost:
+        raise SystemExit(3)
 
 
 def with_load(
@@ -181,11 +183,16 @@ class Terminal:
             self._said = {kind} if changed else self._said | {kind}
             self._state = answer.state
             why = why_text(answer, self._threshold)
-            print(f"\r{sample.t:10.3f} s  {answer.state}{why}".ljust(79), flush=True)
+            print(f"\r{_at(sample.t)}  {answer.state}{why}".ljust(79), flush=True)
         elif self._live and now >= self._next:
             self._next = now + self._every
-            print(f"\r{sample.t:10.3f} s  {answer.state}  score {answer.score:.2f} ", end="")
+            print(f"\r{_at(sample.t)}  {answer.state}  score {answer.score:.2f} ", end="")
             sys.stdout.flush()
+
+
+def _at(t: float) -> str:
+    """The robot's time, if it is known."""
+    return f"{t:10.3f} s" if t == t else f"{'-':>10}  "
 
 
 def why_text(answer: Answer, threshold: float) -> str:
@@ -215,14 +222,13 @@ def charts(
     states, due = {"free": 0, "collision": 1, "fault": 2}, [-np.inf, 0.0]
 
     def show(sample: Sample, answer: Answer) -> None:
-        if (
-            not (sample.t - due[0] >= 1 / FRAMES or sample.t < due[0])
-            or not np.isfinite(sample.q).all()
-        ):
+        soon = due[0] <= sample.t < due[0] + 1 / FRAMES
+        if soon or not np.isfinite(sample.t):
             return
         due[0] = sample.t
-        data.qpos[rows] = sample.q
-        mujoco.mj_kinematics(model, data)
+        if np.isfinite(sample.q).all():  # during silence the arm stays where it was
+            data.qpos[rows] = sample.q
+            mujoco.mj_kinematics(model, data)
         view.show(data, sample.t, [])
         view.chart("score", ["score"], [answer.score / max(alarm.threshold, 1e-9)])
         view.chart("state", ["state"], [states[answer.state]])
@@ -230,23 +236,23 @@ def charts(
     return show
 
 
-def summary(heard: Session, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:
+def summary(session: Session, events: list[str], alarm: CollisionAlarm) -> dict[str, Any]:
     """The figures of a run, ready for JSON; events as `tauguard detect` writes them."""
-    collisions = heard.spans.of("collision")
-    faults = heard.spans.of("fault")
+    collisions = session.spans.of("collision")
     return {
         "name": "listen",
-        "joints": list(heard.joint_names),
+        "joints": list(session.joint_names),
         "detector": alarm.detector.name,
         "score_threshold": alarm.threshold,
-        "samples": heard.samples,
-        "seconds": heard.last - heard.first if heard.samples else 0.0,
+        "samples": session.samples,
+        "seconds": session.last - session.first if session.first == session.first else 0.0,
         "alarms": len(collisions),
         "events": [{"start": s.start, "end": s.end, "score": s.score} for s in collisions],
-        "faults": [{"start": s.start, "end": s.end, "reason": s.reason} for s in faults],
+        "faults": [{"start": s.start, "end": s.end, "reason": s.reason} for s in session.faults()],
+        "state": session.state,
         "connection": events,
-        "ended": heard.ended,
-        "latency_us": heard.quantiles(),
+        "ended": session.ended,
+        "latency_us": session.quantiles(),
     }
 
 
@@ -271,6 +277,7 @@ def report(result: dict[str, Any]) -> None:
         )
     else:
         print(f"no sample came: {result['ended']}")
+    print(f"state at the end: {result['state']}")
 
 
 def _us(value: float | None) -> str:
@@ -278,24 +285,24 @@ def _us(value: float | None) -> str:
     return "100,000 or more" if value is None else f"{value:,.0f}"
 
 
-def save(path: Path, heard: Session, alarm: CollisionAlarm) -> None:
+def save(path: Path, session: Session, alarm: CollisionAlarm) -> None:
     """What was heard, with alarms, as MCAP."""
     import numpy as np
 
     from tauguard.detectors import find_alarms
     from tauguard.traces import Detection, write_mcap
 
-    if len(heard.rows) < 2:
+    if len(session.rows) < 2:
         raise ValueError(f"--record {path}: fewer than 2 samples were heard; nothing is written")
-    trace, up = heard.trace(), np.array(heard.alarms)
+    trace, up = session.trace(), np.array(session.alarms)
     detection = Detection(
         detector=alarm.detector.name,
         t=trace.t,
         residual=np.zeros_like(trace.q),
-        score=np.array(heard.scores),
+        score=np.array(session.scores),
         threshold=alarm.threshold,
         alarm=up,
         alarms=find_alarms(trace.t, up),
     )
     write_mcap(path, trace, detection)
-    print(f"{path}: {len(heard.rows)} samples")
+    print(f"{path}: {len(session.rows)} samples")
