@@ -64,7 +64,8 @@ def test_commands_exist(page, studies):
     from tauguard.cli import COMMANDS
 
     shell = "\n".join(re.findall(r"```sh\n(.*?)```", page.read_text(), re.DOTALL))
-    told = shell + "\n".join(re.findall(r"`(tauguard [^`]+)`", page.read_text()))
+    inline = re.findall(r"`(tauguard\s[^`]+)`", page.read_text())
+    told = "\n".join([shell, *(" ".join(text.split()) for text in inline)])
     for command, rest in re.findall(r"tauguard ([a-z][a-z-]*)([^\n]*)", told):
         if command == "bench":
             assert rest.split()[0] in studies, rest
