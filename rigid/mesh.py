@@ -13,7 +13,7 @@ from tauguard.rigid import _rigid_mesh
 from tauguard.rigid.motion import Motion, bounded, common_length, poses
 from tauguard.rigid.results import MeshImpacts
 
-Volume = Literal["obb", "aabb", "k_dop", "sphere"]
+Volume = Literal["obb", "aabb"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +62,7 @@ class MeshTree:
     every mesh measured (``tauguard bench rigid``). ``aabb`` keeps axis-aligned boxes in the mesh's
     own frame, tested in the same way against the other mesh's boxes, which the pose turns; it
     builds in two thirds of the time, which pays for a mesh that is asked a few thousand poses or
-    fewer. ``k_dop`` (18 half-spaces, Klosowski et al. 1998) and ``sphere`` (a ball) bound the same
-    nodes and are there to compare. The volume never changes an answer.
+    fewer. The volume never changes an answer.
 
     What is exact: a pose places a vertex ``y`` of the other mesh at ``R y + t``, evaluated in
     double precision and rounded; whether two triangles of the resulting corners share a point is
@@ -72,14 +71,16 @@ class MeshTree:
     Args:
         vertices: Shape (V, 3), m.
         faces: Shape (F, 3), rows of ``vertices``, at least one. Degenerate triangles are legal.
-        volume: ``"obb"``, ``"aabb"``, ``"k_dop"`` or ``"sphere"``.
+        volume: ``"obb"`` or ``"aabb"``.
 
     Raises:
         ValueError: wrong shapes, an entry that is not finite, an index out of range, no faces, or
             an unknown volume.
     """
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, volume: Volume = "obb") -> None:
+    volumes: tuple[str, ...] = get_args(Volume)
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, volume: str = "obb") -> None:
         """Build the tree; the class says what is expected."""
         points = frozen_finite("vertices", vertices, (None, 3))
         triangles = frozen_indices("faces", faces, (None, 3), len(points))
@@ -89,8 +90,8 @@ class MeshTree:
             raise ValueError(f"faces: {len(triangles)} rows, at most {2**28 - 1} fit")
         if np.abs(points).max() > 1e30:
             raise ValueError("vertices: a coordinate beyond 1e30; scale the mesh down")
-        if volume not in get_args(Volume):
-            raise ValueError(f"volume: {volume!r}, expected one of {', '.join(get_args(Volume))}")
+        if volume not in self.volumes:
+            raise ValueError(f"volume: {volume!r}, expected one of {', '.join(self.volumes)}")
         self._vertices, self._faces, self._volume = points, triangles, volume
         self._mesh = _rigid_mesh.Mesh(points, triangles, volume)
 
@@ -105,7 +106,7 @@ class MeshTree:
         return self._faces
 
     @property
-    def volume(self) -> Volume:
+    def volume(self) -> str:
         """The bounding volume of the nodes."""
         return self._volume
 

@@ -23,21 +23,15 @@ from tauguard.rigid.shapes import Bodies, Boxes, Hulls, Parallelepipeds, Polygon
 
 SweepMethod = Literal["abfme", "sat", "auto"]
 
-#: Number of a method in the native module; ``sat_textbook`` and ``exact`` serve studies and tests.
-_METHODS = {"abfme": 0, "sat": 1, "auto": 2, "sat_textbook": 3, "exact": 4}
+#: Number of a method in the native module; ``exact`` serves studies and tests.
+_METHODS = {"abfme": 0, "sat": 1, "auto": 2, "exact": 4}
 _KINDS: dict[type, int] = {Tetrahedra: 0, Boxes: 1, Parallelepipeds: 2, Hulls: 3, Polygons: 4}
 _NO_OFFSETS = np.zeros(1, dtype=np.int64)
 
 
 def sharp_overlap(a: Bodies, b: Bodies, method: str, threads: int) -> Overlap:
     """Whether bodies without radii share a point; the methods are those of the public query."""
-    count = rows(a, b)
-    if method == "gjk":
-        from tauguard.rigid.coal_peer import collide
-
-        hit = collide(a, b, count)
-    else:
-        hit = native_overlap(a, b, method, threads)[0]
+    hit = native_overlap(a, b, method, threads)[0]
     return Overlap(hit, lambda: find_witness(a, b, hit, threads))
 
 
@@ -45,13 +39,19 @@ def native_overlap(
     a: Bodies, b: Bodies, method: str, threads: int = 1
 ) -> tuple[NDArray[np.bool_], int]:
     """``hit`` of shape (N,), and how many rows the filter left to exact arithmetic."""
-    if method.startswith("sat") and (isinstance(a, Hulls | Polygons) or isinstance(b, Hulls)):
-        raise ValueError("method: sat needs facets, which hulls do not have; use abfme or auto")
+    if method == "sat":
+        refuse_hulls(a, b)
     hit = np.empty(rows(a, b), dtype=np.uint8)
     if method == "auto" and isinstance(a, Boxes) and isinstance(b, Boxes):
         return hit.view(np.bool_), overlap_boxes(a, b, thread_count(threads), hit)
     left = _rigid.overlap(*native(a), *native(b), _METHODS[method], thread_count(threads), hit)
     return hit.view(np.bool_), left
+
+
+def refuse_hulls(a: Bodies, b: Bodies) -> None:
+    """Nothing; hulls and polygons, whose facets are not known, are a ``ValueError``."""
+    if isinstance(a, Hulls | Polygons) or isinstance(b, Hulls):
+        raise ValueError("method: sat needs facets, which hulls do not have; use abfme or auto")
 
 
 def overlap_boxes(a: Boxes, b: Boxes, threads: int, hit: NDArray[np.uint8]) -> int:

@@ -12,7 +12,7 @@ from tauguard.rigid.rounded import Solid
 from tauguard.rigid.shapes import Bodies
 from tauguard.rigid.solid_queries import rounded_overlap, solid_distances
 
-OverlapMethod = Literal["abfme", "sat", "gjk", "auto"]
+OverlapMethod = Literal["abfme", "sat", "auto"]
 
 
 @overload
@@ -36,7 +36,6 @@ def overlap(
         b: likewise; kinds mix freely, and at most one side is a mesh.
         method: ``abfme``, ``sat`` (not for hulls, which have no facets) or ``auto`` (what the
             study ``rigid`` shows fastest for the two kinds): never wrong on any finite input.
-            ``gjk`` asks coal, pair by pair and without that guarantee, and serves as a peer.
             Rounded bodies and meshes know ``auto``, which is as exact.
         threads: 0 means all processors; the answer does not depend on it.
 
@@ -45,8 +44,8 @@ def overlap(
         mesh the ``faces`` that are met.
 
     Raises:
-        ValueError: lengths that do not match, an unknown method, ``sat`` of hulls, ``gjk``
-            without coal, another method than ``auto`` of rounded bodies or a mesh, two meshes,
+        ValueError: lengths that do not match, an unknown method, ``sat`` of hulls,
+            another method than ``auto`` of rounded bodies or a mesh, two meshes,
             a coordinate beyond 1e100 of rounded bodies (1e30 beside a mesh).
     """
     if method not in get_args(OverlapMethod):

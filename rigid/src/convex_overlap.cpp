@@ -2,11 +2,11 @@
 
 #include <atomic>
 
+#include "comparison_sat.hpp"
 #include "convex_abfme.hpp"
 #include "convex_boxes.hpp"
 #include "convex_resolve.hpp"
 #include "convex_sat.hpp"
-#include "convex_sat_textbook.hpp"
 #include "tauguard/geometry/interrupt.hpp"
 
 namespace tauguard::rigid {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "comparison_volumes.hpp"
 #include "mesh_obb.hpp"
-#include "mesh_volumes.hpp"
 
 namespace tauguard::rigid {
 

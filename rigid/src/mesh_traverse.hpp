@@ -20,7 +20,7 @@ struct SlotPair {
   Slot a, b;
 };
 
-// Boxes of the default trees; see mesh_volumes.hpp for the others.
+// Boxes of the default trees; see comparison_volumes.hpp for the others.
 struct BoxBounds {
   const Tree &a, &b;
   const Placement& at;

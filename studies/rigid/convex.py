@@ -29,7 +29,8 @@ from studies.rigid import peer
 from studies.rigid.bars import count, error, faster, per, within
 from tauguard.report import Row, rate
 from tauguard.rigid import PlaneCache
-from tauguard.rigid.queries import native_overlap, native_sweep, portable
+from tauguard.rigid.comparators import overlap_by
+from tauguard.rigid.queries import native_sweep, portable
 from tauguard.rigid.queries import overlap_boxes as overlap_boxes_native
 from tauguard.rigid.shapes import Bodies, Boxes
 
@@ -104,10 +105,10 @@ def static_row(pair: tuple[str, str], outcome: str, a: Bodies, b: Bodies, coal_p
     """Times, ratios and errors of one cell."""
     n, expected = len(a), outcome == "collision"
     _ = (a.packed, b.packed)
-    calls = {name: partial(native_overlap, a, b, method) for name, method in METHODS.items()}
+    calls = {name: partial(overlap_by, a, b, method) for name, method in METHODS.items()}
     ns = {name: per(t, n) for name, t in time_in_turn(calls, clock=process_time).items()}
     wrong = {
-        name: int((native_overlap(a, b, method)[0] != expected).sum())
+        name: int((overlap_by(a, b, method)[0] != expected).sum())
         for name, method in METHODS.items()
     }
     few = np.arange(min(n, coal_pairs))
@@ -217,7 +218,7 @@ def coherent_row(rng: np.random.Generator, kind: str, n: int, frames: int) -> Ro
         seconds["cached"].append((process_time() - start) / n * 1e9)
         for method in ("auto", "abfme"):
             start = process_time()
-            fresh, _ = native_overlap(a, moved, method)
+            fresh, _ = overlap_by(a, moved, method)
             seconds[method].append((process_time() - start) / n * 1e9)
         wrong += int((hit != fresh).sum())
         if frame:
@@ -244,7 +245,7 @@ def hard_row(name: str, rng: np.random.Generator, n: int) -> Row:
     row: Row = {"study": "hard cases", "case": name, "pairs": n, "hits": float(expected.mean())}
     for label, method in METHODS.items():
         start = process_time()
-        hit, left = native_overlap(a, b, method)
+        hit, left = overlap_by(a, b, method)
         row[f"{label}_ns"] = (process_time() - start) / n * 1e9
         row[f"{label}_false_hit"] = int((hit & ~expected).sum())
         row[f"{label}_false_clear"] = int((~hit & expected).sum())

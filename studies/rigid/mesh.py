@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,12 @@ from oracles.coal_motion import MovingDistance
 from oracles.convex_pairs import REST, farthest, random_bodies, random_motions, shifted, take
 from oracles.surfaces import bumpy_surface, poses_near
 from studies.framework import table_rows, time_in_turn
-from studies.rigid import peer
+from studies.rigid import coal_peer, peer
 from studies.rigid.bars import count, error, faster, per
 from tauguard.arrays import Array
 from tauguard.report import Row, rate
-from tauguard.rigid import Impacts, MeshTree, Motion, coal_peer, distance, overlap, time_of_impact
-from tauguard.rigid.mesh import Volume
+from tauguard.rigid import Impacts, MeshTree, Motion, distance, overlap, time_of_impact
+from tauguard.rigid.comparators import ComparedTree
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,7 +129,7 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
 
 def build_rows(mesh: Mesh, coal_ms: float, repeats: int) -> list[Row]:
     """Time of a tree with each bounding volume."""
-    calls = {v: partial(MeshTree, mesh.vertices, mesh.faces, v) for v in get_args(Volume)}
+    calls = {v: partial(ComparedTree, mesh.vertices, mesh.faces, v) for v in ComparedTree.volumes}
     return [
         {
             "study": "mesh build",
@@ -149,7 +149,7 @@ def static_rows(mesh: Mesh, model: Any, poses: Array, repeats: int) -> list[Row]
 
     The overhead of coal's call is that of two one-triangle models far apart.
     """
-    trees = {v: MeshTree(mesh.vertices, mesh.faces, v) for v in get_args(Volume)}
+    trees = {v: ComparedTree(mesh.vertices, mesh.faces, v) for v in ComparedTree.volumes}
     hits = {v: tree.overlap(tree, poses).hit for v, tree in trees.items()}
     far, one = np.tile(np.eye(4), (1000, 1, 1)), coal_peer.mesh(mesh.vertices, mesh.faces[:1])[0]
     far[:, 0, 3] = 10 * mesh.size

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from oracles.coal_motion import CONTACT, MovingDistance, advanced_times
 from studies.framework import time_in_turn
+from studies.rigid import coal_peer
 from studies.rigid.bars import per
 from tauguard.arrays import Array
 from tauguard.report import Row
-from tauguard.rigid import Impacts, coal_peer
+from tauguard.rigid import Impacts
 from tauguard.rigid.shapes import Bodies
 
 

@@ -24,18 +24,13 @@ from studies.rigid.bars import count, error, per
 from studies.rigid.mesh import load
 from tauguard.arrays import Array
 from tauguard.report import Row, rate
-from tauguard.rigid import Hulls, _rigid_mesh
+from tauguard.rigid import Hulls
+from tauguard.rigid.comparators import VOLUMES
 from tauguard.rigid.queries import native_overlap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NATIVE: dict[str, Any] = {
-    "sphere": _rigid_mesh.BallVolumes,
-    "aabb": _rigid_mesh.AabbVolumes,
-    "obb": _rigid_mesh.ObbVolumes,
-    "k_dop": _rigid_mesh.KDopVolumes,
-}
 #: The 18-DOP's directions, one of each pair.
 DIRECTIONS = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1],
@@ -64,7 +59,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
     sides = hulls.sides(pose, pairs)
     hit, size = native_overlap(*sides, "auto")[0], hulls.size.copy()
     rows = []
-    for name, kind in NATIVE.items():
+    for name, kind in VOLUMES.items():
         volume, found = kind(corners, offsets), np.empty(len(pairs), dtype=np.bool_)
         numbers = np.empty((n, volume.numbers))
         volume.fit()

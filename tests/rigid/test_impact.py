@@ -14,6 +14,7 @@ from tauguard.rigid import (
     overlap,
     time_of_impact,
 )
+from tauguard.rigid.comparators import ComparedTree
 
 REST = Motion(np.eye(4), np.zeros(3), np.zeros(3))
 CUBE_FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)]
@@ -151,7 +152,7 @@ def test_meshes_touch_when_the_first_of_all_their_triangles_do(distance, linear,
     assert np.isfinite(truth).sum() >= 3
     faces = np.arange(36).reshape(12, 3)
     for volume in ("obb", "aabb", "k_dop", "sphere"):
-        x, y = (MeshTree(c.reshape(-1, 3), faces, volume) for c in corners)
+        x, y = (ComparedTree(c.reshape(-1, 3), faces, volume) for c in corners)
         found = time_of_impact(x, y, ma, mb)
         np.testing.assert_allclose(found.time_of_impact, truth, rtol=0, atol=1e-10)
         # Never late, to the rounding of either search.

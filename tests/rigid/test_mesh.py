@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from oracles.triangle_meshes import cube, icosphere, random_poses, soup, transform, triangles_meet
 from tauguard.rigid import MeshTree, Motion, _rigid_mesh
+from tauguard.rigid.comparators import ComparedTree
 
 VOLUMES = ["aabb", "obb", "k_dop", "sphere"]
 
@@ -57,7 +58,7 @@ def test_every_pair_and_no_other(volume, n):
     w, g = soup(rng, 40)
     poses = random_poses(rng, 25, 1.0)
     poses[0, :3, :3] = np.eye(3)
-    a, b = MeshTree(v, f, volume), MeshTree(w, g, volume)
+    a, b = ComparedTree(v, f, volume), ComparedTree(w, g, volume)
     overlap, contacts = a.overlap(b, poses), a.contacts(b, poses)
     for i, pose in enumerate(poses):
         truth = all_pairs(v, f, w, g, pose)
@@ -81,7 +82,7 @@ def test_every_pair_at_any_scale_and_however_flat(volume, scale, stretch):
     poses = random_poses(rng, 5, 0.5 * scale)
     poses[:2, :3, :3] = np.eye(3)
     poses[:2, 2, 3] = 0
-    tree = MeshTree(v, f, volume)
+    tree = ComparedTree(v, f, volume)
     contacts = tree.contacts(tree, poses)
     for i, pose in enumerate(poses):
         assert {tuple(x) for x in contacts.faces[contacts.pose == i]} == all_pairs(v, f, v, f, pose)
@@ -92,7 +93,7 @@ def test_every_pair_at_any_scale_and_however_flat(volume, scale, stretch):
 @pytest.mark.parametrize("shift", [0.0, 1e6, -1e9])
 def test_cubes_that_just_touch(volume, shift):
     v, f = cube()
-    a = MeshTree(v + shift, f, volume)
+    a = ComparedTree(v + shift, f, volume)
     pose = np.tile(np.eye(4), (6, 1, 1))
     step = np.spacing(abs(shift) + 1) * 2
     pose[:, 0, 3] = [1, 1 + step, -1, -1 - step, 1, 1]
@@ -209,7 +210,7 @@ def test_a_contact_comes_free_along_its_normal():
 def test_thread_count_changes_nothing(volume):
     rng = np.random.default_rng(4)
     v, f = soup(rng, 300)
-    tree = MeshTree(v, f, volume)
+    tree = ComparedTree(v, f, volume)
     poses = random_poses(rng, 64, 1.5)
     faces = [tree.overlap(tree, poses, threads=n).faces for n in (1, 2, 5)]
     contacts = [tree.contacts(tree, poses, threads=n) for n in (1, 2, 5)]
@@ -226,7 +227,7 @@ def test_rotation_only_orthonormal_to_1e_6_still_misses_nothing():
     poses = random_poses(rng, 40, 0.8)
     poses[:, :3, :3] += rng.uniform(-2e-7, 2e-7, (40, 3, 3))
     for volume in VOLUMES:
-        tree = MeshTree(v, f, volume)
+        tree = ComparedTree(v, f, volume)
         hit = tree.overlap(tree, poses).hit
         assert hit.tolist() == [bool(all_pairs(v, f, v, f, p)) for p in poses]
 

@@ -15,6 +15,7 @@ from tauguard.rigid import (
     overlap,
     time_of_impact,
 )
+from tauguard.rigid.comparators import ComparedTree
 from tauguard.rigid.rounded import parts
 
 
@@ -31,7 +32,7 @@ def soup(rng, n=40):
 def test_a_mesh_answers_as_all_its_triangles(kind, volume):
     rng = np.random.default_rng(74)
     corners, tree = soup(rng)
-    tree = MeshTree(tree.vertices, tree.faces, volume)
+    tree = ComparedTree(tree.vertices, tree.faces, volume)
     n, m = 30, len(corners)
     body = rounded(kind, rng, n)
     at = placed(body, motions(rng, n, 1.5), 0.0)
@@ -123,8 +124,8 @@ def test_mesh_queries_refuse_what_they_cannot_answer():
         overlap(tree, Spheres(np.full((1, 3), 1e31), 1.0))
     with pytest.raises(ValueError, match=r"tauguard\.rigid\.overlap and distance"):
         tree.overlap(ball, np.eye(4))  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="method: 'gjk' knows sharp bodies only, a is none"):
-        overlap(tree, Tetrahedra(np.zeros((1, 4, 3))), "gjk")
+    with pytest.raises(ValueError, match="method: 'sat' knows sharp bodies only, a is none"):
+        overlap(tree, Tetrahedra(np.zeros((1, 4, 3))), "sat")
     none = overlap(tree, Spheres(np.zeros((0, 3)), 1.0))
     assert none.faces.shape == (0, 2)
 

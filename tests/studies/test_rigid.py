@@ -4,6 +4,13 @@ import os
 import subprocess
 import sys
 
+import numpy as np
+import pytest
+
+from oracles.convex_pairs import pairs_by_outcome
+from studies.rigid import coal_peer
+from tauguard.rigid import Hulls
+
 
 def no_errors(rows):
     """What is asked of errors is met; a time may be left to the full run."""
@@ -38,3 +45,20 @@ def test_a_mesh_that_cannot_be_read_is_one_line(tmp_path):
     assert done.returncode == 2
     assert "TAUGUARD_MESH: none.obj" in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_coal_agrees_away_from_contact():
+    pytest.importorskip("coal")
+    rng = np.random.default_rng(0)
+    for outcome, a, b in pairs_by_outcome(rng, ("tetrahedra", "boxes"), 100, 10):
+        hit = coal_peer.collide(a, b, len(a))
+        assert (hit == (outcome == "collision")).mean() > 0.98
+
+
+def test_coal_refuses_flat_hulls_by_their_row():
+    # coal's convex hull of flat points ends the process.
+    pytest.importorskip("coal")
+    solid = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]])
+    with pytest.raises(ValueError, match="hull 1 is flat"):
+        coal_peer.geometries(Hulls(np.concatenate([solid, flat]), [0, 4, 8]))

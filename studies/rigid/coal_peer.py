@@ -1,4 +1,4 @@
-"""coal's GJK, pair by pair: the peer behind ``method="gjk"`` and in the study ``rigid``."""
+"""coal's GJK, pair by pair: a peer in the study ``rigid``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def coal_module() -> Any:
         import coal
     except ImportError as error:
         raise ValueError(
-            f"method: gjk needs the package pin, which brings coal ({error})"
+            f"coal comes with the package pin: it is not installed ({error})"
         ) from None
     return coal
 
@@ -110,9 +110,9 @@ def _hulls(bodies: Bodies) -> list[tuple[NDArray[np.float64], Any]]:
         for row, cloud in enumerate(clouds):
             # coal's own hull of flat points ends the process.
             if np.linalg.matrix_rank(cloud - cloud[0]) < 3:
-                raise ValueError(f"hull {row} is flat: method gjk needs volume; use abfme or auto")
+                raise ValueError(f"hull {row} is flat: coal needs volume")
         return [(cloud, None) for cloud in clouds]
-    raise ValueError(f"method: gjk knows no {type(bodies).__name__}; use abfme or auto")
+    raise ValueError(f"coal knows no {type(bodies).__name__}")
 
 
 def _convex(coal: Any, points: NDArray[np.float64], faces: Any) -> Any:

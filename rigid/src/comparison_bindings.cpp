@@ -1,11 +1,11 @@
-// The bounding volumes side by side as textbooks use them: fitted in the body's frame, brought to
-// the world under a pose (a ball and an oriented box move, bounds along fixed directions are taken
-// anew over the posed corners), tested against each other there. What each of the three costs is
-// what the study wants to know.
+// For comparison only: the bounding volumes side by side as textbooks use them: fitted in the
+// body's frame, brought to the world under a pose (a ball and an oriented box move, bounds along
+// fixed directions are taken anew over the posed corners), tested against each other there. What
+// each of the three costs is what the study wants to know.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
-#include "mesh_volumes.hpp"
+#include "comparison_volumes.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -1,6 +1,6 @@
-// The bounding volumes besides the axis-aligned box: ball, oriented box, 18-direction polytope. All
-// are in their tree's centred frame, in double, and tested with a pad that covers rounding: never a
-// wrong "clear".
+// For comparison only: the bounding volumes that no query uses by default: ball, oriented box,
+// 18-direction polytope. All are in their tree's centred frame, in double, and tested with a pad
+// that covers rounding: never a wrong "clear".
 #pragma once
 
 #include "mesh_traverse.hpp"

@@ -1,4 +1,4 @@
-#include "mesh_volumes.hpp"
+#include "comparison_volumes.hpp"
 
 #include "symmetric.hpp"
 

@@ -1,7 +1,7 @@
-// Separating axes as the textbooks have them (Ericson 2005, 5.2.1): all face normals of both
-// bodies, then the products of all edge pairs; every vertex is projected; exit at the first axis
-// that separates. Plain arithmetic without error bounds: the comparator of the study, wrong where
-// rounding makes it so.
+// For comparison only: separating axes as the textbooks have them (Ericson 2005, 5.2.1): all face
+// normals of both bodies, then the products of all edge pairs; every vertex is projected; exit at
+// the first axis that separates. Plain arithmetic without error bounds: the comparator of the
+// study, wrong where rounding makes it so.
 #pragma once
 
 #include "convex_lanes.hpp"

@@ -1,0 +1,51 @@
+"""For comparison only: methods that the studies measure and no query of the package uses.
+
+Textbook separating axes (Ericson 2005, 5.2.1) in plain arithmetic, wrong where rounding makes them
+so; mesh trees of 18-DOPs (Klosowski et al. 1998) and of balls; and single bounding volumes, built,
+moved and tested as in figure 1.1 of the dissertation.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.geometry import thread_count
+from tauguard.rigid import _rigid, _rigid_mesh
+from tauguard.rigid.mesh import MeshTree
+from tauguard.rigid.queries import native, native_overlap, refuse_hulls, rows
+from tauguard.rigid.shapes import Bodies
+
+#: Runs of triangles with one bounding volume each, by its name.
+VOLUMES: dict[str, Any] = {
+    "sphere": _rigid_mesh.BallVolumes,
+    "aabb": _rigid_mesh.AabbVolumes,
+    "obb": _rigid_mesh.ObbVolumes,
+    "k_dop": _rigid_mesh.KDopVolumes,
+}
+#: Number of the textbook's separating axes in the native module.
+_TEXTBOOK = 3
+
+
+def overlap_by(
+    a: Bodies, b: Bodies, method: str, threads: int = 1
+) -> tuple[NDArray[np.bool_], int]:
+    """``hit`` of shape (N,) and the rows left to exact arithmetic; also ``method="sat_textbook"``.
+
+    Raises:
+        ValueError: lengths that do not match, ``sat_textbook`` of hulls or polygons.
+    """
+    if method != "sat_textbook":
+        return native_overlap(a, b, method, threads)
+    refuse_hulls(a, b)
+    hit = np.empty(rows(a, b), dtype=np.uint8)
+    left = _rigid.overlap(*native(a), *native(b), _TEXTBOOK, thread_count(threads), hit)
+    return hit.view(np.bool_), left
+
+
+class ComparedTree(MeshTree):
+    """A :class:`~tauguard.rigid.MeshTree` whose volume may also be ``"k_dop"`` or ``"sphere"``."""
+
+    volumes = (*MeshTree.volumes, "k_dop", "sphere")
