@@ -14,7 +14,7 @@ from tauguard.contacts.checker import (
 )
 from tauguard.contacts.cloth_checker import ClothChecker
 from tauguard.contacts.compare import compare
-from tauguard.contacts.guard import Balance, Cut, GuardedStepper, StepReport
+from tauguard.contacts.guard import Cut, EnergyBalance, GuardedStepper, StepReport
 from tauguard.contacts.mujoco_checker import MujocoChecker, contacts_of
 from tauguard.contacts.pairs import Pairs, flex_pairs, geom_flex_pairs, geom_pairs
 from tauguard.contacts.report import Disagreement, Outcome, Report, Score
@@ -26,12 +26,12 @@ register("rigid", RigidChecker)
 
 __all__ = [
     "KINDS",
-    "Balance",
     "Checker",
     "ClothChecker",
     "Contacts",
     "Cut",
     "Disagreement",
+    "EnergyBalance",
     "GuardedStepper",
     "MujocoChecker",
     "Outcome",

@@ -1,7 +1,7 @@
 """The guarded stepper: no covered pair passes through itself, at any timestep."""
 
-from tauguard.contacts.guard.balance import Balance
+from tauguard.contacts.guard.energy_budget import EnergyBalance
 from tauguard.contacts.guard.report import Cut, StepReport
 from tauguard.contacts.guard.stepper import GuardedStepper
 
-__all__ = ["Balance", "Cut", "GuardedStepper", "StepReport"]
+__all__ = ["Cut", "EnergyBalance", "GuardedStepper", "StepReport"]

@@ -1,4 +1,4 @@
-"""Which pairs a guard covers, and by which cores it judges them."""
+"""Which pairs a guard covers, and by which eroded shapes it judges them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from tauguard.contacts._contacts import Guard
 from tauguard.contacts.checker import geom_kinds
 from tauguard.contacts.geoms import CONVEX
-from tauguard.contacts.guard.cores import Cores
-from tauguard.contacts.guard.crossings import elements
+from tauguard.contacts.guard.eroded_shapes import ErodedShapes
 from tauguard.contacts.guard.report import Pair, Partner
+from tauguard.contacts.guard.tunnelling import elements
 from tauguard.contacts.pairs import flex_pairs, geom_flex_pairs, geom_pairs
 
-#: Layers taken off both partners, as shares of half their thickness. Where the cores of the last
-#: level never meet, the pair cannot have passed through itself anywhere.
+#: Layers eroded from both partners, as fractions of half their thickness. Where the eroded shapes
+#: of the last level never meet, the pair cannot have passed through itself anywhere.
 LEVELS = (0.0, 0.5, 0.75, 0.95)
 #: Of geoms against flexes there is one more level, no deeper than this many radii of the flex:
 #: MuJoCo pushes a cloth's triangles out of a geom each by its own shortest way.
@@ -46,7 +46,7 @@ class Covered:
         """Choose the pairs and copy the shapes, at every level."""
         self._model, self._guard = model, guard
         kinds = geom_kinds(model)
-        self._cores = Cores(model, kinds, guard)
+        self._eroded = ErodedShapes(model, kinds, guard)
         self._known = np.isin(kinds, CONVEX)
         self.pairs: list[Pair] = []
         self.uncovered: list[Pair] = []
@@ -65,11 +65,11 @@ class Covered:
             if not (wanted and self._known[a] and self._known[b]):
                 self.uncovered.append(own)
                 continue
-            cores = [
-                [self._cores.add(g, level * self._cores.radius(g)) for level in LEVELS]
+            levels = [
+                [self._eroded.add(g, level * self._eroded.radius(g)) for level in LEVELS]
                 for g in (a, b)
             ]
-            self._guard.pair(*(np.array(c, dtype=np.int32) for c in cores))
+            self._guard.pair(*(np.array(c, dtype=np.int32) for c in levels))
             self.pairs.append(own)
             number = self._explicit.get((own[0][1], own[1][1]))
             carrier = own[0] if number is None else ("pair", number)
@@ -83,15 +83,15 @@ class Covered:
             if not (wanted and self._known[geom]):
                 self.uncovered.append(own)
                 continue
-            radius, thick = float(model.flex_radius[flex]), self._cores.radius(geom)
+            radius, thick = float(model.flex_radius[flex]), self._eroded.radius(geom)
             near = min(thick, NEAR_FLEX * radius)
             layers = [0.0, 0.5 * near, *(level * thick for level in LEVELS[1:])]
             radii = [radius * (1 - level) for level in (0.0, 0.5, *LEVELS[1:])]
             simplices = elements(model, flex)
             bodies = model.flex_vertbodyid[simplices]
             hangs = (bodies == int(model.geom_bodyid[geom])).any(axis=1).astype(np.uint8)
-            cores = np.array([self._cores.add(geom, layer) for layer in layers], dtype=np.int32)
-            self._guard.flex_pair(cores, np.array(radii), simplices, hangs)
+            levels = np.array([self._eroded.add(geom, layer) for layer in layers], dtype=np.int32)
+            self._guard.flex_pair(levels, np.array(radii), simplices, hangs)
             self.pairs.append(own)
             rows.append(_row(own, own[0], len(LEVELS)))
         self._tell(rows)

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 
 
-class Carriers:
-    """The velocity that mocap bodies give to all that hangs on them, over a piece of a step.
+class MocapVelocityField:
+    """The velocity that mocap bodies give to all that hangs on them, over a sub-step of a step.
 
     Args:
         model: MjModel.
-        data: MjData whose kinematics are those of the piece's start; mocap poses are its end's.
-        length: of the piece [s].
+        data: MjData whose kinematics are those of the sub-step's start; mocap poses are its end's.
+        length: of the sub-step [s].
     """
 
     def __init__(self, model: Any, data: Any, length: float) -> None:

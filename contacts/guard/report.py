@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 
 from tauguard.contacts.geoms import geom_name
-from tauguard.contacts.guard.balance import Balance
+from tauguard.contacts.guard.energy_budget import EnergyBalance
 
 #: A partner of a contact: ("geom", id) or ("flex", id).
 Partner = tuple[str, int]
@@ -29,7 +29,7 @@ def partner_name(model: Any, partner: Partner) -> str:
 
 @dataclass(frozen=True)
 class Cut:
-    """One attempt at a piece of a step that was taken back."""
+    """One sub-step that was rolled back."""
 
     time: float  #: at which the next attempt ends [s]
     pair: Pair  #: that would have passed through, become too deep, or parted unseen
@@ -41,13 +41,13 @@ class StepReport:
     """What one guarded step did; ``guard.partners(pair)`` gives the names of a pair."""
 
     steps: int  #: calls of ``mj_step``, those that were taken back included
-    contacts: int  #: that MuJoCo listed, the most in any piece of the step that stood
+    contacts: int  #: that MuJoCo listed, the most in any sub-step of the step that stood
     cuts: tuple[Cut, ...] = ()
     restored: tuple[Pair, ...] = ()  #: pairs whose contact parameters are as before again
     passed: tuple[Pair, ...] = ()  #: pairs that may have passed through: the work ran out
-    arrested: tuple[Pair, ...] = ()  #: pairs that were held by stopping one against the other
-    energy_added: float = 0.0  #: that constraint forces gave in redone pieces, without losses [J]
-    _balance: Callable[[], Balance] | None = field(default=None, repr=False, compare=False)
+    impact_zones: tuple[Pair, ...] = ()  #: pairs that moved rigidly together
+    energy_added: float = 0.0  #: by constraint forces in sub-steps, losses left out [J]
+    _balance: Callable[[], EnergyBalance] | None = field(default=None, repr=False, compare=False)
 
     @property
     def exhausted(self) -> bool:
@@ -55,6 +55,6 @@ class StepReport:
         return bool(self.passed)
 
     @cached_property
-    def balance(self) -> Balance | None:
-        """Energy and momentum from the first redone piece on; ``None`` if the step stood whole."""
+    def balance(self) -> EnergyBalance | None:
+        """Energy and momentum before and after; ``None`` if the plain step was accepted."""
         return None if self._balance is None else self._balance()

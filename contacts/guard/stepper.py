@@ -1,4 +1,4 @@
-"""Steps that let nothing through: plain where that holds, redone with the approach stopped."""
+"""Steps that let nothing through: plain steps, or sub-steps in which the solver stops approach."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
-from tauguard.contacts.guard.arrest import Hit, arrest
-from tauguard.contacts.guard.balance import Balance, Books, sheets_of
 from tauguard.contacts.guard.covered import Covered, names
-from tauguard.contacts.guard.crossings import Crossings, elements
+from tauguard.contacts.guard.energy_budget import EnergyBalance, EnergyMeter, sheets_of
 from tauguard.contacts.guard.engine import INTEGRATION, addresses
+from tauguard.contacts.guard.impact_zone import Hit, impact_zone
 from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
+from tauguard.contacts.guard.tunnelling import TunnellingEvents, elements
 
 #: What the native part goes by.
 SETTINGS = {
-    "beyond": 1e-5,  # how far beyond the touch a cut piece goes, so that MuJoCo finds it [m]
+    "beyond": 1e-5,  # how far beyond the touch a cut sub-step goes, so that MuJoCo finds it [m]
     "room": 1.25,  # margins over what the pair travelled in the attempt that failed
-    "smallest": 1 / 64,  # a step is never cut into pieces shorter than this share of it
-    "push": 0.2,  # share of a depth that a piece may push out for each whole step that it lasts
-    "watched": 10,  # energy is counted for so many steps that stand after one that was redone
+    "smallest": 1 / 64,  # a step is never cut into sub-steps shorter than this fraction of it
+    "push": 0.2,  # fraction of a depth that is pushed out in each step
+    "watched": 10,  # energy is counted for so many steps that stand after a rollback
     "look": 16,  # whether pairs have parted is looked up at least every so many steps
-    "allowed": 0.01,  # share of the kinetic energy at first that contacts may give beyond theirs
-    "deeper_geom": 1 / 8,  # pieces above this share of a step may not deepen a pair that is held
+    "allowed": 0.01,  # energy budget: fraction of the first kinetic energy that contacts may add
+    "deeper_geom": 1 / 8,  # sub-steps above this fraction may not deepen a held pair
     "deeper_flex": 1 / 2,  # the same of a flex
     "turned": 1.0,  # rotation in a step above which its whole turns are counted [rad]
 }
@@ -39,12 +39,12 @@ SETTINGS = {
 class GuardedStepper:
     """``mj_step`` that lets no pair pass through itself.
 
-    A step is first tried as it is and stands, with the bits of ``mj_step``, unless the verdict
-    finds a pair that becomes too deep or parts again unseen. Then the state is restored, the pair
-    made stiff until it parts, and the step redone in pieces with the approach stopped by the
-    solver: up to the touch, and from there on. A piece that still fails is halved; where that does
-    not help, the partners are stopped against one another
-    (:func:`~tauguard.contacts.guard.arrest.arrest`). All of that but the last runs in C++.
+    A plain step is tried first. It is accepted, with the bits of ``mj_step``, unless the verdict
+    finds a pair that becomes too deep or that touches and parts unseen. Otherwise the state is
+    rolled back, the pair made stiff until it parts, and the step taken in sub-steps: one up to the
+    touch, and from there on sub-steps in which the solver stops the approach. A sub-step that still
+    fails is halved; where that does not help, the partners move rigidly together
+    (:func:`~tauguard.contacts.guard.impact_zone.impact_zone`). All but the last runs in C++.
 
     Args:
         model: the scene's. Its ``opt.timestep``, margins and contact parameters are changed within
@@ -53,7 +53,7 @@ class GuardedStepper:
         checkers: which pairs are covered, as the checkers of that name: ``rigid`` geoms against
             geoms, ``cloth`` flexes against geoms, one another and themselves. :attr:`uncovered`
             lists what may touch and is not.
-        stiff: whether the contacts of pairs that were redone are made stiff.
+        stiff: whether the contacts of pairs that caused a rollback are made stiff.
         most: calls of ``mj_step`` that one step may cost before partners are stopped.
 
     Raises:
@@ -87,12 +87,12 @@ class GuardedStepper:
         self._guard.spins(_turning(model))
         self._guard.pulled(pulled(model))
         self._elements = [elements(model, flex) for flex in range(model.nflex)]
-        self._crossings = None
+        self._tunnelling = None
         if covered.sheets:
             first = len(covered.pairs) - len(covered.sheets)
-            self._crossings = Crossings(model, covered.sheets, first)
-        self._guard.start(self._crossings is not None)
-        self._books: Books | None = None
+            self._tunnelling = TunnellingEvents(model, covered.sheets, first)
+        self._guard.start(self._tunnelling is not None)
+        self._meter: EnergyMeter | None = None
         self._quiet: dict[int, StepReport] = {}  # by the number of contacts
 
     @property
@@ -127,7 +127,7 @@ class GuardedStepper:
         """Advance by one ``model.opt.timestep``.
 
         Args:
-            each: called at the end of every piece of a step that was cut, ``data`` being there;
+            each: called at the end of every sub-step of a step that was cut, ``data`` being there;
                 a step that stands whole does not call it.
         """
         contacts = self._guard.step(self, each)
@@ -166,34 +166,34 @@ class GuardedStepper:
         return tuple(sorted(self._pairs[k] for k in numbers))
 
     def _report(self) -> StepReport:
-        steps, contacts, cuts, restored, passed, arrested, added, first = self._guard.report()
+        steps, contacts, cuts, restored, passed, zones, added, first = self._guard.report()
         return StepReport(
             steps,
             contacts,
             tuple(Cut(time, self._pairs[pair], stiff) for time, pair, stiff in cuts),
             self._named(restored),
             self._named(passed),
-            self._named(arrested),
+            self._named(zones),
             added,
             None if first is None else self._balance(first),
         )
 
-    def _balance(self, first: Array) -> Callable[[], Balance]:
+    def _balance(self, first: Array) -> Callable[[], EnergyBalance]:
         last = np.empty_like(first)
         mujoco.mj_getState(self.model, self.data, last, INTEGRATION)
 
-        def balance() -> Balance:
-            if self._books is None:
-                self._books = Books(self.model)
-            return self._books.between(first, last)
+        def balance() -> EnergyBalance:
+            if self._meter is None:
+                self._meter = EnergyMeter(self.model)
+            return self._meter.between(first, last)
 
         return balance
 
-    def _crossing(self, x_t1: Array) -> list[tuple[int, list[int], float]]:
-        assert self._crossings is not None
-        return self._crossings.find(self.data.flexvert_xpos, x_t1.reshape(-1, 3))
+    def _tunnelling_events(self, x_t1: Array) -> list[tuple[int, list[int], float]]:
+        assert self._tunnelling is not None
+        return self._tunnelling.find(self.data.flexvert_xpos, x_t1.reshape(-1, 3))
 
-    def _arrest(self, rows: list[Any], qpos: int, length: float) -> tuple[list[int], float]:
+    def _impact_zone(self, rows: list[Any], qpos: int, length: float) -> tuple[list[int], float]:
         """Stop the partners of these rows from the positions at that address on.
 
         Also the work that mocap bodies did by it [J].
@@ -205,7 +205,7 @@ class GuardedStepper:
             return [self._hit(row) for row in self._guard.passing()]
 
         hits = [self._hit(row) for row in rows]
-        stopped, work = arrest(self.model, self.data, start, length, hits, judge)
+        stopped, work = impact_zone(self.model, self.data, start, length, hits, judge)
         pairs = dict.fromkeys(hit.pair for hit in stopped)
         return [self._pairs.index(pair) for pair in pairs], work
 

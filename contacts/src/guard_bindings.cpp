@@ -151,15 +151,16 @@ class Guard {
   void spins(Ints dofs) { spins_ = list<int>(dofs); }
   void pulled(Bytes equalities) { pulled_ = list<char>(equalities); }
 
-  // All was added. Whether flexes are covered against flexes: the owner's `_crossing` finds them.
+  // All was added. Whether flexes are covered against flexes: the owner's `_tunnelling_events`
+  // finds them.
   void start(bool sheets) {
     stepper_ = std::make_unique<Stepper>(engine_, std::move(verdict_), std::move(pairs_),
                                          std::move(last_), std::move(sheets_), std::move(spins_),
                                          std::move(pulled_), s_, allowed_);
-    Stepper::Crossings find;
-    if (sheets) find = [this](std::vector<PairHit>* hits) { add_crossings(hits); };
+    Stepper::TunnellingEvents find;
+    if (sheets) find = [this](std::vector<PairHit>* hits) { add_tunnelling(hits); };
     stepper_->set_callbacks(find, [this](const std::vector<PairHit>& hits, const double* qpos,
-                                         double length) { return arrested(hits, qpos, length); });
+                                         double length) { return joined(hits, qpos, length); });
   }
 
   // The number of contacts where nothing else is to be said, or -1. `owner` is not held beyond the
@@ -181,8 +182,8 @@ class Guard {
     return quiet ? stepper_->report().contacts : -1;
   }
 
-  // Steps, contacts, cuts (time, pair, stiffened), pairs restored, passed and arrested, energy
-  // added, and the state at the start if the step was redone.
+  // Steps, contacts, cuts (time, pair, stiffened), pairs restored, passed and in impact zones,
+  // energy added, and the state at the start if the step was rolled back.
   using Cuts = nb::typed<nb::list, nb::typed<nb::tuple, double, int, bool>>;
   using State = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
   nb::typed<nb::tuple, int, int, Cuts, Integers, Integers, Integers, double, std::optional<State>>
@@ -196,8 +197,8 @@ class Guard {
     nb::list cuts;
     for (const Cut& cut : r.cuts) cuts.append(nb::make_tuple(cut.time, cut.pair, cut.stiffened));
     return nb::make_tuple(r.steps, r.contacts, cuts, ids(r.restored), ids(r.passed),
-                          ids(r.arrested), r.added,
-                          r.redone ? array_of(stepper_->first()) : nb::none());
+                          ids(r.impact_zones), r.added,
+                          r.rolled_back ? array_of(stepper_->first()) : nb::none());
   }
 
   // What passes on the way to where the data is now.
@@ -216,22 +217,22 @@ class Guard {
   void reset() { stepper_->reset(); }
 
  private:
-  // Rows (pair, vertices, way) of owner._crossing(x_t1).
-  void add_crossings(std::vector<PairHit>* hits) {
+  // Rows (pair, vertices, way) of owner._tunnelling_events(x_t1).
+  void add_tunnelling(std::vector<PairHit>* hits) {
     const nb::gil_scoped_acquire acquire;
-    for (const nb::handle row : owner_.attr("_crossing")(array_of(stepper_->vertices()))) {
+    for (const nb::handle row : owner_.attr("_tunnelling_events")(array_of(stepper_->vertices()))) {
       PairHit hit{nb::cast<int>(row[0]),    0,  true, false, false, 0,
                   nb::cast<double>(row[2]), {}, {}};
       for (const nb::handle v : row[1]) hit.corners.push_back(nb::cast<std::int32_t>(v));
       hits->push_back(std::move(hit));
     }
   }
-  // The pairs that owner._arrest(rows, qpos, length) stopped, and the work of mocap bodies.
-  Stepper::Stopped arrested(const std::vector<PairHit>& hits, const double* qpos, double length) {
+  // The pairs that owner._impact_zone(rows, qpos, length) stopped, and the work of mocap bodies.
+  Stepper::Stopped joined(const std::vector<PairHit>& hits, const double* qpos, double length) {
     const nb::gil_scoped_acquire acquire;
     Stepper::Stopped out{};
     const auto from = reinterpret_cast<std::uintptr_t>(qpos);
-    const nb::object found = owner_.attr("_arrest")(rows_of(hits), from, length);
+    const nb::object found = owner_.attr("_impact_zone")(rows_of(hits), from, length);
     for (const nb::handle pair : found[0]) out.pairs.push_back(nb::cast<int>(pair));
     out.work = nb::cast<double>(found[1]);
     return out;

@@ -102,7 +102,7 @@ bool Mocap::begin() {
   return continued;
 }
 
-void Mocap::piece(double from, double to) {
+void Mocap::sub_step(double from, double to) {
   if (!moves_) return;
   jumps_ = false;
   const auto at = [&](double share, std::size_t m) {
@@ -134,7 +134,7 @@ bool Mocap::shifted() {
 }
 
 // How far a point goes that the carrier of a body takes along; it is where the data's kinematics
-// are: at the start of a piece, at the end of a step that jumps.
+// are: at the start of a sub-step, at the end of a step that jumps.
 Vec Mocap::way(int body, const double* point) const {
   const int m = e_.body_mocapid[e_.body_rootid[body]];
   if (m < 0) return {};

@@ -24,9 +24,9 @@ class Mocap {
   bool begin();
   bool moves() const { return moves_; }  // whether the way of this step has a length
 
-  // The next attempt goes from one share of the way to another; the data is at its start.
-  void piece(double from, double to);
-  // Poses of a piece's start, end, and of the step's end as the user wrote them.
+  // The next attempt goes from one fraction of the way to another; the data is at its start.
+  void sub_step(double from, double to);
+  // Poses of a sub-step's start, end, and of the step's end as the user wrote them.
   void depart() { write(from_); }
   void arrive() { write(to_); }
   void command() { write(commanded_); }
@@ -38,8 +38,8 @@ class Mocap {
   // Adds how far each body is turned by what carries it (nbody, 3) [rad].
   void add_turns(double* turn) const;
 
-  // Of a piece: potential energy of the start's joint positions with the poses of its end [J], and
-  // the vertices there. False if nothing moves or the data has these poses anyway.
+  // Of a sub-step: potential energy of the start's joint positions with the poses of its end [J],
+  // and the vertices there. False if nothing moves or the data has these poses anyway.
   bool shifted();
   double potential() const { return e_.other_energy[0]; }
   const double* vertices() const { return e_.other_flexvert; }

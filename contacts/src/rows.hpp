@@ -1,15 +1,15 @@
-// A piece of a step in which the solver stops the approach of chosen pairs before they are deep.
+// A sub-step in which the solver stops the approach of chosen pairs before they are deep.
 //
 // The margins of the chosen pairs are as wide as the pair may travel, so that MuJoCo lists every
 // place in which they are about to meet. Between mj_step1 and mj_step2 each of their rows gets the
-// velocity that it is to have at the end: for a gap d and a piece of length h no faster than d / h
-// towards each other, and in overlap none. The solver then finds the least change of velocity (in
-// the metric of the inertia) that obeys; as all these velocities allow standing still, that change
-// takes energy and never adds any, except for what pushes an overlap out.
-// What mocap bodies carry is taken along by their own velocity, of which MuJoCo's rows know
-// nothing. They push without friction: MuJoCo's friction lets what slides at a speed v part at
-// mu v, so that a ball between a paddle and a table, which must slide on one of them, would leave
-// at many times the paddle's speed.
+// velocity that it is to have at the end: for a signed distance d > 0 and a sub-step of length h no
+// faster than d / h towards each other, and in overlap none. The solver then finds the least change
+// of velocity (in the metric of the inertia) that obeys; as all these velocities allow standing
+// still, that change takes energy and never adds any, except for what pushes an overlap out. What
+// mocap bodies carry is taken along by their own velocity, of which MuJoCo's rows know nothing.
+// They push without friction: MuJoCo's friction lets what slides at a speed v part at mu v, so that
+// a ball between a paddle and a table, which must slide on one of them, would leave at many times
+// the paddle's speed.
 #pragma once
 
 #include "mocap.hpp"
@@ -17,7 +17,7 @@
 
 namespace tauguard::contacts {
 
-// A pair that is held, and how far it may travel in the piece [m].
+// A pair that is held, and how far it may travel in the sub-step [m].
 struct Held {
   int pair;
   double margin;

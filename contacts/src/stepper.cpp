@@ -48,7 +48,7 @@ Stepper::Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pa
       s_(settings),
       verdict_(std::move(verdict)),
       mocap_(e_, std::move(pulled)),
-      account_(e_, mocap_, std::move(sheets), allowed),
+      budget_(e_, mocap_, std::move(sheets), allowed),
       stiffening_(e_, pairs_),
       rows_(e_, pairs_, mocap_),
       spins_(std::move(spins)),
@@ -60,7 +60,7 @@ Stepper::Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pa
       turn_(3 * static_cast<std::size_t>(engine.nbody)),
       guarded_(pairs_.size(), 0),
       passed_(pairs_.size(), 0),
-      arrested_(pairs_.size(), 0) {
+      in_zone_(pairs_.size(), 0) {
   for (std::size_t i = 0; i < pairs_.size(); ++i)
     number_[key(pairs_[i].first, pairs_[i].second)] = static_cast<int>(i);
 }
@@ -83,7 +83,7 @@ bool Stepper::step(const std::function<void()>& each) {
     hits = unseen(std::move(hits));
   }
   report_ = Report{};
-  if (hits.empty() && (!watched || solvent())) {
+  if (hits.empty() && (!watched || within_budget())) {
     report_.contacts = *e_.ncon;
     const bool released = stands();
     if (lost) report_.passed = marked(passed_);
@@ -93,13 +93,13 @@ bool Stepper::step(const std::function<void()>& each) {
   watched_ = s_.watched;
   {
     const Back back{e_, whole_, mocap_};
-    redo(std::move(hits), !watched, each);
+    roll_back(std::move(hits), !watched, each);
   }
   mocap_.remember();
   return false;
 }
 
-// The step stands as mj_step made it; true if some pair's parameters were put back.
+// Accepts the step as mj_step made it; true if the parameters of some pair were restored.
 bool Stepper::stands() {
   watched_ = std::max(watched_ - 1, 0);
   if (!guarded_count_) return false;
@@ -133,7 +133,7 @@ std::vector<PairHit> Stepper::judge() {
     hit.brushed = hit.brushed && row.level == 0;
     hit.time = std::min(hit.time, row.t), hit.way = std::max(hit.way, row.way);
   }
-  if (crossings_) crossings_(&hits);
+  if (tunnelling_) tunnelling_(&hits);
   return hits;
 }
 
@@ -189,11 +189,11 @@ std::vector<PairHit> Stepper::unseen(std::vector<PairHit> hits) {
   return hits;
 }
 
-// Whether a plain step gives no more energy than contacts may; then it is booked.
-bool Stepper::solvent() {
-  const Entry entry = account_.entry(velocity_.data(), *e_.timestep, x_t1_.data());
-  if (account_.overdrawn(entry)) return false;
-  account_.book(entry);
+// Whether a plain step is within the energy budget; if so, its change is recorded.
+bool Stepper::within_budget() {
+  const EnergyChange change = budget_.change(velocity_.data(), *e_.timestep, x_t1_.data());
+  if (budget_.exceeded(change)) return false;
+  budget_.record(change);
   return true;
 }
 
@@ -207,7 +207,7 @@ std::vector<char> Stepper::listed() const {
   return seen;
 }
 
-// Let go of the pairs that have parted; those whose parameters are as before again.
+// Releases the pairs that have parted; returns those whose parameters were restored.
 std::vector<int> Stepper::release() {
   std::vector<int> out;
   if (!guarded_count_) return out;

@@ -184,7 +184,7 @@ Counts RigidPairs::find(Geoms& geoms, const Poses& poses, std::vector<Row>* rows
 Counts find_flex(Geoms& geoms, const Poses& poses, const double* x_t0, const double* x_t1,
                  const std::int32_t* elements, std::size_t count, int corners, double radius,
                  const std::vector<FlexPair>& pairs, std::vector<Row>* rows) {
-  constexpr std::size_t block = 32;  // simplices that share a box
+  constexpr std::size_t block = 32;  // simplices that fraction a box
   geoms.update(poses);
   Counts counts;
   counts.moved = geoms.moved();

@@ -6,12 +6,12 @@
 namespace tauguard::contacts {
 namespace {
 
-// Shapes nearer than this share of their size count as touching at the start: above what
+// Shapes nearer than this fraction of their size count as touching at the start: above what
 // first_touch takes for a touch, so that a pair that parts from there is no hit.
 constexpr double resting = 1e-5;
 constexpr double touching = 1e-6;
 // In roundings of the positions: what such a distance needs above that, and what a sweep of the
-// last cores leaves at the least (advance.cpp leaves 128).
+// last eroded shapes leaves at the least (advance.cpp leaves 128).
 constexpr double rounded = 512, left_over = 64;
 
 bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double roundoffs) {
@@ -23,7 +23,7 @@ bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double r
   return !d.overlap && d.lower > needed;
 }
 
-// What is known of a pair from earlier steps: nothing, that some cores were apart, or none.
+// What is known of a pair from earlier steps: nothing, that some eroded shapes were apart, or none.
 enum : char { unknown, apart, sunk };
 
 // `a_at(level)` and `b_at(level)` make the movers of a pair. A deeper core never touches before a
@@ -39,8 +39,8 @@ bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* 
     SupportShape a = a_at(level), b = b_at(level);
     return apart_at(a, b, t, resting, rounded);
   };
-  // Last cores that did not meet so far may be as near as rounding lets them, and must not meet
-  // now.
+  // Last eroded shapes that did not meet so far may be as near as rounding lets them, and must not
+  // meet now.
   const auto hardly = [&] {
     SupportShape a = a_at(levels - 1), b = b_at(levels - 1);
     return apart_at(a, b, 0, 0, left_over);
@@ -155,7 +155,7 @@ void Verdict::judge_rigid(std::size_t number, std::vector<Hit>* hits) {
 
 void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x_t1,
                          std::vector<Hit>* hits) {
-  constexpr std::size_t block = 32;  // simplices that share a box
+  constexpr std::size_t block = 32;  // simplices that fraction a box
   FlexPair& pair = flex_pairs_[number];
   const std::size_t count = pair.skip.size();
   const Box& near = boxes_[pair.a[0]];

@@ -1,8 +1,9 @@
-// Which pairs pass through one another on their way through a step, by their cores.
+// Which pairs pass through one another in a step, by their eroded shapes.
 //
-// A core is a shape less a layer of its surface. Levels go from the whole shape (0) to all but its
-// middle (the last). A pair is judged at the shallowest level at which it is apart at the start; as
-// long as its last cores never meet, no place of one partner has passed through the other.
+// A shape is eroded by a layer of its surface. Levels go from the whole shape (0) to almost its
+// middle (the last). A pair is judged at the shallowest level at which it is apart at the start. As
+// long as the shapes of the last level never meet, no part of one partner has passed through the
+// other.
 #pragma once
 
 #include "sweep.hpp"
@@ -12,9 +13,9 @@ namespace tauguard::contacts {
 struct Hit {
   std::int32_t pair;     // rigid pairs first, then those with a flex
   std::int32_t feature;  // the simplex of a flex, -1 for geoms
-  std::int32_t level;    // 0: touched and parted again; otherwise the level whose cores met
-  std::int32_t deepest;  // the deepest level that met; the number of levels: all cores meet at the
-                         // start, and did not at that of the step before
+  std::int32_t level;    // 0: touched and parted again; otherwise the level whose shapes met
+  std::int32_t deepest;  // the deepest level that met; the number of levels: all shapes meet at
+                         // the start, and did not at the start of the step before
   double t;              // when the whole shapes first touch; 0 where they do at the start
   double way;            // no two points of the pair approach each other further in the step [m]
 };

@@ -159,7 +159,7 @@ def played(scene: Thrown, method: str, timestep: float, stiff: bool = False) -> 
             report = guard.step(each)
             calls += report.steps
             exhausted |= report.exhausted
-            arrested |= bool(report.arrested)
+            arrested |= bool(report.impact_zones)
             touched |= report.steps > 1
         spent += time.thread_time() - begin
         if report is not None and report.balance is not None and not model.nu:

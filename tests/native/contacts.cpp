@@ -40,7 +40,7 @@ bool same(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 struct Tally {
-  int steps = 0, redone = 0;
+  int steps = 0, rolled_back = 0;
 };
 
 // Puts the paddle somewhere near, turned in some way.
@@ -75,9 +75,9 @@ Tally play(Guarded& g, bool hard, int steps) {
     const bool quiet = g.stepper->step(nullptr);
     const Report& report = g.stepper->report();
     ++tally.steps;
-    tally.redone += report.redone;
-    lost = lost || !report.passed.empty() || !report.arrested.empty();
-    if (!report.redone && g.stepper->stiffened().empty() && report.restored.empty()) {
+    tally.rolled_back += report.rolled_back;
+    lost = lost || !report.passed.empty() || !report.impact_zones.empty();
+    if (!report.rolled_back && g.stepper->stiffened().empty() && report.restored.empty()) {
       mj_setState(m, twin, first.data(), mjSTATE_INTEGRATION);
       mj_step(m, twin);
       check(same(state_of(m, twin), state_of(m, d)), "a step that stands is not mj_step's");
@@ -116,7 +116,7 @@ Tally scenes(Random& random, int rounds) {
       });
     for (auto& thread : threads) thread.join();
     check(same(ends[0], ends[1]) && same(ends[1], ends[2]), "threads change bits");
-    for (const Tally& t : tallies) all.steps += t.steps, all.redone += t.redone;
+    for (const Tally& t : tallies) all.steps += t.steps, all.rolled_back += t.rolled_back;
   }
   return all;
 }
@@ -248,7 +248,7 @@ int main(int argc, char** argv) {
   Random random(4);
   const Tally tally = scenes(random, 2 * effort);
   const int pairs = shapes(random, effort), flexes = simplices(random, effort);
-  std::printf("guarded steps %d (%d redone), shapes %d, simplices %d: %d wrong\n", tally.steps,
-              tally.redone, pairs, flexes, failures);
+  std::printf("guarded steps %d (%d rolled_back), shapes %d, simplices %d: %d wrong\n", tally.steps,
+              tally.rolled_back, pairs, flexes, failures);
   return failures != 0;
 }

@@ -169,7 +169,7 @@ struct Guarded {
     stepper.reset(new Stepper(engine_of(scene, end, other), std::move(verdict), std::move(pairs),
                               std::move(last), {}, std::move(spins), {}, settings, 0.01));
     stepper->set_callbacks(nullptr, [](const std::vector<PairHit>& hits, const double*, double) {
-      Stepper::Stopped out{};  // nothing is stopped here: it is reported as arrested
+      Stepper::Stopped out{};  // nothing is stopped here: it is reported as an impact zone
       for (const PairHit& hit : hits) out.pairs.push_back(hit.pair);
       return out;
     });

@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tauguard.contacts.guard.balance import sheets_of
+from tauguard.contacts.guard.energy_budget import sheets_of
 
 #: Energy over the unit above which a simulation counts as diverged.
 DIVERGED = 1e6

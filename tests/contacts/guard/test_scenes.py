@@ -231,7 +231,7 @@ def test_whips_pass_neither_one_another_nor_a_post_and_redone_steps_add_no_energ
     data.qvel[:] = np.concatenate(speeds)
     mujoco.mj_forward(model, data)
     guard, tunnelling = GuardedStepper(model, data), Tunnelling(model, data)
-    kinetic, change, redone = energies(model, data)[1], 0.0, 0
+    kinetic, change, rolled_back = energies(model, data)[1], 0.0, 0
     for _ in range(60):
         before = sum(energies(model, data))
         report = guard.step(lambda: tunnelling.observe(data))
@@ -239,10 +239,10 @@ def test_whips_pass_neither_one_another_nor_a_post_and_redone_steps_add_no_energ
         tunnelling.observe(data)
         assert not tunnelling.pairs
         if report.steps > 1:
-            redone += 1
+            rolled_back += 1
             change += sum(energies(model, data)) - before
             assert change <= 0.02 * kinetic
-    assert redone > 0
+    assert rolled_back > 0
 
 
 def test_an_arm_that_is_driven_into_a_plate_stays_above_it():

@@ -9,8 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tauguard.contacts import GuardedStepper, State
-from tauguard.contacts.guard.arrest import Hit, arrest
-from tauguard.contacts.guard.balance import Books
+from tauguard.contacts.guard.energy_budget import EnergyMeter
+from tauguard.contacts.guard.impact_zone import Hit, impact_zone
 from tauguard.contacts.scenes import SCENES, ball_cloth, sphere_plate
 from tauguard.contacts.scenes.impacts import IMPACT_POINTS
 
@@ -124,7 +124,7 @@ def test_the_report_tells_what_was_done():
         clock += model.opt.timestep
         assert data.time == pytest.approx(clock, rel=1e-12)
         assert model.opt.timestep == 5e-3
-        assert not report.arrested
+        assert not report.impact_zones
         restored += report.restored
         if report.cuts and cut is None:
             cut = report
@@ -174,15 +174,15 @@ def test_with_next_to_no_work_partners_are_stopped_and_nothing_passes(build):
         guard = GuardedStepper(model, data, most=2)
         dof = int(model.body("ball").dofadr[0])
         height = int(model.jnt_qposadr[model.body("ball").jntadr[0]]) + 2
-        arrested = set()
+        zones = set()
         for _ in range(12):
             report = guard.step()
             assert report.steps <= 4
             assert not report.exhausted
-            arrested |= set(report.arrested)
+            zones |= set(report.impact_zones)
             assert np.linalg.norm(data.qvel[dof : dof + 3]) < 40.4
         assert data.qpos[height] > (0 if build is sphere_plate else -0.15)
-        assert arrested <= set(guard.pairs)
+        assert zones <= set(guard.pairs)
 
 
 def test_stopped_partners_move_as_one_and_momentum_stays():
@@ -197,11 +197,11 @@ def test_stopped_partners_move_as_one_and_momentum_stays():
     data.qpos[0] += 1
     pair = (("geom", 0), ("geom", 1))
     hit = Hit(pair, np.zeros(0, dtype=np.int32))
-    assert arrest(model, data, start, 2e-3, [hit], lambda: []) == ([hit], 0.0)
+    assert impact_zone(model, data, start, 2e-3, [hit], lambda: []) == ([hit], 0.0)
     np.testing.assert_allclose(data.qvel[[0, 6]], [-50, -50], atol=1e-9)
     np.testing.assert_allclose(data.qvel[[3, 4, 5, 9, 10, 11]], 0, atol=1e-9)
     np.testing.assert_allclose(data.qpos[[0, 7]], start[[0, 7]] - 0.1, atol=1e-9)
-    assert len(arrest(model, data, start, 2e-3, [hit], lambda: [hit])[0]) > 1
+    assert len(impact_zone(model, data, start, 2e-3, [hit], lambda: [hit])[0]) > 1
     np.testing.assert_array_equal(data.qpos, start)  # what never ends stands still
 
 
@@ -361,7 +361,7 @@ def test_the_stretch_energy_has_mujocos_spring_force_as_its_gradient():
     data.qpos[:12] += rng.normal(size=12) * 0.01
     data.qvel[:] = 0
     mujoco.mj_forward(model, data)
-    books, step = Books(model), 1e-6
+    books, step = EnergyMeter(model), 1e-6
 
     def energy(dof, sign):
         moved = mujoco.MjData(model)

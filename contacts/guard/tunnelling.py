@@ -12,7 +12,7 @@ from tauguard.arrays import Array
 from tauguard.cloth import Groups, MeshCCD
 
 
-class Crossings:
+class TunnellingEvents:
     """Which vertices and faces, and which edges, cross in a step.
 
     Args:

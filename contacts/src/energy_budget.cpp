@@ -1,4 +1,4 @@
-#include "account.hpp"
+#include "energy_budget.hpp"
 
 namespace tauguard::contacts {
 
@@ -17,7 +17,7 @@ double Sheet::energy(const double* x) const {
   return sum / 4;
 }
 
-Entry Account::entry(const double* velocity, double length, const double* x_t1) {
+EnergyChange EnergyBudget::change(const double* velocity, double length, const double* x_t1) {
   e_.com_pos(e_.model, e_.end);
   if (e_.ntendon) e_.tendon(e_.model, e_.end);
   e_.make_m(e_.model, e_.end);
@@ -37,21 +37,21 @@ Entry Account::entry(const double* velocity, double length, const double* x_t1) 
   return {kinetic_end + e_.end_energy[0] + stretch(x_t1) - before - driven, kinetic_end};
 }
 
-double Account::kinetic(const void* data, const double* velocity) {
+double EnergyBudget::kinetic(const void* data, const double* velocity) {
   e_.mul_m(e_.model, data, momentum_.data(), velocity);
   double sum = 0;
   for (int i = 0; i < e_.nv; ++i) sum += velocity[i] * momentum_[i];
   return 0.5 * sum;
 }
 
-double Account::stretch(const double* x) const {
+double EnergyBudget::stretch(const double* x) const {
   double sum = 0;
   for (const Sheet& sheet : sheets_) sum += sheet.energy(x);
   return sum;
 }
 
 // Power of forces applied to bodies.
-double Account::pushed(const double* velocity) {
+double EnergyBudget::pushed(const double* velocity) {
   double power = 0;
   std::vector<double> jacobian;
   for (int b = 0; b < e_.nbody; ++b) {

@@ -13,7 +13,7 @@ from tauguard.arrays import Array
 
 
 @dataclass(frozen=True)
-class Balance:
+class EnergyBalance:
     """What a step did to energy and momentum of all moving bodies."""
 
     energy: Array
@@ -22,8 +22,8 @@ class Balance:
     momentum: Array  #: linear, before and after, shape (2, 3) [N s]
 
 
-class Books:
-    """Computes :class:`Balance` on data of its own.
+class EnergyMeter:
+    """Computes :class:`EnergyBalance` on data of its own.
 
     Args:
         model: the scene's.
@@ -34,10 +34,10 @@ class Books:
         self._model, self._data = model, mujoco.MjData(model)
         self._sheets = sheets_of(model)
 
-    def between(self, first: Array, last: Array) -> Balance:
+    def between(self, first: Array, last: Array) -> EnergyBalance:
         """From one state (``mjSTATE_INTEGRATION``) to another."""
         rows = [self._read(state) for state in (first, last)]
-        return Balance(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]))
+        return EnergyBalance(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]))
 
     def _read(self, state: Array) -> tuple[Array, Array]:
         model, data = self._model, self._data

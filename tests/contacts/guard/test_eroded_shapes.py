@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from tauguard.contacts.guard.cores import _Hull
+from tauguard.contacts.guard.eroded_shapes import _Hull
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.5, 0.75, 0.95]))

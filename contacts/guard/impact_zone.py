@@ -1,4 +1,4 @@
-"""The last resort: partners that would pass through one another go on as one for a moment."""
+"""The last resort: penetrating partners move rigidly together for one sub-step (impact zone)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.contacts.guard.mocap import Carriers
+from tauguard.contacts.guard.mocap import MocapVelocityField
 from tauguard.contacts.guard.report import Pair
 
 
@@ -27,7 +27,7 @@ class Hit:
 ROUNDS = 8
 
 
-def arrest(
+def impact_zone(
     model: Any,
     data: Any,
     qpos: Array,
@@ -35,22 +35,23 @@ def arrest(
     hits: Sequence[Hit],
     judge: Callable[[], list[Hit]],
 ) -> tuple[list[Hit], float]:
-    """Take the piece of a step again so that no pair passes through.
+    """Take a sub-step again so that no pair passes through.
 
     The velocity at its end is changed by as little as possible, in the metric of the inertia, such
     that the partners of each hit do not move against one another (rigid impact zones: Provot 1997;
     Bridson, Fedkiw and Anderson 2002); beyond the work of mocap bodies, that takes kinetic energy
-    and never adds any. The piece then goes by that velocity. Pairs that meet on this new way are
-    added; if that does not end, all but mocap bodies stands still for the piece.
+    and never adds any. The bodies then follow that velocity for the sub-step. Pairs that meet on
+    this new path are added. If that does not end, everything but mocap bodies stands still for the
+    sub-step.
 
     Args:
         model: MjModel.
-        data: MjData after the failed piece; its kinematics are those of the piece's start, its
-            mocap poses those of the end.
-        qpos: At the piece's start.
-        length: Of the piece [s].
+        data: MjData after the failed sub-step; its kinematics are those of the start, its mocap
+            poses those of the end.
+        qpos: At the sub-step's start.
+        length: Of the sub-step [s].
         hits: What it let through.
-        judge: Judges the way from the start to ``data.qpos``.
+        judge: Judges the path from the start to ``data.qpos``.
 
     Returns:
         All hits whose partners were stopped, and the work that mocap bodies did by it [J].
@@ -73,11 +74,11 @@ def _joined(
 ) -> tuple[Array, float]:
     """The velocity nearest to ``velocity`` at which the partners of each hit move as one.
 
-    With rows J, inertia M, carriers' velocity c and S the impulses, J M^-1 J' S = J v + c; the
-    carriers do the work S c.
+    With rows J, inertia M, mocap velocity c and S the impulses, J M^-1 J' S = J v + c; the
+    field do the work S c.
     """
-    carriers = Carriers(model, data, length) if model.nmocap else None
-    parts = [_rows(model, data, hit, carriers) for hit in hits]
+    field = MocapVelocityField(model, data, length) if model.nmocap else None
+    parts = [_rows(model, data, hit, field) for hit in hits]
     rows, carried = (np.concatenate([part[k] for part in parts]) for k in range(2))
     acts = np.abs(rows).max(axis=1) > 0
     rows, carried = rows[acts], carried[acts]
@@ -85,18 +86,18 @@ def _joined(
         return velocity, 0.0
     weighted = np.zeros_like(rows)
     mujoco.mj_solveM(model, data, weighted, rows)
-    share = np.linalg.lstsq(rows @ weighted.T, rows @ velocity + carried, rcond=1e-10)[0]
-    return np.asarray(velocity - share @ weighted), float(share @ carried)
+    impulses = np.linalg.lstsq(rows @ weighted.T, rows @ velocity + carried, rcond=1e-10)[0]
+    return np.asarray(velocity - impulses @ weighted), float(impulses @ carried)
 
 
-def _rows(model: Any, data: Any, hit: Hit, carriers: Carriers | None) -> tuple[Array, Array]:
+def _rows(model: Any, data: Any, hit: Hit, field: MocapVelocityField | None) -> tuple[Array, Array]:
     """Jacobian of the relative motion of a hit's partners, shape (R, nv), and what is carried."""
 
     def of(body: int, point: Array, count: int) -> tuple[Array, Array]:
         jacobian = np.zeros((6, model.nv))
         place = np.ascontiguousarray(point)
         mujoco.mj_jac(model, data, jacobian[:3], jacobian[3:], place, body)
-        velocity = np.zeros(6) if carriers is None else carriers.velocity(body, place)
+        velocity = np.zeros(6) if field is None else field.velocity(body, place)
         return jacobian[:count], velocity[:count]
 
     (first, one), (_, other) = hit.pair

@@ -1,4 +1,4 @@
-"""Cores: a geom less a layer of its surface, as shapes of the native kernel."""
+"""ErodedShapes: a geom less a layer of its surface, as shapes of the native kernel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tauguard.contacts.geoms import CONVEX, hull_vertices
 _NONE = np.zeros((0, 3))
 
 
-class Cores:
+class ErodedShapes:
     """The shapes of a model's geoms at any depth, added to a native guard once each.
 
     Args:

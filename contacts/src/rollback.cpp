@@ -1,4 +1,4 @@
-// A step that did not stand, in pieces.
+// A step that was not accepted: rolled back and taken again in sub-steps.
 #include <algorithm>
 
 #include "stepper.hpp"
@@ -6,22 +6,22 @@
 namespace tauguard::contacts {
 namespace {
 
-// Shares of its way that a piece with too much energy goes instead, until it has not.
+// Fractions of its path tried until the sub-step is within its energy budget.
 constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 
-// Where stopping alone helps, shorter pieces are lost work: how much longer the least piece becomes
-// by each, up to this share of a step.
+// Where only an impact zone helps, shorter sub-steps are wasted: each zone makes the shortest
+// sub-step this much longer, up to this fraction of a step.
 constexpr double longer = 4, longest = 0.25;
 
 }  // namespace
 
-// `fresh` opens the account of energy anew.
-void Stepper::redo(std::vector<PairHit> hits, bool fresh, const std::function<void()>& each) {
-  report_.redone = true;
-  std::fill(arrested_.begin(), arrested_.end(), 0);
+// `fresh` starts a new energy budget.
+void Stepper::roll_back(std::vector<PairHit> hits, bool fresh, const std::function<void()>& each) {
+  report_.rolled_back = true;
+  std::fill(in_zone_.begin(), in_zone_.end(), 0);
   speeds_.clear();
   e_.set_state(e_.model, e_.data, first_.data(), e_.signature.integration);
-  if (fresh) account_.open(e_.qvel);
+  if (fresh) budget_.open(e_.qvel);
   const double end = *e_.time + whole_;
   push_ = s_.push / whole_;
   if (hits.empty()) {  // only pushed out too fast
@@ -34,7 +34,7 @@ void Stepper::redo(std::vector<PairHit> hits, bool fresh, const std::function<vo
   double length = shorter(hits, whole_);
   for (rest_ = whole_; rest_ > 0;) {
     const int stops = stops_;
-    length = piece(std::min(length, rest_), each);
+    length = sub_step(std::min(length, rest_), each);
     rest_ = length < rest_ * (1 - 1e-9) ? rest_ - length : 0;
     length = stops_ > stops ? least_ * whole_ : rest_;
   }
@@ -42,22 +42,22 @@ void Stepper::redo(std::vector<PairHit> hits, bool fresh, const std::function<vo
   report_.restored = release();
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (passed_[i]) report_.passed.push_back(static_cast<int>(i));
-    if (arrested_[i]) report_.arrested.push_back(static_cast<int>(i));
+    if (in_zone_[i]) report_.impact_zones.push_back(static_cast<int>(i));
   }
 }
 
-// Go on by `length` or less, however many attempts it takes; how far it went.
-double Stepper::piece(double length, const std::function<void()>& each) {
+// Advances by `length` or less, in as many attempts as that takes; returns how far it went [s].
+double Stepper::sub_step(double length, const std::function<void()>& each) {
   const double share = 1 - rest_ / whole_;
-  mocap_.piece(share, 1), mocap_.depart();
+  mocap_.sub_step(share, 1), mocap_.depart();
   e_.get_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
   if (mocap_.moves()) e_.copy_state(e_.model, e_.data, e_.other, e_.signature.pose);
   std::copy_n(e_.qvel, e_.nv, velocity_.begin());
   std::copy_n(e_.qpos, e_.nq, qpos_.begin());
   const double begin = *e_.time;
-  Entry entry{};
+  EnergyChange change{};
   for (;;) {
-    mocap_.piece(share, length < rest_ * (1 - 1e-9) ? share + length / whole_ : 1);
+    mocap_.sub_step(share, length < rest_ * (1 - 1e-9) ? share + length / whole_ : 1);
     rows_.step(length, held(length), push_);
     ++report_.steps;
     if (*e_.time != begin + length) {
@@ -68,11 +68,11 @@ double Stepper::piece(double length, const std::function<void()>& each) {
     std::vector<PairHit> hits = judge();
     note_lost(hits);
     hits = unseen(std::move(hits));
-    entry = account_.entry(velocity_.data(), length, x_t1_.data());
+    change = budget_.change(velocity_.data(), length, x_t1_.data());
     const bool fails = !bearable(hits, length);
-    if (!fails && !account_.overdrawn(entry)) break;
+    if (!fails && !budget_.exceeded(change)) break;
     if (length <= least_ * whole_ || report_.steps >= s_.most) {
-      entry = last_resort(length, hits, entry);
+      change = last_resort(length, hits, change);
       break;
     }
     e_.set_state(e_.model, e_.data, saved_.data(), e_.signature.integration);
@@ -84,8 +84,8 @@ double Stepper::piece(double length, const std::function<void()>& each) {
       length *= 0.5;
   }
   report_.contacts = std::max(report_.contacts, *e_.ncon);
-  account_.book(entry);
-  report_.added += std::max(entry.gain, 0.0);
+  budget_.record(change);
+  report_.added += std::max(change.gain, 0.0);
   if (each) each();
   return length;
 }
@@ -97,7 +97,7 @@ std::vector<Held> Stepper::held(double length) const {
   return out;
 }
 
-// Whether nothing passes through, nor becomes deeper unless a shorter piece was tried.
+// Whether no pair passes through, and none becomes deeper unless a shorter sub-step was tried.
 bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
   return std::all_of(hits.begin(), hits.end(), [&](const PairHit& hit) {
     const bool rigid = pairs_[hit.pair].first.kind == Place::geom;
@@ -106,19 +106,21 @@ bool Stepper::bearable(const std::vector<PairHit>& hits, double length) const {
   });
 }
 
-// The work ran out: stop what passes through, then slow down what has too much energy.
-Entry Stepper::last_resort(double length, const std::vector<PairHit>& hits, Entry entry) {
+// The budget of attempts is spent: joins what passes through in impact zones, then slows down what
+// exceeds the energy budget.
+EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hits,
+                                  EnergyChange change) {
   std::vector<PairHit> through;
   for (const PairHit& hit : hits)
     if (hit.passed) through.push_back(hit);
   double work = 0;
   const auto again = [&] {
-    entry = account_.entry(velocity_.data(), length, x_t1_.data());
-    entry.gain -= work;
+    change = budget_.change(velocity_.data(), length, x_t1_.data());
+    change.gain -= work;
   };
   if (!through.empty()) {
-    const Stopped stopped = arrest_(through, qpos_.data(), length);
-    for (const int pair : stopped.pairs) arrested_[pair] = 1;
+    const Stopped stopped = impact_zone_(through, qpos_.data(), length);
+    for (const int pair : stopped.pairs) in_zone_[pair] = 1;
     work = stopped.work;
     ++stops_, least_ = std::min(longer * least_, longest);
     again();
@@ -130,19 +132,19 @@ Entry Stepper::last_resort(double length, const std::vector<PairHit>& hits, Entr
     e_.integrate(e_.model, e_.qpos, e_.qvel, length);
   };
   for (const double share : slower) {
-    if (!account_.overdrawn(entry)) break;
-    for (const auto& [pair, speed] : speeds_) arrested_[pair] = 1;
+    if (!budget_.exceeded(change)) break;
+    for (const auto& [pair, speed] : speeds_) in_zone_[pair] = 1;
     go(share);
     if (passes() && share > 0) continue;
     again();
   }
-  if (!mocap_.moves()) return entry;
-  // What stands still may be passed by what is moved: then rather too fast.
+  if (!mocap_.moves()) return change;
+  // A mocap body may pass through what stands still: then too much energy is the lesser error.
   if (passes()) go(1), note_passed(), again();
-  return entry;
+  return change;
 }
 
-// Names what passes on the present way.
+// Marks the pairs that pass through on the present path.
 void Stepper::note_passed() {
   for (const PairHit& hit : judge())
     if (hit.passed) passed_[hit.pair] = 1;
