@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from oracles import coal_peer
 from oracles.convex_bodies import HARD, KINDS
 from oracles.convex_distance import exact_distance, exactly_meet, extent, relative_error
 from oracles.convex_pairs import random_bodies, take
 from studies.framework import number, table_rows, time_in_turn
-from studies.rigid import coal_peer
 from studies.rigid.bars import count, error, faster, per
 from tauguard.report import Row, rate
 from tauguard.rigid import distance, overlap

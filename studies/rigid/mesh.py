@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from oracles import coal_peer
 from oracles.coal_motion import MovingDistance
 from oracles.convex_pairs import REST, farthest, random_bodies, random_motions, shifted, take
 from oracles.surfaces import bumpy_surface, poses_near
 from studies.framework import table_rows, time_in_turn
-from studies.rigid import coal_peer, peer
+from studies.rigid import peer
 from studies.rigid.bars import count, error, faster, per
 from tauguard.arrays import Array
 from tauguard.report import Row, rate

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from oracles import coal_peer
 from oracles.coal_motion import MovingDistance, advanced_times
 from oracles.convex_impact import AxisGap, bracket, impact_errors
 from oracles.convex_pairs import farthest, random_bodies, random_motions, take
 from studies.framework import table_rows
-from studies.rigid import coal_peer, peer
+from studies.rigid import peer
 from studies.rigid.bars import count, error, within
 from studies.rigid.distance import ROUNDED
 from tauguard.report import Row

@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from oracles import coal_peer
 from oracles.coal_motion import CONTACT, MovingDistance, advanced_times
 from studies.framework import time_in_turn
-from studies.rigid import coal_peer
 from studies.rigid.bars import per
 from tauguard.arrays import Array
 from tauguard.report import Row

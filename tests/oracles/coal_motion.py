@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from oracles import coal_peer
 from oracles.convex_pairs import take
 from tauguard.arrays import Array
-from tauguard.rigid import Motion, coal_peer
+from tauguard.rigid import Motion
 
 #: coal's shapes, each with its pose in the body's frame.
 Shapes = list[tuple[Any, Any]]

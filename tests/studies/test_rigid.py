@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
+from oracles import coal_peer
 from oracles.convex_pairs import pairs_by_outcome
-from studies.rigid import coal_peer
 from tauguard.rigid import Hulls
 
 

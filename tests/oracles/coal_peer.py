@@ -1,4 +1,4 @@
-"""coal's GJK, pair by pair: a peer in the study ``rigid``."""
+"""coal's GJK, pair by pair: an independent peer of the kernels."""
 
 from __future__ import annotations
 
