@@ -12,32 +12,20 @@ STUDY = Study(
     "how many collisions detectors find, how soon, and at which rate of false alarms",
     {
         "experiment": Part(
-            "detection.study",
+            "detection.experiment",
             "the dissertation's experiment: detectors, speeds, operating points, false alarms",
-            ("detector", "robot", "keep"),
+            ("detector", "keep"),
         ),
         "false_alarms": Part(
-            "detection.false_alarms",
-            "thresholds for a rate of false alarms, on ten arms of fresh seeds",
+            "detection.rates",
+            "false alarms asked for and counted on ten fresh arms, also with a guarantee",
             ("keep",),
             alias="false_alarms",
         ),
-        "guarantee": Part(
-            "detection.conformal",
-            "false alarms per hour: what calibration guarantees, and what is counted",
-            alias="detection_conformal",
-        ),
-        "parts": Part(
-            "detection.parts",
-            "what each part of the detector brings: left out, everything else stays",
-            ("keep",),
-            alias="detection_parts",
-        ),
-        "ladder": Part(
-            "detection.ladder",
-            "from the dissertation's setting to ours: one change at a time",
-            ("keep",),
-            alias="detection_ladder",
+        "robots": Part(
+            "detection.robots",
+            "any robot (--robot): collisions found, delays and false alarms",
+            ("robot", "keep"),
         ),
         "online": Part(
             "detection.online",

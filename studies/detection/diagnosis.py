@@ -1,11 +1,10 @@
 """After the alarm: which link, which force, where, and what kind of event, against the truth.
 
-Four ways are compared on the same alarms. ``surface``: every point of the arm's surface is a
-hypothesis (tauguard.detectors.diagnosis.diagnosis). ``exposed``: the same, where nothing can
-reach link 1, the shoulder on its base. ``usual``: the link of the last joint with a significant
-residual, and the damped least-squares force at the middle of that link. ``exact``: as ``surface``,
-but with the true external torque instead of the observer's estimate: what is wrong then is not the
-observer's fault, other contacts explain the same torques.
+Four methods are compared on the same alarms. ``surface``: every point of the arm's surface is a
+hypothesis. ``exposed``: the same, where nothing can reach link 1. ``usual``, the peer: the link of
+the last joint with a significant residual, and the damped least-squares force at the middle of that
+link. ``exact``: ``surface`` with the true external torque; what is wrong then is ambiguous, since
+other contacts explain the same torques.
 """
 
 from __future__ import annotations
@@ -16,15 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.detection.diagnosis_pool import (
-    Event,
-    payload_events,
-    push_events,
-    struck_events,
-)
-from studies.detection.fleet import CALIBRATE, TEST, Training, stream
-from studies.detection.pool import SPEEDS, free_pool
-from studies.detection.severity_rows import NOTE, severity_rows
+from studies.detection.events import Event, payload_events, push_events, struck_events
+from studies.detection.motions import CALIBRATE, SPEEDS, TEST, Training, free_pool, stream
 from studies.framework import time_in_turn
 from tauguard.arrays import Array
 from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
@@ -36,6 +28,7 @@ from tauguard.detectors.diagnosis.diagnosis_metrics import (
     ContactErrors,
     TrueSeverity,
     contact_at,
+    severity_figures,
 )
 from tauguard.envs import simulate
 from tauguard.models import LinkSurface, cura6, link_surface
@@ -63,13 +56,14 @@ _ALARMS = (
 #: What the columns of each table mean.
 NOTES = {
     "link": "rates " + _ALARMS + "Missed collisions are not in it.",
-    "link_confusion": "counts: a row a true link, a column what was said of it.",
     "contact": "medians and 95th percentiles " + _ALARMS + "force_error_n: norm of the difference.",
     "kind": "counts: a row a true kind, a column what was said of it. All are simulated, pushes "
     "too: no person made one.",
     "payload": "loads unknown to the detector, taken up and put down. mass_error_g: median, of "
     "those not called a collision.",
-    "severity": NOTE,
+    "severity": "how often the interval that is to hold 90 % of the true values does, of the "
+    "collisions that raised an alarm; width: median of the upper end over the lower one; "
+    "identifiable: that factor is 6 or less. Impulse [N s] and peak force [N] of the window.",
     "cost": "wall time of one alarm; aftermath_us is what the residual around it takes first.",
 }
 
@@ -137,8 +131,8 @@ def measure(quick: bool, seed: int) -> list[Row]:
                 judged.append(judge(event, trained[event.arm], surface))
                 sample = sample or (event if event.alarm is not None else None)
     contacts = [j for j in judged if j.collision is not None]
-    rows = [*link_rows(contacts), *confusion_rows(contacts), *contact_rows(contacts)]
-    rows += [*sizes(contacts), *kind_rows(judged), *payload_rows(judged)]
+    rows = [*link_rows(contacts), *contact_rows(contacts)]
+    rows += [*severity_rows(contacts), *kind_rows(judged), *payload_rows(judged)]
     assert sample is not None
     return [*rows, cost_row(sample, trained[sample.arm], surface)]
 
@@ -192,7 +186,7 @@ def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
     return Answer(found.last_joint, force, point)
 
 
-def groups(contacts: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
+def by_group(contacts: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
     """All, by speed and by severity; only events that raised an alarm."""
     known = [j for j in contacts if j.diagnosis is not None and j.kind != "push"]
     speeds = sorted({j.speed for j in known})
@@ -219,7 +213,7 @@ def _link(judged: Judged) -> int:
 def link_rows(contacts: Sequence[Judged]) -> list[Row]:
     """How often the link is right, and how often it or a neighbour is."""
     rows = []
-    for group, some in groups(contacts):
+    for group, some in by_group(contacts):
         for method in METHODS:
             off = [abs(j.links[method] - _link(j)) for j in some]
             rows.append(
@@ -234,23 +228,10 @@ def link_rows(contacts: Sequence[Judged]) -> list[Row]:
     return rows
 
 
-def confusion_rows(contacts: Sequence[Judged]) -> list[Row]:
-    """True link (a row) against the link said, for every method."""
-    known = [j for j in contacts if j.diagnosis is not None]
-    rows = []
-    for method in METHODS:
-        for link in sorted({_link(j) for j in known}):
-            said = [j.links[method] for j in known if _link(j) == link]
-            counts = {f"said_{k}": said.count(k) for k in range(1, 7)}
-            row = {"study": "link_confusion", "method": method, "link": link, **counts}
-            rows.append({**row, "said_none": said.count(0)})
-    return rows
-
-
 def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
     """Errors of force and point at the time of the estimated force: median and p95."""
     rows = []
-    for group, some in groups(contacts):
+    for group, some in by_group(contacts):
         for method in METHODS:
             own = [j.errors[method] for j in some]
             errors = np.array([(e.true_force, e.force, e.direction, 100 * e.point) for e in own])
@@ -263,15 +244,23 @@ def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
     return rows
 
 
-def sizes(contacts: Sequence[Judged]) -> list[Row]:
-    """What the intervals of impulse and peak force are worth."""
-    return severity_rows(
-        [
-            (j.kind, _link(j), j.diagnosis, j.severity)
-            for j in contacts
-            if j.diagnosis is not None and j.severity is not None
-        ]
-    )
+def severity_rows(contacts: Sequence[Judged]) -> list[Row]:
+    """What the intervals of impulse and peak force are worth, by kind and by link."""
+    known = [j for j in contacts if j.diagnosis is not None and j.severity is not None]
+    named = sorted({j.kind for j in known}), sorted({_link(j) for j in known})
+    some = [(kind, [j for j in known if j.kind == kind]) for kind in named[0]]
+    some += [(f"link {link}", [j for j in known if _link(j) == link]) for link in named[1]]
+    rows = []
+    for name, own in some:
+        pairs = [(j.diagnosis, j.severity) for j in own if j.diagnosis and j.severity]
+        found = severity_figures(pairs)
+        row: Row = {"study": "severity", "group": name}
+        for size in ("impulse", "peak"):
+            row[f"{size}_held"] = found[f"{size}_held"]
+            row[f"{size}_width"] = found[f"{size}_width"]["median"]
+            row[f"{size}_identifiable"] = found[f"{size}_identifiable"]["value"]
+        rows.append(row)
+    return rows
 
 
 def kind_rows(judged: Sequence[Judged]) -> list[Row]:
@@ -324,8 +313,8 @@ def cost_row(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Row
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
-    """Link accuracy and point error by severity, and both confusion tables."""
-    axes = figure.subplots(2, 2)
+    """Link accuracy and point error by severity."""
+    axes = figure.subplots(1, 2)
     names = [f"{stratum(low)} N m" for low, _ in STRATA]
     for method in METHODS:
         own = {r["group"]: r for r in rows if r["study"] == "link" and r["method"] == method}
@@ -334,24 +323,9 @@ def draw(rows: list[Row], figure: Figure) -> None:
         }
         at = [i for i, name in enumerate(names) if name in own]
         rates = (own[names[i]]["link_right"] for i in at)
-        errorbars(axes[0, 0], at, rates, fmt="o-", label=method)
-        axes[0, 1].plot(at, [own_errors[names[i]]["point_cm"] for i in at], "o-", label=method)
-    for axis, label in ((axes[0, 0], "link right"), (axes[0, 1], "point error, median [cm]")):
+        errorbars(axes[0], at, rates, fmt="o-", label=method)
+        axes[1].plot(at, [own_errors[names[i]]["point_cm"] for i in at], "o-", label=method)
+    for axis, label in ((axes[0], "link right"), (axes[1], "point error, median [cm]")):
         axis.set_xticks(range(len(names)), names)
         axis.set_ylabel(label)
         axis.legend()
-    links = [r for r in rows if r["study"] == "link_confusion" and r["method"] == "surface"]
-    _table(axes[1, 0], links, "link", [f"said_{k}" for k in range(1, 7)])
-    kinds = [r for r in rows if r["study"] == "kind"]
-    _table(axes[1, 1], kinds, "kind", [f"said_{k}" for k in KINDS])
-
-
-def _table(axes: Any, rows: list[Row], name: str, columns: list[str]) -> None:
-    counts = np.array([[row[c] for c in columns] for row in rows])
-    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    axes.imshow(share, cmap="YlGnBu", vmin=0, vmax=1, aspect="auto")
-    for (i, j), count in np.ndenumerate(counts):
-        axes.text(j, i, str(count), ha="center", color="white" if share[i, j] > 0.6 else "black")
-    axes.set_xticks(range(len(columns)), [c.removeprefix("said_") for c in columns])
-    axes.set_yticks(range(len(rows)), [str(row[name]) for row in rows])
-    axes.set(xlabel=f"{name} said", ylabel=f"true {name}")

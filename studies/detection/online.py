@@ -1,19 +1,14 @@
 """What one sample costs: simulated and detected in batch, then online, method by method.
 
-The alarm runs sample by sample through :meth:`AlarmStream.step` on a motion with collisions that
-its detector was not trained on, for every method of the registry. scikit-learn's ``SVR.predict``
-gets the same windows as the kernel sum, one row a call; its kernel is precomputed and it is charged
-with the kernel row against the support vectors alone, in NumPy: less than its own callable kernels
-compute.
+scikit-learn's ``SVR.predict`` gets the same windows as the kernel sum, one row a call; it is
+charged with the kernel row against the support vectors alone, in NumPy: less than its own callable
+kernels compute.
 """
 
 from __future__ import annotations
 
-import contextlib
-import os
 import time
-import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -72,7 +67,7 @@ class Extent:
 
 def motions(extent: Extent, seed: int) -> tuple[list[Trace], Trace]:
     """Training traces of a simulated arm, and a motion with collisions that is not among them."""
-    from studies.detection.fleet import TRAINING_SPEEDS
+    from studies.detection.motions import TRAINING_SPEEDS
     from tauguard.datasets.plans import TRAINING_PAYLOADS, free_episodes, struck_episodes
     from tauguard.envs import simulate
     from tauguard.models import Mismatch
@@ -106,7 +101,7 @@ def step_row(alarm: CollisionAlarm, trace: Trace, samples: int) -> Row:
     count = min(samples, len(trace.t))
     score, dt = alarm.scores(trace)[:count], [None, *np.diff(trace.t[:count])]
     rows = list(zip(trace.q[:count], trace.qd[:count], trace.current[:count], dt, strict=True))
-    timed_stream, kept_stream, grown_stream = (alarm.stream() for _ in range(3))
+    timed_stream, kept_stream = alarm.stream(), alarm.stream()
     online = np.empty(count)
 
     def kept(k: int) -> None:
@@ -124,7 +119,6 @@ def step_row(alarm: CollisionAlarm, trace: Trace, samples: int) -> Row:
         "us_max": float(spent.max()),
         "over_a_period": int((spent > PERIOD).sum()),
         "difference_to_batch": float(np.abs(online - score).max()),
-        "bytes_kept_a_call": allocated(lambda k: grown_stream.step(*rows[k]), count // 4),
         "met": bool(np.median(spent) <= GOAL),
     }
 
@@ -150,7 +144,7 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
         "detection": lambda: alarm.detect(replace(trace)),  # a copy: estimates are kept by trace
         "peer": rollout_along(Simulation(episode).motion),
     }
-    with one_core(), threadpool_limits(1):
+    with threadpool_limits(1):
         taken = time_in_turn(calls, repeats, time.process_time)
         found = alarm.detect(replace(trace))
     us = {k: {n: 1e6 * v / len(trace.t) for n, v in t.items()} for k, t in taken.items()}
@@ -172,35 +166,6 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
         "peer_us": us["peer"],
         "difference_to_online": float(np.abs(online - found.score[:count]).max()),
     }
-
-
-@contextlib.contextmanager
-def one_core() -> Iterator[None]:
-    """This process on one core, where the system lets it choose."""
-    if not hasattr(os, "sched_setaffinity"):
-        yield
-        return
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(before)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
-
-
-def allocated(call: Callable[[int], object], count: int) -> float:
-    """Bytes that Python and NumPy hold more of after ``count`` calls, per call."""
-    for k in range(min(200, count)):
-        call(k)
-    tracemalloc.start()
-    try:
-        before, _ = tracemalloc.get_traced_memory()
-        for k in range(count):
-            call(k)
-        after, _ = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    return (after - before) / count
 
 
 def peer(regressor: SrqSVR) -> Callable[[Array], Array]:

@@ -1,20 +1,20 @@
-"""Rows of the detection study."""
+"""Rows of the dissertation's experiment, how they are printed, and their figure."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import stats
 
-from studies.detection.judge import Outcome, Tallies, Tally
-from studies.detection.oracle import LEVELS, ORACLE, at_level
-from studies.detection.thresholds import AMPERES, HOURLY, ONCE, POINTS, Fleet
-from tauguard.detectors.evaluation.metrics import HEADLINE, poisson_rate
-from tauguard.report import Row
-from tauguard.report import rate as wilson
+from studies.detection.operating import AMPERES, HOURLY, Fleet, Outcome, Tallies, Tally
+from studies.framework import groups, table_rows
+from tauguard.detectors.evaluation.metrics import HEADLINE, delay_figures, poisson_rate
+from tauguard.report import Row, rate
 from tauguard.traces import stratum
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: The dissertation's confusion matrices (TP, FN, FP, TN; 65 collisions) by speed [%]:
 #: SVR at 1.6 A, network of [25] at 1.6 A, SVR at 2.0 A, network at 2.0 A. Kowalczuk & Czubenko.
@@ -26,284 +26,274 @@ DISSERTATION = {
     50.0: ((59, 6, 90, 180), (59, 6, 89, 181), (56, 9, 16, 178), (58, 7, 15, 181)),
     60.0: ((59, 6, 87, 167), (59, 6, 87, 167), (59, 6, 12, 166), (59, 6, 12, 166)),
 }
+#: Detectors beside the dissertation's SVR (0) and network (1).
+BESIDE = {"srq-svr": 0, "srq-svr-plain": 0, "current-network": 1}
 #: The lowest torque of the 65 judged collisions [N m].
 LOWEST = 4.0
-#: tau98 is the smallest torque above which this share of the collisions is found.
-TAU_SHARE = 0.98
+#: tau98 is the smallest torque above which this fraction of the collisions is found.
+GOAL = 0.98
 
 BySpeed = Mapping[float, Tallies]
-#: Every arm's threshold of a detector at a point.
-Spread = Mapping[str, Mapping[str, Sequence[float]]]
 
 
-def spread(fleets: Sequence[Fleet]) -> Spread:
-    """The thresholds by detector and point, arm by arm."""
-    return {
-        name: {p: [fleet[name].thresholds[p] for fleet in fleets] for p in own.thresholds}
-        for name, own in fleets[0].items()
-    }
+def rows(by_speed: BySpeed, fleets: Sequence[Fleet]) -> list[Row]:
+    """Rows ``speed``, ``hourly``, ``strata``, ``dissertation`` and ``headline``."""
+    names, points = list(fleets[0]), [*map(str, AMPERES), HOURLY]
+    found: list[Row] = []
+    for name in names:
+        for amperes in AMPERES:
+            known = {"study": "speed", "detector": name, "threshold_a": amperes}
+            known |= _thresholds(fleets, name, str(amperes))
+            for speed, tallies in by_speed.items():
+                found.append({**known, "speed": speed, **_figures(tallies[name, str(amperes)])})
+    for name in names:
+        whole = Tally()
+        for tallies in by_speed.values():
+            whole.add(tallies[name, HOURLY])
+        known = {"study": "hourly", "detector": name, **_thresholds(fleets, name, HOURLY)}
+        for speed, tally in [*((s, t[name, HOURLY]) for s, t in by_speed.items()), (0.0, whole)]:
+            found.append({**known, "speed": speed, **_figures(tally)})
+    for name in names:
+        for point in points:
+            for speed, tallies in by_speed.items():
+                found += _strata(name, point, speed, tallies[name, point].outcomes)
+    found += _dissertation(by_speed, names)
+    return found + headline(found)
 
 
-def _threshold(values: Sequence[float]) -> Row:
+def _thresholds(fleets: Sequence[Fleet], name: str, point: str) -> Row:
     """Of the normalised score (the network's first two: amperes): median over arms and range."""
+    values = [fleet[name].thresholds[point] for fleet in fleets]
     low, high = float(min(values)), float(max(values))
     return {"threshold": float(np.median(values)), "threshold_low": low, "threshold_high": high}
 
 
-def rows(by_speed: BySpeed, thresholds: Spread) -> list[Row]:
-    """All rows: speed, hourly, once, floor, strata, dissertation, mcnemar, output."""
-    names = list(thresholds)
-    return [
-        *cells(by_speed, thresholds, names),
-        *hourly(by_speed, thresholds, names),
-        *hourly(by_speed, thresholds, names, "once", ONCE),
-        *floor(by_speed),
-        *strata(by_speed, names),
-        *dissertation(by_speed, names),
-        *mcnemar(by_speed, names),
-        *outputs(by_speed, names),
-    ]
-
-
 def countable(tally: Tally) -> list[Outcome]:
     """The outcomes of the 65, without the faint ones."""
-    return [o for o in tally.outcomes if o.collision.peak_tau >= LOWEST]
+    return [outcome for outcome in tally.outcomes if outcome.collision.peak_tau >= LOWEST]
 
 
-def found(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Sensitivity with its Wilson interval."""
-    return wilson(sum(o.delay is not None for o in outcomes), len(outcomes))
-
-
-def delays(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Median (95 % interval from order statistics), 95th percentile [ms]."""
-    known = np.sort([1e3 * o.delay for o in outcomes if o.delay is not None])
-    n = len(known)
-    if not n:
-        return {"median": None, "low": None, "high": None, "p95": None, "n": 0}
-    low, high = stats.binom.ppf((0.025, 0.975), n, 0.5)
-    return {
-        "median": float(np.median(known)),
-        "low": float(known[max(int(low) - 1, 0)]),
-        "high": float(known[min(int(high), n - 1)]),
-        "p95": float(np.percentile(known, 95)),
-        "n": n,
-    }
+def sensitivity(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """With its Wilson interval."""
+    return rate(sum(outcome.delay is not None for outcome in outcomes), len(outcomes))
 
 
 def tau98(outcomes: Sequence[Outcome]) -> float | None:
     """The smallest torque above which sensitivity is 0.98 [N m]; ``None`` where it never is."""
-    ordered = sorted(outcomes, key=lambda o: -o.collision.peak_tau)
-    missed = np.cumsum([o.delay is None for o in ordered])
-    good = np.flatnonzero(missed <= (1 - TAU_SHARE) * np.arange(1, len(ordered) + 1) + 1e-9)
+    ordered = sorted(outcomes, key=lambda outcome: -outcome.collision.peak_tau)
+    missed = np.cumsum([outcome.delay is None for outcome in ordered])
+    good = np.flatnonzero(missed <= (1 - GOAL) * np.arange(1, len(ordered) + 1) + 1e-9)
     return ordered[good[-1]].collision.peak_tau if len(good) else None
 
 
 def _figures(tally: Tally) -> Row:
-    """The common part of a row: the headline strata, then all 65."""
+    """The headline strata, then all 65."""
     own = countable(tally)
-    hard = [o for o in own if o.collision.peak_tau >= HEADLINE]
-    hits = sum(o.delay is not None for o in hard)
+    hits = sum(outcome.delay is not None for outcome in own)
+    true_cases = tally.cases - tally.false_cases
     return {
         "tp": hits,
-        "fn": len(hard) - hits,
+        "fn": len(own) - hits,
         "fp": tally.false_cases,
-        "tn": tally.cases - tally.false_cases,
-        "sensitivity": found(hard),
-        "specificity": wilson(tally.cases - tally.false_cases, tally.cases),
-        "delay_ms": delays(hard),
-        "false_alarms_per_hour": poisson_rate(tally.false_alarms, tally.free_seconds / 3600),
-        "tp_all": sum(o.delay is not None for o in own),
-        "fn_all": sum(o.delay is None for o in own),
-        "sensitivity_all": found(own),
+        "tn": true_cases,
+        "specificity": rate(true_cases, tally.cases),
         "tau98": tau98(tally.outcomes),
+        "hours": tally.free_seconds / 3600,
+        **summary(tally),
     }
 
 
-def headline(tally: Tally) -> Row:
+def summary(tally: Tally) -> Row:
     """Sensitivity and delay from 16 N m up, and false alarms per hour."""
-    own = [o for o in tally.outcomes if o.collision.peak_tau >= HEADLINE]
+    hard = [outcome for outcome in tally.outcomes if outcome.collision.peak_tau >= HEADLINE]
     return {
-        "sensitivity": found(own),
-        "sensitivity_all": found(countable(tally)),
-        "delay_ms": delays(own),
+        "sensitivity": sensitivity(hard),
+        "sensitivity_all": sensitivity(countable(tally)),
+        "delay_ms": delay_figures(outcome.delay for outcome in hard),
         "false_alarms_per_hour": poisson_rate(tally.false_alarms, tally.free_seconds / 3600),
     }
 
 
-def cells(by_speed: BySpeed, thresholds: Spread, names: Sequence[str]) -> list[Row]:
-    """``speed``: a row per detector, speed and ampere point."""
+def _low(name: str) -> float:
+    return float(name.split("-")[0])
+
+
+def _strata(name: str, point: str, speed: float, outcomes: Sequence[Outcome]) -> list[Row]:
+    by_torque = groups(outcomes, lambda outcome: stratum(outcome.collision.peak_tau))
+    known = {"study": "strata", "detector": name, "point": point, "speed": speed}
     return [
-        {
-            "study": "speed",
-            "detector": name,
-            "speed": speed,
-            "threshold_a": amperes,
-            **_threshold(thresholds[name][str(amperes)]),
-            **_figures(tallies[name, str(amperes)]),
-        }
-        for name in names
-        for speed, tallies in by_speed.items()
-        for amperes in AMPERES
+        {**known, "torque_nm": kind, "sensitivity": sensitivity(by_torque[kind])}
+        for kind in sorted(by_torque, key=_low)
     ]
 
 
-def hourly(
-    by_speed: BySpeed,
-    thresholds: Spread,
-    names: Sequence[str],
-    study: str = "hourly",
-    point: str = HOURLY,
-) -> list[Row]:
-    """``hourly``: the same at the rate of false alarms aimed at; speed 0 is all speeds together."""
-    found_rows: list[Row] = []
-    for name in names:
-        whole = Tally()
-        for tallies in by_speed.values():
-            whole.add(tallies[name, point])
-        each = [(s, t[name, point]) for s, t in by_speed.items()]
-        found_rows += [
-            {
-                "study": study,
-                "detector": name,
-                "speed": speed,
-                **_threshold(thresholds[name][point]),
-                **_figures(tally),
-                "hours": tally.free_seconds / 3600,
-            }
-            for speed, tally in [*each, (0.0, whole)]
-        ]
-    return found_rows
-
-
-def floor(by_speed: BySpeed) -> list[Row]:
-    """``floor``: what an oracle of the true torque finds and when; all speeds are together."""
-    found_rows: list[Row] = []
-    for level in LEVELS:
-        whole = Tally()
-        for tallies in by_speed.values():
-            whole.add(tallies.get((ORACLE, at_level(level)), Tally()))
-        if whole.outcomes:
-            hard = [o for o in whole.outcomes if o.collision.peak_tau >= HEADLINE]
-            found_rows.append(
-                {
-                    "study": "floor",
-                    "detector": f"oracle, true torque above {at_level(level)}",
-                    "sensitivity": found(hard),
-                    "median_ms": delays(hard)["median"],
-                    "p95_ms": delays(hard)["p95"],
-                    "median_ms from 4 N m": delays(countable(whole))["median"],
-                    "p95_ms from 4 N m": delays(countable(whole))["p95"],
-                }
-            )
-    return found_rows
-
-
-def strata(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
-    """``strata``: sensitivity and delay by achieved peak torque, at every operating point."""
-    found_rows: list[Row] = []
-    for name in names:
-        for point in POINTS:
-            for speed, tallies in by_speed.items():
-                outcomes = tallies[name, point].outcomes
-                kinds = sorted(
-                    {stratum(o.collision.peak_tau) for o in outcomes},
-                    key=lambda s: float(s.split("-")[0]),
-                )
-                for kind in kinds:
-                    own = [o for o in outcomes if stratum(o.collision.peak_tau) == kind]
-                    found_rows.append(
-                        {
-                            "study": "strata",
-                            "detector": name,
-                            "point": point,
-                            "speed": speed,
-                            "torque_nm": kind,
-                            "sensitivity": found(own),
-                            "delay_ms": delays(own),
-                        }
-                    )
-    return found_rows
-
-
-def dissertation(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
-    """``dissertation``: its confusion matrices beside ours, all 65 collisions of each cell."""
-    found_rows: list[Row] = []
+def _dissertation(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
+    """Its confusion matrices beside ours, all 65 collisions of each cell."""
+    found: list[Row] = []
     for k, amperes in enumerate(AMPERES):
-        for method, own in ((0, "srq-svr"), (0, "srq-svr-plain"), (1, "current-network")):
-            if own not in names:
-                continue
+        for name in (name for name in BESIDE if name in names):
             for speed, tallies in by_speed.items():
-                tp, fn, fp, tn = DISSERTATION[speed][2 * k + method]
-                ours = _figures(tallies[own, str(amperes)])
-                found_rows.append(
+                tp, fn, fp, tn = DISSERTATION[speed][2 * k + BESIDE[name]]
+                ours = _figures(tallies[name, str(amperes)])
+                found.append(
                     {
                         "study": "dissertation",
-                        "detector": own,
+                        "detector": name,
                         "speed": speed,
                         "threshold_a": amperes,
                         "theirs": f"{tp},{fn},{fp},{tn}",
-                        "ours": f"{ours['tp_all']},{ours['fn_all']},{ours['fp']},{ours['tn']}",
-                        "their_sensitivity": wilson(tp, tp + fn),
+                        "ours": ",".join(str(ours[key]) for key in ("tp", "fn", "fp", "tn")),
+                        "their_sensitivity": rate(tp, tp + fn),
                         "sensitivity": ours["sensitivity_all"],
-                        "their_specificity": wilson(tn, tn + fp),
+                        "their_specificity": rate(tn, tn + fp),
                         "specificity": ours["specificity"],
                     }
                 )
-    return found_rows
+    return found
 
 
-def mcnemar(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
-    """``mcnemar``: exact tests on the same collisions, all speeds, every detector to the first."""
-    found_rows: list[Row] = []
-    for point in POINTS:
-        for name in names[1:]:
-            first = [o for t in by_speed.values() for o in countable(t[names[0], point])]
-            other = [o for t in by_speed.values() for o in countable(t[name, point])]
-            hits = [(a.delay is not None, b.delay is not None) for a, b in _paired(first, other)]
-            only, missed = hits.count((True, False)), hits.count((False, True))
-            n = only + missed
-            found_rows.append(
-                {
-                    "study": "mcnemar",
-                    "point": point,
-                    "first": names[0],
-                    "second": name,
-                    "collisions": len(hits),
-                    "only_first": only,
-                    "only_second": missed,
-                    "p": float(stats.binomtest(only, n).pvalue) if n else 1.0,
-                }
-            )
-    return found_rows
+def headline(found: Sequence[Row]) -> list[Row]:
+    """A row per operating point and speed, from 16 N m up.
 
-
-def _paired(first: Sequence[Outcome], second: Sequence[Outcome]) -> list[tuple[Outcome, Outcome]]:
-    """The same collisions, in the order in which they were judged."""
-    pairs = list(zip(first, second, strict=True))
-    assert all(a.collision.onset == b.collision.onset for a, b in pairs)
-    return pairs
-
-
-def outputs(by_speed: BySpeed, names: Sequence[str]) -> list[Row]:
-    """``output``: how a detector's output grows with the torque, and each collision's pair.
-
-    ``correlation`` is Spearman's between the achieved torque and the highest output.
+    The best detector is one for all cells: the one whose smallest rate over them is largest (then
+    the largest sum). ``met`` says whether both of its rates reach 0.98 and both of SVR-SRQ's reach
+    the dissertation's SVR in that cell.
     """
-    found_rows: list[Row] = []
-    for name in names:
-        for speed, tallies in by_speed.items():
-            own = tallies[name, HOURLY].outcomes
-            torque, peak = [o.collision.peak_tau for o in own], [o.peak for o in own]
-            steady = len(set(peak)) > 1
-            found_rows.append(
-                {
-                    "study": "output",
-                    "detector": name,
-                    "speed": speed,
-                    "correlation": float(stats.spearmanr(torque, peak)[0]) if steady else None,
-                    "torque_nm": " ".join(f"{x:.3g}" for x in torque),
-                    "output": " ".join(f"{x:.4g}" for x in peak),
-                }
-            )
-    return found_rows
+    by_name = groups(table_rows(found, "speed"), lambda row: str(row["detector"]))
+
+    def quality(name: str) -> tuple[float, float]:
+        rates = [value for row in by_name[name] for value in _values(row)]
+        return min(rates), sum(rates)
+
+    best = max(by_name, key=quality)
+    theirs = {
+        (r["threshold_a"], r["speed"]): (r["their_sensitivity"], r["their_specificity"])
+        for r in table_rows(found, "dissertation")
+        if r["detector"] == "srq-svr"
+    }
+    made = []
+    for number, row in enumerate(by_name[best]):
+        reached = min(_values(row)) >= GOAL
+        made.append(
+            {
+                "study": "headline",
+                "threshold_a": row["threshold_a"],
+                "speed": row["speed"],
+                "best": best,
+                "best_rates": "{:.3f} / {:.3f}".format(*_values(row)),
+            }
+        )
+        for name in (name for name in ("srq-svr", "srq-svr-plain") if name in by_name):
+            made[-1][name] = "{:.3f} / {:.3f}".format(*_values(by_name[name][number]))
+        cell = theirs.get((row["threshold_a"], row["speed"]))
+        if cell:
+            its = [one["value"] for one in cell]
+            made[-1]["dissertation"] = "{:.3f} / {:.3f}".format(*its)
+            ours = _values(by_name["srq-svr"][number])
+            reached &= ours[0] >= its[0] and ours[1] >= its[1]
+        made[-1]["met"] = bool(reached)
+    return made
+
+
+def _values(row: Row) -> tuple[float, float]:
+    """Sensitivity and specificity of a cell; 0 where nothing was judged."""
+    return row["sensitivity"]["value"] or 0.0, row["specificity"]["value"] or 0.0
+
+
+# -- as printed ------------------------------------------------------------------------------------
+
+
+def printed(found: Sequence[Row]) -> list[Row]:
+    """What is printed, in this order: speeds are columns, the headline comes last."""
+    compact: dict[str, Callable[[list[Row]], Row]] = {
+        "speed": _cells,
+        "hourly": _hourly,
+        "strata": _torques,
+    }
+    shown: list[Row] = []
+    for name, make in compact.items():
+        shown += [make(own) for own in groups(table_rows(found, name), _line).values()]
+    rest = [row for row in found if row["study"] not in (*compact, "headline")]
+    return shown + rest + table_rows(found, "headline")
+
+
+def _line(row: Row) -> str:
+    return str([row.get(key) for key in ("detector", "threshold_a", "point")])
+
+
+def _threshold(row: Row) -> str:
+    low, high, middle = row["threshold_low"], row["threshold_high"], f"{row['threshold']:.3g}"
+    return middle if low == high else f"{middle} [{low:.3g}, {high:.3g}]"
+
+
+def _cells(own: list[Row]) -> Row:
+    known = {key: own[0][key] for key in ("study", "detector", "threshold_a")}
+    speeds = {f"{r['speed']:g} %": "{:.3f} / {:.3f}".format(*_values(r)) for r in own}
+    return {**known, "threshold": _threshold(own[0]), "sensitivity / specificity": "", **speeds}
+
+
+def _hourly(own: list[Row]) -> Row:
+    """All speeds together, then tau98 by speed."""
+    whole = next(row for row in own if row["speed"] == 0)
+    return {
+        "study": "hourly",
+        "detector": whole["detector"],
+        "threshold": _threshold(whole),
+        "sensitivity": whole["sensitivity"],
+        "from 4 N m": whole["sensitivity_all"],
+        "median_ms": whole["delay_ms"]["median"],
+        "p95_ms": whole["delay_ms"]["p95"],
+        "alarms_per_hour": whole["false_alarms_per_hour"],
+        "hours": whole["hours"],
+        "tau98": "",
+        **{f"{row['speed']:g} %": row["tau98"] for row in own if row["speed"]},
+    }
+
+
+def _torques(own: list[Row]) -> Row:
+    """Found of all by torque, every speed together."""
+    by_torque = groups(own, lambda row: str(row["torque_nm"]))
+    kinds = {kind: _together(by_torque[kind]) for kind in sorted(by_torque, key=_low)}
+    return {"study": "strata", "detector": own[0]["detector"], "point": own[0]["point"], **kinds}
+
+
+def _together(own: Sequence[Row]) -> str:
+    """``found/all`` of some rates."""
+    rates = [row["sensitivity"] for row in own]
+    hits = sum(round((one["value"] or 0.0) * one["n"]) for one in rates)
+    return f"{hits}/{sum(one['n'] for one in rates)}"
+
+
+def draw(found: list[Row], figure: Figure) -> None:
+    """Sensitivity over the torque, tau98, delay, and the cells beside the dissertation's."""
+    (torque, least), (delay, cells) = figure.subplots(2, 2)
+    hourly = groups(table_rows(found, "hourly"), lambda row: str(row["detector"]))
+    strata = [row for row in table_rows(found, "strata") if row["point"] == HOURLY]
+    kinds = sorted({row["torque_nm"] for row in strata}, key=_low)
+    for k, (name, own) in enumerate(hourly.items()):
+        mine = groups([r for r in strata if r["detector"] == name], lambda r: str(r["torque_nm"]))
+        pairs = [_together(mine[kind]).split("/") for kind in kinds if kind in mine]
+        torque.plot(range(len(pairs)), [int(a) / int(b) for a, b in pairs], "o-", label=name, ms=3)
+        own = [row for row in own if row["speed"]]
+        speed, style = [row["speed"] for row in own], {"color": f"C{k}", "ms": 3}
+        least.plot(speed, [row["tau98"] or np.nan for row in own], "o-", **style)
+        for key, line in (("median", "o-"), ("p95", ":")):
+            delay.plot(speed, [row["delay_ms"][key] or np.nan for row in own], line, **style)
+    for name, own in groups(table_rows(found, "dissertation"), lambda r: r["detector"]).items():
+        x = [1 - row["specificity"]["value"] for row in own]
+        cells.plot(x, [row["sensitivity"]["value"] for row in own], "o", ms=5, label=name)
+        if name == "srq-svr":
+            x = [1 - row["their_specificity"]["value"] for row in own]
+            y = [row["their_sensitivity"]["value"] for row in own]
+            cells.plot(x, y, "kx", label="dissertation, SVR")
+    torque.set_xticks(range(len(kinds)), kinds, rotation=30)
+    torque.set(xlabel="achieved peak |tau_ext| over joints 1-4 [N m]", ylabel="sensitivity")
+    least.set(yscale="log", ylabel="torque above which 98 % are found [N m]")
+    delay.set(yscale="log", ylabel="delay [ms]: median, 95th percentile dotted")
+    for axis in (least, delay):
+        axis.set(xlabel="speed [% of the maximum]")
+    cells.set(xlabel="1 - specificity (motion cases)", ylabel="sensitivity, all collisions")
+    for axis in (torque, least, delay, cells):
+        axis.grid(alpha=0.3)
+    torque.legend(fontsize=7, framealpha=0.5)
+    cells.legend(fontsize=7)

@@ -6,11 +6,11 @@ STUDY = Study(
     "faults of a robot's samples: which are reported, how soon, and at what cost",
     {
         "samples": Part(
-            "faults.study",
+            "faults.samples",
             "faults of samples: which are seen, how soon, false alarms, and those not reported",
         ),
         "listen": Part(
-            "faults.live",
+            "faults.listen",
             "a log played by RTDE in real time and heard: losses, alarms, latency",
             alias="listen",
         ),

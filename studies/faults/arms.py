@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from studies.real_arms.arms import ARMS, available, nominal, recordings
-from studies.small_detector import thinned, trained
+from studies.real_arms.arms import ARMS, available, nominal, recordings, thinned
 from tauguard.datasets.plans import free_episodes, struck_episodes
-from tauguard.detectors import CollisionAlarm
+from tauguard.detectors import CollisionAlarm, make_detector, train
+from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.faults import UsualInput
 from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
 from tauguard.envs import Episode, simulate
@@ -20,6 +20,12 @@ from tauguard.traces.trace import Trace
 RATE = 500.0
 #: Of a real arm's collision-free logs every so many are left out of training.
 LEFT_OUT = 3
+
+
+def trained(traces: Sequence[Trace], rate: float, per_hour: float) -> CollisionAlarm:
+    """A detector that trains in seconds, from collision-free motion at ``rate`` [Hz]."""
+    own = [thinned(trace, rate) for trace in traces]
+    return train(make_detector("moving-thresholds"), own, nominal_design(), per_hour)
 
 
 @dataclass(frozen=True)

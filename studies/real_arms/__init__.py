@@ -10,10 +10,14 @@ from tauguard.report import Row, cell
 STUDY = Study(
     "logs of real arms: pushes found, delays and false alarms, beside three simple rules",
     {
-        "logs": Part(
-            "real_arms.study",
-            "logs of real arms: pushes found, delays and false alarms, beside three simple rules",
+        "pushes": Part(
+            "real_arms.pushes",
+            "pushes found, delays and false alarms in logs of real arms, beside three simple rules",
             alias="real_arm",
+        ),
+        "training": Part(
+            "real_arms.training",
+            "how many seconds of training an arm needs, real and simulated",
         ),
     },
 )

@@ -14,6 +14,7 @@ from tauguard.datasets.drives import DRIVES
 from tauguard.detectors import ArmModel, RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording
 from tauguard.models import pin_model
+from tauguard.traces import Trace
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,13 @@ ARMS = (
     ),
     ArmData("ur3", ("free",)),
 )
+
+
+def thinned(trace: Trace, rate: float) -> Trace:
+    """The samples that are left at ``rate`` [Hz], without truth."""
+    rows = slice(None, None, round(1 / (trace.dt * rate)))
+    signals = (trace.t[rows], trace.q[rows], trace.qd[rows], trace.current[rows])
+    return Trace(trace.joint_names, *signals)
 
 
 def folder() -> Path:

@@ -1,7 +1,7 @@
 """Real arms: false alarms and pushes found, beside three simple rules on the same logs.
 
 Each arm's collision-free logs are dealt into folds; a detector trained on the others judges each
-log, told what it carried if that is known. Logs with pushes are judged by a detector trained on all
+log, with its load if that is known. Logs with pushes are judged by a detector trained on all
 collision-free logs. A push is found by an alarm between 0.15 s before its start and the peak of its
 force. ``by chance`` is what the same alarms find when all are shifted by a random time.
 
@@ -9,18 +9,9 @@ The rules: ``plain observer``, thresholds of 1.5 times the largest residual of a
 with the gains of the preset and no friction; ``1 A`` and ``10 N m``, a fixed threshold on what the
 same calibration as ours leaves, in amperes at the motor and in torque at the joint.
 
-A second table trains with less: :mod:`~studies.real_arms.trained_with`.
-
-What is optimistic: the constants (:mod:`~tauguard.detectors.features.free_bound`,
-``src/regimes.hpp``) were chosen on these logs of all three real arms. Compared on them were: the
-observer's rate (20 and 30/s), the bound at rest (0.2 to 0.4 of the friction level), after motion
-(0.8 to 1.5, forgotten in 0.5 to 1 s, in full from 0.05 to 0.2 rad/s on), at a start (0.7 to 1.2),
-the bound in motion as a regression (its margin 1.25 to 2.2, its least value 0.4 to 0.8) and as a
-share of the inertial torque (eight settings), the baseline at rest (0.2 to 0.7 s, or a band, in
-five settings), the rule after an alarm (ten settings), the time until a slow joint is at rest (0.05
-to 0.2 s), the confirmation (30 and 40 ms), and the friction level (with and without the load).
-Pushes without a sensor were read off the residual. docs/notes/2026-11-23-real-arms.md lists what
-was compared since then for standing arms. A fresh arm does a little worse.
+What is optimistic: the constants of the bound were chosen on these logs of all three real arms, and
+pushes without a sensor were read off the residual. A fresh arm does a little worse.
+docs/notes/2026-11-23-real-arms.md lists what was compared.
 """
 
 from __future__ import annotations
@@ -33,15 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from studies.real_arms import trained_with
-from studies.real_arms.arms import (
-    ArmData,
-    Push,
-    available,
-    nominal,
-    pushes,
-    recordings,
-)
+from studies.real_arms.arms import ArmData, Push, available, nominal, pushes, recordings
 from tauguard.detectors import ArmModel, poisson_rate
 from tauguard.detectors.calibration.recording import Recording
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
@@ -69,8 +52,6 @@ NOTES = {
     "pushes": "found of pushes by an alarm from 0.15 s before the start to the peak of the force.",
     "false alarms": "per hour of collision-free logs that training has not seen; the plain "
     "observer is not judged in the 4 s that it learns from.",
-    "trained with": "false alarms in logs left out; median force at the tool that is found within "
-    "0.4 s, pushes added to those logs at moments and in directions drawn at random.",
 }
 
 
@@ -92,7 +73,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
         found.append({"study": "real arm", "log": "no logs: set TAUGUARD_DATA to their folder"})
     for arm in tqdm(arms, desc="arms", unit="arm", disable=None):
         found += arm_rows(arm, 6, 1 if quick else 6, np.random.default_rng(seed))
-    return found + trained_with.rows(quick, seed)
+    return found
 
 
 def arm_rows(arm: ArmData, folds: int, turns: int, rng: np.random.Generator) -> list[Row]:

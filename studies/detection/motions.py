@@ -1,8 +1,8 @@
-"""The judged collisions and the collision-free motion of the detection study, episode by episode.
+"""Simulated arms: their training slices, collisions of fixed severity, and collision-free motion.
 
-Severity is fixed: every speed has as many collisions in each stratum of achieved peak |tau_ext|
-over joints 1-4, so that hard blows cannot flatter a detector. Plans that found no target, or whose
-collision fell into another stratum, are drawn again with another seed until the strata are full.
+Every speed has as many collisions in each stratum of achieved peak |tau_ext| over joints 1-4, so
+that severe collisions cannot flatter a detector. Plans that found no target, or whose collision
+fell into another stratum, are drawn again with another seed until the strata are full.
 """
 
 from __future__ import annotations
@@ -16,15 +16,19 @@ import numpy as np
 from tauguard.datasets.plans import (
     BEGIN,
     KIND_CYCLE,
+    TRAINING_PAYLOADS,
     collision_plans,
     episode_seconds,
     free_episodes,
+    struck_episodes,
 )
 from tauguard.detectors.evaluation.events import detection_window
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.models import Mismatch
 from tauguard.traces import STRATA, Collision, Trace
 
+#: Percent of the maximum speed in the training slices.
+TRAINING_SPEEDS = (10.0, 30.0, 60.0, 20.0, 45.0)
 #: Percent of the joints' maximum speed that detectors are judged at.
 SPEEDS = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
 #: Payloads of the judged motions, none of them a training payload, unknown to the detector [g].
@@ -35,6 +39,9 @@ FORCES = (20.0, 200.0)
 FAINT, FAINT_FORCES = ((0.5, 1.0), (1.0, 2.0), (2.0, 4.0)), (2.0, 200.0)
 #: Collisions of one judged episode, and rounds of drawing again.
 GROUP, ROUNDS = 5, 8
+
+#: Streams of seeds: training, thresholds, judged motions.
+TRAIN, CALIBRATE, TEST = 11, 12, 13
 
 Stratum = tuple[float, float]
 Wish = tuple[str, Stratum]
@@ -49,8 +56,6 @@ class Conditions:
     payloads: tuple[float, ...] = PAYLOADS  #: gone through in turn [g]
     temperature: float | None = None  #: of the gears [degC]; None: drawn between 25 and 45
     scale: float = 1.0  #: of the mismatch between the arm and what is believed of it
-    timestep: float = 1e-3  #: [s]
-    without: tuple[str, ...] = ()  #: parts of the drives that are left out
     robot: str = "cura6"  #: a name or a file
     joints: int = 6  #: of the robot
     share: float = 1.0  #: of the payloads, torques and least forces that are for the CURA6-like arm
@@ -62,12 +67,11 @@ class Conditions:
         return replace(plain, **{n: self.scale * getattr(plain, n) for n in names})
 
     def applied(self, episode: Episode) -> Episode:
-        """``episode`` of this robot, at this temperature and time step."""
+        """``episode`` of this robot, at this temperature."""
         if self.temperature is not None:
             episode = replace(episode, temperature=self.temperature)
         return replace(
             episode,
-            timestep=self.timestep,
             arm=self.robot,
             payload_g=self.share * episode.payload_g,
             collisions=tuple(self._planned(plan) for plan in episode.collisions),
@@ -91,7 +95,30 @@ class Conditions:
 
     def simulated(self, episode: Episode) -> Trace:
         """``episode`` under these conditions."""
-        return simulate(self.applied(episode), without=self.without)
+        return simulate(self.applied(episode))
+
+
+@dataclass(frozen=True)
+class Training:
+    """How much one arm's detectors are trained with."""
+
+    slices: int = 15  #: with collisions, through the dissertation's payloads
+    collisions: int = 5  #: a slice
+    free: int = 20  #: collision-free slices
+    free_seconds: float = 40.0  #: of each
+
+    def traces(self, seed: int, arm: int, under: Conditions = Conditions()) -> list[Trace]:
+        """The slices of one arm."""
+        own, mismatch = stream(seed, TRAIN, arm), under.arm(arm)
+        speeds, payloads = TRAINING_SPEEDS, TRAINING_PAYLOADS
+        struck = struck_episodes(own, self.slices, self.collisions, speeds, payloads, mismatch)
+        free = free_episodes(own, self.free, self.free_seconds, speeds, payloads[::2], mismatch)
+        return [under.simulated(episode) for episode in [*struck, *free]]
+
+
+def stream(seed: int, *key: int) -> int:
+    """A seed of its own for every purpose, so that judged motions are never trained on."""
+    return int(np.random.SeedSequence([seed, *key]).generate_state(1)[0])
 
 
 @dataclass(frozen=True)
@@ -99,7 +126,6 @@ class Struck:
     """One judged episode with collisions."""
 
     arm: int  #: mismatch seed
-    payload_g: float
     trace: Trace
     kept: tuple[bool, ...]  #: which of the trace's collisions count, in their order
 
@@ -163,7 +189,7 @@ def struck_pool(
                 good = missing[wish] > 0 and _counts(collision, trace, under.forces(forces))
                 missing[wish] -= int(good)
                 kept.append(good)
-            yield Struck(arm, payload, trace, tuple(kept))
+            yield Struck(arm, trace, tuple(kept))
         if not sum(missing.values()):
             return
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.detection.pool import FORCES, PAYLOADS, Conditions, struck_pool
+from studies.detection.motions import FORCES, PAYLOADS, Conditions, struck_pool
 from tauguard.datasets.plans import BEGIN, collision_plans, episode_seconds
 from tauguard.detectors import CollisionAlarm
 from tauguard.detectors.diagnosis.aftermath import AFTER

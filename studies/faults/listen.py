@@ -10,7 +10,6 @@ import contextlib
 import multiprocessing
 import tempfile
 import time
-import tracemalloc
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import Connection
@@ -20,9 +19,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.small_detector import thinned, trained
+from studies.faults.arms import trained
+from studies.real_arms.arms import thinned
+from tauguard.datasets import read_log
+from tauguard.datasets.plans import free_episodes, struck_episodes
+from tauguard.detectors import load_model, save_model
+from tauguard.detectors.faults import FaultCheck
+from tauguard.detectors.faults.detection import detect_with_faults
+from tauguard.detectors.faults.monitor import Monitor
+from tauguard.detectors.faults.torques import TorqueCheck
+from tauguard.envs import simulate
+from tauguard.live import UrServer, UrStream, rtde
+from tauguard.live.packets import Packets
+from tauguard.live.session import listen
+from tauguard.models import Mismatch
 from tauguard.report import Row
 from tauguard.report import rate as share
+from tauguard.traces import write_mcap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,8 +46,8 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
-#: Samples a second: of UR's CB and e-Series; blows in the log of a full and of a quick run.
-RATES, BLOWS = (125.0, 500.0), (195, 3)
+#: Samples a second: of UR's CB and e-Series; collisions in the log of a full and of a quick run.
+RATES, COLLISIONS = (125.0, 500.0), (195, 3)
 #: Training: collision-free seconds, speeds [%], and false alarms an hour that it aims at.
 SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
 #: Samples of which each stage is timed.
@@ -45,14 +58,14 @@ ANSWERS = 120.0
 LEVELS = ("median", "p99", "p99_9", "p99_99", "max")
 
 NOTES = {
-    "listen": "a simulated arm with blows, played in real time, all rates at once. events: "
+    "listen": "a simulated arm with collisions, played in real time, all rates at once. events: "
     "lines about the connection. alike: share of the alarms of `detect` on the file that begin at "
     "the same sample. silent or late: stretches of fault that begin so, as other programs of the "
     "machine ran. Times in us from the "
     "packet's arrival to the answer.",
-    "stages": "one sample, us of this thread at the median and at p99.9, and what a call allocates "
-    "at most at a time and keeps, bytes. native: the work is C++; the rest is Python around it. "
-    "monitor does the work of the other three in one call; packet: RTDE bytes to arrays.",
+    "stages": "one sample, us of this thread at the median and at p99.9. native: the work is C++; "
+    "the rest is Python around it. monitor does the work of the other three in one call; packet: "
+    "RTDE bytes to arrays.",
 }
 
 
@@ -69,16 +82,11 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 def write_inputs(folder: Path, quick: bool, seed: int) -> None:
     """A log and a detector for each rate; the arm and its motions follow from the seed."""
-    from tauguard.datasets.plans import free_episodes, struck_episodes
-    from tauguard.detectors import save_model
-    from tauguard.envs import simulate
-    from tauguard.models import Mismatch
-    from tauguard.traces import write_mcap
 
     drawn = Mismatch(seed=2000 + seed)
     free = free_episodes(seed, EPISODES, SECONDS, SPEEDS, (0.0,), drawn)
     training = [simulate(episode) for episode in free]
-    (struck,) = struck_episodes(700 + seed, 1, BLOWS[quick], (40.0,), (0.0,), drawn)
+    (struck,) = struck_episodes(700 + seed, 1, COLLISIONS[quick], (40.0,), (0.0,), drawn)
     log = simulate(struck)
     for rate in RATES:
         write_mcap(folder / f"{rate:g}.mcap", thinned(log, rate))
@@ -87,17 +95,12 @@ def write_inputs(folder: Path, quick: bool, seed: int) -> None:
 
 def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
     """The detector and the log of a rate."""
-    from tauguard.datasets import read_log
-    from tauguard.detectors import load_model
 
     return load_model(folder / f"{rate:g}.skops"), read_log(folder / f"{rate:g}.mcap").trace
 
 
 def serve(folder: Path, rate: float, pipe: Connection) -> None:
     """Play the log: tell the port, and at the end how many packets were sent."""
-    from tauguard.datasets import read_log
-    from tauguard.live import UrServer
-    from tauguard.live.packets import Packets
 
     with UrServer(Packets.of(read_log(folder / f"{rate:g}.mcap").trace), 0) as server:
         pipe.send(server.port)
@@ -135,10 +138,6 @@ def received(pipe: Connection) -> int:
 
 def heard(folder: Path, rate: float) -> Row:
     """Listen to the played log."""
-    from tauguard.detectors.faults.detection import detect_with_faults
-    from tauguard.detectors.faults.monitor import Monitor
-    from tauguard.live import UrStream
-    from tauguard.live.session import listen
 
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None
@@ -193,10 +192,6 @@ def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool])
 
 def stages(folder: Path, rate: float) -> list[Row]:
     """What a sample costs, stage by stage, on the log's beginning."""
-    from tauguard.detectors.faults import FaultCheck
-    from tauguard.detectors.faults.monitor import Monitor
-    from tauguard.detectors.faults.torques import TorqueCheck
-    from tauguard.live import rtde
 
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None
@@ -223,9 +218,7 @@ def stages(folder: Path, rate: float) -> list[Row]:
         "monitor": ("these three in one call", lambda k: monitor.step(t[k], *rows[k])),
     }
     return [
-        {"study": "stages", "stage": name, "native": native, "samples": count}
-        | timed(call, count // 2)
-        | allocated(call, range(count // 2, count))
+        {"study": "stages", "stage": name, "native": native, "samples": count} | timed(call, count)
         for name, (native, call) in calls.items()
     ]
 
@@ -239,23 +232,6 @@ def timed(call: Callable[[int], object], count: int) -> Row:
         spent[k] = time.thread_time_ns() - begin
     median, tail = np.percentile(spent / 1e3, (50, 99.9))
     return {"p50 [us]": float(median), "p99.9 [us]": float(tail)}
-
-
-def allocated(call: Callable[[int], object], numbers: range) -> Row:
-    """Bytes that Python and NumPy take during a call at the median, and keep of it."""
-    peaks = np.empty(len(numbers))
-    tracemalloc.start()
-    try:
-        begin, _ = tracemalloc.get_traced_memory()
-        for row, k in enumerate(numbers):
-            before, _ = tracemalloc.get_traced_memory()
-            tracemalloc.reset_peak()
-            call(k)
-            peaks[row] = tracemalloc.get_traced_memory()[1] - before
-        end, _ = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    return {"taken [bytes]": float(np.median(peaks)), "kept [bytes]": (end - begin) / len(numbers)}
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

@@ -14,9 +14,7 @@ drawn by the seed, and nothing was chosen on them but that a load of training is
 
 from __future__ import annotations
 
-import gc
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -24,7 +22,6 @@ import numpy as np
 from tqdm import tqdm
 
 from studies.faults.arms import ArmLogs, arms
-from tauguard.arrays import Array
 from tauguard.detectors.faults.monitor import COLLISION, FREE, Monitor
 from tauguard.detectors.faults.spans import Spans
 from tauguard.live.lateness import Lateness
@@ -50,8 +47,6 @@ NOTES = {
     "sample. silent_s: the answer is free. missed: collisions within faults with no answer but "
     "free; of_struck: collisions that the same stretch without the fault finds there. found_after: "
     "share of its later collisions that are found after the recovery.",
-    "loop": "microseconds from sample to answer, calls taken in turn on the longest log; Python "
-    "around native parts. Other programs of the machine are in the tail.",
     "another arm": "one arm's samples given to another's model.",
 }
 
@@ -158,7 +153,6 @@ def measure(quick: bool, seed: int) -> list[Row]:
     known: list[ArmLogs] = []
     for tested in arms(quick, seed):
         known.append(tested)
-        rows += loop(tested)
         rows += [clean(tested, name, trace) for name, trace in tested.logs.items()]
         for name in tqdm(FAULTS, desc=tested.name, disable=None, leave=False):
             tally = Tally()
@@ -207,38 +201,6 @@ def clean(tested: ArmLogs, name: str, trace: Trace) -> Row:
         "alarms": len(found.starts),
         "alarms_of_detect": int(np.sum(np.diff(batch.astype(int), prepend=0) > 0)),
     }
-
-
-def loop(tested: ArmLogs) -> list[Row]:
-    """Microseconds from a sample to its answer: the monitor, and the alarm inside it alone."""
-    assert tested.alarm.inputs is not None
-    trace = max(tested.logs.values(), key=lambda one: len(one.t))
-    monitor, stream = Monitor(tested.alarm, tested.alarm.inputs), tested.alarm.stream()
-    calls: dict[str, Callable[[float, Array, Array, Array], object]] = {
-        "monitor": monitor.step,
-        "alarm alone": lambda _, q, qd, current: stream.step(q, qd, current),
-    }
-    times: dict[str, list[int]] = {name: [] for name in calls}
-    gc.disable()  # as `listen` does
-    try:
-        for row in zip(trace.t.tolist(), trace.q, trace.qd, trace.current, strict=True):
-            for name, call in calls.items():
-                began = time.perf_counter_ns()
-                call(*row)
-                times[name].append(time.perf_counter_ns() - began)
-    finally:
-        gc.enable()
-    return [
-        {
-            "study": "loop",
-            "arm": tested.name,
-            "call": name,
-            "samples": len(own),
-            "detector": tested.alarm.detector.name,
-        }
-        | {f"p{q}_us": float(np.percentile(own, q)) / 1e3 for q in (50, 99, 99.9, 99.99)}
-        for name, own in times.items()
-    ]
 
 
 def others(known: Sequence[ArmLogs]) -> list[Row]:

@@ -1,0 +1,218 @@
+"""Detectors of one arm at operating points: training, thresholds, and what their alarms say.
+
+Hours of motion at 1 kHz do not fit the memory: an episode is simulated, scored by every detector,
+reduced to alarms at the operating points, and forgotten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from studies.detection.motions import CALIBRATE, Conditions, Struck, Training, free_pool, stream
+from tauguard.arrays import Array
+from tauguard.datasets.plans import BEGIN, TRAINING_PAYLOADS
+from tauguard.detectors import (
+    CollisionAlarm,
+    FittedDetector,
+    FreeScores,
+    find_alarms,
+    make_detector,
+    match,
+)
+from tauguard.detectors.calibration.nominal import nominal_design
+from tauguard.detectors.thresholds.free_scores import speed_levels
+from tauguard.detectors.thresholds.law import threshold_for_rate
+from tauguard.detectors.thresholds.rates import tail_level
+from tauguard.envs import simulate
+from tauguard.traces import Collision, Trace
+
+#: The current-predicting network, whose specificity sets every detector's first two thresholds.
+NETWORK = "current-network"
+#: The dissertation's thresholds on the network's residual current [A].
+AMPERES = (1.6, 2.0)
+#: The third operating point: a rate of false alarms.
+HOURLY = "hourly"
+#: Fraction of the cases that are the tail, which is extrapolated to rarer ones.
+CASE_TAIL = 0.1
+
+#: Collision-free scores: by detector, an episode each.
+Free = Mapping[str, Sequence[FreeScores]]
+
+
+@dataclass(frozen=True)
+class Operated:
+    """A trained detector of one arm and its alarm at every operating point."""
+
+    detector: FittedDetector
+    alarms: Mapping[str, CollisionAlarm]
+
+    @property
+    def thresholds(self) -> dict[str, float]:
+        """By operating point."""
+        return {point: alarm.threshold for point, alarm in self.alarms.items()}
+
+    def sustained(self, trace: Trace) -> dict[str, Array]:
+        """Scores as every point's alarm compares them, (T,); -inf until all have settled."""
+        score, early = self.detector.scores(trace), trace.t - trace.t[0] < BEGIN
+        levels = {point: alarm.sustained(trace, score) for point, alarm in self.alarms.items()}
+        for level in levels.values():
+            level[early] = -np.inf
+        return levels
+
+
+Fleet = Mapping[str, Operated]
+
+
+def trained(
+    seed: int, arm: int, names: Sequence[str], training: Training, under: Conditions
+) -> dict[str, FittedDetector]:
+    """The detectors of one arm, trained on its slices."""
+    traces, robot = training.traces(seed, arm, under), nominal_design(under.robot)
+    return {name: make_detector(name).fit(traces, robot) for name in names}
+
+
+def free_scores(detectors: Mapping[str, FittedDetector], trace: Trace) -> Free:
+    """Every detector's scores over a collision-free trace."""
+    plain = {name: CollisionAlarm(detector, np.inf) for name, detector in detectors.items()}
+    return {name: [FreeScores.of(alarm, trace)] for name, alarm in plain.items()}
+
+
+def joined(parts: Sequence[Free]) -> Free:
+    """All episodes of several traces, by detector."""
+    return {name: [one for part in parts for one in part[name]] for name in parts[0]}
+
+
+def calibration(
+    seed: int, arm: int, detectors: Mapping[str, FittedDetector], speed: float, hours: float
+) -> Free:
+    """Scores of the arm's collision-free motion with the training payloads."""
+    under = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
+    pool = free_pool(stream(seed, CALIBRATE), speed, (arm,), hours, under)
+    return joined([free_scores(detectors, simulate(episode)) for _, episode in pool])
+
+
+def expected(scores: Sequence[FreeScores], threshold: float) -> float:
+    """The fraction of cases expected above ``threshold``: that of N seen, Jeffreys' prior."""
+    cases = np.concatenate([one.cases() for one in scores])
+    return (float(np.sum(cases > threshold)) + 0.5) / (len(cases) + 1)
+
+
+def at_fraction(scores: Sequence[FreeScores], fraction: float) -> float:
+    """The threshold that a ``fraction`` of the cases is expected to exceed, along their tail."""
+    ordered = np.sort(np.concatenate([one.cases() for one in scores]))[::-1]
+    return tail_level(ordered, fraction * len(ordered), max(2, round(CASE_TAIL * len(ordered))))
+
+
+def operated(
+    detectors: Mapping[str, FittedDetector],
+    free: Mapping[float, Free],
+    network: str | None,
+    per_hour: float,
+) -> dict[str, Operated]:
+    """Detectors with their alarms at the operating points.
+
+    The network's first two thresholds are its residual current. Every other detector gets at each
+    the lowest threshold with which it is expected, at every speed, to be as specific as the
+    network: rows then compare speed by speed. The third is for a rate over all speeds, which the
+    normalised score spreads evenly. It bounds the other two, which ask for more alarms over all
+    speeds; at a single one that can leave a detector less specific than the network.
+
+    Args:
+        detectors: trained, by name.
+        free: scores of collision-free motion of their arm, by speed [%], then by detector.
+        network: the name whose specificity is matched; ``None``: the third point alone.
+        per_hour: false alarms that the third point aims at.
+    """
+    found = {}
+    for name, detector in detectors.items():
+        levels = speed_levels([one for own in free.values() for one in own[name]])
+        normal = {speed: [one.over(levels) for one in own[name]] for speed, own in free.items()}
+        hourly = threshold_for_rate([one for own in normal.values() for one in own], per_hour)
+        alarms = {}
+        for amperes in AMPERES if network else ():
+            if name == network:
+                alarms[str(amperes)] = CollisionAlarm(detector, amperes)
+                continue
+            matched = (
+                at_fraction(own, expected(free[speed][str(network)], amperes))
+                for speed, own in normal.items()
+            )
+            threshold = min(max(matched), hourly)
+            alarms[str(amperes)] = CollisionAlarm(detector, threshold, levels=levels)
+        alarms[HOURLY] = CollisionAlarm(detector, hourly, levels=levels)
+        found[name] = Operated(detector, alarms)
+    return found
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One collision and its delay [s], ``None`` where it was missed."""
+
+    collision: Collision
+    delay: float | None
+
+
+@dataclass
+class Tally:
+    """One detector at one operating point over some episodes."""
+
+    outcomes: list[Outcome] = field(default_factory=list)
+    cases: int = 0
+    false_cases: int = 0
+    false_alarms: int = 0
+    free_seconds: float = 0.0
+
+    def add(self, other: Tally) -> None:
+        """Take the other's episodes in."""
+        self.outcomes += other.outcomes
+        self.cases += other.cases
+        self.false_cases += other.false_cases
+        self.false_alarms += other.false_alarms
+        self.free_seconds += other.free_seconds
+
+
+#: By detector and operating point.
+Tallies = dict[tuple[str, str], Tally]
+
+
+def on_free(fleet: Fleet, trace: Trace) -> Tallies:
+    """False alarms and false cases of every detector at every point over a free trace."""
+    span, found = (float(trace.t[0]) + BEGIN, float(trace.t[-1])), {}
+    for name, own in fleet.items():
+        levels = own.sustained(trace)
+        for point, threshold in own.thresholds.items():
+            m = match(find_alarms(trace.t, levels[point] > threshold), (), span)
+            counts = (m.cases, m.false_cases, len(m.false_alarms), m.free_seconds)
+            found[name, point] = Tally([], *counts)
+    return found
+
+
+def on_struck(fleet: Fleet, struck: Struck) -> Tallies:
+    """Delays of the collisions that count; alarms elsewhere are judged on free motion alone."""
+    trace = struck.trace
+    assert trace.truth is not None
+    span, found = (float(trace.t[0]) + BEGIN, float(trace.t[-1])), {}
+    counted = {
+        collision.onset: kept
+        for collision, kept in zip(trace.truth.collisions, struck.kept, strict=True)
+    }
+    for name, own in fleet.items():
+        levels = own.sustained(trace)
+        for point, threshold in own.thresholds.items():
+            alarms = find_alarms(trace.t, levels[point] > threshold)
+            m = match(alarms, trace.truth.collisions, span)
+            pairs = zip(m.collisions, m.delays, strict=True)
+            found[name, point] = Tally([Outcome(c, d) for c, d in pairs if counted[c.onset]])
+    return found
+
+
+def merged(parts: Iterable[Tallies]) -> Tallies:
+    """All episodes' tallies together, detector by detector and point by point."""
+    total: Tallies = {}
+    for part in parts:
+        for key, tally in part.items():
+            total.setdefault(key, Tally()).add(tally)
+    return total

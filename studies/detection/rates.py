@@ -1,0 +1,190 @@
+"""False alarms asked for and counted on fresh arms, and what the same thresholds find.
+
+Every arm has its own detectors and thresholds from its own collision-free motion with the training
+payloads. What is counted is other motion of that arm, with payloads that were in no recording. One
+arm says little of a rate, since a bad moment returns in all of its motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from studies.detection.motions import (
+    CALIBRATE,
+    SPEEDS,
+    TEST,
+    Conditions,
+    Training,
+    free_pool,
+    stream,
+    struck_pool,
+)
+from studies.detection.operating import (
+    Operated,
+    Tallies,
+    Tally,
+    free_scores,
+    joined,
+    merged,
+    on_free,
+    on_struck,
+    trained,
+)
+from studies.framework import JobCache, Workers
+from tauguard.datasets.plans import TRAINING_PAYLOADS
+from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores, poisson_rate
+from tauguard.detectors.evaluation.metrics import HEADLINE, delay_figures
+from tauguard.detectors.thresholds.free_scores import speed_levels
+from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
+from tauguard.detectors.thresholds.law import threshold_for_rate
+from tauguard.envs import simulate
+from tauguard.report import Row, rate
+from tauguard.report.charts import errorbars
+from tauguard.traces import STRATA
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: How a threshold is chosen: expected to give a rate, or guaranteed not to exceed it.
+AIMED, GUARANTEED = "aimed at", "guaranteed"
+
+#: What the columns of the table mean.
+NOTES = {
+    "false alarms": "thresholds from each arm's calibration motion for asked false alarms per "
+    "hour: aimed at, as `train` chooses them, or guaranteed with 95 % confidence (conformal). "
+    "found: in these arms' fresh motion together, with its exact 95 % interval; kept: fraction of "
+    "the arms whose own interval reaches down to asked; refused: arms whose calibration is too "
+    "short for the guarantee. sensitivity from 16 N m up and of all from 4 N m up; delays of the "
+    "former [ms].",
+}
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is simulated."""
+
+    arms: int
+    names: tuple[str, ...]  #: of the detectors
+    asked: tuple[float, ...]  #: false alarms per hour
+    training: Training
+    calibration_hours: float  #: of each arm
+    hours: float  #: fresh, free of collisions, of each arm
+    per_stratum: int  #: judged collisions of a stratum at one speed
+    under: Conditions = field(default_factory=Conditions)
+
+
+NAMES = ("srq-svr", "moving-thresholds")
+FULL = Size(10, NAMES, (0.25, 1.0, 5.0), Training(), 0.75, 1.4, 1)
+LITTLE = Training(slices=4, free=4, free_seconds=20.0)
+QUICK = Size(1, NAMES, (5.0, 30.0), LITTLE, 0.05, 0.03, 0)
+
+
+def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
+    """Rows ``false alarms``: of every detector, rate asked for and way to choose a threshold."""
+    size = QUICK if quick else FULL
+    jobs = [(size, seed, 51_000 + 100 * seed + k) for k in range(size.arms)]
+    with Workers() as each:
+        cache = JobCache.of(keep, "false_alarms", seed, size)
+        arms = list(cache.over(each, "arm")(arm_tallies, jobs))
+    return [
+        {"study": "false alarms", "detector": name, "threshold": way, "asked": asked}
+        | _counted(arms, name, way, asked)
+        for name in size.names
+        for way in (AIMED, GUARANTEED)
+        for asked in size.asked
+    ]
+
+
+def _counted(arms: Sequence[Tallies], name: str, way: str, asked: float) -> Row:
+    tallies = [arm[name, point(way, asked)] for arm in arms if (name, point(way, asked)) in arm]
+    rates = [poisson_rate(tally.false_alarms, tally.free_seconds / 3600) for tally in tallies]
+    whole = merged({("", ""): tally} for tally in tallies).get(("", ""), Tally())
+    row = collisions(whole, 1.0)
+    return {
+        "found": row.pop("false_alarms_per_hour"),
+        "kept": rate(sum(one["low"] <= asked for one in rates), len(rates)),
+        "refused": len(arms) - len(tallies),
+        **row,
+    }
+
+
+def collisions(tally: Tally, share: float) -> Row:
+    """What an arm finds whose torques are ``share`` of the CURA6-like arm's."""
+    pairs = [(outcome.collision.peak_tau, outcome.delay) for outcome in tally.outcomes]
+    hard = [delay for torque, delay in pairs if torque >= share * HEADLINE]
+    every = [delay for torque, delay in pairs if torque >= share * STRATA[0][0]]
+    delays = delay_figures(hard)
+    return {
+        "sensitivity": rate(sum(d is not None for d in hard), len(hard)),
+        "all": rate(sum(d is not None for d in every), len(every)),
+        "median_ms": delays["median"],
+        "p95_ms": delays["p95"],
+        "false_alarms_per_hour": poisson_rate(tally.false_alarms, tally.free_seconds / 3600),
+    }
+
+
+def point(way: str, asked: float) -> str:
+    """The name of an operating point."""
+    return f"{way} {asked:g}/h"
+
+
+def arm_tallies(job: tuple[Size, int, int]) -> Tallies:
+    """Train, set thresholds and judge on the arm ``job[2]``, with the study's seed ``job[1]``."""
+    size, seed, arm = job
+    payloads = tuple(sorted(map(float, set(TRAINING_PAYLOADS))))
+    known, hours = replace(size.under, payloads=payloads), size.calibration_hours / len(SPEEDS)
+    detectors = trained(seed, arm, size.names, size.training, size.under)
+    pools = [free_pool(stream(seed, CALIBRATE, 9), v, (arm,), hours, known) for v in SPEEDS]
+    scores = joined([free_scores(detectors, simulate(e)) for pool in pools for _, e in pool])
+    fleet = {
+        name: Operated(detector, dict(_alarms(detector, scores[name], size.asked)))
+        for name, detector in detectors.items()
+    }
+    return merged(_judged(size, seed, arm, fleet))
+
+
+def _alarms(
+    detector: FittedDetector, scores: Sequence[FreeScores], asked: Sequence[float]
+) -> Iterator[tuple[str, CollisionAlarm]]:
+    levels = speed_levels(scores)
+    for per_hour in asked:
+        threshold = threshold_for_rate([one.over(levels) for one in scores], per_hour)
+        yield point(AIMED, per_hour), CollisionAlarm(detector, threshold, levels=levels)
+        try:
+            held = guaranteed_threshold(scores, per_hour).threshold
+        except ValueError:
+            continue  # too little motion: the row counts it
+        yield point(GUARANTEED, per_hour), CollisionAlarm(detector, held)
+
+
+def _judged(size: Size, seed: int, arm: int, fleet: dict[str, Operated]) -> Iterator[Tallies]:
+    fresh, struck = stream(seed, TEST, 9), stream(seed, TEST, 10, arm)
+    for k, speed in enumerate(SPEEDS):
+        for _, episode in free_pool(fresh, speed, (arm,), size.hours / len(SPEEDS), size.under):
+            yield on_free(fleet, simulate(episode))
+        if size.per_stratum:
+            pool = struck_pool(
+                struck, speed, (arm,), size.per_stratum, conditions=size.under, first=k
+            )
+            yield from (on_struck(fleet, one) for one in pool)
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Rate found, with its interval, over the rate asked for."""
+    axes = figure.add_subplot()
+    asked = sorted({row["asked"] for row in rows})
+    lines = list(dict.fromkeys((row["detector"], row["threshold"]) for row in rows))
+    for k, line in enumerate(lines):
+        own = [r for r in rows if (r["detector"], r["threshold"]) == line and r["found"]["hours"]]
+        at = [row["asked"] * 1.05 ** (k - len(lines) / 2) for row in own]
+        if own:
+            errorbars(
+                axes, at, (r["found"] for r in own), fmt="o", capsize=3, label=", ".join(line)
+            )
+    axes.plot(asked, asked, "k--", label="as asked")
+    axes.set(xscale="log", yscale="symlog", xlabel="false alarms per hour, asked for")
+    axes.set(ylabel="counted on fresh motion", title="False alarms of arms nothing was set on")
+    axes.legend()
+    axes.grid(alpha=0.3)
