@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds", "boosting")
 #: False alarms per hour that the thresholds aim at.
 ASKED = 1.0
-#: Robots of a run that names none.
-ROBOTS = "ur5,panda,xarm7"
+#: Robots of a run that names none: those of the package.
+ROBOTS = ",".join(NAMED)
 
 NOTES = {
     "robot": "One individual of each robot, thresholds from its own motion for one false alarm an "

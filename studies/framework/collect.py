@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -16,15 +16,8 @@ from tauguard.report import versions
 
 #: Quick parts at a time: one a core of the smallest machine.
 TOGETHER = 2
-#: What a file of rows holds beside them, and of which type.
-FIELDS: Mapping[str, type | tuple[type, ...]] = {
-    "name": str,
-    "quick": bool,
-    "machine": dict,
-    "versions": dict,
-    "seed": (int, type(None)),
-    "rows": list,
-}
+#: What a file of rows holds beside them.
+FIELDS = ("name", "quick", "machine", "versions", "seed", "rows")
 #: What it says of the machine.
 MACHINE = ("processor", "cores", "system")
 
@@ -102,26 +95,16 @@ def read_rows(path: Path, name: str) -> dict[str, Any]:
         found = json.loads(path.read_text())
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{path.name} is no JSON file ({error})") from None
-    wrong = _wrong(found, name)
-    if wrong:
-        raise ValueError(f"{path.name} is no file of this study: {wrong}")
-    rows: dict[str, Any] = found
-    return rows
-
-
-def _wrong(found: Any, name: str) -> str | None:
-    """What keeps ``found`` from being a file of the part ``name``."""
     if not isinstance(found, dict):
-        return "it holds no object"
-    for field, kind in FIELDS.items():
-        if field not in found:
-            return f"{field!r} is missing"
-        if not isinstance(found[field], kind):
-            return f"{field!r} is {found[field]!r:.40}"
-    if found["name"] != name:
-        return f"it says {found['name']!r:.40}"
-    if any(key not in found["machine"] for key in MACHINE):
-        return f"'machine' lacks one of {', '.join(MACHINE)}"
-    if not all(isinstance(row, dict) for row in found["rows"]):
-        return "a row is no object"
-    return None
+        wrong = "it holds no object"
+    elif not set(FIELDS) <= set(found):
+        wrong = f"{next(field for field in FIELDS if field not in found)!r} is missing"
+    elif found["name"] != name:
+        wrong = f"it says {found['name']!r:.40}"
+    elif not isinstance(found["machine"], dict) or not set(MACHINE) <= set(found["machine"]):
+        wrong = f"'machine' lacks one of {', '.join(MACHINE)}"
+    elif not isinstance(found["rows"], list) or not all(isinstance(r, dict) for r in found["rows"]):
+        wrong = "a row is no object"
+    else:
+        return found
+    raise ValueError(f"{path.name} is no file of this study: {wrong}")

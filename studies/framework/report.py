@@ -6,7 +6,7 @@ import json
 import math
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -28,6 +28,31 @@ BESIDE = ("hard-cases.json", "wrong.json")
 UNITS = (("s", 1e6), ("ms", 1e3), ("µs", 1.0), ("ns", 1e-3))
 #: Characters of a line about something that is missing.
 LENGTH = 300
+
+#: What the page says above its sections.
+NONE = "<p>None of these studies is in this report.</p>"
+BESIDE_WHOM = (
+    "<p>Time and error of each kernel and of a peer in the same run, one thread. "
+    "A ratio above 1 says that tauguard is faster.</p>"
+)
+DETECTIONS = (
+    "<p>Collisions of arms that no threshold was set on, each figure with its 95 % interval. "
+    "Simulated: thresholds that aim at 0.25 false alarms an hour. Real: pushes on a UR5.</p>"
+)
+FIGURES = (
+    "<p>Left is fast, low is right. The grey line joins what nothing else beats in both. "
+    "Circles are tauguard's, squares are peers of the same run.</p>"
+)
+RUNS = (
+    "<p>A quick run shows the form of the answers, a full run their size. Of all quick parts two "
+    "run at a time: their times are those of a busy machine. load: programs that wanted to run "
+    "when the part ended; above the number of cores its times are too long.</p>"
+)
+CASES = (
+    "<p>Named cases with exact answers, put to every library that is installed; "
+    "<code>tauguard hard-cases</code> runs them, on other libraries too. "
+    "Right answers of those asked:</p>"
+)
 
 T = TypeVar("T")
 
@@ -110,46 +135,35 @@ class Report:
     """The page of a folder: files that are damaged or of another program are named on it."""
 
     def __init__(self, folder: Path, failed: Mapping[str, str], missing: Missing) -> None:
-        """Read the files; ``failed`` says why a part has none, ``missing`` gets what is not shown.
-
-        Args:
-            folder: what :func:`~.collect.collect` has written, or anything else.
-            failed: by the parts' full names.
-            missing: for the page and the command.
-        """
+        """Read the files of ``folder``; ``failed`` says why a part has none."""
         self.folder, self.failed, self.missing = folder, failed, missing
-        self.parts = all_parts()
-        self.found = dict(self._read())
-
-    def _read(self) -> Iterable[tuple[str, Mapping[str, Any]]]:
+        self.parts, self.found = all_parts(), {}
         for name in self.parts:
-            path = self.folder / f"{name}.json"
-            if name in self.failed or not path.exists():
+            path = folder / f"{name}.json"
+            if name in failed or not path.exists():
                 continue
             try:
-                one = read_rows(path, name)
+                one = self.found[name] = read_rows(path, name)
             except (OSError, ValueError) as error:
-                self.missing.add(name, str(error))
+                missing.add(name, str(error))
                 continue
-            if not one["rows"]:
-                self.missing.add(name, "its file has no rows")
-            if "incomplete" in one:
-                self.missing.add(name, f"incomplete: {one['incomplete']}")
-            yield name, one
+            if not one["rows"] or "incomplete" in one:
+                missing.add(name, f"incomplete: {one.get('incomplete', 'its file has no rows')}")
 
     def write(self, cases: Sequence[Row], mistakes: str) -> Path:
         """Write ``index.html`` with these rows of the hard cases and links to mistakes (HTML)."""
         points, attempt = self._of_studies("points"), self.missing.attempt
-        bodies = {name: self._part(name, self.parts[name]) for name in self.found}
+        bodies = {f"Study: {name}": self._part(name, self.parts[name]) for name in self.found}
+        detections = tables(self._of_studies("detections"), {}) or NONE
         sections = {
             "How fast, how wrong, beside whom": attempt("first table", lambda: _beside(points), ""),
-            "Collisions found, false alarms": _detections(self._of_studies("detections")),
+            "Collisions found, false alarms": DETECTIONS + detections,
             "Error against microseconds": self._figures(points),
             "Asked and not reached": self._not_reached(),
             "Hard cases": attempt("hard cases", lambda: _cases(cases), "") if cases else "",
             "Mistakes to look at": mistakes,
             "What was measured": self._runs(),
-            **{f"Study: {name}": body for name, body in bodies.items()},
+            **bodies,
         }
         target = self.folder / "index.html"
         write_atomic(target, page("tauguard: speed against error", sections, self._lead()))
@@ -163,10 +177,9 @@ class Report:
             rows = [row for name in names for row in self.found[name]["rows"]]
             make = getattr(package(study), function, None)
             if make and rows:
-                nothing: list[Any] = []
-                found += self.missing.attempt(
-                    f"first page, {study}", partial(_listed, make, rows), nothing
-                )
+                empty: list[Any] = []
+                listed = partial(lambda call, own: list(call(own)), make, rows)
+                found += self.missing.attempt(f"first page, {study}", listed, empty)
         return found
 
     def _figures(self, points: Sequence[Point]) -> str:
@@ -175,27 +188,26 @@ class Report:
         for question, own in groups(shown, lambda point: point.question).items():
             code = self.missing.attempt(f"figure {question!r}", partial(svg, own), "")
             drawn.append(picture(code.encode(), "svg+xml", question) if code else "")
-        return (
-            "<p>Left is fast, low is right. The grey line joins what nothing else beats in both. "
-            "Circles are tauguard's, squares are peers of the same run.</p>"
-            f'<div class="figures">{"".join(drawn)}</div>'
-        )
+        return f'{FIGURES}<div class="figures">{"".join(drawn)}</div>'
 
     def _not_reached(self) -> str:
         """Every line of a summary whose figure was not reached."""
         judged = [
+            (name, row)
+            for name, one in self.found.items()
+            for row in one["rows"]
+            if "asked" in row and isinstance(row.get("met"), bool)
+        ]
+        lost = [
             {
                 "part": name,
                 "what": row.get("question") or row.get("claim") or row.get("what"),
                 "asked": row["asked"],
                 "measured": row.get("measured"),
-                "met": row["met"],
             }
-            for name, one in self.found.items()
-            for row in one["rows"]
-            if "asked" in row and isinstance(row.get("met"), bool)
+            for name, row in judged
+            if not row["met"]
         ]
-        lost = [{k: v for k, v in row.items() if k != "met"} for row in judged if not row["met"]]
         met = len(judged) - len(lost)
         return f"<p>{met} of {len(judged)} asked figures are met.</p>" + tables(lost, {})
 
@@ -206,7 +218,6 @@ class Report:
                 "question": self.parts[name].line,
                 "run": "quick" if one["quick"] else "full",
                 "seed": one["seed"],
-                "rows": len(one["rows"]),
                 "load": one["machine"].get("load"),
             }
             for name, one in self.found.items()
@@ -218,38 +229,34 @@ class Report:
         ]
         known = {f"{name}.json" for name in self.parts} | set(BESIDE)
         others = sorted(p.name for p in self.folder.glob("*.json") if p.name not in known)
-        lost, beside = ", ".join(absent), ", ".join(others)
         return (
-            "<p>A quick run shows the form of the answers, a full run their size. Of all quick "
-            "parts two run at a time: their times are those of a busy machine. load: programs that "
-            "wanted to run when the part ended; above the number of cores its times are too long."
-            "</p>"
+            RUNS
             + tables(runs, {})
-            + (f"<p>Not in this report: {escape(lost)}.</p>" if lost else "")
-            + (f"<p>Files of no study, not read: {escape(beside)}.</p>" if beside else "")
+            + (f"<p>Not in this report: {escape(', '.join(absent))}.</p>" if absent else "")
+            + (
+                f"<p>Files of no study, not read: {escape(', '.join(others))}.</p>"
+                if others
+                else ""
+            )
         )
 
     def _part(self, name: str, part: Part) -> str:
         one, module = self.found[name], part.load()
-        rows, nothing = one["rows"], "<p>Not shown: see the top of this page.</p>"
+        rows, empty = one["rows"], "<p>Not shown: see the top of this page.</p>"
         with warnings.catch_warnings(record=True) as raised:
             warnings.simplefilter("always", UserWarning)
             figure = self.missing.attempt(
                 f"figure of {name}",
                 lambda: picture(chart(module, rows), "png", f"figure of {name}"),
-                nothing,
+                empty,
             )
         for line in dict.fromkeys(str(warning.message) for warning in raised):
             self.missing.add(f"figure of {name}", line)  # matplotlib draws an empty panel
         text = self.missing.attempt(
-            f"tables of {name}", lambda: tables(printed(module, rows), module.NOTES), nothing
+            f"tables of {name}", lambda: tables(printed(module, rows), module.NOTES), empty
         )
-        run = f"{'quick' if one['quick'] else 'full'} run, seed {one['seed']}"
-        stopped = f"; incomplete: {one['incomplete']}" if "incomplete" in one else ""
-        return (
-            f"<p>{escape(part.line)} ({escape(run + stopped)}).</p>"
-            f"<figure>{figure}</figure>" + folded("Tables", text)
-        )
+        run = f"{part.line} ({'quick' if one['quick'] else 'full'} run, seed {one['seed']})."
+        return f"<p>{escape(run)}</p><figure>{figure}</figure>" + folded("Tables", text)
 
     def _lead(self) -> str:
         """Machines and versions, a paragraph each, and what the page does not show."""
@@ -259,23 +266,12 @@ class Report:
             versions = ", ".join(f"{package} {v}" for package, v in one["versions"].items())
             text = f"{on['processor']}, {on['cores']} cores, {on['system']}: {versions}"
             machines.setdefault(text, []).append(name)
-        quick = {one["quick"] for one in self.found.values()}
-        kinds = " and ".join("quick" if one else "full" for one in sorted(quick))
-        many = len(machines) > 1
-        lines = [
-            f"<p>{escape(text + (' (' + ', '.join(names) + ')' if many else ''))}.</p>"
-            for text, names in machines.items()
-        ]
+        lines = [f"{len(self.found)} of {len(self.parts)} parts of studies."]
+        for text, names in machines.items():
+            lines.append(text + (f" ({', '.join(names)})." if len(machines) > 1 else "."))
         items = "".join(f"<li>{escape(line)}</li>" for line in self.missing.lines)
         absent = f'<div class="no"><p>Not shown, or not whole:</p><ul>{items}</ul></div>'
-        return (
-            f"<p>{len(self.found)} of {len(self.parts)} parts of studies, {kinds} runs. "
-            "Every time stands beside its error.</p>" + "".join(lines) + (absent if items else "")
-        )
-
-
-def _listed(make: Callable[[list[Row]], Iterable[Any]], rows: list[Row]) -> list[Any]:
-    return list(make(rows))
+        return "".join(f"<p>{escape(line)}</p>" for line in lines) + (absent if items else "")
 
 
 def time_text(us: float) -> str:
@@ -302,33 +298,19 @@ def _beside(points: Sequence[Point]) -> str:
         for peer in own
         if peer.role == "peer" and peer.error_text
     ]
-    return (
-        "<p>Time and error of each kernel and of a peer in the same run, one thread. "
-        "A ratio above 1 says that tauguard is faster.</p>"
-        + (tables(lines, {}) or "<p>None of these studies is in this report.</p>")
-    )
-
-
-def _detections(lines: Sequence[Row]) -> str:
-    return (
-        "<p>Collisions of arms that no threshold was set on, each figure with its 95 % interval. "
-        "Simulated: thresholds that aim at 0.25 false alarms an hour. Real: pushes on a UR5.</p>"
-        + (tables(lines, {}) or "<p>None of these studies is in this report.</p>")
-    )
+    return BESIDE_WHOM + (tables(lines, {}) or NONE)
 
 
 def _cases(rows: Sequence[Row]) -> str:
     from tauguard.hard_cases.verdicts import by_library
 
-    full = ("case", "library", "expected", "answer", "right", "why", "origin")
     columns = ("case", "expected", "answer", "why", "explained")
     wrong = [row for row in rows if not row["right"] and row["library"] == "tauguard"]
     ours = tables([{key: row[key] for key in columns} for row in wrong], {})
+    every = [{k: row[k] for k in ("library", *columns[:-1], "right", "origin")} for row in rows]
     return (
-        "<p>Named cases with exact answers, put to every library that is installed; "
-        "<code>tauguard hard-cases</code> runs them, on other libraries too. "
-        "Right answers of those asked:</p>"
+        CASES
         + tables(by_library(rows), {})
         + (f"<p>What tauguard answers wrongly:</p>{ours}" if wrong else "")
-        + folded(f"All {len(rows)} answers", tables([{k: r[k] for k in full} for r in rows], {}))
+        + folded(f"All {len(rows)} answers", tables(every, {}))
     )

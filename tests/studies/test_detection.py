@@ -24,13 +24,17 @@ def own_detector(tmp_path, monkeypatch):
     return "mine:Size"
 
 
+@pytest.mark.slow
 def test_the_experiment_has_the_dissertations_cells_beside_a_detector_of_ones_own(
     bench, own_detector
 ):
     file, said = bench("detection", "--detector", own_detector)
     assert file["name"] == "detection-experiment"
-    tables = {name: [r for r in file["rows"] if r["study"] == name] for name in said.split()}
-    cells = {(row["detector"], row["speed"], row["threshold_a"]) for row in tables["speed:"[:-1]]}
+    assert "headline: " in said
+    tables = {}
+    for row in file["rows"]:
+        tables.setdefault(row["study"], []).append(row)
+    cells = {(row["detector"], row["speed"], row["threshold_a"]) for row in tables["speed"]}
     assert len(cells) == 4 * 6 * 2
     assert ("mine:Size", 60.0, 2.0) in cells
     printed = [row for row in tables["dissertation"] if row["detector"] == "srq-svr"]
@@ -57,13 +61,14 @@ def test_false_alarms_are_counted_beside_the_rate_asked_for(bench):
         assert few <= many
 
 
+@pytest.mark.slow
 def test_a_robot_is_judged_by_its_own_torques(bench):
-    file, _ = bench("detection", "--robot", "ur5")
+    file, _ = bench("detection", "--robot", "cura6-small")
     assert file["name"] == "detection-robots"
     names = [row["detector"] for row in file["rows"]]
     assert names == ["srq-svr", "moving-thresholds", "residual-thresholds"]
     ours = file["rows"][0]
-    assert 0 < ours["share"] <= 1
+    assert 0 < ours["share"] < 1
     assert ours["sensitivity"]["value"] > 0.8
 
 
@@ -79,6 +84,7 @@ def test_a_sample_online_has_the_score_of_the_batch(bench):
     assert fewer[-1]["us"]["median"] < full["us"]["median"]
 
 
+@pytest.mark.slow
 def test_diagnosis_names_links_kinds_and_forces(bench):
     file, _ = bench("diagnosis")
     tables = {row["study"] for row in file["rows"]}
