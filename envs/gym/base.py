@@ -11,23 +11,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import Array
 from tauguard.envs.gym.batch import Batch, StepMetrics
-from tauguard.envs.gym.compiled import (
-    CompiledScene,
-    compile_scene,
-    crossing,
-    opposite,
-    region_pressure,
-)
+from tauguard.envs.gym.compiled import CompiledScene, compile_scene, region_pressure
+from tauguard.envs.gym.placing import MOVES, STEP, StartsInContact, Usual
 from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import Picture
-from tauguard.envs.gym.settings import Settings, one_of
-from tauguard.models import BodyProxy, Person, Scene
+from tauguard.envs.gym.settings import PERSON, Settings, one_of
+from tauguard.models import Scene
 
 #: Why a diverged episode ended.
 DIVERGED_REASON = (
     "diverged: a position is not finite or a speed beyond 1000; a smaller timestep would hold"
 )
 RENDER_MODES = ("rgb_array", "human")
+#: Value of :attr:`StepMetrics.diverged` where the force is what cannot be.
+IMPOSSIBLE = 2
+#: Beginnings of an episode that are drawn until the arm touches nothing.
+BEGINNINGS = 20
+#: Seeds of the beginnings by which a scene is arranged.
+ARRANGED = 6
 
 
 class Outcome(NamedTuple):
@@ -39,7 +40,7 @@ class Outcome(NamedTuple):
     terminated: Any = False
 
 
-class Task:
+class Task(Usual):
     """What is to be done: where an episode starts, what a step is worth, when it is over."""
 
     #: Keywords that differ from those of :class:`tauguard.envs.gym.settings.Settings`.
@@ -59,16 +60,6 @@ class Task:
         #: What :meth:`score` remembers from one step to the next, a number a copy.
         self.memory = np.zeros(batch.rows)
 
-    @classmethod
-    def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
-        """Where a body region goes that was asked for by name."""
-        return crossing(region, bare, reach)
-
-    @classmethod
-    def person(cls, bare: Scene, reach: float) -> Person:
-        """Where "person" stands."""
-        return opposite(bare, reach)
-
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Begin an episode of copy ``i``; the last thing it does is :meth:`Batch.start`."""
         raise NotImplementedError
@@ -81,6 +72,19 @@ class Task:
             memory: what the last step, or :meth:`start`, left.
         """
         raise NotImplementedError
+
+    def begin(self, i: int, rng: np.random.Generator) -> None:
+        """Begin an episode of copy ``i`` in which the arm touches nothing at first.
+
+        Raises:
+            StartsInContact: no such beginning was found.
+        """
+        for _ in range(BEGINNINGS):
+            try:
+                return self.start(i, rng)
+            except StartsInContact as error:
+                refused = error
+        raise refused
 
     def after(self, i: int, rng: np.random.Generator) -> None:
         """What follows a success of copy ``i``, before its observation is shown."""
@@ -193,7 +197,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         check_options(options or {}, self.compiled.settings.randomize or {})
         super().reset(seed=seed)
         self.batch.draw(0, self.np_random, options or {})
-        self.task.start(0, self.np_random)
+        self.task.begin(0, self.np_random)
         self.batch.cost_sum[0] = 0.0
         self._begun = True
         if self.render_mode == "human":
@@ -219,7 +223,9 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         step = self._metrics()
         rewards, success, task.memory[0], over = task.score(step, task.memory.item(0))
         diverged = step.diverged != 0
-        reason = DIVERGED_REASON if diverged else task.ended if over else ""
+        reason = (
+            divergence(self.compiled, step.diverged) if diverged else task.ended if over else ""
+        )
         info = self._info(step, rewards, success, reason)
         if success and not diverged:
             task.after(0, self.np_random)
@@ -337,9 +343,45 @@ def build(
         if own and str(error).startswith("keyword "):
             raise ValueError(f"{error}, {', '.join(own)}") from None
         raise
-    compiled = compile_scene(settings, task_type.arms, task_type.proxy, task_type.person)
-    batch = Batch(compiled, rows)
-    return compiled, batch, task_type(batch, **own)
+    default, moved = frozenset(task_type.defaults) - keywords.keys(), dict[str, float]()
+    for _ in range(MOVES + 1):
+        compiled = compile_scene(settings, task_type, task_type.arms, moved, default)
+        batch = Batch(compiled, rows)
+        task = task_type(batch, **own)
+        overlap = _overlap(task)
+        if overlap is None or overlap.kind not in _movable(settings, default, task_type):
+            break
+        moved[overlap.kind] = moved.get(overlap.kind, 0.0) + STEP
+    if overlap is not None:
+        raise overlap
+    return compiled, batch, task
+
+
+def _overlap(task: Task) -> StartsInContact | None:
+    """What the arm overlaps in one of some beginnings."""
+    for seed in range(ARRANGED):
+        try:
+            task.begin(0, np.random.default_rng(seed))
+        except StartsInContact as error:
+            return error
+    return None
+
+
+def _movable(settings: Settings, default: frozenset[str], task_type: type[Task]) -> set[str]:
+    """Kinds of things that the environment places itself."""
+    kinds = set(default & {"table", "cloth"})
+    kinds |= {"person"} if PERSON in settings.obstacles else set()
+    return kinds | ({"second arm"} if task_type.arms == 2 else set())
+
+
+def divergence(compiled: CompiledScene, kind: float) -> str:
+    """Why a simulation is not to be believed any more, by :attr:`StepMetrics.diverged`."""
+    if kind != IMPOSSIBLE:
+        return DIVERGED_REASON
+    return (
+        f"diverged: a force beyond the {compiled.force_bound.total:.0f} N that the arm at its "
+        "largest speed can exert"
+    )
 
 
 def touches(batch: Batch, rows: int | slice) -> dict[str, Array]:

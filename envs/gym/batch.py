@@ -16,6 +16,7 @@ from tauguard.envs import _plant
 from tauguard.envs.gym.actions import Entry, action_scale, action_table, observation_table
 from tauguard.envs.gym.compiled import CompiledScene, RegionInfo
 from tauguard.envs.gym.people import REACHES, WALKS, anatomy, draw_script
+from tauguard.envs.gym.placing import check_clear
 from tauguard.envs.gym.randomization import Variant, draw, own_model, vary
 from tauguard.envs.gym.sensing import Sensing, listening
 from tauguard.envs.gym.settings import CONTROLS
@@ -40,7 +41,7 @@ class StepMetrics(NamedTuple):
     onset_time: Any  #: of the latest collision [s]; -1: none yet
     link: Any  #: of the largest force, 1-based; 0: none
     region: Any  #: of the largest ratio, 1-based; 0: none
-    diverged: Any  #: a position is not finite, or a speed beyond 1000
+    diverged: Any  #: 1: a position is not finite or a speed beyond 1000; 2: an impossible force
     speed_ratio: Any  #: of the fastest joint over its largest speed, after the action
 
 
@@ -130,6 +131,7 @@ class Batch:
         self.reaches = np.zeros((rows, 2, REACHES, _plant.REACH_WIDTH))
         self.walks = np.zeros((rows, WALKS, _plant.WALK_WIDTH))
         self._variants: list[Variant | None] = [None] * rows
+        self._scratch = mujoco.MjData(compiled.scene.model)
         self.datas = [mujoco.MjData(compiled.scene.model) for _ in range(rows)]
         self.plants = [self._make_plant(i) for i in range(rows)]
         self.sensing: list[Sensing] | None = None
@@ -185,9 +187,14 @@ class Batch:
             self.reaches[i], self.walks[i] = draw_script(person, rng)
 
     def start(self, i: int) -> None:
-        """Begin an episode of copy ``i`` from the state in its data."""
+        """Begin an episode of copy ``i`` from the state in its data.
+
+        Raises:
+            StartsInContact: the arm overlaps something.
+        """
         mujoco.mj_forward(self.model(i), self.datas[i])
         self.plants[i].reset()
+        check_clear(self.compiled.scene, self.model(i), self._scratch, self.datas[i])
         self.residual[i], self.alarm[i], self.contacts[i] = 0.0, False, 0
         self.alarm_delay[i], self.alarm_last[i] = -1.0, False
         if self.sensing is not None:
@@ -343,6 +350,8 @@ def _controls(compiled: CompiledScene) -> _plant.Controls:
         torque_limit=compiled.torque_limit.tolist(),
         low=compiled.joint_range[:, 0].tolist(),
         high=compiled.joint_range[:, 1].tolist(),
+        moving=compiled.force_bound.moving**2,
+        driven=compiled.force_bound.driven**2,
     )
 
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.envs.gym.placing import Layout, Usual
 from tauguard.envs.gym.randomization import check_names
-from tauguard.envs.gym.second_arm import add_second_arm, both_drives
+from tauguard.envs.gym.second_arm import PLACE, add_second_arm, both_drives
 from tauguard.envs.gym.settings import PERSON, Settings
 from tauguard.envs.plant import Gains
 from tauguard.models import (
+    BODY_REGIONS,
     BodyProxy,
     Drive,
     Mismatch,
@@ -22,6 +26,7 @@ from tauguard.models import (
     Scene,
     SceneSpec,
     compose,
+    derive,
     set_payload,
     without_losses,
 )
@@ -29,22 +34,11 @@ from tauguard.models.person import PersonPart
 
 #: A tool pose to reach lies at least this high and this far from the base's axis [m].
 LOWEST, NEAREST = 0.12, 0.2
-#: Where the body regions cross: position and direction in units of the arm's reach, span [reach].
-LINES = {
-    "hand": ((0.55, 0.0, 0.40), (0.0, 1.0, 0.0)),
-    "lower_arm": ((0.70, 0.10, 0.30), (1.0, 0.0, 0.0)),
-    "upper_arm": ((0.75, -0.10, 0.45), (1.0, 0.3, 0.0)),
-    "chest": ((0.95, 0.0, 0.45), (0.2, 1.0, 0.0)),
-}
-#: Any other region's.
-OTHER_LINE = ((0.85, 0.0, 0.50), (0.0, 1.0, 0.0))
 #: A region turns back this far from the middle of its line, in units of the reach.
 SPAN = 0.6
 #: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
 #: a torso at less.
 HAND_SPEED, BODY_SPEED = 0.8, 0.3
-#: A person's hips are this far from the arm [reach], at least so far [m].
-OPPOSITE, NEAREST_PERSON = 0.9, 0.6
 
 
 @dataclass(frozen=True)
@@ -66,6 +60,23 @@ class RegionInfo:
 
 
 @dataclass(frozen=True)
+class ForceBound:
+    """Largest force [N] of an arm against a contact of stiffness k, from the energy E in it.
+
+    F^2 / (2 k) = E: of the arm in motion at its largest speeds (a faster arm has more), and of its
+    drives, its load and what meets it. See :func:`tauguard.models.derive.largest_energy`.
+    """
+
+    moving: float
+    driven: float
+
+    @property
+    def total(self) -> float:
+        """At the arm's largest speeds [N]."""
+        return math.hypot(self.moving, self.driven)
+
+
+@dataclass(frozen=True)
 class CompiledScene:
     """A scene, and what the controller and the observation need to know about it."""
 
@@ -81,7 +92,8 @@ class CompiledScene:
     tools: tuple[tuple[int, int, int], ...]  #: an arm: site or -1, body, index of its first joint
     regions: tuple[RegionInfo, ...]
     person: Person | None
-    reach: float  #: from the first joint to the tool at most [m]
+    force_bound: ForceBound
+    layout: Layout  #: the arm's reach, and how things were placed
 
     @property
     def arms(self) -> int:
@@ -97,24 +109,21 @@ class CompiledScene:
         return np.array([self.scene.model.joint(name).id for name in self.scene.joint_names])
 
 
-Placing = Callable[[str, Scene, float], BodyProxy]
-Standing = Callable[[Scene, float], Person]
-
-
 def compile_scene(
     settings: Settings,
+    places: type[Usual] = Usual,
     arms: int = 1,
-    placing: Placing | None = None,
-    standing: Standing | None = None,
+    moved: Mapping[str, float] = MappingProxyType({}),
+    default: frozenset[str] = frozenset(),
 ) -> CompiledScene:
     """Compile what ``settings`` ask for, and nothing else.
 
     Args:
         settings: what is wanted.
+        places: where things go that were asked for by name.
         arms: 1 or 2.
-        placing: where a body region goes that was asked for by name (default: :func:`crossing`),
-            from its name, the bare arm's scene and the arm's reach [m].
-        standing: where "person" stands (default: :func:`opposite`), from the same.
+        moved: see :attr:`tauguard.envs.gym.placing.Layout.moved`.
+        default: which of "table" and "cloth" the user did not state: they are fitted to the arm.
 
     Raises:
         ValueError, FileNotFoundError: a robot that cannot be used.
@@ -134,12 +143,17 @@ def compile_scene(
         replace(spec, payload=False, labels=False, region_labels=False, cloth=None, mismatch=None),
         visuals=False,
     )
-    reach = arm_reach(bare)
-    proxies, person = _people(settings, bare, reach, placing or crossing, standing or opposite)
+    layout = Layout.of(bare, arm_reach(bare), moved)
+    proxies, person = _people(settings, bare, layout, places)
     check_names(settings.randomize or {}, person, settings.checkers)
-    scene = compose(replace(spec, proxies=proxies, person=person), visuals=False)
+    spec = replace(spec, proxies=proxies, person=person)
+    if settings.table is not None and "table" in default:
+        spec = replace(spec, table=layout.table(settings.table))
+    if settings.cloth is not None and "cloth" in default:
+        spec = replace(spec, cloth=layout.cloth(settings.cloth))
+    scene = compose(spec, visuals=False)
     if arms == 2:
-        scene = add_second_arm(scene)
+        scene = add_second_arm(scene, layout.second_arm(PLACE))
     if settings.ideal_drive:
         scene = without_losses(scene)
     if settings.payload_g > 0:
@@ -147,11 +161,11 @@ def compile_scene(
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
     # A diverged state must stay visible instead of starting again at the origin by itself.
     scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return _known(settings, scene, bare, reach, arms)
+    return _known(settings, scene, bare, layout, arms)
 
 
 def _people(
-    settings: Settings, bare: Scene, reach: float, placing: Placing, standing: Standing
+    settings: Settings, bare: Scene, layout: Layout, places: type[Usual]
 ) -> tuple[tuple[BodyProxy, ...], Person | None]:
     """The body regions and the person that were asked for, placed."""
     proxies: list[BodyProxy] = []
@@ -160,13 +174,16 @@ def _people(
         if isinstance(item, Person):
             person = item
         elif item == PERSON:
-            person = standing(bare, reach)
+            person = layout.person(places.person(bare, layout))
         else:
-            proxies.append(item if isinstance(item, BodyProxy) else placing(item, bare, reach))
+            by_hand = isinstance(item, BodyProxy)
+            proxies.append(item if by_hand else places.proxy(item, bare, layout))
     return tuple(proxies), person
 
 
-def _known(settings: Settings, scene: Scene, bare: Scene, reach: float, arms: int) -> CompiledScene:
+def _known(
+    settings: Settings, scene: Scene, bare: Scene, layout: Layout, arms: int
+) -> CompiledScene:
     model = scene.model
     joints = [model.joint(name).id for name in scene.joint_names]
     limited = model.jnt_limited[joints].astype(bool)[:, None]
@@ -188,27 +205,44 @@ def _known(settings: Settings, scene: Scene, bare: Scene, reach: float, arms: in
         torque_limit=np.tile(nominal.torque_limit, arms),
         max_speed=np.tile(speed, arms),
         tools=find_tools(scene, arms),
-        regions=_regions(scene, reach),
+        regions=_regions(scene, layout.reach),
         person=scene.spec.person,
-        reach=reach,
+        force_bound=_force_bound(settings, scene, bare, speed, arms),
+        layout=layout,
     )
+
+
+def _force_bound(
+    settings: Settings, scene: Scene, bare: Scene, speed: Array, arms: int
+) -> ForceBound:
+    """Of everything in the scene against its stiffest contact."""
+    limit = bare.facts.drive.torque_limit
+    moving, driven = derive.largest_energy(bare.model, bare.facts.joints, speed, limit)
+    moving, driven = arms * moving, arms * driven
+    grams = (settings.randomize or {}).get("payload_g")
+    load = max(settings.payload_g, 0.0 if grams is None else grams.ends()[1]) / 1000
+    reach = arm_reach(bare) + 0.2
+    moving += 0.5 * load * float((np.abs(speed) * reach).sum()) ** 2
+    regions = _regions(scene, 1.0)
+    if regions:
+        masses = scene.model.body_mass[[r.body for r in regions]]
+        speeds = [_fastest(r, scene.spec.person) for r in regions]
+        driven += float((0.5 * masses * np.square(speeds)).max())
+    stiffness = max([BODY_REGIONS["skull"].stiffness, *(r.stiffness for r in regions)])
+    return ForceBound(math.sqrt(2 * stiffness * moving), math.sqrt(2 * stiffness * driven))
+
+
+def _fastest(region: RegionInfo, person: Person | None) -> float:
+    """At which a region may meet the arm [m/s]."""
+    if region.mocap < 0 or person is None:
+        return region.speed
+    limb = region.name.endswith(("hand", "arm"))
+    return person.walk_speed + (person.hand_speed if limb else 0.0)
 
 
 def nominal_drive(settings: Settings, bare: Scene) -> Drive:
     """What the controller believes: the arm's nominal drive, with all friction that is known."""
     return bare.facts.drive if settings.ideal_drive else bare.facts.nominal
-
-
-def crossing(region: str, bare: Scene, reach: float) -> BodyProxy:
-    """A body region on its line through the workspace."""
-    position, direction = LINES.get(region, OTHER_LINE)
-    x, y, z = (reach * c for c in position)
-    return BodyProxy(region, position=(x, y, z), direction=direction)
-
-
-def opposite(bare: Scene, reach: float) -> Person:
-    """A person at work opposite the arm, within its reach."""
-    return Person(position=(max(OPPOSITE * reach, NEAREST_PERSON), 0.0))
 
 
 def _regions(scene: Scene, reach: float) -> tuple[RegionInfo, ...]:

@@ -12,7 +12,8 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv, Outcome, Task
 from tauguard.envs.gym.batch import Batch, Override, StepMetrics
-from tauguard.envs.gym.compiled import CompiledScene, find_tools, tool_position
+from tauguard.envs.gym.compiled import find_tools, tool_position
+from tauguard.envs.gym.placing import Layout
 from tauguard.envs.gym.settings import positive
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import BodyProxy, Person, Scene
@@ -21,6 +22,8 @@ from tauguard.models import BodyProxy, Person, Scene
 RUN_UP = 0.25
 #: The motion would have gone on this far [m].
 BEYOND = 0.25
+#: Upwards.
+UP = np.array([0.0, 0.0, 1.0])
 #: Radius of the ball that is hit, and of the last link around its tool, about [m].
 BALL, LINK = 0.07, 0.05
 #: The point of impact varies by this much across the swing [m], the speed by this fraction.
@@ -38,6 +41,8 @@ class React(Task):
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": ("chest",)}
     options: ClassVar[dict[str, Any]] = {"speed": 0.5, "approach": True}
+    #: An episode begins at the touch.
+    meets: ClassVar[bool] = True
     terms: ClassVar[tuple[str, ...]] = ("rest", "force", "speed")
     ended: ClassVar[str] = f"at rest without contact for {REST_TIME:g} s"
 
@@ -56,40 +61,39 @@ class React(Task):
             raise ValueError("obstacles (): expected a body region to strike, such as 'chest'")
         self._approach = bool(options["approach"])
         self._scratch = mujoco.MjData(batch.compiled.scene.model)
-        self._meeting = home_tool(batch.compiled)
+        scene, own = batch.compiled.scene, batch.compiled.layout.own
+        self._meeting, self._along = home_swing(scene, own)
+        self._across = np.array([np.cross(self._along, UP), UP])
+        scale = min(1.0, batch.compiled.layout.scale)
+        self._run_up, self._beyond = scale * RUN_UP, scale * BEYOND
         self.swing = [np.zeros((0, 0))] * batch.rows
 
     @classmethod
-    def proxy(cls, region: str, bare: Scene, reach: float) -> BodyProxy:
+    def proxy(cls, region: str, bare: Scene, layout: Layout) -> BodyProxy:
         """On the path of the swing, free to move along it."""
-        data = mujoco.MjData(bare.model)
-        data.qpos[bare.qpos_adr] = bare.home
-        mujoco.mj_kinematics(bare.model, data)
-        x, y, z = _bare_tool(bare, data)
-        return BodyProxy(region, (x, y + LINK + BALL, z), direction=(0.0, 1.0, 0.0), radius=BALL)
+        tool, along = home_swing(bare, layout.own)
+        x, y, z = (tool + LINK * along + BALL * along).tolist()
+        return BodyProxy(region, (x, y, z), direction=tuple(along.tolist()), radius=BALL)
 
     @classmethod
-    def person(cls, bare: Scene, reach: float) -> Person:
+    def person(cls, bare: Scene, layout: Layout) -> Person:
         """Stands with hanging arms, the chest on the path of the swing."""
-        data = mujoco.MjData(bare.model)
-        data.qpos[bare.qpos_adr] = bare.home
-        mujoco.mj_kinematics(bare.model, data)
-        x, y, z = _bare_tool(bare, data)
-        someone = Person(motion="still", facing=-np.pi / 2)
+        tool, along = home_swing(bare, layout.own)
+        facing = -np.pi / 2 if layout.own else float(np.arctan2(-along[1], -along[0]))
+        someone = Person(motion="still", facing=facing)
         thick = max(part.radius for part in someone.parts())
-        return replace(
-            someone, position=(x, y + LINK + thick), floor=float(z) - someone.chest_height()
-        )
+        x, y, z = (tool + LINK * along + thick * along).tolist()
+        return replace(someone, position=(x, y), floor=z - someone.chest_height())
 
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Swing into the region, up to the alarm (with a detector) or the first touch."""
         batch, period = self.batch, 1 / self.batch.compiled.settings.control_rate
         aside = rng.uniform(-ASIDE, ASIDE, 2)
-        begin = self._meeting + np.array([aside[0], -RUN_UP, aside[1]])
+        begin = self._meeting + aside @ self._across - self._run_up * self._along
         speed = self._speed * (1 + rng.uniform(-SPEED_SPREAD, SPEED_SPREAD))
         self.swing[i] = self._plan(begin, speed, period)
         batch.place(i, self.swing[i][0])
-        batch.target[i, 0] = begin + np.array([0.0, RUN_UP + BEYOND, 0.0])
+        batch.target[i, 0] = begin + (self._run_up + self._beyond) * self._along
         batch.send_person(i, rng)
         batch.start(i)
         self.memory[i] = 0.0
@@ -124,11 +128,11 @@ class React(Task):
         data.qpos[adr] = compiled.scene.home
         self._move(begin, 30)
         rows = [data.qpos[adr].copy()]
-        travelled, total = 0.0, RUN_UP + BEYOND
+        travelled, total = 0.0, self._run_up + self._beyond
         while travelled < total:
-            ramp = np.sqrt(2 * (speed**2 / (0.8 * RUN_UP)) * max(travelled, 1e-4))
+            ramp = np.sqrt(2 * (speed**2 / (0.8 * self._run_up)) * max(travelled, 1e-4))
             travelled += min(speed, ramp) * period
-            self._move(begin + np.array([0.0, travelled, 0.0]), 2)
+            self._move(begin + travelled * self._along, 2)
             rows.append(data.qpos[adr].copy())
         return np.array(rows)
 
@@ -159,17 +163,23 @@ class React(Task):
         return Outcome(rewards, success=over, memory=rested, terminated=over)
 
 
-def home_tool(compiled: CompiledScene) -> Array:
-    """Where the tool is at home [m], shape (3,)."""
-    data = mujoco.MjData(compiled.scene.model)
-    data.qpos[compiled.scene.qpos_adr] = compiled.scene.home
-    mujoco.mj_kinematics(compiled.scene.model, data)
-    return tool_position(compiled, data)
+def home_swing(scene: Scene, own: bool) -> tuple[Array, Array]:
+    """Where the tool is at home [m], and the direction of its swing, shapes (3,).
 
-
-def _bare_tool(bare: Scene, data: mujoco.MjData) -> Array:
-    site, body, _ = find_tools(bare, 1)[0]
-    return np.array(data.site_xpos[site] if site >= 0 else data.xpos[body])
+    The package's arm swings along y; any other horizontally, across the line from its first joint
+    to its tool, so that no other link is on the path.
+    """
+    model, data = scene.model, mujoco.MjData(scene.model)
+    data.qpos[scene.qpos_adr] = scene.home
+    mujoco.mj_kinematics(model, data)
+    site, body, _ = find_tools(scene, 1)[0]
+    tool = np.array(data.site_xpos[site] if site >= 0 else data.xpos[body])
+    along = np.array([0.0, 1.0, 0.0])
+    if not own:
+        x, y, _ = tool - data.xanchor[model.joint(scene.joint_names[0]).id]
+        size = float(np.hypot(x, y))
+        along = np.array([-y, x, 0.0]) / size if size > 1e-6 else along
+    return tool, along
 
 
 class ReactEnv(ArmEnv):

@@ -104,7 +104,7 @@ class Stage:
 
     def look(self, camera: Any) -> None:
         """From beside the first arm's front; two arms from the side, so that neither hides one."""
-        compiled, reach = self._world, self._world.reach
+        compiled, reach = self._world, self._world.layout.reach
         if compiled.person is not None:
             places = np.array([*_bases(compiled), [*compiled.person.position, 0.0]])
             x, y = places[:, :2].mean(axis=0)

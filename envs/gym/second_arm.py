@@ -7,19 +7,18 @@ from dataclasses import fields, replace
 import mujoco
 import numpy as np
 
+from tauguard.envs.gym.placing import SECOND
 from tauguard.models import Drive, Scene
 from tauguard.models.arm import ARM_BITS, OBSTACLE_BITS
 from tauguard.models.mjcf import SpecText
 from tauguard.models.obstacles import Springy, add_pairs
 from tauguard.models.scene import _add_label, lean_model, region_names
 
-#: Names of the second arm's parts begin with this.
-PREFIX = "arm2_"
 #: The second arm stands here in the first one's frame [m] and faces it.
 PLACE = (1.1, 0.0, 0.0)
 
 
-def add_second_arm(scene: Scene) -> Scene:
+def add_second_arm(scene: Scene, place: tuple[float, float, float] = PLACE) -> Scene:
     """The scene with a second, nominal arm of the same kind; joints and links of both in a row.
 
     The two arms can touch one another, and both can touch what stands around. The model is without
@@ -31,16 +30,16 @@ def add_second_arm(scene: Scene) -> Scene:
         other.delete(key)
     for key in list(whole.keys):
         whole.delete(key)
-    frame = whole.worldbody.add_frame(pos=PLACE, quat=[0, 0, 0, 1])
-    whole.attach(other, frame=frame, prefix=PREFIX)
+    frame = whole.worldbody.add_frame(pos=place, quat=[0, 0, 0, 1])
+    _set_bits(whole, other)
+    whole.attach(other, frame=frame, prefix=SECOND)
     first = {scene.model.body(int(b)).name for b in scene.link_bodies}
-    links = [PREFIX + scene.model.body(int(b)).name for b in scene.link_bodies]
-    _set_bits(whole)
+    links = [SECOND + scene.model.body(int(b)).name for b in scene.link_bodies]
     shapes = []
     for link in links:
         shapes += [g for g in whole.body(link).geoms if g.contype or g.conaffinity]
     for i, geom in enumerate(shapes):
-        geom.name = geom.name or f"{PREFIX}collision{i}"
+        geom.name = geom.name or f"{SECOND}collision{i}"
     if scene.spec.labels:
         # The links' sensors must follow one another: those of the regions come after them all.
         for sensor in [s for s in whole.sensors if s.name.startswith("contact_")]:
@@ -58,30 +57,26 @@ def add_second_arm(scene: Scene) -> Scene:
     return _located(scene, whole, links)
 
 
-def _set_bits(whole: mujoco.MjSpec) -> None:
-    """The second arm touches the first, and everything else touches both."""
+def _set_bits(whole: mujoco.MjSpec, other: mujoco.MjSpec) -> None:
+    """The second arm, its base too, touches the first; everything else touches both.
+
+    The base is part of the world: with the first arm's bits it would touch its own first link,
+    which cannot move away, and MuJoCo would hold it with 1e13 N.
+    """
     for geom in whole.geoms:
-        if not (geom.contype or geom.conaffinity):
-            continue
-        second = _of_second(geom.parent)
-        if second:
-            geom.contype, geom.conaffinity = OBSTACLE_BITS, ARM_BITS
-        elif geom.contype == OBSTACLE_BITS:
+        if geom.contype == OBSTACLE_BITS:
             geom.contype = geom.conaffinity = ARM_BITS | OBSTACLE_BITS
-
-
-def _of_second(body: mujoco.MjsBody) -> bool:
-    while body is not None and body.name != "world":
-        if body.name.startswith(PREFIX):
-            return True
-        body = body.parent
-    return False
+    for i, geom in enumerate(other.geoms):
+        if geom.contype or geom.conaffinity:
+            geom.contype, geom.conaffinity = OBSTACLE_BITS, ARM_BITS
+            if geom.parent.name == "world":
+                geom.name = geom.name or f"base{i}"
 
 
 def _located(scene: Scene, whole: mujoco.MjSpec, links: list[str]) -> Scene:
     text = SpecText(whole)
     model = lean_model(whole)
-    names = (*scene.joint_names, *(PREFIX + name for name in scene.joint_names))
+    names = (*scene.joint_names, *(SECOND + name for name in scene.joint_names))
     joints = [model.joint(name) for name in names]
     bodies = [scene.model.body(int(b)).name for b in scene.link_bodies] + links
     return replace(

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from tauguard.envs.gym.base import ArmEnv
+from tauguard.envs.gym.placing import Layout
 from tauguard.envs.gym.reach import Reach
 from tauguard.envs.gym.second_arm import PLACE
 from tauguard.envs.gym.vector import VectorArmEnv
@@ -25,10 +26,10 @@ class TwoArms(Reach):
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "table": BOARD}
 
     @classmethod
-    def person(cls, bare: Scene, reach: float) -> Person:
+    def person(cls, bare: Scene, layout: Layout) -> Person:
         """Beside the table, looking at it."""
-        x = PLACE[0] / 2
-        return Person(position=(x, -max(BESIDE * reach, 0.6)), facing=np.pi / 2)
+        x = layout.second_arm(PLACE)[0] / 2
+        return Person(position=(x, -max(BESIDE * layout.reach, 0.6)), facing=np.pi / 2)
 
 
 class TwoArmsEnv(ArmEnv):

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array, Bools
 from tauguard.envs.gym.base import (
-    DIVERGED_REASON,
     RENDER_MODES,
     Task,
     build,
+    divergence,
     frame_rate,
     make_spaces,
     touches,
@@ -120,7 +120,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
 
     def _begin(self, i: int, stated: Mapping[str, Any] = MappingProxyType({})) -> None:
         self.batch.draw(i, self._rngs[i], stated)
-        self.task.start(i, self._rngs[i])
+        self.task.begin(i, self._rngs[i])
         self.batch.cost_sum[i] = 0.0
         self._elapsed[i], self._over[i] = 0, False
 
@@ -201,7 +201,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
     def _infos(self, terms: dict[str, Array], success: Bools, mask: Bools) -> dict[str, Any]:
         batch, area, step = self.batch, self.compiled.settings.contact_area, self._metrics()
         reason = np.full(self.num_envs, "", dtype=object)
-        reason[step.diverged != 0] = DIVERGED_REASON
+        for i in np.flatnonzero(step.diverged):
+            reason[i] = divergence(self.compiled, step.diverged[i])
         infos: dict[str, Any] = {
             "time": step.time,
             "distance": step.distance,

@@ -46,6 +46,9 @@ struct Controls {
   std::vector<double> max_speed;     // [rad/s]
   std::vector<double> torque_limit;  // [N m]
   std::vector<double> low, high;     // ends of the joints' ranges [rad]
+  // Square of the largest force that the arm and what it meets can exert [N^2]: a part that grows
+  // with the square of the joints' speed over the largest, and one that does not.
+  double moving = INFINITY, driven = 0;
   Override override = Override::none;
   std::vector<double> override_speed;  // [rad/s]
   Command command;

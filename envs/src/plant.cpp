@@ -270,8 +270,11 @@ void bind_outputs(nb::module_& m) {
       .def(
           "__init__",
           [](Controls* self, int mode, double period, Numbers scale, Numbers centre,
-             Numbers max_speed, Numbers torque_limit, Numbers low, Numbers high) {
+             Numbers max_speed, Numbers torque_limit, Numbers low, Numbers high, double moving,
+             double driven) {
             new (self) Controls();
+            self->moving = moving;
+            self->driven = driven;
             self->low = std::move(low);
             self->high = std::move(high);
             self->mode = static_cast<Mode>(mode);
@@ -283,7 +286,7 @@ void bind_outputs(nb::module_& m) {
             self->torque_limit = std::move(torque_limit);
           },
           nb::kw_only(), "mode"_a, "period"_a, "scale"_a, "centre"_a, "max_speed"_a,
-          "torque_limit"_a, "low"_a, "high"_a);
+          "torque_limit"_a, "low"_a, "high"_a, "moving"_a, "driven"_a);
 }
 
 void bind_plant(nb::module_& m) {

@@ -47,6 +47,8 @@ class Plant {
     for (Region& r : around_.regions) r.touching = r.force = 0;
     count_ = 0;
     sound_ = true;
+    impossible_ = false;
+    fastest_ = 0;
   }
 
   // The same for an environment, after the data was forwarded too: the reference is where the arm
@@ -169,6 +171,8 @@ class Plant {
   std::int64_t count_ = 0;    // physics steps since the reset
   std::size_t row_ = 0;       // of the action or table
   bool sound_ = true;
+  bool impossible_ = false;  // unsound because of a force that the arm cannot exert
+  double fastest_ = 0;       // joint speed over the largest, after the last action
 
   template <class Visitor>
   void visit(Visitor&& each) {
@@ -180,7 +184,7 @@ class Plant {
     Contact& c = contact_;
     each(c.force), each(c.cost), each(c.ratio), each(c.region_force), each(c.link), each(c.region);
     each(c.onset), each(c.onset_time), each(c.last);
-    each(count_), each(sound_), each(controls.override);
+    each(count_), each(sound_), each(impossible_), each(fastest_), each(controls.override);
     Command& command = controls.command;
     each(command.servo), each(command.powered), each(command.brake);
     for (auto* row : {&command.origin, &command.speed, &command.feed, &controls.override_speed}) {
@@ -290,14 +294,33 @@ class Plant {
     if (around_.sensor_begin < 0) return;
     const std::size_t n = joints();
     double* tau = rows_.tau.data() + row_ * n;
+    const Contact before = contact_;
     read_links(around_.arms, physics_.sensors() + around_.sensor_begin,
                static_cast<double>(count_ - 1) * drives_.dt, contact_, tau,
                rows_.contact.data() + row_ * contact_width);
+    if (!possible()) {
+      contact_ = before;
+      sound_ = false;
+      impossible_ = true;
+      return;
+    }
     std::copy_n(tau, n, rows_.tau_ext.data());
     double* peak = rows_.tau_peak.data();
     for (std::size_t i = 0; i < n; ++i)
       if (std::fabs(tau[i]) > std::fabs(peak[i])) peak[i] = tau[i];
     read_regions(around_.regions, physics_.sensors(), drives_.dt, contact_, rows_.peak.data());
+  }
+
+  // Whether the arm can exert the largest force so far; a solver that fails reports any number.
+  bool possible() const {
+    const double squared = contact_.force * contact_.force;
+    if (squared <= controls.moving + controls.driven) return true;
+    double fastest = std::max(1.0, fastest_);
+    for (std::size_t k = 0; k <= row_; ++k)
+      for (std::size_t i = 0; i < joints(); ++i)
+        fastest =
+            std::max(fastest, std::fabs(rows_.qd.data()[k * joints() + i]) / controls.max_speed[i]);
+    return squared <= fastest * fastest * controls.moving + controls.driven;
   }
 
   // A region that has left its span comes back at its own speed: a hand that goes to and fro.
@@ -349,12 +372,12 @@ class Plant {
     m.onset_time = contact_.onset_time;
     m.link = contact_.link;
     m.region = contact_.region;
-    m.diverged = sound_ ? 0.0 : 1.0;
+    m.diverged = sound_ ? 0.0 : impossible_ ? 2.0 : 1.0;
     double fastest = 0.0;
     for (std::size_t i = 0; i < joints(); ++i)
       fastest = std::max(fastest,
                          std::fabs(physics_.qvel()[drives_.joints[i].dof]) / controls.max_speed[i]);
-    m.speed_ratio = std::isfinite(fastest) ? fastest : 0.0;
+    m.speed_ratio = fastest_ = std::isfinite(fastest) ? fastest : 0.0;
   }
 };
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 if TYPE_CHECKING:
-    from tauguard.models import Facts
+    from tauguard.models import Facts, Scene
 
 
 def command(
@@ -16,6 +16,9 @@ def command(
     /,
     download: bool = False,
     json: Path | None = None,
+    try_: Annotated[bool, tyro.conf.arg(name="try")] = False,
+    episodes: int = 10,
+    pictures: Path | None = None,
 ) -> None:
     """Print the description of an arm as tauguard simulates it; without a name, the names.
 
@@ -23,6 +26,10 @@ def command(
         robot: a name, an MJCF or URDF file, or a TOML file that describes a robot.
         download: fetch the model by mujoco-menagerie where it has not been fetched before.
         json: write the description as JSON.
+        try_: run episodes of every environment with the arm: what begins in contact, the largest
+            force and its bound, and what diverges. The exit code is 1 where something is wrong.
+        episodes: of each environment, with --try.
+        pictures: a PNG of the beginning of an episode in each environment, with --try.
     """
     from tauguard.envs.plant import Gains
     from tauguard.models import ROBOTS, SceneSpec, compose
@@ -47,10 +54,55 @@ def command(
     scene = compose(SceneSpec(arm=robot), visuals=False)
     gains = Gains.for_scene(scene)
     rows = table(scene.facts, gains)
-    print(text(scene.facts, rows))
+    print(text(scene.facts, rows, largest_force(scene)))
+    if try_ or pictures is not None:
+        run_trial(robot, episodes, pictures)
     if json is not None:
         sources = dict(scene.facts.sources)
         write_json(json, {"name": "robot", "robot": robot, "sources": sources, "rows": rows})
+
+
+def largest_force(scene: Scene) -> float:
+    """What the arm alone can exert on a skull, the stiffest body region [N]."""
+    from tauguard.models import BODY_REGIONS, derive
+
+    facts = scene.facts
+    energies = derive.largest_energy(
+        scene.model, facts.joints, facts.max_speed, facts.drive.torque_limit
+    )
+    return float((2 * BODY_REGIONS["skull"].stiffness * sum(energies)) ** 0.5)
+
+
+def run_trial(robot: str, episodes: int, pictures: Path | None) -> None:
+    """Print a line an environment.
+
+    Raises:
+        SystemExit: something is wrong.
+    """
+    from tauguard.envs.gym.trial import picture, try_arm
+
+    rows = try_arm(robot, episodes)
+    print()
+    print(f"{'environment':<22} episodes  begin in contact  largest force [N]  bound [N]  diverged")
+    for row in rows:
+        if row.refused:
+            print(f"{row.environment:<22} refused: {row.refused}")
+            continue
+        print(
+            f"{row.environment:<22} {row.episodes:>8}  {row.overlaps:>16}  {row.force:>17.0f}  "
+            f"{row.bound:>9.0f}  {row.diverged:>8}"
+            + "".join(f"  {kind} moved by {far:.2f} m" for kind, far in row.moved.items())
+        )
+    if pictures is not None:
+        import matplotlib.pyplot as plt
+        import numpy as np
+
+        shown = [picture(row.environment, robot) for row in rows if not row.refused]
+        if shown:
+            plt.imsave(pictures, np.concatenate(shown, axis=1))
+            print(f"wrote {pictures}")
+    if not all(row.passed for row in rows):
+        raise SystemExit(1)
 
 
 def names() -> str:
@@ -96,7 +148,7 @@ def table(facts: Facts, gains: object) -> list[dict[str, object]]:
     ]
 
 
-def text(facts: Facts, rows: list[dict[str, object]]) -> str:
+def text(facts: Facts, rows: list[dict[str, object]], bound: float) -> str:
     """The table and where its columns come from."""
     heads = list(rows[0])
     cells = [[_cell(row[head]) for head in heads] for row in rows]
@@ -104,6 +156,7 @@ def text(facts: Facts, rows: list[dict[str, object]]) -> str:
     lines = ["  ".join(h.rjust(w) for h, w in zip(heads, widths, strict=True))]
     lines += ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
     lines.append("")
+    lines.append(f"largest force against a skull, 150 N/mm: {bound:.0f} N")
     lines.append(f"tool: {facts.tool or 'origin of the last link'}")
     lines += [f"{part}: {source}" for part, source in sorted(facts.sources.items())]
     return "\n".join(lines)

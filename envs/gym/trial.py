@@ -1,0 +1,94 @@
+"""Whether an arm can be used in every environment: overlaps, forces and divergences of episodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+import tauguard  # noqa: F401  (registers the environments)
+from tauguard.environments import ENVIRONMENTS
+from tauguard.models import Robot
+
+#: Actions of an episode, the first half zero, the rest random.
+ACTIONS = 60
+
+
+@dataclass(frozen=True)
+class ArmTrial:
+    """What episodes of one environment came to."""
+
+    environment: str
+    episodes: int
+    overlaps: int  #: episodes that began in contact
+    force: float  #: largest on a link [N]
+    bound: float  #: largest that the arm can exert [N]
+    diverged: int  #: episodes
+    moved: dict[str, float]  #: what was placed farther from the arm, and by how much [m]
+    refused: str = ""  #: why there is no such environment
+
+    @property
+    def passed(self) -> bool:
+        """Nothing is wrong."""
+        return not (self.refused or self.overlaps or self.diverged) and self.force <= self.bound
+
+
+def try_arm(robot: str | Robot, episodes: int = 10, seed: int = 0) -> list[ArmTrial]:
+    """Run episodes of every environment with an arm.
+
+    Args:
+        robot: as the keyword ``robot`` of an environment.
+        episodes: of each environment.
+        seed: of the first episode.
+
+    Raises:
+        ValueError, FileNotFoundError: no arm at all.
+    """
+    return [_tried(name, robot, episodes, seed) for name in ENVIRONMENTS]
+
+
+def _tried(name: str, robot: str | Robot, episodes: int, seed: int) -> ArmTrial:
+    try:
+        env: Any = _made(name, robot)
+    except ValueError as error:
+        return ArmTrial(name, 0, 0, 0.0, 0.0, 0, {}, " ".join(str(error).split()))
+    overlaps = diverged = 0
+    force = 0.0
+    rng = np.random.default_rng(seed)
+    still = np.zeros(env.action_space.shape)
+    begins_by_contact = getattr(env.task, "meets", False)
+    for episode in range(episodes):
+        env.reset(seed=seed + episode)
+        for step in range(ACTIONS):
+            random = rng.uniform(-1, 1, still.shape)
+            *_, ended, cut, info = env.step(still if step < ACTIONS // 2 else random)
+            force = max(force, info["force"])
+            overlaps += step == 0 and info["force"] > 0 and not begins_by_contact
+            diverged += info["reason"].startswith("diverged")
+            if ended or cut:
+                break
+    compiled = env.compiled
+    env.close()
+    bound, moved = compiled.force_bound.total, dict(compiled.layout.moved)
+    return ArmTrial(name, episodes, overlaps, force, bound, diverged, moved)
+
+
+def picture(name: str, robot: str | Robot, seed: int = 0) -> NDArray[np.uint8]:
+    """The beginning of an episode, shape (480, 640, 3).
+
+    Raises:
+        ValueError: no such environment with this arm.
+        RuntimeError: there is nothing to draw with.
+    """
+    env = _made(name, robot, render_mode="rgb_array")
+    env.reset(seed=seed)
+    shown: NDArray[np.uint8] = env.render()
+    env.close()
+    return shown
+
+
+def _made(name: str, robot: str | Robot, **keywords: Any) -> Any:
+    return gymnasium.make(name, robot=robot, disable_env_checker=True, **keywords).unwrapped
