@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tauguard  # noqa: F401  (registers the environments)
-from tauguard.environments import ENVIRONMENTS
 from tauguard.models import Robot
 
 #: Actions of an episode, the first half zero, the rest random.
@@ -47,7 +46,8 @@ def try_arm(robot: str | Robot, episodes: int = 10, seed: int = 0) -> list[ArmTr
     Raises:
         ValueError, FileNotFoundError: no arm at all.
     """
-    return [_tried(name, robot, episodes, seed) for name in ENVIRONMENTS]
+    names = [name for name in gymnasium.registry if name.startswith("tauguard/")]
+    return [_tried(name, robot, episodes, seed) for name in names]
 
 
 def _tried(name: str, robot: str | Robot, episodes: int, seed: int) -> ArmTrial:
