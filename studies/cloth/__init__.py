@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -13,80 +12,78 @@ STUDY = Study(
     "continuous collision detection of deforming meshes: time, misses and false hits",
     {
         "frames": Part(
-            "cloth.study",
-            "whole frames of deforming meshes: methods, volumes, front, growth, beside ipctk",
+            "cloth.frames", "whole frames: ab2pf, ICCD, DNF, SCD, VCD and ipctk, time and misses"
+        ),
+        "volumes": Part("cloth.volumes", "kinds of bounding volumes; growth to 10^6 triangles"),
+        "queries": Part("cloth.queries", "single queries: candidates of a frame, public labels"),
+        "adversarial": Part(
+            "cloth.adversarial", "queries near every degeneracy, decided again by exact integers"
         ),
     },
 )
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """Single queries, hard queries, and frames."""
+    """Single queries, labelled queries, and frames."""
     yield from _queries(rows)
-    yield from _hard_queries(rows)
+    yield from _labelled(rows)
     yield from _frames(rows)
 
 
-def _count(rates: Sequence[Any]) -> tuple[str, str]:
-    known = [rate for rate in rates if isinstance(rate, Mapping) and rate["n"]]
-    return f"{round(sum(r['value'] * r['n'] for r in known)):,}", f"{sum(r['n'] for r in known):,}"
-
-
 def _errors(rows: Sequence[Row]) -> str:
-    missed, hits = _count([row["misses"] for row in rows])
-    false, free = _count([row["false_hits"] for row in rows])
-    return f"{missed} missed of {hits}, {false} false of {free}"
+    def count(key: str) -> str:
+        known = [row[key] for row in rows if isinstance(row[key], Mapping) and row[key]["n"]]
+        wrong = round(sum(rate["value"] * rate["n"] for rate in known))
+        return f"{wrong:,} {key.replace('_', ' ')} of {sum(rate['n'] for rate in known):,}"
+
+    return f"{count('misses')}, {count('false_hits')}"
 
 
 def _queries(rows: Sequence[Row]) -> Iterator[Point]:
-    """Single queries of a recorded cloth, hits included."""
-    own = [row for row in table_rows(rows, "query") if row["method"] == "ab2pf"]
+    """Candidates of a frame, hits included, beside each peer."""
+    own = [row for row in table_rows(rows, "query") if row.get("method") == "ab2pf"]
     latest = max((row["toi_error_most"] for row in own), default=0)
     for peer, mine in groups(table_rows(rows, "query peer"), lambda row: str(row["peer"])).items():
         rated = [row for row in mine if row["kind"] != "both"]
+        early = max(row["toi_error_median"] for row in rated)
         for both in (row for row in mine if row["kind"] == "both"):
             question = f"a vertex-face or edge-edge query beside {peer}"
             text = f"{_errors(own)}; time within {latest:.0e}"
-            yield Point(question, "ab2pf", 1e-3 * both["ab2pf_all_ns"], math.nan, text, "ours")
-            early = max(row["toi_error_median"] for row in rated)
+            yield Point(question, "ab2pf", 1e-3 * both["ab2pf_all_ns"], None, text, "ours")
             text = f"{_errors(rated)}; time early by {early:.0e} (median)"
-            yield Point(question, peer, 1e-3 * both["all_ns"], math.nan, text, "peer")
+            yield Point(question, peer, 1e-3 * both["all_ns"], None, text, "peer")
 
 
-def _hard_queries(rows: Sequence[Row]) -> Iterator[Point]:
-    """Every method's mean over all sets with public labels, weighted by their queries."""
-    own = table_rows(rows, "hard query")
-    for method, mine in groups(own, lambda row: str(row["method"])).items():
+def _labelled(rows: Sequence[Row]) -> Iterator[Point]:
+    """Every method's mean over all labelled sets, weighted by their queries."""
+    axes = ("microseconds a query", "fraction of wrong answers")
+    by_method = groups(table_rows(rows, "hard query"), lambda row: str(row["method"]))
+    for method, mine in by_method.items():
         n = sum(row["n"] for row in mine)
         wrong = sum(row["misses"] + row["false_hits"] for row in mine) / n
         cost = sum(row["us"] * row["n"] for row in mine) / n
-        question = "Single queries with public labels, mean over the sets"
-        role = "peer" if method.startswith("ipc") else ""
-        axes = ("microseconds a query", "share of wrong answers")
-        yield Point(question, method, cost, wrong, "", role, *axes)
+        role = "peer" if method.startswith("ipctk") else ""
+        yield Point("Single queries with public labels", method, cost, wrong, "", role, *axes)
 
 
 def _frames(rows: Sequence[Row]) -> Iterator[Point]:
     """The largest frame beside each peer, then every method and volume over all scenes."""
-    peers, frames = table_rows(rows, "frame peer"), table_rows(rows, "frame")
+    frames = table_rows(rows, "frame")
+    peers = [row for row in table_rows(rows, "frame peer") if "speedup" in row]
     largest = max(peers, key=lambda row: number(row["ab2pf_ms"]) or 0.0, default={"scene": None})
-    for own in frames:
-        if own["method"] == "ab2pf" and own["scene"] == largest["scene"]:
-            error = f"{own['missed']} missed, {own['late']} late of {own['ab2pf_hits']:,}"
-            for row in (row for row in peers if row["scene"] == own["scene"]):
-                question = f"a frame of {own['scene']}, {own['triangles']:,} triangles"
-                question += f", beside {row['peer']}"
-                ours = 1e3 * (number(row["ab2pf_ms"]) or 0.0)
-                yield Point(question, "ab2pf", ours, math.nan, error, "ours")
-                text = "not judged on frames"
-                yield Point(question, row["peer"], 1e3 * row["peer_ms"], math.nan, text, "peer")
-            break
-    scenes = {row["scene"] for row in frames}
+    for peer in (row for row in peers if row["scene"] == largest["scene"]):
+        own = next(row for row in frames if row["scene"] == peer["scene"])
+        question = f"a frame of {own['scene']}, {own['triangles']:,} triangles, {peer['peer']}"
+        ours = 1e3 * (number(peer["ab2pf_ms"]) or 0.0)
+        error = f"{own['missed']} missed, {own['late']} late of {own['ab2pf_hits']:,}"
+        yield Point(question, "ab2pf", ours, None, error, "ours")
+        text = "not judged on frames"
+        yield Point(question, peer["peer"], 1e3 * peer["peer_ms"], None, text, "peer")
+    scenes: Any = {row["scene"] for row in frames}
     question = f"A frame of each of {len(scenes)} deforming meshes, one thread"
     axes = ("microseconds, sum", "collisions missed or late")
     by_method = groups(frames, lambda r: f"{r['method']}, {r['volume'].replace('_', ' ')}")
     for method, mine in by_method.items():
-        if {row["scene"] for row in mine} == scenes:
-            cost = 1e3 * sum(number(row["frame_ms"]) or 0.0 for row in mine)
-            wrong = sum(row["missed"] + row["late"] for row in mine)
-            yield Point(question, method, cost, wrong, "", "", *axes)
+        cost = 1e3 * sum(number(row["frame_ms"]) or 0.0 for row in mine)
+        wrong = sum(row["missed"] + row["late"] for row in mine)
+        yield Point(question, method, cost, wrong, "", "", *axes)

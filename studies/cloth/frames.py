@@ -1,10 +1,12 @@
-"""Whole frames: every method beside ipctk's broad and narrow phases, hits and misses with it.
+"""Whole frames: every method beside ipctk, with misses, false hits and late times.
 
-Everything here runs in one thread, and times are the processor's: other programs do not count.
+Everything runs in one thread. Times are those of the processor, without other programs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
@@ -12,31 +14,48 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.cloth.peer import load_ipctk
-from studies.cloth.scaling import CLOTHS, Step, bound, scaled, step_at
-from studies.framework import time_in_turn
+from oracles.recorded_collisions import FRAMES, keys, load_frame
+from studies.cloth import shared
+from studies.cloth.shared import CLOTHS, Step, scaled
+from studies.framework import answer, groups, table_rows, time_in_turn, timed
 from tauguard.cloth import Frame as FrameAnswer
-from tauguard.cloth import Groups
-from tauguard.cloth.comparators import ComparedMeshCCD as MeshCCD
-from tauguard.cloth.scenes import SCENES, load_sequence
+from tauguard.cloth import Groups, MeshCCD
+from tauguard.cloth.impacts import METHODS
+from tauguard.cloth.scenes import SCENES
 from tauguard.report import Row
 
-#: Method and volume: what each was published with, then all on the same candidates.
+#: Method and volume: each as published, then all on the same candidates.
 ENTRIES = [
     ("ab2pf", "moving_k_dop14"),
-    ("iccd", "k_dop18"),
-    ("dnf", "k_dop18"),
-    ("scd", "k_dop18"),
-    ("vcd", "k_dop18"),
-    ("naive", "k_dop18"),
-    ("ab2pf", "k_dop18"),
-    ("iccd", "moving_k_dop14"),
-    ("vcd", "moving_k_dop14"),
+    *((method, "k_dop18") for method in ("iccd", "dnf", "scd", "vcd", "naive", "ab2pf")),
+    *((method, "moving_k_dop14") for method in ("iccd", "vcd")),
 ]
+#: Mean time of a frame over ab2pf's that is asked of comparators, each on its own volume.
+MEANS = {"iccd": 2.3, "vcd": 1.34}
+#: The peer whose frame of cloth-ball is asked to take this many times ab2pf's.
+PEER = ("ipctk LBVH + AdditiveCCD", 10)
+#: A time is late if it is this much later than ab2pf's, which may be this much early [step].
+LATE = 1e-9
+#: The frame with the peer's and the comparator's bars.
+RECORDED = "cloth-ball"
+
+NOTES = {
+    "frame": "all collisions of one step. volume: of the broad phase; (moving_)k_dopK has K/2 axes "
+    "and bounds the whole step (moves with it). First each method with the volume that it was "
+    "published with, then iccd and vcd with ab2pf's. times_ab2pf: time over ab2pf's. missed, "
+    "added: hits of ab2pf that the method lacks, and the reverse. late: common hits whose time is "
+    "more than 1e-9 after ab2pf's; late_most: by which fraction of the step.",
+    "frame mean": "times_ab2pf over the cloths of the table above, cloth-ball among them.",
+    "frame mean of all": "the same over all scenes.",
+    "frame peer": "the same step by ipctk: broad phase, then its candidates (vf_ns, ee_ns each). "
+    "speedup: both over ab2pf's whole frame.",
+    "listed": "recorded frames beside the collisions that their authors list; late as above.",
+}
+SIZE = (11.0, 4.5)
 
 
 class Frame(NamedTuple):
-    """One step of a mesh to be timed."""
+    """One step of a mesh."""
 
     name: str
     faces: NDArray[np.int32]
@@ -44,193 +63,251 @@ class Frame(NamedTuple):
     step: Step
 
 
-def frames(triangles: int, seed: int, data: Path | None) -> list[Frame]:
-    """A late step of every generated scene, and the real cloth-ball step where the data is."""
-    built = [build(triangles, seed) for build in SCENES.values()]
-    found = [Frame(s.name, s.faces, s.groups, step_at(s, 0.85)) for s in built]
-    folder = None if data is None else data / "ccd" / "cloth-ball" / "frames"
-    if folder is not None and folder.is_dir():
-        sequence = load_sequence(folder)
-        found.append(Frame("cloth-ball", sequence.faces, None, next(sequence.steps())))
-    return found
+def measure(quick: bool, seed: int) -> list[Row]:
+    """Generated scenes, and recorded ones in a full run where ``TAUGUARD_DATA`` names them.
 
-
-def methods(frame: Frame, repeats: int) -> list[Row]:
-    """Every method on one frame, with what it misses and adds against ab2pf.
-
-    ab2pf misses nothing; on cloth-ball its hits are exactly the listed ones, on the generated
-    scenes they are an upper bound, so that "missed" there may hold a false hit of ab2pf's.
+    A quick run has no recorded frames: their 6.9 million candidates take ipctk minutes.
     """
-    truth = MeshCCD(frame.faces, groups=frame.groups).find(*frame.step)
+    data = None if quick else shared.recorded()
+    triangles, repeats = (4_000, 3) if quick else (40_000, 7)
+    built = [build(triangles, seed) for build in SCENES.values()]
+    frames = [Frame(s.name, s.faces, s.groups, shared.step_at(s, 0.85)) for s in built]
+    if data is not None:
+        real = load_frame(data, RECORDED)
+        frames.append(Frame(RECORDED, real.faces, None, (real.x_t0, real.x_t1)))
+    rows = [shared.run_row(quick, triangles=triangles, repeats=repeats, recorded=data is not None)]
+    for frame in frames:
+        rows += _methods(frame, repeats)
+    rows += _means(rows)
+    for frame in frames:
+        rows += _peers(frame, repeats, *((5_000, 200) if quick else (10**7, 20_000)))
+    return rows + (_listed(data) if data is not None else [])
+
+
+def _methods(frame: Frame, repeats: int) -> list[Row]:
+    """Every method on one frame.
+
+    ab2pf is the reference: its hits on the recorded frames are exactly the listed ones.
+    """
+    reference = MeshCCD(frame.faces, groups=frame.groups).find(*frame.step)
     meshes = {
-        (method, volume): MeshCCD(frame.faces, method, groups=frame.groups, volume=volume)
-        for method, volume in ENTRIES
+        entry: MeshCCD(frame.faces, entry[0], groups=frame.groups, volume=entry[1])
+        for entry in ENTRIES
     }
-    spent = time_in_turn(
-        {" ".join(key): bound(ccd.find, *frame.step) for key, ccd in meshes.items()},
-        repeats,
-        process_time,
-    )
-    ours = spent[" ".join(ENTRIES[0])]["median"]
+    calls = {" ".join(entry): partial(ccd.find, *frame.step) for entry, ccd in meshes.items()}
+    times = time_in_turn(calls, repeats, process_time)
+    ours = times[" ".join(ENTRIES[0])]["median"]
     rows: list[Row] = []
-    for (method, volume), ccd in meshes.items():
-        answer = ccd.find(*frame.step)
-        vf, ee = compare(truth.vf, answer.vf), compare(truth.ee, answer.ee)
-        time_ms = scaled(spent[f"{method} {volume}"], 1e3)
+    for entry, ccd in meshes.items():
+        found, time = ccd.find(*frame.step), times[" ".join(entry)]
+        missed, added = differences((reference.vf, reference.ee), (found.vf, found.ee))
         rows.append(
             {
                 "study": "frame",
                 "scene": frame.name,
                 "triangles": len(frame.faces),
-                "method": method,
-                "volume": volume,
-                "frame_ms": time_ms,
-                "times_ab2pf": time_ms["median"] / (1e3 * ours),
-                "candidates": answer.stats.vf["candidates"] + answer.stats.ee["candidates"],
-                "ab2pf_hits": len(truth.vf) + len(truth.ee),
-                "missed": vf[0] + ee[0],
-                "added": vf[1] + ee[1],
-                **lateness(truth, answer),
+                "method": entry[0],
+                "volume": entry[1],
+                "frame_ms": scaled(time, 1e3),
+                "times_ab2pf": time["median"] / ours,
+                "candidates": found.stats.vf["candidates"] + found.stats.ee["candidates"],
+                "ab2pf_hits": len(reference.vf) + len(reference.ee),
+                "missed": missed,
+                "added": added,
+                **lateness(reference, found),
             }
         )
     return rows
 
 
-def means(rows: list[Row]) -> list[Row]:
-    """How many times the first entry's time each method takes: over the cloths, then over all."""
-    frames = [row for row in rows if row["study"] == "frame"]
-    cloths = [row for row in frames if row["scene"] in (*CLOTHS, "cloth-ball")]
-    return [
-        _mean(study, of, entry)
-        for study, of in (("frame mean", cloths), ("frame mean of all", frames))
-        for entry in ENTRIES
-    ]
+def _means(rows: Sequence[Row]) -> list[Row]:
+    """Mean of the ratios of each method: over the cloths, then over all scenes."""
+    frames = table_rows(rows, "frame")
+    cloths = [row for row in frames if row["scene"] in (*CLOTHS, RECORDED)]
+    means: list[Row] = []
+    for study, part in (("frame mean", cloths), ("frame mean of all", frames)):
+        for method, volume in ENTRIES:
+            own = [row for row in part if (row["method"], row["volume"]) == (method, volume)]
+            ratios = [row["times_ab2pf"] for row in own]
+            means.append(
+                {
+                    "study": study,
+                    "method": method,
+                    "volume": volume,
+                    "scenes": len(own),
+                    "times_ab2pf_mean": float(np.mean(ratios)),
+                    "times_ab2pf_least": min(ratios),
+                    "times_ab2pf_most": max(ratios),
+                    "missed": sum(row["missed"] for row in own),
+                    "late": sum(row["late"] for row in own),
+                }
+            )
+    return means
 
 
-def _mean(study: str, rows: list[Row], entry: tuple[str, str]) -> Row:
-    own = [row for row in rows if (row["method"], row["volume"]) == entry]
-    ratios = [row["times_ab2pf"] for row in own]
-    return {
-        "study": study,
-        "method": entry[0],
-        "volume": entry[1],
-        "scenes": len(own),
-        "times_ab2pf_mean": float(np.mean(ratios)),
-        "times_ab2pf_least": min(ratios),
-        "times_ab2pf_most": max(ratios),
-        "missed": sum(row["missed"] for row in own),
-        "late": sum(row["late"] for row in own),
-    }
+def _peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row]:
+    """ipctk's LBVH and narrow phases on the same frame.
 
-
-def peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row]:
-    """ipctk's LBVH and narrow phases on the same frame and one thread, all collisions.
-
-    The narrow phase is timed in its own C++ loop over up to ``limit`` candidates drawn from those
-    that the truth calls clear (a hit would shorten the step for what follows), and its time per
-    query is taken times the number of candidates; hits cost it more than that. Both sides test
-    everything against everything (no groups), so that they have the same work.
+    The narrow phase is timed in its own C++ loop over up to ``limit`` candidates without contact,
+    because a hit would shorten the step for the candidates after it. That time for each candidate
+    is multiplied by their number; hits cost ipctk more. Neither side uses groups.
     """
-    ipctk = load_ipctk()
+    ipctk = shared.load_ipctk()
     if ipctk is None:
         return [{"study": "frame peer", "scene": frame.name, "peer": "ipctk is not installed"}]
     ccd = MeshCCD(frame.faces)
-    answer = ccd.find(*frame.step)
+    found = ccd.find(*frame.step)
     x_t0, x_t1 = (np.asfortranarray(x) for x in frame.step)
-    mesh = ipctk.CollisionMesh(x_t0, ccd.edges, frame.faces)
-    found = ipctk.Candidates()
-    spent = time_in_turn(
-        {
-            "ours": bound(ccd.find, *frame.step),
-            "LBVH": lambda: found.build(mesh, x_t0, x_t1, 0.0, ipctk.LBVH()),
-        },
-        repeats,
-        process_time,
-    )
-    lists = found.fv_candidates, found.ee_candidates  # each call makes a list of millions
-    n_vf, n_ee = map(len, lists)
-    rows: list[Row] = []
-    narrow = {
-        "AdditiveCCD": (ipctk.AdditiveCCD(), limit),
-        "TightInclusionCCD": (ipctk.TightInclusionCCD(conservative_rescaling=1.0), tight_limit),
+    mesh, candidates = ipctk.CollisionMesh(x_t0, ccd.edges, frame.faces), ipctk.Candidates()
+    calls = {
+        "ours": partial(ccd.find, *frame.step),
+        "LBVH": lambda: candidates.build(mesh, x_t0, x_t1, 0.0, ipctk.LBVH()),
     }
-    for name, (method, most) in narrow.items():
-        seconds = {}
-        for kind, clear in _clear(*lists, answer, most).items():
+    times = time_in_turn(calls, repeats, process_time)
+    lists = {"fv": candidates.fv_candidates, "ee": candidates.ee_candidates}  # copies of millions
+    rows: list[Row] = []
+    for (name, method), most in zip(
+        shared.narrow_phases(ipctk).items(), (limit, tight_limit), strict=True
+    ):
+        seconds, total = {}, times["LBVH"]["median"]
+        for kind, every in lists.items():
             part = ipctk.Candidates()
+            clear = _clear(kind, every, found, most)
             setattr(part, f"{kind}_candidates", clear)
             start = process_time()
             part.compute_collision_free_stepsize(mesh, x_t0, x_t1, 0.0, method)
             seconds[kind] = (process_time() - start) / max(1, len(clear))
-        total = spent["LBVH"]["median"] + n_vf * seconds["fv"] + n_ee * seconds["ee"]
+            total += seconds[kind] * len(every)
         rows.append(
             {
                 "study": "frame peer",
                 "scene": frame.name,
                 "peer": f"ipctk LBVH + {name}",
-                "peer_candidates": n_vf + n_ee,
-                "broad_ms": scaled(spent["LBVH"], 1e3),
+                "peer_candidates": sum(map(len, lists.values())),
+                "broad_ms": scaled(times["LBVH"], 1e3),
                 "vf_ns": 1e9 * seconds["fv"],
                 "ee_ns": 1e9 * seconds["ee"],
                 "peer_ms": 1e3 * total,
-                "ab2pf_ms": scaled(spent["ours"], 1e3),
-                "speedup": total / spent["ours"]["median"],
+                "ab2pf_ms": scaled(times["ours"], 1e3),
+                "speedup": total / times["ours"]["median"],
             }
         )
     return rows
 
 
-def _clear(fv: list[Any], ee: list[Any], answer: Any, most: int) -> dict[str, list[Any]]:
-    """Up to ``most`` candidates of each kind, evenly over the list, without the true hits."""
-    hits = {tuple(pair) for pair in answer.vf.tolist()}
-    clear_fv = [c for c in fv[:: 1 + len(fv) // most] if (c.vertex_id, c.face_id) not in hits]
-    hits = {tuple(pair) for pair in answer.ee.tolist()}
-    clear_ee = [
-        c
-        for c in ee[:: 1 + len(ee) // most]
-        if (min(c.edge0_id, c.edge1_id), max(c.edge0_id, c.edge1_id)) not in hits
-    ]
-    return {"fv": clear_fv, "ee": clear_ee}
+def _clear(kind: str, candidates: list[Any], found: FrameAnswer, most: int) -> list[Any]:
+    """Up to ``most`` candidates, evenly over the list, without those that are hits."""
+
+    def ids(one: Any) -> tuple[int, int]:
+        if kind == "fv":
+            return one.vertex_id, one.face_id
+        return min(one.edge0_id, one.edge1_id), max(one.edge0_id, one.edge1_id)
+
+    hits = {tuple(pair) for pair in (found.vf if kind == "fv" else found.ee).tolist()}
+    return [one for one in candidates[:: 1 + len(candidates) // most] if ids(one) not in hits]
 
 
-def lateness(truth: FrameAnswer, found: FrameAnswer) -> Row:
-    """How many of the common hits' times are late, and the latest by how much of the step.
+def _listed(data: Path) -> list[Row]:
+    """Every method beside the listed collisions; "exact" only where it takes seconds."""
+    rows: list[Row] = []
+    for name in FRAMES:
+        frame = load_frame(data, name)
+        ours = MeshCCD(frame.faces).find(frame.x_t0, frame.x_t1)
+        for method in METHODS:
+            if method == "exact" and len(frame.faces) > 50_000:
+                continue
+            found = MeshCCD(frame.faces, method).find(frame.x_t0, frame.x_t1)
+            missed, added = differences(frame.hits, (found.vf, found.ee))
+            rows.append(
+                {
+                    "study": "listed",
+                    "scene": name,
+                    "method": method,
+                    "listed": sum(map(len, frame.hits)),
+                    "misses": missed,
+                    "false_hits": added,
+                    **lateness(ours, found),
+                }
+            )
+    return rows
 
-    The truth's times are at most 1e-9 of the step early, so less than that is no lateness.
 
-    Args:
-        truth: A frame with times that are never late.
-        found: Another method's frame of the same step; the pairs of both are compared.
+def differences(reference: tuple[Any, Any], found: tuple[Any, Any]) -> tuple[int, int]:
+    """How many hits (vf, ee) of the reference are missed, and how many others are added."""
+    pairs = [(keys(a), keys(b)) for a, b in zip(reference, found, strict=True)]
+    common = sum(len(np.intersect1d(a, b, assume_unique=True)) for a, b in pairs)
+    return sum(len(a) for a, _ in pairs) - common, sum(len(b) for _, b in pairs) - common
 
-    Returns:
-        ``late``, a count, and ``late_most``, a share of the step (0 where none is late).
-    """
-    after = np.concatenate(
-        [
-            _after(truth.vf, truth.vf_impacts.toi, found.vf, found.vf_impacts.toi),
-            _after(truth.ee, truth.ee_impacts.toi, found.ee, found.ee_impacts.toi),
-        ]
-    )
-    late = after[after > 1e-9]
+
+def lateness(reference: FrameAnswer, found: FrameAnswer) -> Row:
+    """How many common hits are late, and the latest by which fraction of the step."""
+    after = []
+    for kind in ("vf", "ee"):
+        a, b = (keys(getattr(one, kind)) for one in (reference, found))
+        _, i, j = np.intersect1d(a, b, assume_unique=True, return_indices=True)
+        toi = [getattr(one, f"{kind}_impacts").toi for one in (reference, found)]
+        after.append(toi[1][j] - toi[0][i])
+    late = np.concatenate(after)
+    late = late[late > LATE]
     return {"late": len(late), "late_most": float(late.max(initial=0.0))}
 
 
-def _after(
-    pairs: NDArray[np.int32],
-    toi: NDArray[np.float64],
-    other: NDArray[np.int32],
-    other_toi: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """The other's times less the first's, of the pairs that both have."""
-    weights = np.array([1 << 32, 1])
-    a, b = (x.astype(np.int64) @ weights for x in (pairs, other))
-    _, i, j = np.intersect1d(a, b, assume_unique=True, return_indices=True)
-    return other_toi[j] - toi[i]
+def judge(rows: Sequence[Row]) -> list[Row]:
+    """Misses beside the listed collisions, and ratios of times beside what was asked."""
+    quick = shared.is_quick(rows)
+    whole = any(row["scene"] == RECORDED for row in table_rows(rows, "frame"))
+    out: list[Row] = []
+    for row in table_rows(rows, "listed"):
+        if row["method"] == "ab2pf":
+            wrong = row["misses"] + row["false_hits"]
+            what = f"{row['scene']}, {row['listed']} listed collisions: misses and false hits"
+            out.append(answer(what, "0", str(wrong), wrong == 0))
+    for row in table_rows(rows, "frame mean"):
+        asked = MEANS.get(row["method"])
+        if asked is None:
+            continue
+        mean = row["times_ab2pf_mean"]
+        text = f"{mean:.3g} ({row['times_ab2pf_least']:.3g} to {row['times_ab2pf_most']:.3g})"
+        what = f"a frame, mean of {row['scenes']} scenes: {row['method']} over ab2pf, "
+        if row["volume"] == "k_dop18":
+            met = timed(mean >= asked, quick) if whole else "not judged: data absent"
+            out.append(answer(what + "each on its own volume", f"{asked}", text, met))
+        else:
+            out.append(answer(what + f"both on {row['volume']}", "-", text))
+    for row in table_rows(rows, "frame peer"):
+        if (row["scene"], row["peer"]) == (RECORDED, PEER[0]):
+            ours = row["ab2pf_ms"]["median"]
+            text = f"{row['speedup']:.3g} ({row['peer_ms']:.3g} over {ours:.3g} ms)"
+            met = timed(row["speedup"] >= PEER[1], quick)
+            out.append(answer(f"a frame of {RECORDED}: {PEER[0]} over ab2pf", "10", text, met))
+    return out
 
 
-def compare(truth: NDArray[np.int32], found: NDArray[np.int32]) -> tuple[int, int]:
-    """Misses and false hits of sorted pairs."""
-    weights = np.array([1 << 32, 1])
-    a, b = truth.astype(np.int64) @ weights, found.astype(np.int64) @ weights
-    common = len(np.intersect1d(a, b, assume_unique=True))
-    return len(truth) - common, len(found) - common
+def draw(rows: Sequence[Row], figure: Any) -> None:
+    """Time of each method, hatched where it misses collisions, and of ipctk, over ab2pf's."""
+    left, right = figure.subplots(1, 2)
+    frames = [row for row in table_rows(rows, "frame") if (row["method"], row["volume"]) in ENTRIES]
+    by_entry = groups(frames, lambda r: f"{r['method']}, {r['volume'].replace('_', ' ')}")
+    _bars(left, by_entry, "times_ab2pf")
+    left.set(title="A frame, one thread (hatched: misses collisions)", ylabel="time over ab2pf's")
+    peers = [row for row in table_rows(rows, "frame peer") if "speedup" in row]
+    _bars(right, groups(peers, lambda row: str(row["peer"])), "speedup")
+    right.set(title="The same frame by ipctk", ylabel="time over ab2pf's", yscale="log")
+
+
+def _bars(axes: Any, by_label: dict[str, list[Row]], key: str) -> None:
+    """One group of bars for each scene, one colour for each label."""
+    scenes = list(dict.fromkeys(row["scene"] for own in by_label.values() for row in own))
+    width = 0.8 / max(1, len(by_label))
+    for i, (label, own) in enumerate(by_label.items()):
+        at = [scenes.index(row["scene"]) + (i + 0.5) * width - 0.4 for row in own]
+        bars = axes.bar(at, [row[key] for row in own], width, label=label)
+        for bar, row in zip(bars, own, strict=True):
+            if row.get("missed"):
+                bar.set(hatch="////", edgecolor="white", linewidth=0)
+    names = [name.replace("_", " ") for name in scenes]
+    axes.set_xticks(range(len(scenes)), names, rotation=30, ha="right", fontsize="x-small")
+    axes.axhline(1, color="black", linewidth=0.8, zorder=0)
+    axes.margins(y=0.35)
+    if by_label:
+        axes.legend(fontsize="x-small", ncols=2, loc="upper left")

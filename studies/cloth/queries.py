@@ -1,14 +1,16 @@
 """Single queries: nanoseconds beside misses, false hits and errors in time; ipctk in its own loop.
 
-Times are the processor's (other programs do not count), of one thread and one call over the whole
-list, gather included. ipctk is timed over candidates that the truth and itself call clear, through
-``compute_collision_free_stepsize`` (a hit would shorten the step for what follows); what it costs
-on hits and what it answers is asked call by call, Python included, and stated apart.
+Times are those of the processor, of one thread and one call for the whole list, with the gathering
+of positions. ipctk is timed on candidates without contact, by ``compute_collision_free_stepsize``;
+a hit would shorten the step for the candidates after it. Its answers, and its time for a hit, come
+from single calls out of Python.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import product
 from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
@@ -16,25 +18,32 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.cloth.frames import Frame
-from studies.cloth.peer import load_ipctk
-from studies.cloth.scaling import bound
-from studies.framework import time_in_turn
-from tauguard.cloth import MeshCCD
-from tauguard.cloth.comparators import METHODS, solve
+from oracles.recorded_collisions import KINDS, QUERY_SETS, load_frame, load_queries
+from studies.cloth import shared
+from studies.cloth.shared import Step, narrow_phases
+from studies.framework import answer, groups, number, table_rows, time_in_turn, timed
+from tauguard.cloth import MeshCCD, _mesh
+from tauguard.cloth.impacts import METHODS
+from tauguard.cloth.scenes import SCENES
 from tauguard.report import Row, rate
 
-#: Neighbours in the list of candidates that a peer is asked about.
+#: Neighbours in the list of candidates that a peer is asked about in a row, as memory has them.
 RUN = 100
+#: Times over ab2pf's that are asked of ipctk for a query without contact.
+ASKED = {"ipctk AdditiveCCD": 10, "ipctk TightInclusionCCD": 100}
+#: The largest error of a time that is asked [step].
+EARLY = 1e-9
 
-HARD_SETS = (
-    "unit-tests",
-    "erleben-cube-cliff-edges",
-    "erleben-sliding-spike",
-    "erleben-spike-hole",
-    "erleben-spike-wedge",
-    "erleben-wedges",
-)
+NOTES = {
+    "query": "candidates of ipctk's broad phase on one frame (n of so many). ns: a query. misses "
+    "and false_hits beside ab2pf, whose hits on recorded frames are the listed ones. late: times "
+    "after the exact one; toi_error_most: as a fraction of the step.",
+    "query peer": "ns, ab2pf_ns: a query without contact; all_ns: the mix with hits. misses, "
+    "false_hits, times: of the queries that it was asked from Python; us_a_hit: for a hit.",
+    "hard query": "n public queries with exact labels. us: a query; decided_exactly: by exact "
+    "arithmetic.",
+}
+SIZE = (9.0, 4.5)
 
 
 class Queries(NamedTuple):
@@ -49,280 +58,243 @@ class Queries(NamedTuple):
         """The queries that a mask or indices choose."""
         return self._replace(rows=np.ascontiguousarray(self.rows[which]))
 
+    @classmethod
+    def each(cls, vertex: bool, x: NDArray[np.float64]) -> Queries:
+        """Queries that share no positions, given as (N, 2, 4, 3)."""
+        start, end = (np.ascontiguousarray(x[:, i]).reshape(-1, 3) for i in (0, 1))
+        return cls(vertex, start, end, np.arange(4 * len(x), dtype=np.int32).reshape(-1, 4))
+
 
 class Answer(NamedTuple):
-    """Hits, times and what the narrow phase counted."""
+    """Hits, times of impact and what the narrow phase counted."""
 
     hit: NDArray[np.bool_]
     toi: NDArray[np.float64]
     counts: dict[str, int]
 
 
-def solver(queries: Queries, method: str) -> Callable[[], Answer]:
-    """A call that answers all queries, its arrays allocated beforehand."""
+def solver(queries: Queries, method: str = "ab2pf") -> Callable[[], Answer]:
+    """A call that answers all queries; its arrays are allocated beforehand."""
     n = len(queries.rows)
     hit, toi = np.zeros(n, dtype=np.uint8), np.full(n, np.inf)
     point, normal, weights = (np.empty((n, k)) for k in (3, 3, 4))
 
     def call() -> Answer:
-        counts = solve(*queries, method, hit, toi, point, normal, weights)
+        counts = _mesh.solve(*queries, METHODS[method], 0.0, hit, toi, point, normal, weights)
         return Answer(hit.astype(bool), toi, counts)
 
     return call
 
 
-def on_recording(frame: Frame, seed: int, limit: int, calls: int, repeats: int) -> list[Row]:
-    """Every method and peer on the candidates of ipctk's LBVH, up to ``limit`` of each kind.
-
-    Args:
-        frame: A step whose collisions ab2pf finds exactly (the study "truth" says so).
-        seed: Of the choice of candidates.
-        limit: Candidates of each kind for the timings.
-        calls: Candidates of each kind for the peers' answers, asked call by call.
-        repeats: Of each timing.
-    """
-    ipctk = load_ipctk()
-    if ipctk is None:
-        return [{"study": "query", "set": frame.name, "peer": "ipctk is not installed"}]
-    ccd = MeshCCD(frame.faces)
-    mesh = ipctk.CollisionMesh(np.asfortranarray(frame.step[0]), ccd.edges, frame.faces)
-    found = ipctk.Candidates()
-    found.build(mesh, *map(np.asfortranarray, frame.step), 0.0, ipctk.LBVH())
-    rng = np.random.default_rng(seed)
-    rows: list[Row] = []
-    lists = {True: found.fv_candidates, False: found.ee_candidates}  # each makes a new list
-    for vertex, every in lists.items():
-        chosen = sorted(rng.permutation(len(every))[:limit])
-        candidates = [every[i] for i in chosen]
-        queries = Queries(vertex, *frame.step, _rows(candidates, vertex, ccd.edges, frame.faces))
-        truth = solver(queries, "ab2pf")()
-        rows += _methods(frame.name, len(found), queries, truth, repeats)
-        rows += _peers(ipctk, frame.name, mesh, candidates, queries, truth, rng, calls, rows[-1])
-    return rows + _both_kinds(rows, len(lists[True]), len(lists[False]))
-
-
-def _both_kinds(rows: list[Row], n_vf: int, n_ee: int) -> list[Row]:
-    """The peers' and our times per query in the mix of kinds that the broad phase leaves."""
-    share = {"vf": n_vf / (n_vf + n_ee), "ee": n_ee / (n_vf + n_ee)}
-    found: list[Row] = []
-    for peer in dict.fromkeys(row["peer"] for row in rows if row["study"] == "query peer"):
-        own = [row for row in rows if row.get("peer") == peer]
-        mean = {
-            key: sum(share[row["kind"]] * row[key] for row in own)
-            for key in ("ns", "ab2pf_ns", "all_ns", "ab2pf_all_ns")
-        }
-        found.append(
-            {
-                "study": "query peer",
-                "set": own[0]["set"],
-                "kind": "both",
-                "peer": peer,
-                "n": sum(row["n"] for row in own),
-                **mean,
-                "speedup": mean["ns"] / mean["ab2pf_ns"],
-                "speedup_all": mean["all_ns"] / mean["ab2pf_all_ns"],
-            }
-        )
-    return found
-
-
-def on_hard_sets(folder: Path, calls: int) -> list[Row]:
-    """The public hard queries with exact truth: hits, and the price of exact decisions."""
-    rows: list[Row] = []
-    for name in HARD_SETS:
-        for kind in ("vertex-face", "edge-edge"):
-            queries, truth = load_hard(folder / name / kind)
-            for method in METHODS:
-                call = solver(queries, method)
-                answer = call()
-                start = process_time()
-                call()
-                spent = process_time() - start
-                rows.append(
-                    {
-                        "study": "hard query",
-                        "set": name,
-                        "kind": kind,
-                        "method": method,
-                        "n": len(truth),
-                        "us": 1e6 * spent / len(truth),
-                        "misses": int((truth & ~answer.hit).sum()),
-                        "false_hits": int((answer.hit & ~truth).sum()),
-                        "decided_exactly": answer.counts["exact"],
-                    }
-                )
-            rows += _hard_peers(name, kind, queries, truth, calls)
-    return rows
-
-
-def load_hard(folder: Path) -> tuple[Queries, NDArray[np.bool_]]:
-    """Sample-Queries (Wang et al. 2021): rationals that are exact doubles, and their truth."""
-    x, truth = [], []
-    for file in sorted(folder.glob("*.csv")):
-        cells = [[int(cell) for cell in line.split(",")] for line in file.read_text().split()]
-        x += [[row[2 * k] / row[2 * k + 1] for k in range(3)] for row in cells]
-        truth += [bool(row[6]) for row in cells[::8]]
-    positions = np.array(x).reshape(-1, 2, 4, 3)
-    start, end = (np.ascontiguousarray(positions[:, i]).reshape(-1, 3) for i in (0, 1))
-    rows = np.arange(len(start), dtype=np.int32).reshape(-1, 4)
-    return Queries(folder.name == "vertex-face", start, end, rows), np.array(truth)
-
-
-def _rows(
-    candidates: list[Any], vertex: bool, edges: NDArray[np.int32], faces: NDArray[np.int32]
-) -> NDArray[np.int32]:
-    if vertex:
-        pairs = np.array([(c.vertex_id, c.face_id) for c in candidates], dtype=np.int32)
-        rows = np.concatenate([pairs[:, :1], faces[pairs[:, 1]]], axis=1)
+def measure(quick: bool, seed: int) -> list[Row]:
+    """Candidates of one frame, cloth-ball in a full run with data; then the labelled queries."""
+    data = shared.recorded()
+    rows, size = [shared.run_row(quick, recorded=data is not None)], 2_000 if quick else 40_000
+    if data is not None and not quick:
+        name, frame = "cloth-ball", load_frame(data, "cloth-ball")
+        faces, step = frame.faces, (frame.x_t0, frame.x_t1)
     else:
-        pairs = np.array([(c.edge0_id, c.edge1_id) for c in candidates], dtype=np.int32)
-        rows = np.concatenate([edges[pairs[:, 0]], edges[pairs[:, 1]]], axis=1)
-    return np.ascontiguousarray(rows, dtype=np.int32)
+        scene = SCENES["crumpling"](size, seed)
+        name, faces, step = scene.name, scene.faces, shared.step_at(scene, 0.85)
+    rows += _on_frame(name, faces, step, seed, *((2_000, 3) if quick else (20_000, 7)))
+    return rows + (_on_labelled(data, 10 if quick else 60) if data is not None else [])
 
 
-def _methods(name: str, total: int, queries: Queries, truth: Answer, repeats: int) -> list[Row]:
+def _on_frame(
+    name: str, faces: NDArray[np.int32], step: Step, seed: int, calls: int, repeats: int
+) -> list[Row]:
+    """Every method and peer on ipctk's candidates; peers answer ``calls`` of each kind."""
+    ipctk = shared.load_ipctk()
+    if ipctk is None:
+        return [{"study": "query", "set": name, "peer": "ipctk is not installed"}]
+    edges = MeshCCD(faces).edges
+    mesh = ipctk.CollisionMesh(np.asfortranarray(step[0]), edges, faces)
+    found = ipctk.Candidates()
+    found.build(mesh, *map(np.asfortranarray, step), 0.0, ipctk.LBVH())
+    rng, rows = np.random.default_rng(seed), []
+    lists = {"vf": found.fv_candidates, "ee": found.ee_candidates}  # each call copies the list
+    for kind, candidates in lists.items():
+        if kind == "vf":
+            ids = np.array([(c.vertex_id, c.face_id) for c in candidates])
+            corners = np.concatenate([ids[:, :1], faces[ids[:, 1]]], axis=1)
+        else:
+            ids = np.array([(c.edge0_id, c.edge1_id) for c in candidates])
+            corners = edges[ids].reshape(-1, 4)
+        queries = Queries(kind == "vf", *step, np.ascontiguousarray(corners, dtype=np.int32))
+        reference, here = solver(queries)(), {"set": name, "kind": kind}
+        own, clear_ns = _methods(here, queries, reference, repeats)
+        ours = {"ab2pf_ns": clear_ns, "ab2pf_all_ns": own[0]["ns"]["median"]}
+        starts = RUN * np.sort(rng.permutation(len(candidates) // RUN)[: calls // RUN])
+        asked = (starts[:, None] + np.arange(RUN)).ravel()
+        rows += own
+        rows += _peers(ipctk, mesh, candidates, asked, queries, reference, {**here, **ours})
+    return rows + _both_kinds(rows, {kind: len(every) for kind, every in lists.items()})
+
+
+def _methods(
+    here: Row, queries: Queries, reference: Answer, repeats: int
+) -> tuple[list[Row], float]:
+    """A row for each method, and ab2pf's time for a query without contact [ns]."""
     few = np.arange(0, len(queries.rows), 1 + len(queries.rows) // 2000)
     lists = {method: queries.some(few) if method == "exact" else queries for method in METHODS}
     calls = {method: solver(lists[method], method) for method in METHODS}
-    spent = time_in_turn(calls, repeats, process_time)
-    clear = queries.some(~truth.hit)
-    spent["clear"] = time_in_turn({"": solver(clear, "ab2pf")}, repeats, process_time)[""]
-    exact = solver(queries.some(truth.hit), "exact")()
+    clear = queries.some(~reference.hit)
+    times = time_in_turn(calls | {"clear": solver(clear)}, repeats, process_time)
+    exact = solver(queries.some(reference.hit), "exact")()
     rows: list[Row] = []
     for method, call in calls.items():
-        answer, n = call(), len(lists[method].rows)
-        hit = truth.hit[few] if method == "exact" else truth.hit
-        toi = answer.toi[hit & answer.hit]
-        first = exact.toi[answer.hit[hit]] if method != "exact" else toi
+        found, n = call(), len(lists[method].rows)
+        hit = reference.hit[few] if method == "exact" else reference.hit
+        toi = found.toi[hit & found.hit]
+        first = exact.toi[found.hit[hit]] if method != "exact" else toi
         rows.append(
             {
                 "study": "query",
-                "set": name,
-                "kind": "vf" if queries.vertex else "ee",
+                **here,
                 "method": method,
                 "n": n,
-                "of": total,
-                "ns": {key: 1e9 * value / n for key, value in spent[method].items()},
-                "misses": rate(int((hit & ~answer.hit).sum()), int(hit.sum())),
-                "false_hits": rate(int((answer.hit & ~hit).sum()), int((~hit).sum())),
+                "of": len(queries.rows),
+                "ns": {key: 1e9 * value / n for key, value in times[method].items()},
+                "misses": rate(int((hit & ~found.hit).sum()), int(hit.sum())),
+                "false_hits": rate(int((found.hit & ~hit).sum()), int((~hit).sum())),
                 "late": int((toi > first).sum()),
-                "late_most": float((toi - first).max(initial=0)),
                 "toi_error_most": float(np.abs(first - toi).max(initial=0)),
-                "decided_exactly": answer.counts["exact"],
+                "decided_exactly": found.counts["exact"],
             }
         )
-    rows.append(
-        {
-            "study": "query clear",
-            "set": name,
-            "kind": "vf" if queries.vertex else "ee",
-            "n": len(clear.rows),
-            "ab2pf_ns": {k: 1e9 * v / len(clear.rows) for k, v in spent["clear"].items()},
-            "ab2pf_all_ns": 1e9 * spent["ab2pf"]["median"] / len(queries.rows),
-        }
-    )
-    return rows
+    return rows, 1e9 * times["clear"]["median"] / len(clear.rows)
 
 
 def _peers(
     ipctk: Any,
-    name: str,
     mesh: Any,
     candidates: list[Any],
+    asked: NDArray[np.int64],
     queries: Queries,
-    truth: Answer,
-    rng: np.random.Generator,
-    calls: int,
+    reference: Answer,
     ours: Row,
 ) -> list[Row]:
-    own = ours["ab2pf_ns"]["median"]
-    # Runs of neighbours in the list, whose positions lie close in memory as those of the whole do.
-    starts = rng.permutation(len(candidates) // RUN)[: calls // RUN]
-    asked = (RUN * np.sort(starts)[:, None] + np.arange(RUN)).ravel()
     rows: list[Row] = []
-    for peer, method in {
-        "AdditiveCCD": ipctk.AdditiveCCD(),
-        "TightInclusionCCD": ipctk.TightInclusionCCD(conservative_rescaling=1.0),
-    }.items():
-        hit, toi, hit_us = _ask(method, queries.some(asked))
-        timed = [candidates[i] for i in asked[~truth.hit[asked] & ~hit]]
+    step = [np.asfortranarray(x) for x in queries[1:3]]
+    for peer, method in narrow_phases(ipctk).items():
+        hit, toi, call_us = _ask(method, queries.some(asked))
+        clear = [candidates[i] for i in asked[~reference.hit[asked] & ~hit]]
         part = ipctk.Candidates()
-        setattr(part, "fv_candidates" if queries.vertex else "ee_candidates", timed)
-        step = [np.asfortranarray(x) for x in queries[1:3]]
-        seconds = time_in_turn(
-            {"": bound(part.compute_collision_free_stepsize, mesh, *step, 0.0, method)},
-            3,
-            process_time,
-        )[""]["median"]
-        ns = 1e9 * seconds / len(timed)
-        # Hits, without what Python adds to a call: that of a clear one beyond its time above.
-        added_us = max(0.0, float(np.median(hit_us[~hit])) - 1e-3 * ns)
-        all_ns = (~hit).mean() * ns + 1e3 * np.maximum(hit_us[hit] - added_us, 0).sum() / len(asked)
-        real = truth.hit[asked]
-        both = real & hit
-        early = truth.toi[asked][both] - toi[both]
+        setattr(part, "fv_candidates" if queries.vertex else "ee_candidates", clear)
+        call = partial(part.compute_collision_free_stepsize, mesh, *step, 0.0, method)
+        ns = 1e9 * time_in_turn({"": call}, 3, process_time)[""]["median"] / len(clear)
+        # What Python adds to a call is what a clear query takes beyond its time in the loop.
+        hit_us = np.maximum(call_us[hit] - max(0.0, float(np.median(call_us[~hit])) - ns / 1e3), 0)
+        all_ns = float((~hit).mean() * ns + 1e3 * hit_us.sum() / len(asked))
+        real = reference.hit[asked]
+        early = reference.toi[asked][real & hit] - toi[real & hit]
         rows.append(
             {
                 "study": "query peer",
-                "set": name,
-                "kind": ours["kind"],
+                **ours,
                 "peer": f"ipctk {peer}",
-                "n": len(timed),
+                "n": len(clear),
                 "ns": ns,
-                "ab2pf_ns": own,
-                "speedup": ns / own,
-                "all_ns": float(all_ns),
-                "ab2pf_all_ns": ours["ab2pf_all_ns"],
-                "speedup_all": float(all_ns) / ours["ab2pf_all_ns"],
+                "all_ns": all_ns,
                 "queries": len(asked),
                 "misses": rate(int((real & ~hit).sum()), int(real.sum())),
                 "false_hits": rate(int((hit & ~real).sum()), int((~real).sum())),
-                "toi_error_median": float(np.median(np.abs(early))) if both.any() else None,
+                "toi_error_median": float(np.median(np.abs(early))) if len(early) else 0.0,
                 "late_most": float((-early).max(initial=0)),
-                "us_a_hit": float(np.median(hit_us[both])) if both.any() else None,
+                "us_a_hit": float(np.median(call_us[real & hit])) if len(early) else None,
             }
         )
     return rows
+
+
+def _both_kinds(rows: list[Row], counts: dict[str, int]) -> list[Row]:
+    """Times for each query in the mix of kinds that the broad phase leaves."""
+    found: list[Row] = []
+    for peer, own in groups(table_rows(rows, "query peer"), lambda row: str(row["peer"])).items():
+        mean = {
+            key: sum(counts[row["kind"]] * row[key] for row in own) / sum(counts.values())
+            for key in ("ns", "ab2pf_ns", "all_ns", "ab2pf_all_ns")
+        }
+        mixed = {"study": "query peer", "set": own[0]["set"], "kind": "both", "peer": peer}
+        found.append({**mixed, "n": sum(row["n"] for row in own), **mean})
+    return found
 
 
 def _ask(method: Any, queries: Queries) -> tuple[NDArray[np.bool_], NDArray[np.float64], Any]:
-    """A peer's answers and microseconds, call by call."""
+    """A peer's hits, times of impact and microseconds, call by call."""
     call = method.point_triangle_ccd if queries.vertex else method.edge_edge_ccd
-    hit, toi, spent = [], [], []
+    answers, spent = [], []
     for row in queries.rows:
         points = [*queries.x_t0[row], *queries.x_t1[row]]
         start = process_time()
-        answer = call(*points)
+        answers.append(call(*points)[:2])
         spent.append(1e6 * (process_time() - start))
-        hit.append(answer[0])
-        toi.append(answer[1])
+    hit, toi = zip(*answers, strict=True)
     return np.array(hit, dtype=bool), np.array(toi), np.array(spent)
 
 
-def _hard_peers(
-    name: str, kind: str, queries: Queries, truth: NDArray[np.bool_], calls: int
-) -> list[Row]:
-    ipctk = load_ipctk()
-    if ipctk is None:
-        return []
-    few = np.arange(0, len(truth), 1 + len(truth) // calls)
+def _on_labelled(data: Path, calls: int) -> list[Row]:
+    """Every method, and ``calls`` queries of each peer, beside the public labels."""
     rows: list[Row] = []
-    for peer, method in {
-        "AdditiveCCD": ipctk.AdditiveCCD(),
-        "TightInclusionCCD": ipctk.TightInclusionCCD(conservative_rescaling=1.0),
-    }.items():
-        hit, _, spent = _ask(method, queries.some(few))
-        rows.append(
-            {
-                "study": "hard query",
-                "set": name,
-                "kind": kind,
-                "method": f"ipctk {peer}",
-                "n": len(few),
-                "us": float(spent.mean()),
-                "misses": int((truth[few] & ~hit).sum()),
-                "false_hits": int((hit & ~truth[few]).sum()),
-                "decided_exactly": 0,
-            }
-        )
+    ipctk = shared.load_ipctk()
+    peers = narrow_phases(ipctk) if ipctk is not None else {}
+    for name, kind in product(QUERY_SETS, KINDS):
+        x, label = load_queries(data / "ccd" / name / kind)
+        queries, few = Queries.each(kind == KINDS[0], x), np.arange(0, len(x), 1 + len(x) // calls)
+
+        here: Row = {"study": "hard query", "set": name, "kind": kind}
+        for method in METHODS:
+            call = solver(queries, method)
+            time, own = time_in_turn({"": call}, 1, process_time)[""], call()
+            us = 1e6 * time["median"] / len(x)
+            rows.append(here | {"method": method, "us": us} | _wrong(label, own.hit))
+            rows[-1]["decided_exactly"] = own.counts["exact"]
+        for peer, one in peers.items():
+            hit, _, spent = _ask(one, queries.some(few))
+            us = float(spent.mean())
+            rows.append(here | {"method": f"ipctk {peer}", "us": us} | _wrong(label[few], hit))
+            rows[-1]["decided_exactly"] = None
     return rows
+
+
+def _wrong(true: NDArray[np.bool_], hit: NDArray[np.bool_]) -> Row:
+    wrong = int((true & ~hit).sum()), int((hit & ~true).sum())
+    return {"n": len(true), "misses": wrong[0], "false_hits": wrong[1]}
+
+
+def judge(rows: Sequence[Row]) -> list[Row]:
+    """Errors, and ratios of times beside what was asked."""
+    out, quick = [], shared.is_quick(rows)
+    own = [row for row in table_rows(rows, "query") if row.get("method") == "ab2pf"]
+    if own:
+        most = max(row["toi_error_most"] for row in own)
+        out.append(answer("error of the time, most", "1e-9", f"{most:.2g}", most <= EARLY))
+    labelled = [row for row in table_rows(rows, "hard query") if row["method"] == "ab2pf"]
+    if labelled:
+        wrong = sum(row["misses"] + row["false_hits"] for row in labelled)
+        n = sum(row["n"] for row in labelled)
+        out.append(
+            answer(f"{n} labelled queries: misses and false hits", "0", f"{wrong}", not wrong)
+        )
+    for row in table_rows(rows, "query peer"):
+        asked = ASKED[row["peer"]]
+        ratio = row["ns"] / row["ab2pf_ns"]
+        text = f"{ratio:.3g} ({row['ns']:.3g} over {row['ab2pf_ns']:.3g} ns)"
+        what = f"a clear query of {row['set']}, {row['kind']}: {row['peer']} over ab2pf"
+        out.append(answer(what, f"{asked}", text, timed(ratio >= asked, quick)))
+    return out
+
+
+def draw(rows: Sequence[Row], figure: Any) -> None:
+    """Time of a query by method, and of a labelled query, hatched where some answer is wrong."""
+    left, right = figure.subplots(1, 2)
+    mixed = [row for row in table_rows(rows, "query") if "ns" in row]
+    for axes, part, key in ((left, mixed, "ns"), (right, table_rows(rows, "hard query"), "us")):
+        for i, (method, own) in enumerate(groups(part, lambda row: str(row["method"])).items()):
+            time = float(np.mean([number(row[key]) for row in own]))
+            errs = any(number(row["misses"]) or number(row["false_hits"]) for row in own)
+            axes.barh(i, time, color="C0", hatch="////" if errs else None, edgecolor="white")
+            axes.text(time, i, f" {method}", va="center", fontsize="x-small")
+        axes.set(yticks=[], xlabel=f"{key} a query", xscale="log")
+    left.set(title="Candidates of a frame (hatched: errs)")
+    right.set(title="Queries with public labels, mean of the sets")

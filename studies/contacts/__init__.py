@@ -11,12 +11,12 @@ STUDY = Study(
     "contact checkers and guarded steps: what is missed, when it is seen, at what cost",
     {
         "checkers": Part(
-            "contacts.study",
-            "contact checkers beside MuJoCo and a referee: what each sees, when, at what cost",
+            "contacts.checkers",
+            "contact checkers beside MuJoCo's contacts: what each sees, when, at what cost",
         ),
         "guard": Part(
             "contacts.guard",
-            "guarded steps on scenes drawn at random, beside MuJoCo's modes and fine fixed steps",
+            "guarded steps on random scenes, beside MuJoCo's modes and fine fixed steps",
             ("keep",),
             alias="guard",
         ),
@@ -28,33 +28,21 @@ PEERS = ("MuJoCo", "mujoco", "plain", "speculative", "ipc")
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
     """When checkers report the first contact, and steps over fast contacts."""
+    question = "Contact checkers: when the first contact is reported"
+    axes = ("microseconds a step", "error of the first report [ms]")
     for row in table_rows(rows, "scenes"):
         cost, error = number(row.get("us_per_step")), number(row.get("first_error_ms"))
         if cost and error is not None:
-            method = str(row["checker"])
-            yield Point(
-                "Contact checkers: when the first contact is reported",
-                method,
-                cost,
-                abs(error),
-                "",
-                "peer" if method.startswith(PEERS) else "",
-                "microseconds a step",
-                "error of the first report [ms]",
-            )
+            name = str(row["checker"])
+            role = "peer" if name.startswith(PEERS) else ""
+            yield Point(question, name, cost, abs(error), "", role, *axes)
+    question = "Steps over fast contacts, random scenes"
+    axes = ("time over the longest fixed step that holds", "fraction of scenes with tunnelling")
     thrown = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
     for method, own in groups(thrown, lambda row: str(row["method"])).items():
         known = [row["over_fixed"] for row in own if row["over_fixed"] is not None]
         n = sum(row["held"]["n"] for row in own)
         if known and n:
-            held = sum(row["held"]["value"] * row["held"]["n"] for row in own)
-            yield Point(
-                "Steps over fast contacts, scenes drawn at random",
-                method,
-                sum(known) / len(known),
-                1 - held / n,
-                "",
-                "peer" if method.startswith(PEERS) else "",
-                "time over the longest fixed step that holds",
-                "share of scenes passed through",
-            )
+            lost = 1 - sum(row["held"]["value"] * row["held"]["n"] for row in own) / n
+            role = "peer" if method.startswith(PEERS) else ""
+            yield Point(question, method, sum(known) / len(known), lost, "", role, *axes)

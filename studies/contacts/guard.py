@@ -1,141 +1,221 @@
-"""Guarded steps on scenes drawn at random, beside plain steps, MuJoCo's own modes and fine steps.
+"""Guarded steps on random scenes, beside plain steps, MuJoCo's own modes and fine fixed steps.
 
-Studies. ``thrown``: families of scenes (:mod:`studies.contacts.draws`), each scene at
-one timestep of 0.5 to 10 ms, by every method, judged from outside
-(:mod:`studies.contacts.referee`). ``overhead``: scenes in which nothing is to be
-guarded. Which scenes come follows from the seed alone; none of them was chosen.
+The tunnelling oracle judges every scene, at one time step of 0.5 to 10 ms. Which scenes come
+depends on the seed alone. ``overhead``: scenes in which nothing is to be guarded.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from studies.contacts.draws import FAMILIES
-from studies.contacts.play import Line, Played, lines
-from studies.framework import answer
+from oracles.energy import EnergyGain
+from oracles.tunnelling import Tunnelling
+from studies.contacts import rigid_scenes as rigid
+from studies.contacts import soft_scenes as soft
+from studies.contacts.drawing import Drawn
+from studies.framework import JobCache, answer, table_rows
 from tauguard.contacts import GuardedStepper
 from tauguard.contacts.scenes import arm_boxes, arm_cloth
+from tauguard.contacts.scenes.impacts import MODES
 from tauguard.report import Row, rate
 
-#: Scenes of each family: in a full run, in a quick one.
-COUNTS = {
-    "plate": (400, 16),
-    "pair": (250, 12),
-    "chain": (70, 4),
-    "cup": (8, 1),
-    "arm": (40, 4),
-    "cloth": (20, 2),
-    "composite": (150, 8),
-    "stack": (80, 4),
-    "joined": (80, 4),
-    "spin": (60, 4),
-    "soft": (20, 2),
-    "mill": (60, 2),
-    "grid": (40, 2),
-    "small": (40, 2),
-    "door": (40, 2),
-    "servo": (40, 1),
-    "whips": (40, 2),
-    "paddle": (80, 3),
-    "squeeze": (20, 1),
-    "needles": (60, 2),
+#: By name: what draws a scene, and how many scenes in a full and a quick run. Seeds follow this
+#: order, so that a new family comes last.
+FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Drawn], int, int]] = {
+    draw.__name__: (draw, full, quick)
+    for draw, full, quick in (
+        *((rigid.plate, 400, 16), (rigid.pair, 250, 12), (rigid.chain, 70, 4), (rigid.cup, 8, 1)),
+        *((rigid.arm, 40, 4), (soft.cloth, 20, 2), (rigid.composite, 150, 8), (rigid.stack, 80, 4)),
+        *((rigid.joined, 80, 4), (rigid.spin, 60, 4), (soft.soft, 20, 2), (rigid.mill, 60, 2)),
+        *((rigid.grid, 40, 2), (rigid.small, 40, 2), (rigid.door, 40, 2), (rigid.servo, 40, 1)),
+        *((rigid.whips, 40, 2), (rigid.paddle, 80, 3), (rigid.squeeze, 20, 1)),
+        (soft.needles, 60, 2),
+    )
 }
-#: What cannot be held: something goes on by itself through what is in its way.
+#: Scenes of families that nothing can hold: a paddle moves on through a wall.
 HOPELESS = ("squeeze",)
-#: Fixed steps that are tried, with stiff contacts [s].
-FIXED = (5e-4, 2e-4, 1e-4, 5e-5)
-#: Energy that counts as added: more than this times what there was.
+#: Fixed steps that are tried, with stiff contacts [s]; one scene in so many, as they take long.
+FIXED, FIXED_EVERY = (5e-4, 2e-4, 1e-4, 5e-5), 4
+#: The oracle observes shorter steps only this often [s].
+OBSERVED = 5e-4
+#: An energy above this, over the first one, counts as added.
 ADDED = 1.02
+METHODS = ("plain", "speculative", "ipc", "guarded")
 
 NOTES = {
-    "thrown": "held: nothing passed; silent: it did, unreported; arrested: scenes with partners "
-    "stopped; energy: the most over that at first (mocap: over all bodies at twice its speed); "
-    f"above: scenes with more than {ADDED:g}; redone above: of those redone, with more than plain "
-    "steps; redone added: most that redone steps gave, rebound and mocap's work included; over "
-    "plain: time over plain steps'; over fixed: over the largest fixed step (stiff contacts) from "
-    "which all finer ones hold, fixed_ms, one scene in four; unknown: none holds; error: of the "
-    "first body's last velocity against the finest step's, over the speed. Medians. Squeeze cannot "
-    "be held.",
+    "thrown": "held: nothing tunnelled; silent: tunnelling that the guard did not report; "
+    "exhausted: reported; arrested: scenes with partners stopped. energy: the most over that at "
+    "first (mocap: over all bodies at twice its speed); energy_above: scenes with more than "
+    f"{ADDED:g}; redone_above: of those with redone steps, with more than plain steps too; "
+    "redone_added: most that redone steps gave. over_plain: time over plain steps'; over_fixed: "
+    "over the largest fixed step (stiff contacts) from which on all finer ones hold, fixed_ms, one "
+    "scene in four. Medians.",
     "overhead": "a step of a scene in which nothing is to be guarded, plain and guarded.",
 }
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one scene with one method."""
+
+    held: bool
+    exhausted: bool
+    arrested: bool
+    redone: bool  #: the guard redid a step
+    energy: float  #: the most, over the unit of the scene
+    seconds: float  #: processor time of stepping alone
+    calls: float  #: of ``mj_step`` for each step
+    added: float = 0.0  #: most energy that redone steps added in sum; 0 with actuators
+
+
+@dataclass(frozen=True)
+class Played:
+    """One scene with every method."""
+
+    timestep: float  #: of all but the fixed steps [s]
+    runs: dict[str, Outcome]  #: by method
+    fixed: dict[float, Outcome]  #: by fixed step [s]; empty where none was tried
+
+    @property
+    def first(self) -> float | None:
+        """The largest fixed step that holds with all finer ones that were tried [s]."""
+        return max((step for step, run in self.fixed.items() if run.held), default=None)
+
+
 def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
-    """Rows of both studies and of what they say together.
+    """Every family, then the overhead; scenes that the folder ``keep`` holds are not played."""
+    cache, rows = JobCache.of(keep, "guard", seed, quick), []
+    for family, (_, full, few) in FAMILIES.items():
+        soft = family in ("cloth", "soft")
+        methods = [name for name in METHODS if name != "ipc" or soft]
+        fixed = FIXED[1:3] if quick else FIXED
+        jobs = [
+            (family, seed, k, methods, () if k % FIXED_EVERY else fixed)
+            for k in range(few if quick else full)
+        ]
+        played = list(cache.over(map, family)(_play, jobs))
+        for method in methods:
+            for timestep in (*sorted({one.timestep for one in played}), None):
+                chosen = [one for one in played if timestep in (None, one.timestep)]
+                when = "all" if timestep is None else 1e3 * timestep
+                here = {"study": "thrown", "family": family, "method": method}
+                rows.append({**here, "timestep_ms": when, **_figures(chosen, method)})
+    examples = [arm_boxes(), arm_cloth(15)] + ([] if quick else [arm_cloth(40)])
+    return rows + [_overhead(scene, 60 if quick else 300) for scene in examples]
 
-    Scenes that the folder ``keep`` holds are not played again.
+
+def draw_scene(family: str, seed: int, number: int) -> Drawn:
+    """Scene ``number`` of a family for this seed."""
+    place = list(FAMILIES).index(family)
+    return FAMILIES[family][0](np.random.default_rng([seed, place, number]))
+
+
+def _play(job: tuple[str, int, int, Sequence[str], Sequence[float]]) -> Played:
+    *drawn, methods, fixed = job
+    scene = draw_scene(*drawn)
+    runs = {method: play(scene, method, scene.timestep) for method in methods}
+    return Played(scene.timestep, runs, fixed_steps(scene, fixed) if fixed else {})
+
+
+def fixed_steps(scene: Drawn, fixed: Sequence[float]) -> dict[float, Outcome]:
+    """Stiff fixed steps, from fine to coarse, up to the first that does not hold.
+
+    The finest of all is tried only where the next one does not hold.
     """
-    rows: list[Row] = []
-    for family, counts in COUNTS.items():
-        rows += _family_rows(family, seed, counts[quick], quick, Path(keep) if keep else None)
-    return [*rows, *_overhead_rows(quick), *_summary(rows)]
+    out: dict[float, Outcome] = {}
+    finest, *coarser = sorted(fixed)
+    for step in coarser:
+        out[step] = play(scene, "plain", step, stiff=True)
+        if not out[step].held:
+            break
+    if not coarser or not out[coarser[0]].held:
+        out[finest] = play(scene, "plain", finest, stiff=True)
+    return out
 
 
-def _family_rows(
-    family: str, seed: int, count: int, quick: bool, keep: Path | None = None
-) -> list[Row]:
-    """One row a method and timestep, and one of all timesteps."""
-    methods = ["plain", "speculative", "guarded"]
-    if family in ("cloth", "soft"):
-        methods.insert(2, "ipc")
-    fixed = FIXED[1:3] if quick else FIXED
-    table = list(lines(family, seed, count, methods, fixed, keep))
-    groups = [*sorted({line.timestep for line in table}), None]
-    return [_row(family, seed, method, group, table) for method in methods for group in groups]
+@contextmanager
+def unwarned() -> Iterator[None]:
+    """MuJoCo prints and logs no warnings: that plain steps diverge is what is studied here."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
-def _row(
-    family: str,
-    seed: int,
-    method: str,
-    timestep: float | None,
-    table: list[Line],
-) -> Row:
-    chosen = [t for t in table if timestep is None or t.timestep == timestep]
-    runs: list[Played] = [t.runs[method] for t in chosen]
-    known = [(t, t.first) for t in chosen if t.first is not None]
-    lost = [r for r in runs if not r.held]
-    redone = [r for r in runs if r.touched]
+@unwarned()
+def play(scene: Drawn, method: str, timestep: float, stiff: bool = False) -> Outcome:
+    """Simulate ``scene`` to its end; ``method`` is ``guarded`` or one of MuJoCo's modes."""
+    model, data = scene.start(timestep, MODES.get(method, 0), stiff)
+    tunnelling, energy = Tunnelling(model, data), EnergyGain(model, data, scene.energy_unit)
+    guard = GuardedStepper(model, data) if method == "guarded" else None
+    every, steps = max(1, round(OBSERVED / timestep)), round(scene.seconds / timestep) + 1
+    spent, paused, calls, change, added = 0.0, 0.0, 0, 0.0, 0.0
+    exhausted = arrested = redone = False
+
+    def observe() -> None:
+        nonlocal paused
+        begin = time.thread_time()
+        energy.observe(data)
+        tunnelling.observe(data)
+        paused += time.thread_time() - begin
+
+    for k in range(steps):
+        if scene.move is not None:
+            scene.move(data, data.time + timestep)
+        begin, paused = time.thread_time(), 0.0
+        if guard is None:
+            mujoco.mj_step(model, data)
+        else:
+            report = guard.step(observe)
+            calls += report.steps
+            exhausted |= report.exhausted
+            arrested |= bool(report.arrested)
+            redone |= report.steps > 1
+            if report.balance is not None and not model.nu:
+                change += float(np.diff(report.balance.energy.sum(axis=1))[0]) / energy.unit
+                added = max(added, change)
+        spent += time.thread_time() - begin - paused
+        if k % every == every - 1 or k == steps - 1:
+            observe()
+            if not np.isfinite(energy.most):
+                break
+    held = not tunnelling.pairs and bool(np.isfinite(energy.most))
+    flags, most = (held, exhausted, arrested, redone), float(energy.most)
+    return Outcome(*flags, most, spent, calls / steps, added)
+
+
+def _figures(chosen: list[Played], method: str) -> Row:
+    """The columns of one method over some scenes."""
+    runs = [one.runs[method] for one in chosen]
+    known = [(one, one.first) for one in chosen if one.first is not None]
+    lost, guarded = [run for run in runs if not run.held], method == "guarded"
+    pairs = [(one.runs[method], one.runs["plain"]) for one in chosen]
+    above = sum(a.redone and a.energy > max(ADDED, b.energy) for a, b in pairs)
     return {
-        "study": "thrown",
-        "family": family,
-        "seeds": f"{seed}, 0 to {len(table) - 1}",
-        "method": method,
-        "timestep_ms": "all" if timestep is None else 1e3 * timestep,
         "held": rate(len(runs) - len(lost), len(runs)),
-        "silent": sum(not r.exhausted for r in lost),
-        "exhausted": sum(r.exhausted for r in runs),
-        "arrested": sum(r.arrested for r in runs),
-        "energy": max(r.energy for r in runs),
-        "energy_above": sum(r.energy > ADDED for r in runs),
-        "energy_redone": max((r.energy for r in redone), default=None),
-        "redone_above": _above(chosen) if method == "guarded" else None,
-        "redone_added": max(r.added for r in runs) if method == "guarded" else None,
-        "calls": float(np.mean([r.calls for r in runs])) if method == "guarded" else None,
-        "over_plain": _median(t.runs[method].seconds / t.runs["plain"].seconds for t in chosen),
-        "over_fixed": _median(t.runs[method].seconds / t.fine[first].seconds for t, first in known),
+        "silent": sum(not run.exhausted for run in lost),
+        "exhausted": sum(run.exhausted for run in runs),
+        "arrested": sum(run.arrested for run in runs),
+        "energy": max(run.energy for run in runs),
+        "energy_above": sum(run.energy > ADDED for run in runs),
+        "redone_above": above if guarded else None,
+        "redone_added": max(run.added for run in runs) if guarded else None,
+        "calls": float(np.mean([run.calls for run in runs])) if guarded else None,
+        "over_plain": _median(a.seconds / b.seconds for a, b in pairs),
+        "over_fixed": _median(
+            one.runs[method].seconds / one.fixed[first].seconds for one, first in known
+        ),
         "fixed_ms": _median(1e3 * first for _, first in known),
-        "unknown": sum(bool(t.fine) and t.first is None for t in chosen),
-        "error": _median(_error(t, method) for t, _ in known if t.speed > 0),
     }
-
-
-def _above(chosen: list[Line]) -> int:
-    """In how many scenes with redone steps energy is above what there was, and plain steps'."""
-    pairs = [(t.runs["guarded"], t.runs["plain"]) for t in chosen]
-    return sum(a.touched and a.energy > max(ADDED, b.energy) for a, b in pairs)
-
-
-def _error(line: Line, method: str) -> float:
-    """Of the first body's velocity at the end, over the speed of the thrown body at the start."""
-    apart = np.subtract(line.runs[method].velocity, line.fine[min(line.fine)].velocity)
-    return float(np.linalg.norm(apart) / line.speed)
 
 
 def _median(values: Iterable[float]) -> float | None:
@@ -143,107 +223,72 @@ def _median(values: Iterable[float]) -> float | None:
     return float(np.median(found)) if found else None
 
 
-def _overhead_rows(quick: bool) -> list[Row]:
-    """Plain and guarded steps of scenes in which nothing is missed, in turn."""
-    rows = []
-    steps = 60 if quick else 300
-    for scene in (
-        [arm_boxes(), arm_cloth(15)] if quick else [arm_boxes(), arm_cloth(15), arm_cloth(40)]
-    ):
-        times: dict[str, list[float]] = {"plain": [], "guarded": []}
-        states = {name: scene.start(2e-3) for name in times}
-        guard, cuts = GuardedStepper(*states["guarded"]), 0
-        for _ in range(steps):
-            for name, (model, data) in states.items():
-                if scene.control is not None:
-                    scene.control(model, data)
-                begin = time.process_time()
-                if name == "plain":
-                    mujoco.mj_step(model, data)
-                else:
-                    cuts += len(guard.step().cuts)
-                times[name].append(1e6 * (time.process_time() - begin))
-        same = all(
-            np.array_equal(getattr(states["plain"][1], f), getattr(states["guarded"][1], f))
-            for f in ("qpos", "qvel", "qacc_warmstart")
-        )
-        plain, guarded = (
-            dict(zip(("low", "median", "high"), np.quantile(t, [0.1, 0.5, 0.9]), strict=True))
-            for t in times.values()
-        )
-        rows.append(
-            {
-                "study": "overhead",
-                "scene": scene.name,
-                "dofs": scene.model.nv,
-                "plain_us": plain,
-                "guarded_us": guarded,
-                "over_plain": guarded["median"] / plain["median"],
-                "cuts": cuts,
-                "same_bits": same,
-            }
-        )
-    return rows
+def _overhead(scene: Any, steps: int) -> Row:
+    """Plain and guarded steps in turn."""
+    times: dict[str, list[float]] = {"plain": [], "guarded": []}
+    states = {name: scene.start(2e-3) for name in times}
+    guard, cuts = GuardedStepper(*states["guarded"]), 0
+    for _ in range(steps):
+        for name, (model, data) in states.items():
+            if scene.control is not None:
+                scene.control(model, data)
+            begin = time.process_time()
+            if name == "plain":
+                mujoco.mj_step(model, data)
+            else:
+                cuts += len(guard.step().cuts)
+            times[name].append(1e6 * (time.process_time() - begin))
+    low, middle, high = np.quantile(list(times.values()), [0.1, 0.5, 0.9], axis=1)
+    plain, guarded = (
+        {"median": middle[k], "low": low[k], "high": high[k]} for k in range(len(times))
+    )
+    fields, ends = ("qpos", "qvel", "qacc_warmstart"), [data for _, data in states.values()]
+    return {
+        "study": "overhead",
+        "scene": scene.name,
+        "dofs": scene.model.nv,
+        "plain_us": plain,
+        "guarded_us": guarded,
+        "over_plain": guarded["median"] / plain["median"],
+        "cuts": cuts,
+        "same_bits": all(np.array_equal(*(getattr(d, name) for d in ends)) for name in fields),
+    }
 
 
-def _summary(rows: list[Row]) -> list[Row]:
-    """What the tables say, beside what was asked."""
-    whole = [r for r in rows if r["timestep_ms"] == "all"]
+def judge(rows: Sequence[Row]) -> list[Row]:
+    """Scenes held by each method, tunnelling that was not reported, and the time it takes."""
+    whole = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
     out = []
-    for method in ("plain", "speculative", "ipc", "guarded"):
+    for method in METHODS:
         mine = [r for r in whole if r["method"] == method and r["family"] not in HOPELESS]
         runs = sum(r["held"]["n"] for r in mine)
         held = sum(round(r["held"]["value"] * r["held"]["n"]) for r in mine)
-        guarded = method == "guarded"
-        met = held == runs if guarded else None
-        out.append(
-            answer(f"{method}: held", "all" if guarded else "figure", f"{held} of {runs}", met)
-        )
-    mine = [r for r in whole if r["method"] == "guarded"]
-    for key, name in (("silent", "lost without a word"), ("exhausted", "gave up, and said so")):
-        count = sum(r[key] for r in mine if key == "silent" or r["family"] not in HOPELESS)
-        out.append(answer(f"guarded: {name}", "0", str(count), count == 0))
-    figures = (
-        ("energy_above", "scenes with added energy", None),
-        ("redone_added", "energy added by redone steps", None),
-        ("over_plain", "time over plain steps", 3.0),
-        ("over_fixed", "time over the largest fixed step that holds", 1.0),
-    )
-    for key, name, bar in figures:
+        asked, met = ("all", held == runs) if method == "guarded" else ("figure", None)
+        out.append(answer(f"{method}: held", asked, f"{held} of {runs}", met))
+    mine = [row for row in whole if row["method"] == "guarded"]
+    silent = sum(row["silent"] for row in mine)
+    out.append(answer("guarded: tunnelling without a report", "0", f"{silent}", silent == 0))
+    for key, asked in (("over_plain", 3.0), ("over_fixed", 1.0)):
         text = ", ".join(f"{r['family']} {r[key]:.3g}" for r in mine if r[key] is not None)
-        met = None if bar is None else all(r[key] is None or r[key] <= bar for r in mine)
-        out.append(
-            answer(f"guarded: {name}", "figure" if bar is None else f"<= {bar:g}", text, met)
-        )
+        met = all(row[key] is None or row[key] <= asked for row in mine)
+        out.append(answer(f"guarded: {key.replace('_', ' ')}", f"<= {asked:g}", text, met))
     return out
 
 
-def table(rows: list[Row]) -> list[Row]:
-    """The rows of all timesteps together, and those of the guard at each."""
-    return [
-        r
-        for r in rows
-        if r["study"] != "thrown" or r["timestep_ms"] == "all" or r["method"] == "guarded"
-    ]
+def table(rows: Sequence[Row]) -> list[Row]:
+    """The rows of all time steps together, and the guard's at each."""
+    return [r for r in rows if r.get("timestep_ms", "all") == "all" or r["method"] == "guarded"]
 
 
-def draw(rows: list[Row], figure: Any) -> None:
-    """Share that is held, and time over the first fixed step that holds, a group a family."""
-    whole = [r for r in rows if r["study"] == "thrown" and r["timestep_ms"] == "all"]
-    families = [f for f in FAMILIES if any(r["family"] == f for r in whole)]
-    looks = {"plain": "0.6", "speculative": "C1", "ipc": "C2", "guarded": "C0"}
-    top, bottom = figure.subplots(2, 1, sharex=True)
-    for k, (method, color) in enumerate(looks.items()):
-        mine = [r for r in whole if r["method"] == method]
-        x = [families.index(r["family"]) + 0.2 * k - 0.3 for r in mine]
-        top.bar(x, [100 * r["held"]["value"] for r in mine], 0.18, color=color, label=method)
-        known = [(a, r["over_fixed"]) for a, r in zip(x, mine, strict=True) if r["over_fixed"]]
-        bottom.bar([a for a, _ in known], [b for _, b in known], 0.18, color=color)
-    top.set(ylabel="held [%]", ylim=(0, 105))
-    bottom.set(ylabel="time over the first\nfixed step that holds", yscale="log")
-    bottom.axhline(1.0, color="0.3", lw=0.8)
-    bottom.set_xticks(range(len(families)), families)
-    top.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.18), frameon=False)
-    for axis in (top, bottom):
-        axis.grid(axis="y", alpha=0.3)
-        axis.set_axisbelow(True)
+def draw(rows: Sequence[Row], figure: Any) -> None:
+    """Scenes that each method holds, by family."""
+    whole = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
+    families = list(dict.fromkeys(row["family"] for row in whole))
+    axes = figure.subplots()
+    for k, (method, color) in enumerate(zip(METHODS, ("0.6", "C1", "C2", "C0"), strict=True)):
+        mine = [row for row in whole if row["method"] == method]
+        at = [families.index(row["family"]) + 0.2 * k - 0.3 for row in mine]
+        axes.bar(at, [100 * r["held"]["value"] for r in mine], 0.18, color=color, label=method)
+    axes.set(ylabel="held [%]", ylim=(0, 105))
+    axes.set_xticks(range(len(families)), families, rotation=45)
+    axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.12), frameon=False)

@@ -1,4 +1,4 @@
-"""What draws of scenes share: options, shapes, thin slabs, and a body on its way."""
+"""What the families of random scenes share: options, shapes, thin slabs, and a thrown body."""
 
 from __future__ import annotations
 
@@ -17,44 +17,36 @@ from tauguard.contacts.scenes.impacts import STIFF
 TIMESTEPS = (5e-4, 1e-3, 2e-3, 5e-3, 1e-2)
 #: Speeds [m/s].
 SPEEDS = (1.0, 60.0)
-#: Of a thrown body, a component's standard deviation [rad/s].
+#: Standard deviation of each component of a thrown body's angular velocity [rad/s].
 SPINS = (0, 20, 100, 400)
-#: Most that a free body turns in a step by an integrator that is explicit in gyroscopic forces,
-#: and so gives it energy in free flight [rad].
+#: Largest rotation of a free body in a step [rad], for integrators that are explicit in gyroscopic
+#: forces: they add energy to a body that spins faster.
 GYRATION = 0.2
-#: What follows the touch [s].
+#: Time that is simulated after the expected contact [s].
 AFTER = 0.03
+#: Kinds of geoms that are drawn, and the type of each.
 KINDS = ("sphere", "capsule", "cylinder", "box", "ellipsoid", "mesh")
-FREE = ("euler", "implicit", "implicitfast", "implicitfast", "discrete")
+GEOM = {kind: getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}") for kind in KINDS}
+#: Turns the z axis of a capsule or cylinder along x; w first.
+ALONG_X = (0.7071067811865476, 0.0, 0.7071067811865476, 0.0)
+#: Integrators to draw from, one of them twice as often.
+INTEGRATORS = ("euler", "implicit", "implicitfast", "implicitfast", "discrete")
 _SOLVERS = ("newton", "newton", "newton", "cg", "pgs")
 
 
 @dataclass(frozen=True)
-class Thrown:
-    """One scene; :mod:`studies.contacts.referee` says whether something passed."""
+class Drawn:
+    """One random scene."""
 
-    family: str
     spec: Any  #: MjSpec
     qpos: Array  #: where it starts, shape (nq,)
     qvel: Array  #: how fast, shape (nv,)
     timestep: float  #: [s]
     seconds: float
-    geom: str  #: name of the one whose velocity at the end is compared
     ctrl: Array = field(default_factory=lambda: np.zeros(0))  #: of the actuators, shape (nu,)
-    #: Writes the mocap poses for this time [s] into the data, before each step.
+    #: Writes the mocap poses at this time [s] into the data, before each step.
     move: Callable[[Any, float], None] | None = None
-    given: float | None = None  #: what energy is measured by, if not the kinetic one at first [J]
-
-    @property
-    def speed(self) -> float:
-        """Of the thrown body at the start [m/s]; 0 where nothing is thrown."""
-        model = self.spec.compile()
-        free = [
-            int(model.jnt_dofadr[j])
-            for j in range(model.njnt)
-            if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE
-        ]
-        return max((float(np.linalg.norm(self.qvel[d : d + 3])) for d in free), default=0.0)
+    energy_unit: float | None = None  #: divides energies [J]; default: the first kinetic energy
 
     def start(self, timestep: float, flags: int = 0, stiff: bool = False) -> tuple[Any, Any]:
         """Model and data in the first state; ``stiff`` makes all contacts stiff."""
@@ -75,7 +67,7 @@ class Thrown:
 def world(
     rng: np.random.Generator, integrators: tuple[str, ...], gravity: bool = False
 ) -> tuple[Any, float, float]:
-    """A spec with its options, a timestep [s] and a speed [m/s]."""
+    """A spec with random options, a time step [s] and a speed [m/s]."""
     spec = mujoco.MjSpec()
     timestep = settle(spec, rng, integrators, gravity)
     return spec, timestep, between(rng, *SPEEDS)
@@ -84,7 +76,7 @@ def world(
 def settle(
     spec: Any, rng: np.random.Generator, integrators: tuple[str, ...], gravity: bool = False
 ) -> float:
-    """Choose the options of a spec; a timestep [s]."""
+    """Choose the options of a spec; returns a time step [s]."""
     option = spec.option
     option.gravity = [0, 0, -9.81 if gravity or rng.random() < 0.5 else 0]
     integrator = str(rng.choice(integrators)).upper()
@@ -95,13 +87,31 @@ def settle(
     return float(rng.choice(TIMESTEPS))
 
 
+def free_body(spec: Any, name: str, pos: Any = (0, 0, 0)) -> Any:
+    """A body at ``pos`` with a free joint of its name."""
+    body = spec.worldbody.add_body(name=name, pos=list(pos))
+    body.add_freejoint(name=name)
+    return body
+
+
+def solid(body: Any, name: str, kind: str, size: Any, **more: Any) -> None:
+    """Add a geom of this kind (:data:`KINDS`) and size to a body."""
+    body.add_geom(name=name, type=GEOM[kind], size=size, **more)
+
+
+def at_rest(model: Any, joint: str = "body") -> tuple[Array, Array, int, int]:
+    """First qpos and qvel, and the joint's addresses in them."""
+    found = model.joint(joint)
+    return model.qpos0.copy(), np.zeros(model.nv), int(found.qposadr[0]), int(found.dofadr[0])
+
+
 def any_way(rng: np.random.Generator) -> Array:
     """A random orientation, w first."""
     return np.roll(Rotation.from_quat(rng.normal(size=4)).as_quat(), 1)
 
 
 def any_spin(rng: np.random.Generator, timestep: float) -> Array:
-    """A random angular velocity that turns some :data:`GYRATION` a step at the most [rad/s]."""
+    """A random angular velocity of about :data:`GYRATION` in a step at most [rad/s]."""
     return np.asarray(rng.normal(size=3) * min(GYRATION / timestep, rng.choice(SPINS)))
 
 
@@ -119,7 +129,7 @@ def slab(
     spec: Any = None,
     pos: tuple[float, ...] = (0, 0, 0),
 ) -> None:
-    """A box of these half sizes, or a mesh of that form if ``spec`` is given and by chance."""
+    """A box of these half sizes; with ``spec`` a mesh of the same shape in half of the draws."""
     geom = body.add_geom(name=name, pos=list(pos), mass=mass)
     if rng.random() < 0.5:
         geom.priority, geom.solref, geom.solimp = 1, STIFF[0], STIFF[1]
@@ -140,10 +150,10 @@ def shape(
     kinds: tuple[str, ...] = KINDS,
     least: float = 3e-3,
 ) -> float:
-    """Add a geom of a random kind; its reach [m]."""
+    """Add a geom of a random kind; returns a radius that contains it [m]."""
     kind, radius = str(rng.choice(kinds)), between(rng, least, 0.03)
     geom = body.add_geom(name=name, mass=mass)
-    geom.type = getattr(mujoco.mjtGeom, f"mjGEOM_{kind.upper()}")
+    geom.type = GEOM[kind]
     if rng.random() < 0.3:
         geom.margin = rng.uniform(0, 3e-3)
         geom.gap = geom.margin * rng.random() * rng.integers(2)
@@ -165,23 +175,18 @@ def shape(
 
 
 def thrown(
-    family: str,
     rng: np.random.Generator,
     spec: Any,
     timestep: float,
     speed: float,
     place: Any,
-    geom: str,
-    way: float,
+    distance: float,
     normal: Any = (0, 0, 1.0),
     slide: float = 0.3,
     flat: bool = False,
-) -> Thrown:
+) -> Drawn:
     """The body ``body`` at ``place``, flying against ``normal``: flat, tilted or any way."""
-    model = spec.compile()
-    qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
-    joint = int(model.body("body").jntadr[0])
-    at, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+    qpos, qvel, at, dof = at_rest(model := spec.compile())
     how = 0 if flat else int(rng.integers(3))
     turn = Rotation.from_euler("y", rng.choice([0, 90]) * (not flat), degrees=True)
     if how == 1:
@@ -196,5 +201,4 @@ def thrown(
     if model.opt.integrator != mujoco.mjtIntegrator.mjINT_IMPLICIT:
         spin *= min(1.0, GYRATION / max(float(np.linalg.norm(spin)) * timestep, 1e-9))
     qvel[dof + 3 : dof + 6] = 0 if flat else spin
-    seconds = way / speed + AFTER
-    return Thrown(family, spec, qpos, qvel, timestep, seconds, geom)
+    return Drawn(spec, qpos, qvel, timestep, distance / speed + AFTER)

@@ -5,14 +5,17 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from studies.contacts.draws.world import (
+from studies.contacts.drawing import (
     AFTER,
-    FREE,
+    GEOM,
+    INTEGRATORS,
     KINDS,
-    Thrown,
+    Drawn,
     any_spin,
     any_way,
+    at_rest,
     between,
+    free_body,
     settle,
     shape,
     slab,
@@ -23,8 +26,8 @@ from tauguard.contacts.scenes.impacts import STIFF
 from tauguard.models.cloth import Cloth, add_cloth
 
 
-def cloth(rng: np.random.Generator) -> Thrown:
-    """A body into pinned cloth or a hanging flag: flat, corner first or any way, spinning."""
+def cloth(rng: np.random.Generator) -> Drawn:
+    """A body into pinned cloth or a hanging flag: in any orientation, spinning."""
     spec, timestep, speed = world(rng, ("discrete",))
     pinned = str(rng.choice(["frame", "corners", "edge"]))
     hangs, turn = pinned == "edge", np.sqrt(0.5)
@@ -39,8 +42,7 @@ def cloth(rng: np.random.Generator) -> Thrown:
         solref=STIFF[0] if rng.random() < 0.5 else (0.003, 1.0),
     )
     add_cloth(spec, sheet)
-    body = spec.worldbody.add_body(name="body")
-    body.add_freejoint()
+    body = free_body(spec, "body")
     reach = shape(rng, spec, body, "body", between(rng, 5e-3, 0.1), KINDS, 0.008)
     body.geoms[0].conaffinity = 2
     gap = reach + sheet.radius + 0.003 + rng.random() * speed * timestep
@@ -49,18 +51,12 @@ def cloth(rng: np.random.Generator) -> Thrown:
     normal = np.array([0, 1.0, 0]) if hangs else np.array([0, 0, 1.0])
     aside = rng.uniform(-0.06, 0.06, 3)
     place = data.flexvert_xpos.mean(axis=0) + aside - aside @ normal * normal + gap * normal
-    return thrown("cloth", rng, spec, timestep, speed, place, "body", gap, normal, slide=0.0)
+    return thrown(rng, spec, timestep, speed, place, gap, normal, slide=0.0)
 
 
 #: Of :func:`soft`, by dimension: vertices along each side, spacing and radius [m], springs, pins.
 _FORMS = {
-    1: (
-        "13 1 1",
-        0.025,
-        5e-3,
-        '<edge equality="true"/>',
-        '<pin id="0 12"/>',
-    ),
+    1: ("13 1 1", 0.025, 5e-3, '<edge equality="true"/>', '<pin id="0 12"/>'),
     2: ("9 9 1", 0.035, 2e-3, '<edge equality="true"/>', '<pin id="0 8 72 80"/>'),
     3: (
         "5 5 3",
@@ -72,7 +68,7 @@ _FORMS = {
 }
 
 
-def soft(rng: np.random.Generator) -> Thrown:
+def soft(rng: np.random.Generator) -> Drawn:
     """A body onto a rope, a net of edges that hold their length, or a soft block."""
     dim = int(rng.choice([1, 2, 3]))
     count, spacing, radius, springs, pins = _FORMS[dim]
@@ -85,27 +81,26 @@ def soft(rng: np.random.Generator) -> Thrown:
       </worldbody></mujoco>""")
     timestep = settle(spec, rng, ("discrete",))  # which `ipc` needs
     speed = between(rng, 1.0, 40.0)
-    body = spec.worldbody.add_body(name="body")
-    body.add_freejoint()
+    body = free_body(spec, "body")
     reach = shape(rng, spec, body, "body", between(rng, 5e-3, 0.1), KINDS, 0.008)
     gap = reach + radius + 0.003 + rng.random() * speed * timestep
     data = mujoco.MjData(model := spec.compile())
     mujoco.mj_forward(model, data)
     x = data.flexvert_xpos
     place = [*x.mean(axis=0)[:2] + rng.uniform(-0.01, 0.01, 2), x[:, 2].max() + gap]
-    return thrown("soft", rng, spec, timestep, speed, place, "body", gap, slide=0.0)
+    return thrown(rng, spec, timestep, speed, place, gap, slide=0.0)
 
 
 #: Of :func:`needles`: half sizes, the least and the most half thickness [m], mass [kg], reach [m].
 _THIN = {
-    "CAPSULE": ((None, 0.03, 0), 5e-4, 3e-3, 0.01, 0.035),
-    "BOX": ((0.03, 0.02, None), 5e-4, 3e-3, 0.05, 0.04),
-    "CYLINDER": ((0.02, None, 0), 5e-4, 3e-3, 0.03, 0.03),
-    "ELLIPSOID": ((0.03, 0.01, None), 1e-3, 5e-3, 0.03, 0.035),
+    "capsule": ((None, 0.03, 0), 5e-4, 3e-3, 0.01, 0.035),
+    "box": ((0.03, 0.02, None), 5e-4, 3e-3, 0.05, 0.04),
+    "cylinder": ((0.02, None, 0), 5e-4, 3e-3, 0.03, 0.03),
+    "ellipsoid": ((0.03, 0.01, None), 1e-3, 5e-3, 0.03, 0.035),
 }
 
 
-def needles(rng: np.random.Generator) -> Thrown:
+def needles(rng: np.random.Generator) -> Drawn:
     """A needle, plate, disc or lens onto a small net, pinned or free, over a floor or not."""
     count, spacing = int(rng.integers(4, 8)), 0.02
     corners = f"0 {count - 1} {count * (count - 1)} {count**2 - 1}"
@@ -115,23 +110,20 @@ def needles(rng: np.random.Generator) -> Thrown:
         spacing="{spacing} {spacing} {spacing}" radius="{between(rng, 1e-3, 4e-3):.5f}">
         <edge equality="true" damping=".001"/>{pins}
         <contact selfcollide="none" condim="3"/></flexcomp></worldbody></mujoco>""")
-    timestep, speed = settle(spec, rng, FREE[:4]), between(rng, 1.0, 30.0)
-    body = spec.worldbody.add_body(name="body")
-    body.add_freejoint(name="body")
+    timestep, speed = settle(spec, rng, INTEGRATORS[:4]), between(rng, 1.0, 30.0)
+    body = free_body(spec, "body")
     kind = str(rng.choice(list(_THIN)))
     form, least, most, mass, reach = _THIN[kind]
-    thin, kinds = between(rng, least, most), mujoco.mjtGeom
+    thin = between(rng, least, most)
     size = [thin if x is None else x for x in form]
-    body.add_geom(name="body", type=getattr(kinds, f"mjGEOM_{kind}"), size=size, mass=mass)
+    body.add_geom(name="body", type=GEOM[kind], size=size, mass=mass)
     if rng.random() < 0.4:
         floor = spec.worldbody.add_body(name="floor", pos=[0, 0, -0.03])
         slab(rng, floor, "floor", (0.2, 0.2, 1e-3), 1.0)
-    model = spec.compile()
-    qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
-    at, dof = int(model.joint("body").qposadr[0]), int(model.joint("body").dofadr[0])
+    qpos, qvel, at, dof = at_rest(spec.compile())
     qpos[at : at + 3] = [*rng.uniform(-0.02, 0.02, 2), reach + 0.01]
     if rng.random() < 0.5:
         qpos[at + 3 : at + 7] = any_way(rng)
     qvel[dof + 2] = -speed
     qvel[dof + 3 : dof + 6] = any_spin(rng, timestep)
-    return Thrown("needles", spec, qpos, qvel, timestep, (reach + 0.01) / speed + AFTER, "body")
+    return Drawn(spec, qpos, qvel, timestep, (reach + 0.01) / speed + AFTER)

@@ -1,0 +1,204 @@
+"""Contact checkers beside MuJoCo's own contacts: what each sees, how early, at what cost.
+
+``scenes``: every checker in every contact scene, beside the true contacts of the same path.
+``crossing``: a ball into pinned cloth, from starts spread over one step's travel, where a closed
+form gives the time of impact. ``cost``: a large cloth. Precision, recall and lead are those of
+:func:`tauguard.contacts.compare`. MuJoCo's flags ``speculative`` and ``ipc`` leave a moving ball on
+cloth to ordinary contacts, so that their rows equal the plain ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from oracles.tunnelling import Tunnelling
+from studies.framework import answer, groups, table_rows, timed
+from tauguard.contacts import Report, Score, State, checker, compare, contacts_of
+from tauguard.contacts.scenes import SCENES, arm_cloth, ball_cloth
+from tauguard.contacts.scenes.impacts import IMPACT_POINTS
+from tauguard.report import Row, rate
+
+CHECKERS = ("mujoco", "cloth", "rigid")
+#: Seconds of a scene in a quick run, where its own time is long.
+QUICK_SECONDS = dict(arm_cloth=0.35, sleeve_arm=0.3, garment_chest=0.45) | dict.fromkeys(
+    ("arm_boxes", "two_arms"), 1.2
+)
+#: Error of the ball's time of impact that is asked [s], and fraction of a step's cost.
+TIME_ERROR, COST = 1e-6, 0.25
+
+NOTES = {
+    "scenes": "recall: of the true contacts, steps_recall: of the steps with contact, precision: "
+    "of the checker's reports. lead_ms: before MuJoCo's first contact; first_error_ms: beside "
+    "the first contact of MuJoCo in steps 50 times shorter (quick: 10). share: of mj_step's time. "
+    "not_generated, not_held: contacts that MuJoCo did not list, or did not hold.",
+    "crossing": "starts spread over one step's travel. mujoco_generates: it lists a contact; "
+    "mujoco_holds: and the ball does not tunnel; cloth_time_error [s]: beside the closed form.",
+    "cost": "what a checker adds to a step; state_us: the copy of the state that it needs.",
+}
+
+
+def measure(quick: bool, seed: int) -> list[Row]:
+    """Rows of the three tables; the scenes have no random input, so ``seed`` changes nothing."""
+    timesteps = (5e-3,) if quick else (1e-3, 2e-3, 5e-3)
+    rows: list[Row] = []
+    for timestep, name in product(timesteps, SCENES):
+        seconds = QUICK_SECONDS.get(name) if quick else None
+        rows += _scene(name, timestep, seconds, 10 if quick else 50)
+    speeds = (10.0, 50.0) if quick else (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+    modes = ("plain",) if quick else ("plain", "speculative", "ipc")
+    for mode, timestep, speed in product(modes, timesteps, speeds):
+        rows.append(_crossing(speed, timestep, mode, 5 if quick else 20))
+    return rows + _cost(quick)
+
+
+def _scene(name: str, timestep: float, seconds: float | None, fine: int) -> list[Row]:
+    """A row for each checker."""
+    report = compare(SCENES[name](), CHECKERS, timestep=timestep, seconds=seconds, fine=fine)
+    missed = sum(not outcome.generated for outcome in report.outcomes)
+    lost = sum(not outcome.held for outcome in report.outcomes)
+    copied = ("delay_ms", "lead_ms", "first_error_ms", "depth_mm", "normal_deg")
+    return [
+        {
+            "study": "scenes",
+            "scene": name,
+            "timestep_ms": 1e3 * timestep,
+            "checker": score.checker,
+            "precision": rate(score.correct or 0, score.reports or 0),
+            "recall": rate(score.recalled or 0, score.events or 0),
+            "steps_recall": rate(score.steps_found or 0, score.steps or 0),
+            **{key: getattr(score, key) for key in copied},
+            **_times(score, report),
+            "not_generated": missed if score.checker == "mujoco" else None,
+            "not_held": lost if score.checker == "mujoco" else None,
+        }
+        for score in report.scores
+    ]
+
+
+def _times(score: Score, report: Report) -> Row:
+    time = {"median": score.us_per_step, "low": score.us_low, "high": score.us_high}
+    return {"us_per_step": time, "mj_step_us": report.step_us, "share": score.share}
+
+
+def _crossing(speed: float, timestep: float, mode: str, offsets: int) -> Row:
+    """Flights from evenly spread starts to each impact point."""
+    starts = np.arange(offsets) / offsets * speed * timestep
+    flights = [
+        _fly(speed, timestep, mode, impact, float(start))
+        for impact, start in product(IMPACT_POINTS, starts)
+    ]
+    generated, held, errors = (np.array(column) for column in zip(*flights, strict=True))
+    seen = np.isfinite(errors)
+    return {
+        "study": "crossing",
+        "timestep_ms": 1e3 * timestep,
+        "speed": speed,
+        "mode": mode,
+        "mujoco_generates": rate(int(generated.sum()), len(flights)),
+        "mujoco_holds": rate(int(held.sum()), len(flights)),
+        "cloth_recall": rate(int(seen.sum()), len(flights)),
+        "cloth_time_error": float(errors[seen].max(initial=0)),
+    }
+
+
+def _fly(
+    speed: float, timestep: float, mode: str, impact: str, offset: float
+) -> tuple[bool, bool, float]:
+    """Whether MuJoCo lists and holds the contact, and the error of the checker's time [s].
+
+    Until the first contact the ball moves uniformly and the cloth rests, so that the time of impact
+    is their distance over the speed.
+    """
+    scene = ball_cloth(speed=speed, offset=offset, impact=impact, mode=mode)
+    model, data = scene.start(timestep)
+    scratch, check = mujoco.MjData(model), checker("cloth", model)
+    before, ball = State.of(model, data, scratch), int(model.geom_bodyid[0])
+    level = float(before.flexvert_xpos[:, 2].mean())
+    distance = before.xpos[ball, 2] - level - model.geom_size[0, 0] - model.flex_radius[0]
+    tunnelling, generated, found = Tunnelling(model, data), False, np.inf
+    for _ in range(int(np.ceil(scene.seconds / timestep))):
+        mujoco.mj_step(model, data)
+        after = State.of(model, data, scratch)
+        generated |= len(contacts_of(data)) > 0
+        if not np.isfinite(found) and len(contacts := check.check(before, after)):
+            found = before.time + float(contacts.time.min()) * timestep
+        tunnelling.observe(data)
+        before = after
+    return generated, generated and not tunnelling.pairs, abs(found - distance / speed)
+
+
+def _cost(quick: bool) -> list[Row]:
+    """The arm into cloth of 40 x 40 vertices: what a checker adds to MuJoCo's step."""
+    seconds = 0.3 if quick else 0.6
+    report = compare(
+        arm_cloth(count=40), CHECKERS, timestep=2e-3, seconds=seconds, referee=False
+    )
+    copied = {"run": "quick" if quick else "full", "state_us": report.state_us}
+    return [
+        {
+            "study": "cost",
+            "scene": "arm_cloth, 40x40",
+            "checker": score.checker,
+            **_times(score, report),
+            **copied,
+            "share_with_state": score.share + report.state_us / report.step_us,
+        }
+        for score in report.scores
+    ]
+
+
+def judge(rows: Sequence[Row]) -> list[Row]:
+    """Recall, errors and cost beside what was asked."""
+    out: list[Row] = []
+    for name, mine in groups(table_rows(rows, "scenes"), lambda row: str(row["checker"])).items():
+        for kind in ("recall", "steps_recall", "precision"):
+            counted = [row[kind] for row in mine if row[kind]["n"]]
+            count = sum(round(one["value"] * one["n"]) for one in counted)
+            total, asked = sum(one["n"] for one in counted), kind == "recall" and name != "mujoco"
+            met = count == total if asked else None
+            what = f"{name}: {kind}"
+            out.append(answer(what, "1.0" if asked else "figure", f"{count} of {total}", met))
+    flights = table_rows(rows, "crossing")
+    seen = min(row["cloth_recall"]["value"] for row in flights)
+    off = max(row["cloth_time_error"] for row in flights)
+    out.append(answer("ball: crossings seen by cloth", "1.0", f"{seen:.3f}", seen == 1))
+    out.append(answer("ball: error of its time [s]", "below 1e-6", f"{off:.2g}", off < TIME_ERROR))
+    for row in (row for row in table_rows(rows, "cost") if row["checker"] != "mujoco"):
+        text = f"{row['share']:.3f}, {row['share_with_state']:.3f} with the state's copy"
+        what = f"{row['checker']}: fraction of mj_step, arm and 40x40 cloth"
+        met = timed(row["share_with_state"] < COST, row["run"] == "quick")
+        out.append(answer(what, "below 0.25", text, met))
+    return out
+
+
+def draw(rows: Sequence[Row], figure: Any) -> None:
+    """Error against cost in every scene, and the ball's contacts against its speed."""
+    axes = figure.subplot_mosaic([["cost", "generates"], ["cost", "holds"]])
+    left, seen = axes["cost"], [r for r in table_rows(rows, "scenes") if r["recall"]["n"]]
+    by_checker = groups(seen, lambda row: str(row["checker"]))
+    for color, (name, mine) in zip(("C7", "C0", "C1"), by_checker.items(), strict=False):
+        left.plot([], [], "o", color=color, label=name)
+        for row in mine:
+            missed = row["recall"]["value"] < 1
+            error = row["timestep_ms"] if missed else max(abs(row["delay_ms"] or 0.0), 1e-9)
+            left.plot(row["share"], error, "x" if missed else "o", color=color)
+    left.plot([], [], "x", color="black", label="misses contacts (at its time step)")
+    left.set(xscale="log", yscale="log", xlabel="cost: fraction of mj_step")
+    left.set(ylabel="error: onset to first report [ms]")
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    curves = groups(
+        table_rows(rows, "crossing"), lambda row: f"{row['mode']}, {row['timestep_ms']:g} ms"
+    )
+    for kind in ("generates", "holds"):
+        for label, mine in curves.items():
+            values = [row[f"mujoco_{kind}"]["value"] for row in mine]
+            style = "-" if label.startswith("plain") else ":"
+            axes[kind].plot([row["speed"] for row in mine], values, style, label=label)
+        axes[kind].set(xscale="log", ylabel=f"fraction that MuJoCo {kind}", ylim=(-0.05, 1.05))
+    axes["generates"].legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+    axes["holds"].set(xlabel="ball's speed [m/s]")
