@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -49,9 +50,9 @@ def _queries(rows: Sequence[Row]) -> Iterator[Point]:
         for both in (row for row in mine if row["kind"] == "both"):
             question = f"a vertex-face or edge-edge query beside {peer}"
             text = f"{_errors(own)}; time within {latest:.0e}"
-            yield Point(question, "ab2pf", 1e-3 * both["ab2pf_all_ns"], None, text, "ours")
+            yield Point(question, "ab2pf", 1e-3 * both["ab2pf_all_ns"], math.nan, text, "ours")
             text = f"{_errors(rated)}; time early by {early:.0e} (median)"
-            yield Point(question, peer, 1e-3 * both["all_ns"], None, text, "peer")
+            yield Point(question, peer, 1e-3 * both["all_ns"], math.nan, text, "peer")
 
 
 def _labelled(rows: Sequence[Row]) -> Iterator[Point]:
@@ -76,9 +77,9 @@ def _frames(rows: Sequence[Row]) -> Iterator[Point]:
         question = f"a frame of {own['scene']}, {own['triangles']:,} triangles, {peer['peer']}"
         ours = 1e3 * (number(peer["ab2pf_ms"]) or 0.0)
         error = f"{own['missed']} missed, {own['late']} late of {own['ab2pf_hits']:,}"
-        yield Point(question, "ab2pf", ours, None, error, "ours")
+        yield Point(question, "ab2pf", ours, math.nan, error, "ours")
         text = "not judged on frames"
-        yield Point(question, peer["peer"], 1e3 * peer["peer_ms"], None, text, "peer")
+        yield Point(question, peer["peer"], 1e3 * peer["peer_ms"], math.nan, text, "peer")
     scenes: Any = {row["scene"] for row in frames}
     question = f"A frame of each of {len(scenes)} deforming meshes, one thread"
     axes = ("microseconds, sum", "collisions missed or late")

@@ -36,7 +36,7 @@ ERRORS = ("misses", "false_hits", "late", "exact_differs")
 def measure(quick: bool, seed: int) -> list[Row]:
     """At least a million queries of either kind (quick: 3,000), evenly over the sets."""
     n = -(-(3_000 if quick else 1_000_000) // len(KINDS))
-    rows = []
+    rows: list[Row] = []
     with Workers() as run:
         for name, make in KINDS.items():
             for vertex in (True, False):

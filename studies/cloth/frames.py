@@ -5,7 +5,7 @@ Everything runs in one thread. Times are those of the processor, without other p
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from time import process_time
@@ -36,8 +36,7 @@ MEANS = {"iccd": 2.3, "vcd": 1.34}
 PEER = ("ipctk LBVH + AdditiveCCD", 10)
 #: A time is late if it is this much later than ab2pf's, which may be this much early [step].
 LATE = 1e-9
-#: The frame with the peer's and the comparator's bars.
-RECORDED = "cloth-ball"
+RECORDED = "cloth-ball"  #: the frame that a figure is asked of
 
 NOTES = {
     "frame": "all collisions of one step. volume: of the broad phase; (moving_)k_dopK has K/2 axes "
@@ -159,7 +158,7 @@ def _peers(frame: Frame, repeats: int, limit: int, tight_limit: int) -> list[Row
     found = ccd.find(*frame.step)
     x_t0, x_t1 = (np.asfortranarray(x) for x in frame.step)
     mesh, candidates = ipctk.CollisionMesh(x_t0, ccd.edges, frame.faces), ipctk.Candidates()
-    calls = {
+    calls: dict[str, Callable[[], object]] = {
         "ours": partial(ccd.find, *frame.step),
         "LBVH": lambda: candidates.build(mesh, x_t0, x_t1, 0.0, ipctk.LBVH()),
     }

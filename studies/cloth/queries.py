@@ -29,10 +29,9 @@ from tauguard.report import Row, rate
 
 #: Neighbours in the list of candidates that a peer is asked about in a row, as memory has them.
 RUN = 100
-#: Times over ab2pf's that are asked of ipctk for a query without contact.
+#: Asked times of a clear query over ab2pf's.
 ASKED = {"ipctk AdditiveCCD": 10, "ipctk TightInclusionCCD": 100}
-#: The largest error of a time that is asked [step].
-EARLY = 1e-9
+EARLY = 1e-9  #: largest error of a time that is asked [step]
 
 NOTES = {
     "query": "candidates of ipctk's broad phase on one frame (n of so many). ns: a query. misses "

@@ -77,7 +77,7 @@ def recorded() -> Path | None:
     missing = [name for name in needed if not any((folder / name).glob("*.*"))]
     if missing:
         raise ValueError(
-            f"TAUGUARD_DATA: {folder} lacks files in {', '.join(missing)}; docs/cloth.md names "
-            "their origin; without the variable the study runs without recorded data"
+            f"TAUGUARD_DATA: {folder} lacks files in {', '.join(missing)}; "
+            "docs/notes/2026-11-23-cloth.md names their origin (unset: no recorded data)"
         )
     return Path(named)

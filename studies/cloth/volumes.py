@@ -97,8 +97,8 @@ def draw(rows: Sequence[Row], figure: Any) -> None:
             some = [row for row in own if row["volume"].startswith(prefix)]
             k = [int(row["volume"].removeprefix(prefix)) for row in some]
             pairs = [row["vf_candidates"] + row["ee_candidates"] for row in some]
-            label = name.replace("_", " ") if style == "-" else None
-            left.semilogy(k, pairs, style, marker="o", color=f"C{i}", label=label)
+            line = {"label": name.replace("_", " ")} if style == "-" else {}
+            left.semilogy(k, pairs, style, marker="o", color=f"C{i}", **line)
     left.set(title="Candidates (dashed: moving volumes)", xlabel="k of the k-DOP", ylabel="pairs")
     for axes in (growth, left):
         axes.legend(fontsize="x-small")

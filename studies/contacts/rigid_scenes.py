@@ -162,9 +162,9 @@ def stack(rng: np.random.Generator) -> Drawn:
     body = free_body(spec, "body")
     reach = shape(rng, spec, body, "body", between(rng, 5e-3, 0.5))
     distance = reach + 0.005 + rng.random() * speed * timestep
-    normal, place = (0, 0, 1.0), [0, 0, half + top + distance]
+    normal, place = (0.0, 0.0, 1.0), [0, 0, half + top + distance]
     if rng.random() >= 0.5:
-        normal, place = (1.0, 0, 0), [0.06 + distance, 0, half + 0.5 * top + reach]
+        normal, place = (1.0, 0.0, 0.0), [0.06 + distance, 0, half + 0.5 * top + reach]
     return thrown(rng, spec, timestep, speed, place, distance, normal, slide=0.0)
 
 
@@ -215,8 +215,8 @@ def spin(rng: np.random.Generator) -> Drawn:
     rotor.add_joint(name="rotor", axis=[0, 0, 1])
     kind, thin = str(rng.choice(["capsule", "box"])), between(rng, 2e-3, 0.01)
     size = [thin, length, 0] if kind == "capsule" else [thin, thin, length]
-    place, mass = [length * rng.uniform(0, 0.8), 0, 0], between(rng, 0.05, 1.0)
-    solid(rotor, "rotor", kind, size, quat=ALONG_X, pos=place, mass=mass)
+    offset, mass = [length * rng.uniform(0, 0.8), 0, 0], between(rng, 0.05, 1.0)
+    solid(rotor, "rotor", kind, size, quat=ALONG_X, pos=offset, mass=mass)
     angle = rng.uniform(0.5, 2.5)
     place = 0.6 * length * np.array([np.cos(angle), np.sin(angle), 0])
     other = spec.worldbody.add_body(name="body", pos=place)

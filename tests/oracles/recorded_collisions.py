@@ -2,7 +2,7 @@
 
 Sample-Scalable-CCD-Data (Belgrod et al. 2023) lists the collisions of whole frames, and
 Sample-Queries (Wang et al. 2021) labels single queries; both used exact arithmetic. The files lie
-in the folder ``ccd`` of the data (docs/cloth.md names their origin).
+in the folder ``ccd`` of the data (docs/notes/2026-11-23-cloth.md names their origin).
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ def load_frame(data: Path, name: str) -> RecordedFrame:
         chosen: NDArray[np.int64] = np.array(boxes, dtype=np.int64)[np.array(hit, dtype=bool)]
         return chosen
 
-    vf = np.sort(listed("vf"), axis=1) - [0, len(x_t0) + len(edges)]
-    ee = np.sort(theirs[listed("ee") - len(x_t0)], axis=1)
+    vf = np.sort(listed("vf"), axis=1) - np.array([0, len(x_t0) + len(edges)], dtype=np.int64)
+    ee = np.sort(theirs[listed("ee") - len(x_t0)], axis=1).astype(np.int64)
     order = [np.argsort(keys(pairs), kind="stable") for pairs in (vf, ee)]
     return RecordedFrame(sequence.faces, edges, x_t0, x_t1, (vf[order[0]], ee[order[1]]))
 
