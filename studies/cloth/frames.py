@@ -19,8 +19,9 @@ from studies.cloth import shared
 from studies.cloth.shared import CLOTHS, Step, scaled
 from studies.framework import answer, groups, table_rows, time_in_turn, timed
 from tauguard.cloth import Frame as FrameAnswer
-from tauguard.cloth import Groups, MeshCCD
-from tauguard.cloth.impacts import METHODS
+from tauguard.cloth import Groups
+from tauguard.cloth.comparators import METHODS
+from tauguard.cloth.comparators import ComparedMeshCCD as MeshCCD
 from tauguard.cloth.scenes import SCENES
 from tauguard.report import Row
 
@@ -257,8 +258,8 @@ def judge(rows: Sequence[Row]) -> list[Row]:
     whole = any(row["scene"] == RECORDED for row in table_rows(rows, "frame"))
     out: list[Row] = []
     for row in table_rows(rows, "listed"):
+        wrong = row["misses"] + row["false_hits"]
         if row["method"] == "ab2pf":
-            wrong = row["misses"] + row["false_hits"]
             what = f"{row['scene']}, {row['listed']} listed collisions: misses and false hits"
             out.append(answer(what, "0", str(wrong), wrong == 0))
     for row in table_rows(rows, "frame mean"):

@@ -22,8 +22,8 @@ from oracles.recorded_collisions import KINDS, QUERY_SETS, load_frame, load_quer
 from studies.cloth import shared
 from studies.cloth.shared import Step, narrow_phases
 from studies.framework import answer, groups, number, table_rows, time_in_turn, timed
-from tauguard.cloth import MeshCCD, _mesh
-from tauguard.cloth.impacts import METHODS
+from tauguard.cloth import MeshCCD
+from tauguard.cloth.comparators import METHODS, solve
 from tauguard.cloth.scenes import SCENES
 from tauguard.report import Row, rate
 
@@ -79,7 +79,7 @@ def solver(queries: Queries, method: str = "ab2pf") -> Callable[[], Answer]:
     point, normal, weights = (np.empty((n, k)) for k in (3, 3, 4))
 
     def call() -> Answer:
-        counts = _mesh.solve(*queries, METHODS[method], 0.0, hit, toi, point, normal, weights)
+        counts = solve(*queries, method, hit, toi, point, normal, weights)
         return Answer(hit.astype(bool), toi, counts)
 
     return call

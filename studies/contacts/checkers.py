@@ -2,8 +2,8 @@
 
 ``scenes``: every checker in every contact scene (:func:`tauguard.contacts.compare`). ``crossing``:
 a ball into pinned cloth, from starts spread over one step's travel, where a closed form gives the
-time of impact. ``cost``: a large cloth. MuJoCo's flags ``speculative`` and ``ipc`` leave a moving ball on
-cloth to ordinary contacts, so that their rows equal the plain ones.
+time of impact. ``cost``: a large cloth. MuJoCo's flags ``speculative`` and ``ipc`` leave a moving
+ball on cloth to ordinary contacts, so that their rows equal the plain ones.
 """
 
 from __future__ import annotations
