@@ -305,8 +305,7 @@ def _bars(axes: Any, by_label: dict[str, list[Row]], key: str) -> None:
         for bar, row in zip(bars, own, strict=True):
             if row.get("missed"):
                 bar.set(hatch="////", edgecolor="white", linewidth=0)
-    names = [name.replace("_", " ") for name in scenes]
-    axes.set_xticks(range(len(scenes)), names, rotation=30, ha="right", fontsize="x-small")
+    axes.set_xticks(range(len(scenes)), scenes, rotation=30, ha="right", fontsize="x-small")
     axes.axhline(1, color="black", linewidth=0.8, zorder=0)
     axes.margins(y=0.35)
     if by_label:

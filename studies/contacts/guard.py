@@ -47,12 +47,12 @@ METHODS = ("plain", "speculative", "ipc", "guarded")
 
 NOTES = {
     "thrown": "held: nothing tunnelled; silent: tunnelling that the guard did not report; "
-    "exhausted: reported; arrested: scenes with partners stopped. energy: the most over that at "
-    "first (mocap: over all bodies at twice its speed); energy_above: scenes with more than "
-    f"{ADDED:g}; redone_above: of those with redone steps, with more than plain steps too; "
-    "redone_added: most that redone steps gave. over_plain: time over plain steps'; over_fixed: "
-    "over the largest fixed step (stiff contacts) from which on all finer ones hold, fixed_ms, one "
-    "scene in four. Medians.",
+    "exhausted: reported; impact_zones: scenes with partners that moved rigidly together. energy: "
+    "the most over that at first (mocap: over all bodies at twice its speed); energy_above: scenes "
+    f"with more than {ADDED:g}; rolled_back_above: of those with a rollback, with more than plain "
+    "steps too; rolled_back_added: most that rollbacks gave. over_plain: time over plain steps'; "
+    "over_fixed: over the largest fixed step (stiff contacts) from which on all finer ones hold, "
+    "fixed_ms, one scene in four. Medians.",
     "overhead": "a step of a scene in which nothing is to be guarded, plain and guarded.",
 }
 
@@ -63,12 +63,12 @@ class Outcome:
 
     held: bool
     exhausted: bool
-    arrested: bool
-    redone: bool  #: the guard redid a step
+    impact_zones: bool
+    rolled_back: bool  #: the guard redid a step
     energy: float  #: the most, over the unit of the scene
     seconds: float  #: processor time of stepping alone
     calls: float  #: of ``mj_step`` for each step
-    added: float = 0.0  #: most energy that redone steps added in sum; 0 with actuators
+    added: float = 0.0  #: most energy that rollbacks added in sum; 0 with actuators
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def play(scene: Drawn, method: str, timestep: float, stiff: bool = False) -> Out
     guard = GuardedStepper(model, data) if method == "guarded" else None
     every, steps = max(1, round(5e-4 / timestep)), round(scene.seconds / timestep) + 1
     spent, paused, calls, change, added = 0.0, 0.0, 0, 0.0, 0.0
-    exhausted = arrested = redone = False
+    exhausted = impact_zones = rolled_back = False
 
     def observe() -> None:
         nonlocal paused
@@ -174,8 +174,8 @@ def play(scene: Drawn, method: str, timestep: float, stiff: bool = False) -> Out
             report = guard.step(observe)
             calls += report.steps
             exhausted |= report.exhausted
-            arrested |= bool(report.arrested)
-            redone |= report.steps > 1
+            impact_zones |= bool(report.impact_zones)
+            rolled_back |= report.steps > 1
             if report.balance is not None and not model.nu:
                 change += float(np.diff(report.balance.energy.sum(axis=1))[0]) / energy.unit
                 added = max(added, change)
@@ -184,9 +184,8 @@ def play(scene: Drawn, method: str, timestep: float, stiff: bool = False) -> Out
             observe()
             if not np.isfinite(energy.most):
                 break
-    most, flags = float(energy.most), (exhausted, arrested, redone)
-    held = not tunnelling.pairs and bool(np.isfinite(most))
-    return Outcome(held, *flags, most, spent, calls / steps, added)
+    most, held = float(energy.most), not tunnelling.pairs and bool(np.isfinite(energy.most))
+    return Outcome(held, exhausted, impact_zones, rolled_back, most, spent, calls / steps, added)
 
 
 def _figures(chosen: list[Played], method: str) -> Row:
@@ -195,16 +194,16 @@ def _figures(chosen: list[Played], method: str) -> Row:
     known = [(one, one.first) for one in chosen if one.first is not None]
     lost, guarded = [run for run in runs if not run.held], method == "guarded"
     pairs = [(one.runs[method], one.runs["plain"]) for one in chosen]
-    above = sum(a.redone and a.energy > max(ADDED, b.energy) for a, b in pairs)
+    above = sum(a.rolled_back and a.energy > max(ADDED, b.energy) for a, b in pairs)
     return {
         "held": rate(len(runs) - len(lost), len(runs)),
         "silent": sum(not run.exhausted for run in lost),
         "exhausted": sum(run.exhausted for run in runs),
-        "arrested": sum(run.arrested for run in runs),
+        "impact_zones": sum(run.impact_zones for run in runs),
         "energy": max(run.energy for run in runs),
         "energy_above": sum(run.energy > ADDED for run in runs),
-        "redone_above": above if guarded else None,
-        "redone_added": max(run.added for run in runs) if guarded else None,
+        "rolled_back_above": above if guarded else None,
+        "rolled_back_added": max(run.added for run in runs) if guarded else None,
         "calls": float(np.mean([run.calls for run in runs])) if guarded else None,
         "over_plain": _median(a.seconds / b.seconds for a, b in pairs),
         "over_fixed": _median(
