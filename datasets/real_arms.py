@@ -19,8 +19,8 @@ from tauguard.detectors.calibration.assessment import (
     outlier,
     start_gains,
 )
-from tauguard.detectors.calibration.held_joints import holding
 from tauguard.detectors.calibration.recording import Load, Recording, moves
+from tauguard.detectors.dynamics.robot import holding
 from tauguard.models import pin_model
 from tauguard.traces import Trace
 

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 from tauguard.lazy import on_demand
 
 if TYPE_CHECKING:
+    from tauguard.detectors.alarms.alarm import AlarmStream, CollisionAlarm
+    from tauguard.detectors.alarms.training import held_out, train, with_guarantee, with_rate
     from tauguard.detectors.calibration.calibrate import Calibration, Priors, calibrate
-    from tauguard.detectors.detector import Detector, FittedDetector, ScoreStream
     from tauguard.detectors.diagnosis.diagnosis import Diagnoser, Diagnosis, diagnose
-    from tauguard.detectors.diagnosis.diagnosis_metrics import diagnosis_figures, match_diagnoses
     from tauguard.detectors.dynamics.friction import FrictionModel
     from tauguard.detectors.dynamics.robot import (
         RobotNumbers,
@@ -20,24 +20,18 @@ if TYPE_CHECKING:
     )
     from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
     from tauguard.detectors.estimation.observer import MomentumObserver, observe
-    from tauguard.detectors.evaluation.events import (
-        Matching,
-        find_alarms,
-        match,
-        match_detection,
-        matchings,
-    )
-    from tauguard.detectors.evaluation.metrics import figures, poisson_rate
-    from tauguard.detectors.methods.srq_svr import PlainSrqSvr, SrqSvr
-    from tauguard.detectors.methods.svr_regressor import SrqSVR, srq_kernel
+    from tauguard.detectors.evaluation.diagnosis_metrics import diagnosis_metrics, match_diagnoses
+    from tauguard.detectors.evaluation.matching import Matching, match, match_detection, matchings
+    from tauguard.detectors.evaluation.metrics import detection_metrics, poisson_rate
+    from tauguard.detectors.events import confirmed, find_alarms
     from tauguard.detectors.model_file import load_model, save_model
     from tauguard.detectors.registry import DETECTORS, make_detector
-    from tauguard.detectors.thresholds.alarm import AlarmStream, CollisionAlarm
-    from tauguard.detectors.thresholds.confirmation import confirmed
+    from tauguard.detectors.scores.detector import Detector, FittedDetector, ScoreStream
+    from tauguard.detectors.scores.kernel import SrqRegressor, srq_kernel
+    from tauguard.detectors.scores.learned import PlainSrqSvr, SrqSvr
     from tauguard.detectors.thresholds.free_scores import FreeScores
     from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
-    from tauguard.detectors.thresholds.law import held_out, train, with_guarantee, with_rate
-    from tauguard.detectors.thresholds.speed_levels import SpeedLevels
+    from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
     from tauguard.report import rate as wilson
 
 __all__ = [
@@ -61,15 +55,15 @@ __all__ = [
     "Priors",
     "RobotNumbers",
     "ScoreStream",
-    "SpeedLevels",
-    "SrqSVR",
+    "SpeedNormalisation",
+    "SrqRegressor",
     "SrqSvr",
     "Unknowns",
     "calibrate",
     "confirmed",
+    "detection_metrics",
     "diagnose",
-    "diagnosis_figures",
-    "figures",
+    "diagnosis_metrics",
     "find_alarms",
     "gravity_torque",
     "guaranteed_threshold",

@@ -19,11 +19,11 @@ import numpy as np
 import skops.io
 
 from tauguard.atomic_write import write_atomic
+from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.codec import checksum, decode, encode
-from tauguard.detectors.registry import file_type
+from tauguard.detectors.registry import FORMER_FIELDS, file_type
 from tauguard.detectors.self_check import check_alarms, check_ranges
 from tauguard.detectors.signature import check_signature, key_of_user, signed
-from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.untrusted_input import reading
 
 #: The version changes with what a detector computes from the same content, too: a threshold of
@@ -42,7 +42,9 @@ ANEW = "train the detector anew by `tauguard train`"
 EARLIER = ("tauguard detector", "tauguard ranking detector", "tauguard free-motion detector")
 
 #: What builds the value of a file from its content, by kind.
-READERS: dict[str, Callable[[Any], Any]] = {ALARM: lambda content: decode(content, file_type)}
+READERS: dict[str, Callable[[Any], Any]] = {
+    ALARM: lambda content: decode(content, file_type, FORMER_FIELDS)
+}
 
 
 def save_model(alarm: CollisionAlarm, path: str | os.PathLike[str]) -> None:

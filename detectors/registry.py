@@ -7,41 +7,45 @@ import importlib
 from collections.abc import Callable
 from typing import Any
 
-from tauguard.detectors.detector import Detector
+from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.estimation.slow_errors import LoadDeviation
+from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.velocity import SensorNoise
 from tauguard.detectors.faults.inputs import UsualInput
-from tauguard.detectors.features.envelope import Envelope
-from tauguard.detectors.features.free_bound import Bound
-from tauguard.detectors.features.front_end import FrontEnd
-from tauguard.detectors.features.scaling import Scaling
+from tauguard.detectors.features.free_bound import Bound, LoadDeviation
+from tauguard.detectors.features.front_end import FrontEnd, Scaling
 from tauguard.detectors.features.windows import WindowShape
-from tauguard.detectors.methods.boosting import Boosting
-from tauguard.detectors.methods.current_network import (
-    CurrentNetwork,
-    FittedCurrentNetwork,
-    Inputs,
-)
-from tauguard.detectors.methods.current_threshold import CurrentThreshold, FittedCurrentThreshold
-from tauguard.detectors.methods.cusum import Cusum, FittedCusum
-from tauguard.detectors.methods.forest import Forest
-from tauguard.detectors.methods.free_motion import FittedFreeMotion
-from tauguard.detectors.methods.kernel_machine import KernelMachine
-from tauguard.detectors.methods.network import Network
-from tauguard.detectors.methods.one_class import OneClass, Remoteness
-from tauguard.detectors.methods.residual_thresholds import (
+from tauguard.detectors.scores.baselines import (
+    Cusum,
+    FittedCusum,
     FittedThresholds,
     MovingThresholds,
     ResidualThresholds,
 )
-from tauguard.detectors.methods.srq_svr import PlainSrqSvr, SrqSvr
-from tauguard.detectors.methods.window_network import OneOutput, WindowNetwork
-from tauguard.detectors.methods.windowed import FittedWindowed
-from tauguard.detectors.thresholds.alarm import CollisionAlarm
-from tauguard.detectors.thresholds.speed_levels import SpeedLevels
+from tauguard.detectors.scores.currents import (
+    CurrentNetwork,
+    CurrentThreshold,
+    FittedCurrentNetwork,
+    FittedCurrentThreshold,
+    Inputs,
+)
+from tauguard.detectors.scores.detector import Detector
+from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.detectors.scores.kernel import KernelMachine
+from tauguard.detectors.scores.learned import (
+    Boosting,
+    OneClass,
+    OneOutput,
+    PlainSrqSvr,
+    Remoteness,
+    SrqSvr,
+    WindowNetwork,
+)
+from tauguard.detectors.scores.regressors import Forest, Network
+from tauguard.detectors.scores.windowed import FittedWindowed
+from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
 
 #: Every method, in the order that reports show them.
 DETECTORS: dict[str, Callable[[], Detector]] = {
@@ -65,7 +69,7 @@ FILE_TYPES: dict[str, type] = {
         ArmModel,
         Bound,
         CollisionAlarm,
-        Envelope,
+        NoiseModel,
         FittedCurrentNetwork,
         FittedCurrentThreshold,
         FittedCusum,
@@ -84,11 +88,15 @@ FILE_TYPES: dict[str, type] = {
         RobotNumbers,
         Scaling,
         SensorNoise,
-        SpeedLevels,
+        SpeedNormalisation,
         UsualInput,
         WindowShape,
     )
 }
+
+#: What earlier versions called classes and fields of model files: files of theirs still load.
+FORMER_TYPES = {"Envelope": "NoiseModel", "SpeedLevels": "SpeedNormalisation"}
+FORMER_FIELDS = {"envelope": "noise_model", "levels": "normalisation"}
 
 #: Modules of others that the user has named in this process.
 _NAMED: set[str] = set()
@@ -148,6 +156,7 @@ def file_type(name: str) -> type:
     Raises:
         ValueError: not one of ours, nor of a module that was named in this process.
     """
+    name = FORMER_TYPES.get(name, name)
     if name in FILE_TYPES:
         return FILE_TYPES[name]
     module, _, own = name.partition(":")

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.dynamics.robot import gravity_torque
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.thresholds.alarm import CollisionAlarm
 from tauguard.traces.trace import Trace
 
 #: Sample intervals [s] and settling times [s] that a recording of an arm can have.

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Self
 
-from tauguard.detectors.faults.monitor import Answer
+from tauguard.detectors.alarms.monitor import Answer
 from tauguard.live.stream import Sample
 
 #: Answers that wait to be shown; further ones are dropped, changes of state last.

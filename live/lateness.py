@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer
+from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Answer
 
 #: No sample for so long, or samples this much behind the least late of them, are a fault [s].
 BEHIND = 20e-3

@@ -16,8 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.detectors.faults.monitor import COLLISION, FAULT, Answer, Monitor
-from tauguard.detectors.faults.spans import Span, Spans
+from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Answer, Monitor, Span, Spans
 from tauguard.live.lateness import Lateness
 from tauguard.live.stream import RobotStream, Sample, StreamClosed
 from tauguard.traces.trace import Trace

@@ -103,7 +103,7 @@ def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
         late: a collision found later than this is late [s].
         alarm: the detector, whose times are then given.
     """
-    from tauguard.detectors.evaluation.events import MERGE_GAP, WINDOW
+    from tauguard.detectors.events import MERGE_GAP, WINDOW
 
     ms = f"{1e3 * late:.0f} ms"
     begin = "beginning" if alarm is None else f"first {alarm.settle:.3g} s"

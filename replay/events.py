@@ -56,7 +56,7 @@ class Event:
 
 def events_of(matching: Matching, late: float) -> Iterator[Event]:
     """Missed collisions, those found later than ``late`` [s], and false alarms, in this order."""
-    from tauguard.detectors.evaluation.events import detection_window
+    from tauguard.detectors.events import detection_window
 
     pairs = list(zip(matching.collisions, matching.delays, strict=True))
     for wanted in ("missed", "late"):
@@ -138,8 +138,7 @@ class EventFolder:
 
     def _held(self, trace: Trace, detection: Detection) -> Array:
         """The score that was reached throughout the confirmation time, shape (T,)."""
-        from tauguard.detectors.thresholds.confirmation import confirmation_samples
-        from tauguard.detectors.thresholds.rates import sustained
+        from tauguard.detectors.events import confirmation_samples, sustained
 
         if self._alarm is None:
             return detection.score

@@ -111,6 +111,78 @@ def test_includes_point_one_way(package):
             )
 
 
+#: The layers of detectors, from samples to answers. A layer imports those before it, never later
+#: ones, not even inside a function. `calibration` (which arm model) and `faults` (which samples can
+#: be believed) need the estimator and come before everything that is learned from residuals.
+LAYERS = (
+    "dynamics",
+    "estimation",
+    "calibration",
+    "faults",
+    "features",
+    "scores",
+    "thresholds",
+    "alarms",
+    "diagnosis",
+    "evaluation",
+)
+#: Modules of detectors below all layers, and above them.
+BELOW, ABOVE = (
+    {"events", "samples", "frozen"},
+    {
+        "__init__",
+        "codec",
+        "model_file",
+        "registry",
+        "self_check",
+        "signature",
+    },
+)
+NATIVE = {"_kernel", "_observer", "_ranking"}
+
+
+def detector_imports(path: Path) -> set[str]:
+    """Modules of detectors that a file imports anywhere in it, by their path below detectors."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(
+            "tauguard.detectors"
+        ):
+            inner = node.module.split(".")[2:]
+            found |= {"/".join([*inner, a.name] if len(inner) < 2 else inner) for a in node.names}
+    here = {str(p.relative_to(ROOT / "detectors"))[:-3] for p in detector_files()}
+    return {name if name in here else name.split("/")[0] for name in found}
+
+
+def detector_files() -> list[Path]:
+    return sorted((ROOT / "detectors").rglob("*.py"))
+
+
+def test_the_layers_of_detectors_import_only_those_before_them():
+    assert {p.name for p in (ROOT / "detectors").iterdir() if (p / "__init__.py").exists()} == set(
+        LAYERS
+    )
+    assert {p.stem for p in (ROOT / "detectors").glob("*.py")} == BELOW | ABOVE
+    for path in detector_files():
+        own = path.relative_to(ROOT / "detectors")
+        imported = {name.split("/")[0] for name in detector_imports(path)} - NATIVE
+        if len(own.parts) > 1:
+            allowed = BELOW | set(LAYERS[: LAYERS.index(own.parts[0]) + 1])
+        else:
+            allowed = BELOW | (set(LAYERS) | ABOVE if own.stem in ABOVE else set())
+        assert imported <= allowed, f"{own} imports {sorted(imported - allowed)}"
+
+
+def test_no_files_of_detectors_import_each_other():
+    waiting = {
+        str(p.relative_to(ROOT / "detectors"))[:-3]: detector_imports(p) for p in detector_files()
+    }
+    while waiting:
+        ready = {name for name, needs in waiting.items() if not needs & waiting.keys()}
+        assert ready, f"these import each other: {sorted(waiting)}"
+        waiting = {name: needs for name, needs in waiting.items() if name not in ready}
+
+
 @pytest.mark.parametrize("package", ["geometry", "cloth", "rigid", "traces", "report"])
 def test_light_packages_leave_heavy_libraries_unloaded(package):
     code = (

@@ -25,7 +25,7 @@ from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import INERTIAL, RobotNumbers
 from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel
 from tauguard.detectors.estimation.velocity import SLOWEST, SensorNoise
-from tauguard.detectors.evaluation.events import free_rows
+from tauguard.detectors.events import free_rows
 from tauguard.traces.trace import Trace
 
 

@@ -4,7 +4,7 @@ The residual of the nominal observer is linear in the errors of the inertial num
 reflected rotor inertias, in the weights of the friction columns, in the drives' torque per ampere
 and in the payloads. All pass through the detector's own causal filter, so no acceleration is
 needed. The solution is restricted to bodies that can exist
-(:mod:`~tauguard.detectors.calibration.consistent`).
+(:mod:`~tauguard.detectors.dynamics.physical_consistency`).
 
 Currents alone tell torques only up to a factor a joint: if every gain, mass and friction shrinks
 together, every current is explained as well. Something from outside has to fix the scale, and
@@ -22,15 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.detectors.calibration.consistent import solve_consistent
 from tauguard.detectors.calibration.recording import Recording, is_known, known_load, moving_span
 from tauguard.detectors.calibration.regression import Filtered, System, body_deviations, filtered
 from tauguard.detectors.dynamics.friction import FrictionModel
-from tauguard.detectors.dynamics.robot import (
-    INERTIAL,
-    RobotNumbers,
-    mass_matrix,
-)
+from tauguard.detectors.dynamics.physical_consistency import solve_physically_consistent
+from tauguard.detectors.dynamics.robot import INERTIAL, RobotNumbers, mass_matrix
 from tauguard.detectors.estimation.estimator import ArmModel
 
 #: Columns that a real geared joint needs: presliding of several lengths, Stribeck, viscous friction
@@ -218,7 +214,7 @@ def _fit(
             system.add(one, k, 1 / (beliefs.softness * np.maximum(level, 1e-6)), known[k])
         precision = deviations**-2.0
         matrix = system.matrix + np.diag(precision)
-        solution = solve_consistent(
+        solution = solve_physically_consistent(
             matrix, system.vector + precision * means, robot.inertial, robot.armature
         )
         unexplained = np.concatenate(

@@ -17,8 +17,7 @@ from tauguard.detectors.dynamics.robot import (
     momentum_terms,
 )
 from tauguard.detectors.estimation.observer import intervals, low_pass
-from tauguard.detectors.evaluation.events import free_rows
-from tauguard.detectors.thresholds.confirmation import confirmed
+from tauguard.detectors.events import confirmed, free_rows
 from tauguard.traces.trace import Trace
 
 

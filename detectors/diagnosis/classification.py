@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import expit
 
 from tauguard.arrays import Array
-from tauguard.detectors.diagnosis.aftermath import Aftermath
+from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 
 #: What there is; a payload change is no collision, a push is one that somebody intends.
 KINDS = ("impact", "clamp", "push", "payload")
@@ -67,7 +67,7 @@ class Signs:
         return dict(zip(KINDS, shares, strict=True))
 
 
-def signs(after: Aftermath, force: Array, velocity: Array) -> Signs:
+def signs(after: PostAlarmWindow, force: Array, velocity: Array) -> Signs:
     """Measure what came with an alarm.
 
     Args:
@@ -77,7 +77,7 @@ def signs(after: Aftermath, force: Array, velocity: Array) -> Signs:
     """
     level = after.level
     highest = float(level.max())
-    scaled = after.residual / after.envelope
+    scaled = after.residual / after.deviation
     same_way = scaled @ scaled[int(level.argmax())] / highest**2
     share, mass, reach = load(after)
     size, speed = float(np.linalg.norm(force)), float(np.linalg.norm(velocity))
@@ -96,13 +96,13 @@ def signs(after: Aftermath, force: Array, velocity: Array) -> Signs:
     )
 
 
-def load(after: Aftermath) -> tuple[float, float, float]:
+def load(after: PostAlarmWindow) -> tuple[float, float, float]:
     """Share of the residual that a constant payload explains, its mass [kg] and distance [m].
 
     Weighted least squares for mass and first moment over the samples once the blow is over.
     """
     rows = after.t >= min(SETTLING + SETTLING_LAGS * after.lag, 0.5 * float(after.t[-1]))
-    weight = 1 / after.envelope[rows]
+    weight = 1 / after.deviation[rows]
     y = (after.residual[rows] * weight).ravel()
     columns = (after.payload[rows] * weight[:, :, None]).reshape(len(y), -1)
     found = np.linalg.lstsq(columns, y, rcond=None)[0]

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.diagnosis.aftermath import AFTER, Aftermath, AftermathOf
+from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.diagnosis.classification import Signs, signs
 from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
 from tauguard.detectors.diagnosis.isolation import Trust, isolate, last_joint, moments
+from tauguard.detectors.diagnosis.post_alarm import AFTER, PostAlarmWindow, PostAlarmWindows
 from tauguard.detectors.diagnosis.severity import Severity, severity
 from tauguard.detectors.estimation.estimator import ArmModel
-from tauguard.detectors.features.envelope import Envelope
-from tauguard.detectors.thresholds.alarm import CollisionAlarm
+from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.traces.trace import Alarm, Detection, Trace
 
@@ -95,17 +95,17 @@ class Diagnoser:
 
     arm: ArmModel
     surface: LinkSurface
-    envelope: Envelope | None = None  #: of free motion; None: the arm's noise at every speed
+    noise_model: NoiseModel | None = None  #: of free motion; None: the arm's noise at every speed
     trust: Trust = field(default_factory=Trust)
 
     @classmethod
     def of(cls, arm: ArmModel, surface: LinkSurface) -> Diagnoser:
-        """With the envelope that the arm's detector has learned, if it has.
+        """With the noise model that the arm's detector has learned, if it has.
 
         Where a detector reduces the residual of joints that carry an uncertain payload, its
-        envelope is less than what the residual itself does: the noise is the least.
+        deviation is less than what the residual itself does: the noise is the least.
         """
-        known = arm.envelope
+        known = arm.noise_model
         least = None if known is None or arm.noise is None else known.at_least(arm.noise)
         return cls(arm, surface, least)
 
@@ -113,10 +113,10 @@ class Diagnoser:
         self, trace: Trace, alarms: Iterable[Alarm], after: float = AFTER
     ) -> list[Diagnosis]:
         """A diagnosis for each alarm, in order; ``after`` is how long it is looked at [s]."""
-        looked = AftermathOf(self.arm, self.envelope, trace)
+        looked = PostAlarmWindows(self.arm, self.noise_model, trace)
         return [self.explain(alarm, looked.at(alarm.start, after)) for alarm in alarms]
 
-    def explain(self, alarm: Alarm, after: Aftermath) -> Diagnosis:
+    def explain(self, alarm: Alarm, after: PostAlarmWindow) -> Diagnosis:
         """The diagnosis from the residual around an alarm."""
         robot, level = self.arm.robot, after.level
         last = max(ISOLATE, ISOLATE_LAGS * after.lag)
@@ -136,7 +136,7 @@ class Diagnoser:
             alarm,
             link + 1,
             links,
-            last_joint(residual[-1], after.envelope[rows[-1]]),
+            last_joint(residual[-1], after.deviation[rows[-1]]),
             alarm.start + float(after.t[peak]),
             force,
             point,
@@ -148,10 +148,10 @@ class Diagnoser:
             robot.joint_names,
         )
 
-    def _noise(self, after: Aftermath) -> Array:
-        return self.trust.noise(after.residual, after.envelope)
+    def _noise(self, after: PostAlarmWindow) -> Array:
+        return self.trust.noise(after.residual, after.deviation)
 
-    def _velocity(self, link: int, point: Array, after: Aftermath, peak: int) -> Array:
+    def _velocity(self, link: int, point: Array, after: PostAlarmWindow, peak: int) -> Array:
         """Of the touched point with the joint speeds before the alarm [m/s]."""
         poses = link_poses(self.arm.robot, after.q[peak])
         jacobian = point_jacobians(self.arm.robot, poses, np.array([link]), point[None])[0]

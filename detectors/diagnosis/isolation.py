@@ -12,7 +12,7 @@ from tauguard.detectors.diagnosis.contact_force import ContactBelief, contact_be
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 
-#: The usual rule counts torques above this many envelopes and this share of the largest torque:
+#: The usual rule counts torques above this many deviations and this share of the largest torque:
 #: its best values on simulated arms that no study judges.
 SIGNIFICANT, NOTICED = 6.0, 0.05
 #: Moments looked at besides the strongest one, and the share of its level that they need.
@@ -23,20 +23,20 @@ MOMENTS, SHARE = 3, 0.4
 class Trust:
     """How far a residual is believed while something touches the arm.
 
-    The envelope of free motion is one part; a contact adds errors that grow with it: friction that
+    The noise of free motion is one part; a contact adds errors that grow with it: friction that
     changes sign, a gain that is some percent off, links that have moved on.
     """
 
-    free: float = 3.0  #: envelopes of free motion
+    free: float = 3.0  #: deviations of free motion
     own: float = 0.05  #: of the joint's own residual
     largest: float = 0.03  #: of the largest residual of all joints
 
-    def noise(self, residual: Array, envelope: Array) -> Array:
+    def noise(self, residual: Array, deviation: Array) -> Array:
         """Standard deviations [N m], shape (..., n), for residuals of the same shape."""
         size = np.abs(residual)
         most = size.max(axis=-1, keepdims=True)
         value: Array = np.sqrt(
-            (self.free * envelope) ** 2 + (self.own * size) ** 2 + (self.largest * most) ** 2
+            (self.free * deviation) ** 2 + (self.own * size) ** 2 + (self.largest * most) ** 2
         )
         return value
 
@@ -92,7 +92,7 @@ def moments(level: Array, most: int = MOMENTS, share: float = SHARE) -> NDArray[
 
 
 def last_joint(
-    residual: Array, envelope: Array, significant: float = SIGNIFICANT, share: float = NOTICED
+    residual: Array, deviation: Array, significant: float = SIGNIFICANT, share: float = NOTICED
 ) -> int:
     """The usual rule: the link of the last joint with a significant residual, 1-based; 0 if none.
 
@@ -100,10 +100,10 @@ def last_joint(
 
     Args:
         residual: [N m], shape (n,).
-        envelope: its standard deviation in free motion [N m], shape (n,).
-        significant: envelopes that count as torque.
+        deviation: its standard deviation in free motion [N m], shape (n,).
+        significant: deviations that count as torque.
         share: of the largest residual that counts as torque besides.
     """
-    least = np.hypot(significant * envelope, share * np.abs(residual).max())
+    least = np.hypot(significant * deviation, share * np.abs(residual).max())
     found = np.flatnonzero(np.abs(residual) > least)
     return int(found[-1]) + 1 if len(found) else 0

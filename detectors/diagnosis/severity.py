@@ -1,11 +1,8 @@
-"""How hard it was: impulse and peak force of a contact, each with an interval.
+"""Draws from what a residual says about a contact's force: how sure its size is.
 
-The observer's residual r is tau_ext behind a first-order lag T: ``tau_ext = r + T dr/dt``. Over any
-time ``integral tau_ext = integral r + T (r_end - r_begin)``, so the impulse at the joints does not
-depend on the lag, where a force at one instant does. The mean torque of the contact gives draws of
-its mean force (:mod:`~tauguard.detectors.diagnosis.force_draws`). The peak is the mean times how
-far the torque's peak exceeds its mean; a blow shorter than what the samples resolve may have been
-higher.
+The mean force of :mod:`~tauguard.detectors.diagnosis.contact_force` hides how little a residual may
+say: a force through the joints' axes turns none of them. Draws over points, scales and forces keep
+that: where the size is not identifiable, theirs spread as far as the prior.
 """
 
 from __future__ import annotations
@@ -14,27 +11,114 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import log_ndtr, ndtr, ndtri
 
 from tauguard.arrays import Array
-from tauguard.detectors.diagnosis.aftermath import Aftermath
-from tauguard.detectors.diagnosis.contact_force import ContactBelief
-from tauguard.detectors.diagnosis.force_draws import SEED, force_draws
+from tauguard.detectors.diagnosis.contact_force import (
+    FRICTION,
+    SCALES,
+    ContactBelief,
+    link_poses,
+    point_jacobians,
+)
 from tauguard.detectors.diagnosis.isolation import Trust
+from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 from tauguard.report import two_digits
 
+#: Draws, and their seed: the same residual has the same answer.
+DRAWS, SEED = 600, 5
+
+
+def force_draws(
+    robot: RobotNumbers,
+    surface: LinkSurface,
+    q: ArrayLike,
+    residual: Array,
+    noise: Array,
+    probability: Array,
+    count: int = DRAWS,
+) -> Array:
+    """Forces on the arm that a residual may come from, world frame [N], shape (count, 3).
+
+    Args:
+        robot: the arm.
+        surface: its sampled surface.
+        q: positions [rad], shape (n,).
+        residual: estimate of tau_ext [N m], shape (n,).
+        noise: its standard deviation [N m], shape (n,).
+        probability: of a contact at each of the surface's points, shape (K,).
+        count: of draws.
+    """
+    rng = np.random.default_rng(SEED)
+    places = (np.arange(count) + 0.5) / count
+    chosen = np.searchsorted(np.cumsum(probability) / probability.sum(), places)
+    chosen = np.minimum(chosen, len(probability) - 1)
+    poses, link = link_poses(robot, q), surface.link[chosen]
+    turn = poses.rotation[link]
+    point = poses.origin[link] + np.einsum("kij,kj->ki", turn, surface.point[chosen])
+    inward = -np.einsum("kij,kj->ki", turn, surface.normal[chosen])
+    columns = point_jacobians(robot, poses, link, point).transpose(0, 2, 1) / noise[:, None]
+    # A standardised force is the same length in all likely directions.
+    along = np.einsum("knj,kj->kn", columns, inward)
+    columns = FRICTION * columns + (1 - FRICTION) * along[:, :, None] * inward[:, None]
+    force = _drawn(columns, residual / noise, inward, rng)
+    pushing = np.einsum("kj,kj->k", force, inward)[:, None] * inward
+    return np.asarray(FRICTION * force + (1 - FRICTION) * pushing)
+
+
+def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) -> Array:
+    """One standardised force a row: a scale by its evidence, then a Gaussian cut at the surface.
+
+    Args:
+        columns: joint torques in units of the noise for a unit force, shape (K, n, 3).
+        y: residual in units of the noise, shape (n,).
+        inward: unit normals, shape (K, 3).
+        rng: of the draws.
+    """
+    seen, known = np.einsum("kni,n->ki", columns, y), np.einsum("kni,knj->kij", columns, columns)
+    scales = np.array(SCALES)
+    precision = known[:, None] + np.eye(3) / scales[:, None, None] ** 2  # (K, S, 3, 3)
+    covariance = np.linalg.inv(precision)
+    mean = np.einsum("ksij,kj->ksi", covariance, seen)
+    spread = np.sqrt(np.einsum("ki,ksij,kj->ks", inward, covariance, inward))
+    alpha = np.einsum("ksi,ki->ks", mean, inward) / spread
+    log = np.einsum("ksi,ki->ks", mean, seen) - np.linalg.slogdet(precision)[1]
+    log = 0.5 * (log - 6 * np.log(scales)) + log_ndtr(alpha)
+    weight = np.cumsum(np.exp(log - log.max(axis=1, keepdims=True)), axis=1)
+    at = (rng.random(len(weight))[:, None] * weight[:, -1:] > weight).sum(axis=1)
+    rows = np.arange(len(weight))
+    covariance, mean, spread = covariance[rows, at], mean[rows, at], spread[rows, at]
+    factor = np.linalg.cholesky(covariance)
+    free = mean + np.einsum("kij,kj->ki", factor, rng.standard_normal(mean.shape))
+    # The component along the normal anew, above 0; the others follow it as they are correlated.
+    middle = np.einsum("ki,ki->k", mean, inward)
+    most = ndtr(middle / spread)
+    pressed = middle - spread * ndtri(np.maximum(rng.random(len(rows)) * most, 1e-300))
+    missing = pressed - np.einsum("ki,ki->k", free, inward)
+    follows = np.einsum("kij,kj->ki", covariance, inward) / spread[:, None] ** 2
+    drawn: Array = free + follows * missing[:, None]
+    return drawn
+
+
 #: Share of the true values that the intervals are to hold.
 COVERAGE = 0.9
+
 #: The torque is averaged over so many lags to either side before its peak is taken.
 SMOOTHED = 0.3
+
 #: The contact lasts while the torque is above this share of its peak.
 CONTACT_SHARE = 0.15
+
 #: Relative error besides noise and place (log): directions that turn, gains. Chosen on simulated
 #: arms and seeds that no study judges.
 SPREAD = 0.2
+
 #: An interval whose ends differ by more than this factor says nothing of the size.
 IDENTIFIABLE = 6.0
+
 #: What the samples do not resolve is no more than this share of a contact's time.
 UNRESOLVED = 0.9
 
@@ -88,11 +172,11 @@ class ContactTorque:
         return f"{two_digits(abs(float(self.peak[joint])))} N m at {names[joint]}"
 
     @classmethod
-    def of(cls, after: Aftermath) -> ContactTorque:
+    def of(cls, after: PostAlarmWindow) -> ContactTorque:
         """From the residual around an alarm."""
         width, torque = _without_lag(after)
-        top = int(np.linalg.norm(torque / after.envelope, axis=1).argmax())
-        along = torque @ (torque[top] / after.envelope[top] ** 2)
+        top = int(np.linalg.norm(torque / after.deviation, axis=1).argmax())
+        along = torque @ (torque[top] / after.deviation[top] ** 2)
         first, last = _contact(along, top)
         part = slice(first, last + 1)
         seconds = float(after.t[last] - after.t[first])
@@ -131,7 +215,7 @@ class Severity:
 def severity(
     robot: RobotNumbers,
     surface: LinkSurface,
-    after: Aftermath,
+    after: PostAlarmWindow,
     belief: ContactBelief,
     moments: int,
     trust: Trust,
@@ -148,7 +232,7 @@ def severity(
         trust: how far a residual is believed.
     """
     contact_torque = ContactTorque.of(after)
-    noise = trust.noise(contact_torque.mean, after.envelope[contact_torque.row])
+    noise = trust.noise(contact_torque.mean, after.deviation[contact_torque.row])
     place = belief.probability ** (1 / moments)
     force = force_draws(
         robot, surface, after.q[contact_torque.row], contact_torque.mean, noise, place
@@ -162,7 +246,7 @@ def severity(
     )
 
 
-def _without_lag(after: Aftermath) -> tuple[float, Array]:
+def _without_lag(after: PostAlarmWindow) -> tuple[float, Array]:
     """Time that is averaged over [s], and tau_ext without the observer's lag [N m], (M, n)."""
     dt = float(np.median(np.diff(after.t)))
     half = max(1, round(SMOOTHED * after.lag / dt))

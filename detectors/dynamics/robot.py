@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors import _observer
+from tauguard.detectors.dynamics.physical_consistency import inertial_numbers, pseudo_inertia
 
 #: Inertial numbers a link: mass, mass times centre of mass (3), Ixx Ixy Iyy Ixz Iyz Izz.
 INERTIAL = 10
@@ -266,3 +267,41 @@ def momentum_regressor(
     else:
         robot.chain.link_regressor(link, q, qd, p, beta, threads)
     return p, beta
+
+
+def holding(robot: RobotNumbers, held: Collection[str]) -> RobotNumbers:
+    """The robot without the joints ``held``."""
+    kept: list[int] = []
+    inertial: list[Array] = []
+    parent: list[int] = []
+    placed: list[Array] = []
+    frames: list[tuple[int, Array]] = []  # of each joint: the one that carries it, and where
+    for i, name in enumerate(robot.joint_names):
+        above = int(robot.parent[i])
+        carrier, pose = frames[above] if above >= 0 else (-1, np.eye(4))
+        own = np.eye(4)
+        own[:3, :3], own[:3, 3] = robot.rotation[i], robot.translation[i]
+        pose = pose @ own
+        if name not in held:
+            parent.append(carrier)
+            placed.append(pose)
+            inertial.append(robot.inertial[i].copy())
+            frames.append((len(kept), np.eye(4)))
+            kept.append(i)
+            continue
+        frames.append((carrier, pose))
+        if carrier >= 0:
+            moved = pose @ pseudo_inertia(robot.inertial[i]) @ pose.T
+            inertial[carrier] += inertial_numbers(moved)
+    poses = np.array(placed)
+    return replace(
+        robot,
+        joint_names=tuple(robot.joint_names[i] for i in kept),
+        parent=np.array(parent, dtype=np.int64),
+        prismatic=robot.prismatic[kept],
+        rotation=np.ascontiguousarray(poses[:, :3, :3]),
+        translation=np.ascontiguousarray(poses[:, :3, 3]),
+        axis=robot.axis[kept],
+        inertial=np.array(inertial),
+        armature=robot.armature[kept],
+    )

@@ -18,10 +18,9 @@ from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers, same_rows
-from tauguard.detectors.estimation.gains import PLAIN_GAIN
-from tauguard.detectors.estimation.observer import intervals, per_joint
+from tauguard.detectors.estimation.noise_model import NoiseModel
+from tauguard.detectors.estimation.observer import PLAIN_GAIN, intervals, per_joint
 from tauguard.detectors.estimation.velocity import SensorNoise
-from tauguard.detectors.features.envelope import Envelope
 
 #: Unknowns of a joint's own: torque offset [N m], relative viscous and Coulomb error.
 PER_JOINT = 3
@@ -94,7 +93,7 @@ class ArmModel:
     friction: FrictionModel | None = None  #: None: no friction model
     noise: Array | None = None  #: standard deviation of the residual without collision [N m], (n,)
     sensors: SensorNoise | None = None  #: fuses position and velocity; None: as measured
-    envelope: Envelope | None = None
+    noise_model: NoiseModel | None = None
     """Standard deviation of the residual without collision, over the motion; None: ``noise``."""
 
     def __post_init__(self) -> None:

@@ -10,8 +10,8 @@ from tauguard.atomic_write import atomic_file
 
 if TYPE_CHECKING:
     from tauguard.arrays import Array
+    from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
     from tauguard.detectors.evaluation.threshold_card import ThresholdCard
-    from tauguard.detectors.methods.free_logs import JudgedLog
 
 #: Logs shorter than this say nothing of alarms per hour, logs shorter than that hardly [s].
 SHORTEST, SHORT = 300.0, 1800.0
@@ -134,7 +134,7 @@ def _alarms(card: ThresholdCard) -> str:
     )
 
 
-def times(log: JudgedLog) -> str:
+def times(log: CrossValidatedLog) -> str:
     """How many alarms a log has, and at which seconds: "3 alarms at 1.2, 3.4, 5.6 s"."""
     since = printed_from(log.begin)
     starts = [f"{alarm.start - since:.1f}" for alarm in log.alarms]

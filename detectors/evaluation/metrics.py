@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from tauguard.detectors.evaluation.events import Matching
+from tauguard.detectors.evaluation.matching import Matching
 from tauguard.report import rate as wilson
 from tauguard.traces.severity import STRATA, stratum
 
@@ -35,7 +35,7 @@ def poisson_rate(count: int, hours: float) -> Rate:
     }
 
 
-def delay_figures(delays: Iterable[float | None]) -> dict[str, Any]:
+def delay_metrics(delays: Iterable[float | None]) -> dict[str, Any]:
     """Median and 95th percentile of the detected collisions' delays [ms]."""
     known = np.array([d for d in delays if d is not None]) * 1e3
     if not len(known):
@@ -48,11 +48,11 @@ def _severity(pairs: Sequence[tuple[float, float | None]]) -> dict[str, Any]:
     found = [delay is not None for _, delay in pairs]
     return {
         "sensitivity": wilson(sum(found), len(found)),
-        "delay_ms": delay_figures(delay for _, delay in pairs),
+        "delay_ms": delay_metrics(delay for _, delay in pairs),
     }
 
 
-def figures(matchings: Iterable[Matching]) -> dict[str, Any]:
+def detection_metrics(matchings: Iterable[Matching]) -> dict[str, Any]:
     """All figures over the given traces.
 
     Returns:
@@ -81,7 +81,7 @@ def figures(matchings: Iterable[Matching]) -> dict[str, Any]:
         "specificity": wilson(tn, tn + fp),
         "ppv": wilson(tp, tp + fp),
         "accuracy": wilson(tp + tn, tp + fn + fp + tn),
-        "delay_ms": delay_figures(delay for _, delay in pairs),
+        "delay_ms": delay_metrics(delay for _, delay in pairs),
         "false_alarms_per_hour": poisson_rate(alarms, hours),
         "strata": {
             name: _severity([p for p, own in zip(pairs, names, strict=True) if own == name])

@@ -11,7 +11,7 @@ from tauguard.atomic_write import atomic_file
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tauguard.detectors import Matching
+    from tauguard.detectors.evaluation.matching import Matching
 
 
 #: What the words above the legend mean.

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from tauguard.detectors.detector import check_interval
+from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.diagnosis.diagnosis import diagnose
-from tauguard.detectors.diagnosis.diagnosis_metrics import MatchedDiagnosis, match_diagnoses
-from tauguard.detectors.evaluation.events import Matching, match_detection
+from tauguard.detectors.evaluation.diagnosis_metrics import MatchedDiagnosis, match_diagnoses
+from tauguard.detectors.evaluation.matching import Matching, match_detection
+from tauguard.detectors.samples import check_interval
 from tauguard.models import LinkSurface, link_surface
 from tauguard.traces.trace import Detection, Trace
-
-if TYPE_CHECKING:
-    from tauguard.detectors.thresholds.alarm import CollisionAlarm
 
 
 class JudgedRecording(NamedTuple):

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
+from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
 from tauguard.detectors.evaluation.metrics import poisson_rate
-from tauguard.detectors.methods.free_logs import JudgedLog, Sifted
-from tauguard.detectors.methods.free_motion import FittedFreeMotion
+from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Trace
 
 #: A regime that all logs together show for less is not known [s].
@@ -45,8 +45,8 @@ class ThresholdCard:
     seconds: float  #: of the logs
     alarms: int  #: in left-out logs, under bounds from the others
     false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %), if all of them are false
-    logs: tuple[JudgedLog, ...]  #: each judged by the others; empty: not known one by one
-    left_out: tuple[JudgedLog, ...]  #: that stood out, and were not learned from
+    logs: tuple[CrossValidatedLog, ...]  #: each judged by the others; empty: not known one by one
+    left_out: tuple[CrossValidatedLog, ...]  #: that stood out, and were not learned from
     unseen: dict[str, tuple[str, ...]]  #: joints by regime that the logs do not show
 
     @property
@@ -73,7 +73,7 @@ class ThresholdCard:
 
 
 def threshold_card(
-    detector: FittedFreeMotion, traces: Sequence[Trace], sifted: Sifted | None = None
+    detector: FittedFreeMotion, traces: Sequence[Trace], sifted: CrossValidation | None = None
 ) -> ThresholdCard:
     """The card of a fitted detector.
 

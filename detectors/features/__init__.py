@@ -1,1 +1,1 @@
-"""Envelope of collision-free residuals, windows, and training data from traces."""
+"""NoiseModel of collision-free residuals, windows, and training data from traces."""

@@ -1,17 +1,4 @@
-"""What collision-free motion may leave of a joint's residual, in units of the joint's friction.
-
-Friction is what a model knows least, so all bounds are multiples of each joint's friction level.
-
-* **At rest** static friction may hold any torque, so only its change counts: the residual less a
-  baseline that follows it. Motion of any joint stirs the torques of those that stand: the
-  controllers' integral action, and loads that move.
-* **In motion** the residual itself counts, without slow errors. Its bound is linear in speed and
-  accelerations, by a quantile regression on left-out logs that is pulled towards a prior. While a
-  joint starts, its friction is between static and sliding: the bound is larger.
-
-``src/regimes.hpp`` says how the bounds are applied. The constants here and there were chosen on
-three real arms (UR10e, UR5, UR3).
-"""
+"""How uncertain a carried load is, for the filter of slow errors (``src/slow_errors.hpp``)."""
 
 from __future__ import annotations
 
@@ -19,24 +6,89 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import linprog
 
+from tauguard.arrays import Array
+from tauguard.detectors import _observer
 from tauguard.detectors.calibration.recording import Recording
 from tauguard.detectors.dynamics.robot import gravity_torque
 from tauguard.detectors.estimation.estimator import ArmModel
 
-Array = NDArray[np.float64]
+
+@dataclass(frozen=True)
+class LoadDeviation:
+    """How uncertain the carried load is."""
+
+    mass: float = 0.0  #: standard deviation [kg]
+    moment: float = 0.0  #: of each axis of the first moment [kg m]
+
+
+#: The deviation of a load that is not known.
+UNKNOWN_LOAD = LoadDeviation(3.0, 0.3)
+
+#: More rows than this are thinned out.
+ROWS = 2000
+
+
+def upper_quantile(
+    x: Array, y: Array, quantile: float, prior: Array, weight: Array, rows: int = ROWS
+) -> Array:
+    """Coefficients c >= 0 so that ``x @ c`` is about the quantile of ``y``.
+
+    They minimise the pinball loss and ``weight @ |c - prior|``: what the rows do not show keeps
+    the prior. The linear programme is solved in its dual, whose constraints are as few as the
+    coefficients.
+
+    Args:
+        x: at least 0, shape (R, k).
+        y: shape (R,).
+        quantile: between 0 and 1.
+        prior: shape (k,).
+        weight: of the distance from the prior, in rows of x = 1 that say less, shape (k,).
+        rows: how many are used; the sum of the loss stays that of all.
+
+    Returns:
+        Shape (k,).
+
+    Raises:
+        ValueError: the programme has no solution: numbers that are not finite.
+    """
+    k, stride = x.shape[1], max(1, -(-len(y) // rows))
+    x, y = x[::stride], y[::stride]
+    # max a (y - x prior) - m prior over a in [-(1 - quantile), quantile] stride and m >= 0 with
+    # |x^T a + m| <= pull; c - prior is what its constraints cost.
+    columns = np.vstack([x, np.eye(k)]).T
+    pull = np.maximum((1 - quantile) * weight, 1e-9)
+    each = (-(1 - quantile) * stride, quantile * stride)
+    found = linprog(
+        np.concatenate([x @ prior - y, prior]),
+        A_ub=np.vstack([columns, -columns]),
+        b_ub=np.tile(pull, 2),
+        bounds=[each] * len(y) + [(0.0, None)] * k,
+        method="highs",
+    )
+    if found.x is None:
+        raise ValueError(f"quantile regression: {found.message}")
+    cost = found.ineqlin.marginals
+    coefficients: Array = np.maximum(prior - (cost[:k] - cost[k:]), 0.0)
+    return coefficients
+
 
 #: Bound at rest: deviations of the noise, and multiples of the friction level.
 NOISE, REST = 8.0, 0.12
+
 #: What motion of any joint adds to the bound at rest, and a start to that in motion.
 STOP, START = 1.2, 1.0
+
 #: The bound in motion over the 99 % quantile of left-out residuals, and its least value.
 MARGIN, LEAST = 1.7, 0.6
+
 #: Prior of that quantile, in friction levels per 1, rad/s, own and largest acceleration [rad/s^2].
 PRIOR = np.array([0.3, 0.02, 0.05, 0.03])
+
 #: A friction level from T seconds of motion is widened by hypot(1, this / T).
 WIDENING_SECONDS = 40.0
+
 #: Where the logs' gravity torques stand that the friction level is taken at.
 LOADED = 0.9
 
@@ -102,3 +154,32 @@ def friction_level(arm: ArmModel, recordings: Sequence[Recording]) -> Array:
     least: Array = np.maximum(level, max(0.02 * float(level.max()), 1e-3))
     assert least.shape == (n,)
     return least
+
+
+#: A joint slower than this [rad/s] for a while is at rest.
+SLOW = _observer.REGIME_SLOW
+
+
+def native(arm: ArmModel, bound: Bound, load: LoadDeviation) -> _observer.FreeMotion:
+    """The native detector of one recording.
+
+    Args:
+        arm: calibrated, with friction.
+        bound: of its joints.
+        load: how uncertain the carried load is.
+    """
+    assert arm.friction is not None
+    return _observer.FreeMotion(
+        arm.robot.chain,
+        arm.friction.basis(arm.robot.joints),
+        arm.drive_gain.tolist(),
+        arm.friction.weights.ravel().tolist(),
+        bound.friction.tolist(),
+        load.mass,
+        load.moment,
+        bound.rest.tolist(),
+        bound.stop.tolist(),
+        bound.least.tolist(),
+        bound.moving.ravel().tolist(),
+        bound.start.tolist(),
+    )

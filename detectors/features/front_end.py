@@ -1,25 +1,107 @@
-"""What the residual-based methods share: a calibrated arm, its estimator and its envelope."""
+"""The calibrated arm, its estimator and noise model; residuals in standard deviations.
+
+Scaling decides whether the SVR works: raw residuals in N m have a median distance near 100, which
+makes the matrix of a kernel of length sigma = 3 almost diagonal. Each joint's residual is divided
+by its standard deviation, compressed by asinh (a hard impact must stay within the region of the
+training data) and multiplied by one factor.
+"""
 
 from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from tauguard.arrays import Array
+from tauguard.detectors import _kernel, _observer
 from tauguard.detectors.calibration.calibrate import calibrate
-from tauguard.detectors.detector import check_trace, common_interval
 from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
-from tauguard.detectors.estimation.gains import DETECTION_GAIN, PLAIN_GAIN
-from tauguard.detectors.evaluation.events import undisturbed_rows
-from tauguard.detectors.features.envelope import Envelope
-from tauguard.detectors.features.scaling import Scaling
+from tauguard.detectors.estimation.noise_model import NoiseModel
+from tauguard.detectors.estimation.observer import DETECTION_GAIN, PLAIN_GAIN
+from tauguard.detectors.events import undisturbed_rows
 from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.samples import check_trace, common_interval
 from tauguard.traces.trace import Trace
 
-#: Every so many samples of collision-free motion are enough to fit an envelope.
+
+@dataclass(frozen=True, eq=False)
+class Scaling(Frozen):
+    """``factor asinh(residual / (units deviation))`` of the chosen joints."""
+
+    joints: tuple[int, ...]  #: 0-based
+    noise_model: NoiseModel | None = None  #: None: ``factor residual`` in N m
+    units: float = 1.0  #: standard deviations that count one
+    factor: float = 1.0
+    compress: bool = False  #: by asinh
+
+    def __post_init__(self) -> None:
+        """Check: ``ValueError``."""
+        if not self.joints or not (self.units > 0 and np.isfinite(self.factor)):
+            raise ValueError(f"Scaling: {self}, expected some joints, units > 0, a finite factor")
+
+    @property
+    def numbers(self) -> tuple[list[int], list[float], float, float, bool]:
+        """Joints, weights of the noise model, units, factor, whether it compresses: native form."""
+        weights = [] if self.noise_model is None else self.noise_model.weights.ravel().tolist()
+        return list(self.joints), weights, self.units, self.factor, self.compress
+
+    @cached_property
+    def _native(self) -> _kernel.Scaling:
+        weights = np.empty((0, 4)) if self.noise_model is None else self.noise_model.weights
+        joints = np.array(self.joints, dtype=np.int64)
+        return _kernel.Scaling(joints, weights, self.units, self.factor, self.compress)
+
+    def rows(
+        self, residual: Array, qd: Array, acceleration: Array, out: Array | None = None
+    ) -> Array:
+        """The scaled residual, shape (T, len(joints)).
+
+        Args:
+            residual: [N m], shape (T, n).
+            qd: [rad/s], shape (T, n).
+            acceleration: [rad/s^2], shape (T, n).
+            out: where to write it (default: a new array).
+        """
+        found = np.empty((len(residual), len(self.joints))) if out is None else out
+        self._native.rows(residual, qd, acceleration, found)
+        return found
+
+
+class NativeStream:
+    """The scores of one recording as its samples come in.
+
+    Attributes:
+        native: what gives them.
+    """
+
+    def __init__(self, native: _observer.Scores, dt: float) -> None:
+        """Take the native stream and the interval of steps that do not say theirs [s]."""
+        self.native, self._dt = native, dt
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
+        """The score of this sample.
+
+        Args:
+            q: [rad], float64, shape (n,).
+            qd: [rad/s], shape (n,).
+            current: [A], shape (n,).
+            dt: time since the last sample [s] (default: the constructor's).
+
+        Raises:
+            ValueError: wrong shapes or numbers that are not finite; the state is as before.
+        """
+        try:
+            return self.native.step(q, qd, current, self._dt if dt is None else dt)
+        except TypeError:
+            raise ValueError(
+                f"q, qd, current: expected float64 arrays of shape ({self.native.joints},)"
+            ) from None
+
+
+#: Every so many samples of collision-free motion are enough to fit a noise model.
 THIN = 5
 
 
@@ -34,7 +116,7 @@ class FrontEndSettings:
     calibrate: bool = True  #: identify friction, inertia and gains from the collision-free motion
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FrontEnd:
-        """Identify the arm and its envelope from the collision-free rows.
+        """Identify the arm and its noise model from the collision-free rows.
 
         The last result for these settings is kept while its traces live: methods with equal
         settings share it.
@@ -54,7 +136,7 @@ class FrontEndSettings:
         return found
 
     def _fit(self, traces: Sequence[Trace], arm: ArmModel) -> FrontEnd:
-        dt, count = common_interval(traces, arm), arm.robot.joints
+        dt, count = common_interval(traces, arm.robot.joint_names), arm.robot.joints
         joints = tuple(j - 1 for j in self.joints if 1 <= j <= count)
         if not joints:
             raise ValueError(f"joints {self.joints}: expected some of 1 to {count}")
@@ -72,19 +154,19 @@ class FrontEndSettings:
             [t.qd for t in traces],
             [e.acceleration for e in estimates],
         )
-        envelope = Envelope.fit(
+        noise_model = NoiseModel.fit(
             *(
                 np.concatenate([values[rows] for values, rows in zip(own, free, strict=True)])
                 for own in tables
             )
         )
-        found = replace(bare, arm=replace(arm, envelope=envelope))
+        found = replace(bare, arm=replace(arm, noise_model=noise_model))
         for trace, estimate in zip(traces, estimates, strict=True):
             _remember(trace, found, estimate)
         return found
 
     def bare(self, joints: tuple[int, ...], arm: ArmModel, dt: float) -> FrontEnd:
-        """The front end of a calibrated arm before its envelope is known."""
+        """The front end of a calibrated arm before its noise model is known."""
         return FrontEnd(self.gain, self.adapt, self.settle, joints, arm, dt)
 
 
@@ -126,8 +208,8 @@ class FrontEnd(Frozen):
         return found
 
     def scaling(self, units: float = 1.0) -> Scaling:
-        """The residual over ``units`` envelopes."""
-        return Scaling(self.joints, self.arm.envelope, units)
+        """The residual over ``units`` standard deviations."""
+        return Scaling(self.joints, self.arm.noise_model, units)
 
     def scaled(self, trace: Trace, scaling: Scaling) -> Array:
         """The scaled residual of a trace, shape (T, joints)."""
@@ -156,6 +238,7 @@ class ResidualStream:
 
 
 _FITTED: dict[FrontEndSettings, tuple[tuple[weakref.ref[object], ...], FrontEnd]] = {}
+
 _ESTIMATES: dict[int, tuple[FrontEnd, Estimate]] = {}
 
 

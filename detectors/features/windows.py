@@ -6,13 +6,16 @@ t_I = 8 ms: 11 samples each, 44 numbers.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, Bools
 from tauguard.detectors import _kernel
+from tauguard.detectors.estimation.observer import intervals, low_pass
+from tauguard.traces.trace import Trace
 
 #: The dissertation's window [s].
 WINDOW, INTERVAL = 80e-3, 8e-3
@@ -81,3 +84,129 @@ def median_distance(a: Array, b: Array, rng: np.random.Generator, pairs: int = 4
     """Median Euclidean distance between random rows of ``a`` and of ``b``."""
     one, two = rng.integers(len(a), size=pairs), rng.integers(len(b), size=pairs)
     return float(np.median(np.linalg.norm(a[one] - b[two], axis=1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """One training trace after the estimator."""
+
+    signal: Array  #: scaled residual, shape (T, joints of the features)
+    target: Array  #: what the regressor should say, shape (T,)
+    free: Bools  #: rows that are surely collision-free, shape (T,)
+    struck: Bools  #: rows with a collision that can be felt, shape (T,)
+
+
+#: Torques of joints 1, 2, ... that count alike in the training target; the last is repeated. Only
+#: their ratios matter.
+ALIKE = (20.0, 20.0, 15.0, 6.0)
+
+#: The sum of torques, in its unit, that half of the training collisions exceed.
+MEDIAN_SEVERITY = 2.5
+
+#: A target above this is a collision that can be felt.
+FELT = 0.05
+
+#: No target counts more: its severity is 49.
+HIGHEST = 0.98
+
+
+def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float) -> list[Array]:
+    """The training target: x / (1 + x) of x = sum over ``joints`` of |tau_ext|, in a unit.
+
+    The torques are lagged as the observer is, and weighted by :data:`ALIKE`. The unit is such that
+    the peaks of x of the collisions have the median :data:`MEDIAN_SEVERITY`: arms of all sizes have
+    the same targets. Labels 0/1 do not grow with torque and fail as a ranking. x / (1 + x) keeps
+    the target within [0, 1), so that hard blows do not spend the regressor's bounded weights.
+
+    Args:
+        traces: without truth the target is 0.
+        joints: 0-based.
+        gain: of the observer [1/s].
+
+    Returns:
+        One target a trace, shape (T,).
+    """
+    alike = np.array([ALIKE[min(k, len(ALIKE) - 1)] for k in range(len(joints))])
+    totals = [_total(trace, list(joints), alike, gain) for trace in traces]
+    highest = [
+        float(total[(trace.t >= c.onset) & (trace.t <= c.end)].max(initial=0.0))
+        for trace, total in zip(traces, totals, strict=True)
+        for c in (trace.truth.collisions if trace.truth else ())
+    ]
+    felt = [value for value in highest if value > 0]
+    unit = float(np.median(felt)) / MEDIAN_SEVERITY if felt else 1.0
+    return [total / (unit + total) for total in totals]
+
+
+def severity(target: Array) -> Array:
+    """x of a target x / (1 + x), no more than that of :data:`HIGHEST`.
+
+    A regressor's output cannot exceed 1 by much however hard the blow. Peaks of x have a tail that
+    can be extrapolated, and at any speed a blow can exceed what free motion leaves.
+    """
+    bounded = np.minimum(target, HIGHEST)
+    found: Array = bounded / (1 - bounded)
+    return found
+
+
+def _total(trace: Trace, joints: list[int], alike: Array, gain: float) -> Array:
+    """Lagged external torques, weighted and summed, shape (T,)."""
+    if trace.truth is None:
+        return np.zeros(len(trace.t))
+    external = trace.truth.tau_ext[:, joints] / alike
+    nothing = np.zeros_like(external)
+    gains = np.full(external.shape[1], gain)
+    lagged = low_pass(gains, intervals(trace.t, len(trace.t)), nothing, nothing, external)
+    total: Array = np.abs(lagged).sum(axis=1)
+    return total
+
+
+def binary_target(trace: Trace) -> Array:
+    """The dissertation's plain labels: 1 while a collision lasts, else 0."""
+    label = np.zeros(len(trace.t))
+    for collision in trace.truth.collisions if trace.truth else ():
+        label[(trace.t >= collision.onset) & (trace.t <= collision.end)] = 1.0
+    return label
+
+
+def peaks(score: Array, count: int, gap: int) -> NDArray[np.int64]:
+    """Indices of the ``count`` highest scores that are at least ``gap`` apart, in order."""
+    chosen: list[int] = []
+    blocked = np.zeros(len(score), dtype=np.bool_)
+    for index in np.argsort(-score, kind="stable"):
+        if len(chosen) == count:
+            break
+        if not blocked[index]:
+            chosen.append(int(index))
+            blocked[max(0, index - gap) : index + gap + 1] = True
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
+def draw_windows(
+    rng: np.random.Generator,
+    prepared: Sequence[Prepared],
+    shape: WindowShape,
+    count: int,
+    positive: float = 0.2,
+) -> tuple[Array, Array]:
+    """Random windows and targets, a share ``positive`` of them from collisions.
+
+    Raises:
+        ValueError: no collision, or no free motion, in the traces.
+    """
+    x, y = [], []
+    for name, share in (("struck", positive), ("free", 1 - positive)):
+        masks = [getattr(p, name) for p in prepared]
+        total = sum(int(m.sum()) for m in masks)
+        if total == 0:
+            what = "collision" if name == "struck" else "collision-free row"
+            raise ValueError(f"the training traces hold no {what}: both kinds are needed")
+        picks = np.sort(rng.choice(total, min(total, round(count * share)), replace=False))
+        start = 0
+        for p, mask in zip(prepared, masks, strict=True):
+            rows = np.flatnonzero(mask)
+            own = rows[picks[(picks >= start) & (picks < start + len(rows))] - start]
+            x.append(shape.of(p.signal, own))
+            y.append(p.target[own] if name == "struck" else np.zeros(len(own)))
+            start += len(rows)
+    return np.concatenate(x), np.concatenate(y)

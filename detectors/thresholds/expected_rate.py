@@ -23,7 +23,7 @@ from scipy import optimize, stats
 
 from tauguard.arrays import Array
 from tauguard.detectors.thresholds.free_scores import FreeScores
-from tauguard.detectors.thresholds.rates import BEYOND_CHANCE, Tail, shape_error
+from tauguard.detectors.thresholds.tail_model import BEYOND_CHANCE, Tail, shape_error
 
 #: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
 TAIL = 0.05

@@ -1,4 +1,4 @@
-"""The scores of collision-free motion, reduced to the peaks of short pieces."""
+"""Peaks of scores and their tails."""
 
 from __future__ import annotations
 
@@ -6,13 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauguard.arrays import Array
-from tauguard.detectors.evaluation.events import CASE_SECONDS, MERGE_GAP, find_alarms, free_rows
-from tauguard.detectors.thresholds.alarm import CollisionAlarm
-from tauguard.detectors.thresholds.rates import block_maxima
-from tauguard.detectors.thresholds.speed_levels import SpeedLevels, recent_speed
+from tauguard.detectors.events import CASE_SECONDS, MERGE_GAP, find_alarms, free_rows
+from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation, recent_speed
 from tauguard.traces.trace import Trace
+
+
+def block_maxima(level: Array, rows: int) -> tuple[Array, NDArray[np.intp]]:
+    """The maximum of each block of ``rows`` samples (the last may be shorter) and its row."""
+    rows = max(1, rows)
+    padded = np.append(level, np.full(-len(level) % rows, -np.inf)).reshape(-1, rows)
+    where = padded.argmax(axis=1) + rows * np.arange(len(padded))
+    return level[where], where
+
 
 #: Motion is kept as the peaks of pieces this long [s], or of single samples that are longer: ten
 #: hours are two million numbers.
@@ -28,23 +36,22 @@ class FreeScores:
     seconds: float  #: of collision-free motion
 
     @classmethod
-    def of(cls, alarm: CollisionAlarm, trace: Trace, score: Array | None = None) -> FreeScores:
+    def of(cls, level: Array, trace: Trace, settle: float) -> FreeScores:
         """From the collision-free rows of a trace after the detector has settled.
 
         Args:
-            alarm: detector, confirmation and speed levels; its threshold does not count.
-            trace: of the detector's arm.
-            score: of the detector, where it is known already.
+            level: what the score has reached throughout the last t_c, shape (T,); -inf: not known.
+            trace: that was scored.
+            settle: time that the detector needs to settle [s].
 
         Raises:
             ValueError: the trace is over before the detector has settled.
         """
-        level = alarm.sustained(trace, score)
-        rows = np.flatnonzero(free_rows(trace, alarm.settle) & (level > -np.inf))
+        rows = np.flatnonzero(free_rows(trace, settle) & (level > -np.inf))
         if not len(rows):
             raise ValueError(
                 f"an episode of {trace.t[-1] - trace.t[0]:g} s: no collision-free motion after the "
-                f"{alarm.settle:g} s that {alarm.detector.name} needs to settle"
+                f"{settle:g} s that the detector needs to settle"
             )
         samples = max(1, round(PIECE / trace.dt))
         peaks, where = block_maxima(level[rows], samples)
@@ -73,7 +80,7 @@ class FreeScores:
         found: Array = self.peaks[:whole].reshape(-1, case).max(axis=1)
         return found
 
-    def over(self, levels: SpeedLevels) -> FreeScores:
+    def over(self, levels: SpeedNormalisation) -> FreeScores:
         """Normalised: the speed hardly changes within a piece."""
         return replace(self, peaks=levels(self.peaks, self.speeds))
 
@@ -87,7 +94,7 @@ class FreeScores:
         return max(1, round(seconds / self.piece))
 
 
-def speed_levels(episodes: Sequence[FreeScores]) -> SpeedLevels:
+def speed_normalisation(episodes: Sequence[FreeScores]) -> SpeedNormalisation:
     """What the peaks of merge gaps reach at each speed."""
     peaks, speeds = zip(*(episode.blocks() for episode in episodes), strict=True)
-    return SpeedLevels.fit(np.concatenate(peaks), np.concatenate(speeds))
+    return SpeedNormalisation.fit(np.concatenate(peaks), np.concatenate(speeds))

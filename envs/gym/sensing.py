@@ -17,10 +17,11 @@ from tauguard.detectors import (
     MomentumObserver,
     RobotNumbers,
     Unknowns,
+    load_model,
 )
-from tauguard.detectors.detector import same_rate
-from tauguard.detectors.estimation.gains import ENVIRONMENT_GAIN, PLAIN_GAIN
-from tauguard.detectors.faults.monitor import Monitor
+from tauguard.detectors.alarms.monitor import Monitor
+from tauguard.detectors.estimation.observer import ENVIRONMENT_GAIN, PLAIN_GAIN
+from tauguard.detectors.samples import same_rate
 from tauguard.envs.gym.actions import observation_table
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.settings import DETECTORS
@@ -268,7 +269,7 @@ def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener]
         return observers
     if isinstance(wanted, str):
         try:
-            wanted = CollisionAlarm.load(wanted)
+            wanted = load_model(wanted)
         except ValueError as error:
             raise ValueError(f"detector {error}") from None
     if not isinstance(wanted, CollisionAlarm):

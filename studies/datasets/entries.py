@@ -30,7 +30,7 @@ from tauguard.detectors import (
     DETECTORS,
     CollisionAlarm,
     Matching,
-    figures,
+    detection_metrics,
     make_detector,
     matchings,
     train,
@@ -150,7 +150,7 @@ def rows_of(name: str, entries: Sequence[Entry]) -> list[Row]:
 
 
 def _columns(found: Sequence[Matching]) -> dict[str, Any]:
-    one = figures(found)
+    one = detection_metrics(found)
     head = one["headline"]
     return {
         "from_16": head["sensitivity"],

@@ -21,10 +21,10 @@ from studies.framework import time_in_turn
 from tauguard.arrays import Array
 from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
 from tauguard.detectors.calibration.nominal import nominal_design
-from tauguard.detectors.diagnosis.aftermath import Aftermath, AftermathOf
 from tauguard.detectors.diagnosis.classification import KINDS
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
-from tauguard.detectors.diagnosis.diagnosis_metrics import (
+from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow, PostAlarmWindows
+from tauguard.detectors.evaluation.diagnosis_metrics import (
     ContactErrors,
     TrueSeverity,
     contact_at,
@@ -151,7 +151,9 @@ def judge(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Judged
     if event.alarm is None:
         return Judged(*known, None, {}, {})
     diagnoser = Diagnoser.of(trained.detector.arm, surface)
-    after = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace).at(event.alarm.start)
+    after = PostAlarmWindows(diagnoser.arm, diagnoser.noise_model, event.trace).at(
+        event.alarm.start
+    )
     found = diagnoser.explain(event.alarm, after)
     if event.collision is None:
         return Judged(*known, found, {}, {})
@@ -171,7 +173,7 @@ def judge(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Judged
     return Judged(*known, found, {n: a.link for n, a in answers.items()}, errors, true)
 
 
-def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
+def usual(diagnoser: Diagnoser, after: PostAlarmWindow, found: Diagnosis) -> Answer:
     """Last significant joint; damped least-squares force at the middle of its link."""
     robot, link = diagnoser.arm.robot, max(found.last_joint, 1) - 1
     row = int(after.level.argmax())
@@ -180,9 +182,9 @@ def usual(diagnoser: Diagnoser, after: Aftermath, found: Diagnosis) -> Answer:
     middle = diagnoser.surface.point[rows].mean(axis=0)
     point = poses.origin[link] + poses.rotation[link] @ middle
     jacobian = point_jacobians(robot, poses, np.array([link]), point[None])[0]
-    columns = jacobian.T / after.envelope[row][:, None]
+    columns = jacobian.T / after.deviation[row][:, None]
     damped = columns.T @ columns + np.eye(3) / EXPECTED**2
-    force = np.linalg.solve(damped, columns.T @ (after.residual[row] / after.envelope[row]))
+    force = np.linalg.solve(damped, columns.T @ (after.residual[row] / after.deviation[row]))
     return Answer(found.last_joint, force, point)
 
 
@@ -299,7 +301,7 @@ def cost_row(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Row
     alarm = event.alarm
     assert alarm is not None
     diagnoser = Diagnoser.of(trained.detector.arm, surface)
-    looked = AftermathOf(diagnoser.arm, diagnoser.envelope, event.trace)
+    looked = PostAlarmWindows(diagnoser.arm, diagnoser.noise_model, event.trace)
     after = looked.at(alarm.start)
     times: dict[str, Any] = time_in_turn(
         {

@@ -10,8 +10,8 @@ import numpy as np
 from studies.detection.motions import FORCES, PAYLOADS, Conditions, struck_pool
 from tauguard.datasets.plans import BEGIN, collision_plans, episode_seconds
 from tauguard.detectors import CollisionAlarm
-from tauguard.detectors.diagnosis.aftermath import AFTER
-from tauguard.detectors.evaluation.events import detection_window
+from tauguard.detectors.diagnosis.post_alarm import AFTER
+from tauguard.detectors.events import detection_window
 from tauguard.envs import Episode, PayloadPick, simulate
 from tauguard.traces import STRATA, Alarm, Collision, Trace
 

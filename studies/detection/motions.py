@@ -22,7 +22,7 @@ from tauguard.datasets.plans import (
     free_episodes,
     struck_episodes,
 )
-from tauguard.detectors.evaluation.events import detection_window
+from tauguard.detectors.events import detection_window
 from tauguard.envs import CollisionPlan, Episode, simulate
 from tauguard.models import Mismatch
 from tauguard.traces import STRATA, Collision, Trace

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tauguard.detectors import CollisionAlarm
-    from tauguard.detectors.methods.kernel_machine import KernelMachine
-    from tauguard.detectors.methods.svr_regressor import SrqSVR
+    from tauguard.detectors.scores.kernel import KernelMachine, SrqRegressor
     from tauguard.traces import Trace
 
 
@@ -168,7 +167,7 @@ def real_time_row(alarm: CollisionAlarm, seed: int, seconds: float, repeats: int
     }
 
 
-def peer(regressor: SrqSVR) -> Callable[[Array], Array]:
+def peer(regressor: SrqRegressor) -> Callable[[Array], Array]:
     """scikit-learn's own ``predict`` of the fitted SVR on one window, shape (1, size)."""
     svr, vectors = regressor.svr_, regressor.machine_.vectors
     row = np.zeros((1, svr.shape_fit_[0]))
@@ -183,7 +182,7 @@ def peer(regressor: SrqSVR) -> Callable[[Array], Array]:
     return predict
 
 
-def kernel_rows(regressor: SrqSVR, windows: Array, single: int, seed: int) -> list[Row]:
+def kernel_rows(regressor: SrqRegressor, windows: Array, single: int, seed: int) -> list[Row]:
     """``kernel``: the full sum beside scikit-learn, then reduced sets: time against error."""
     rng = np.random.default_rng([seed, 9])
     own = np.ascontiguousarray(windows[rng.integers(len(windows), size=single)])
@@ -217,7 +216,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
     """Rows ``real time`` (scene to alarm), ``step`` (methods), ``kernel`` (fewer vectors)."""
     from tauguard.detectors import DETECTORS, SrqSvr, held_out, make_detector, train
     from tauguard.detectors.calibration.nominal import nominal_design
-    from tauguard.detectors.methods.svr_regressor import SrqSVR
+    from tauguard.detectors.scores.kernel import SrqRegressor
 
     extent = Extent(3, 4, 8_000, 500, 10.0, 3) if quick else Extent(15, 20, 27_000, 5000, 60.0, 9)
     traces, trace = motions(extent, seed)
@@ -229,11 +228,11 @@ def measure(quick: bool, seed: int) -> list[Row]:
             rows.append(real_time_row(alarm, seed, extent.seconds, extent.repeats))
         rows.append(step_row(alarm, trace, extent.samples))
     rows.sort(key=lambda row: row["study"] != "real time")
-    full: list[SrqSVR] = []
+    full: list[SrqRegressor] = []
 
     class Keeping(SrqSvr):
         def learn(self, x: Array, y: Array) -> KernelMachine:
-            full.append(SrqSVR(self.sigma, self.C, self.epsilon).fit(x, y))
+            full.append(SrqRegressor(self.sigma, self.C, self.epsilon).fit(x, y))
             return full[-1].machine_
 
     fitted = Keeping(vectors=0, windows=900 if quick else SrqSvr.windows).fit(

@@ -23,9 +23,8 @@ from tauguard.detectors import (
     match,
 )
 from tauguard.detectors.calibration.nominal import nominal_design
-from tauguard.detectors.thresholds.free_scores import speed_levels
-from tauguard.detectors.thresholds.law import threshold_for_rate
-from tauguard.detectors.thresholds.rates import tail_level
+from tauguard.detectors.thresholds.free_scores import speed_normalisation
+from tauguard.detectors.thresholds.tail_model import tail_level, threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.traces import Collision, Trace
 
@@ -77,7 +76,7 @@ def trained(
 def free_scores(detectors: Mapping[str, FittedDetector], trace: Trace) -> Free:
     """Every detector's scores over a collision-free trace."""
     plain = {name: CollisionAlarm(detector, np.inf) for name, detector in detectors.items()}
-    return {name: [FreeScores.of(alarm, trace)] for name, alarm in plain.items()}
+    return {name: [alarm.free_scores(trace)] for name, alarm in plain.items()}
 
 
 def joined(parts: Sequence[Free]) -> Free:
@@ -128,7 +127,7 @@ def operated(
     """
     found = {}
     for name, detector in detectors.items():
-        levels = speed_levels([one for own in free.values() for one in own[name]])
+        levels = speed_normalisation([one for own in free.values() for one in own[name]])
         normal = {speed: [one.over(levels) for one in own[name]] for speed, own in free.items()}
         hourly = threshold_for_rate([one for own in normal.values() for one in own], per_hour)
         alarms = {}
@@ -141,8 +140,8 @@ def operated(
                 for speed, own in normal.items()
             )
             threshold = min(max(matched), hourly)
-            alarms[str(amperes)] = CollisionAlarm(detector, threshold, levels=levels)
-        alarms[HOURLY] = CollisionAlarm(detector, hourly, levels=levels)
+            alarms[str(amperes)] = CollisionAlarm(detector, threshold, normalisation=levels)
+        alarms[HOURLY] = CollisionAlarm(detector, hourly, normalisation=levels)
         found[name] = Operated(detector, alarms)
     return found
 

@@ -35,10 +35,10 @@ from studies.detection.operating import (
 from studies.framework import JobCache, Workers
 from tauguard.datasets.plans import TRAINING_PAYLOADS
 from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores, poisson_rate
-from tauguard.detectors.evaluation.metrics import HEADLINE, delay_figures
-from tauguard.detectors.thresholds.free_scores import speed_levels
+from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics
+from tauguard.detectors.thresholds.free_scores import speed_normalisation
 from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
-from tauguard.detectors.thresholds.law import threshold_for_rate
+from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.report import Row, rate
 from tauguard.report.charts import errorbars
@@ -115,7 +115,7 @@ def collisions(tally: Tally, share: float) -> Row:
     pairs = [(outcome.collision.peak_tau, outcome.delay) for outcome in tally.outcomes]
     hard = [delay for torque, delay in pairs if torque >= share * HEADLINE]
     every = [delay for torque, delay in pairs if torque >= share * STRATA[0][0]]
-    delays = delay_figures(hard)
+    delays = delay_metrics(hard)
     return {
         "sensitivity": rate(sum(d is not None for d in hard), len(hard)),
         "all": rate(sum(d is not None for d in every), len(every)),
@@ -148,10 +148,10 @@ def arm_tallies(job: tuple[Size, int, int]) -> Tallies:
 def _alarms(
     detector: FittedDetector, scores: Sequence[FreeScores], asked: Sequence[float]
 ) -> Iterator[tuple[str, CollisionAlarm]]:
-    levels = speed_levels(scores)
+    levels = speed_normalisation(scores)
     for per_hour in asked:
         threshold = threshold_for_rate([one.over(levels) for one in scores], per_hour)
-        yield point(AIMED, per_hour), CollisionAlarm(detector, threshold, levels=levels)
+        yield point(AIMED, per_hour), CollisionAlarm(detector, threshold, normalisation=levels)
         try:
             held = guaranteed_threshold(scores, per_hour).threshold
         except ValueError:

@@ -9,7 +9,7 @@ import numpy as np
 
 from studies.detection.operating import AMPERES, HOURLY, Fleet, Outcome, Tallies, Tally
 from studies.framework import groups, table_rows
-from tauguard.detectors.evaluation.metrics import HEADLINE, delay_figures, poisson_rate
+from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics, poisson_rate
 from tauguard.report import Row, rate
 from tauguard.traces import stratum
 
@@ -109,7 +109,7 @@ def summary(tally: Tally) -> Row:
     return {
         "sensitivity": sensitivity(hard),
         "sensitivity_all": sensitivity(countable(tally)),
-        "delay_ms": delay_figures(outcome.delay for outcome in hard),
+        "delay_ms": delay_metrics(outcome.delay for outcome in hard),
         "false_alarms_per_hour": poisson_rate(tally.false_alarms, tally.free_seconds / 3600),
     }
 

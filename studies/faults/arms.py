@@ -10,8 +10,8 @@ from studies.real_arms.arms import ARMS, available, nominal, recordings, thinned
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import CollisionAlarm, make_detector, train
 from tauguard.detectors.calibration.nominal import nominal_design
-from tauguard.detectors.faults import UsualInput
-from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
+from tauguard.detectors.faults.inputs import UsualInput
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
 from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch
 from tauguard.traces.trace import Trace

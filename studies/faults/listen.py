@@ -24,9 +24,8 @@ from studies.real_arms.arms import thinned
 from tauguard.datasets import read_log
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import load_model, save_model
-from tauguard.detectors.faults import FaultCheck
-from tauguard.detectors.faults.detection import detect_with_faults
-from tauguard.detectors.faults.monitor import Monitor
+from tauguard.detectors.alarms.monitor import Monitor, detect_with_faults
+from tauguard.detectors.faults.inputs import FaultCheck
 from tauguard.detectors.faults.torques import TorqueCheck
 from tauguard.envs import simulate
 from tauguard.live import UrServer, UrStream, rtde
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from tauguard.detectors import CollisionAlarm
-    from tauguard.detectors.faults.monitor import Answer
+    from tauguard.detectors.alarms.monitor import Answer
     from tauguard.live import Sample
     from tauguard.traces import Trace
 

@@ -22,8 +22,7 @@ import numpy as np
 from tqdm import tqdm
 
 from studies.faults.arms import ArmLogs, arms
-from tauguard.detectors.faults.monitor import COLLISION, FREE, Monitor
-from tauguard.detectors.faults.spans import Spans
+from tauguard.detectors.alarms.monitor import COLLISION, FREE, Monitor, Spans
 from tauguard.live.lateness import Lateness
 from tauguard.live.packets import FAULTS, Fault, Packets
 from tauguard.report import Row, rate

@@ -26,13 +26,12 @@ from tqdm import tqdm
 
 from studies.real_arms.arms import ArmData, Push, available, nominal, pushes, recordings
 from tauguard.detectors import ArmModel, poisson_rate
+from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.alarms.baseline_window import detect_after_baseline
 from tauguard.detectors.calibration.recording import Recording
 from tauguard.detectors.estimation.estimator import Estimator, Unknowns
-from tauguard.detectors.evaluation.events import find_alarms
-from tauguard.detectors.methods.free_motion import CONFIRMATION, FittedFreeMotion, FreeMotion
-from tauguard.detectors.thresholds.alarm import CollisionAlarm
-from tauguard.detectors.thresholds.confirmation import confirmation_samples, confirmed
-from tauguard.detectors.thresholds.quiet_start import SERIES, detect_after_quiet
+from tauguard.detectors.events import SERIES, confirmation_samples, confirmed, find_alarms
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FittedFreeMotion, FreeMotion
 from tauguard.report import Row, rate
 from tauguard.traces import Trace
 
@@ -106,7 +105,7 @@ def detectors(fitted: FittedFreeMotion, start: ArmModel, recording: Recording) -
     def plain(trace: Trace) -> NDArray[np.bool_]:
         tau = trace.current * start.drive_gain
         try:
-            return detect_after_quiet(trace, start.robot, tau, QUIET).detection.alarm
+            return detect_after_baseline(trace, start.robot, tau, QUIET).detection.alarm
         except ValueError:  # the motion does not explain the torques, or the log is too short
             return np.zeros(len(trace.t), dtype=np.bool_)
 

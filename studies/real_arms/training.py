@@ -17,14 +17,13 @@ from tqdm import tqdm
 
 from studies.real_arms.arms import available, nominal, recordings, thinned
 from tauguard.detectors import ArmModel, RobotNumbers, poisson_rate
+from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.calibration.recording import Recording, cut
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
-from tauguard.detectors.evaluation.events import find_alarms
 from tauguard.detectors.evaluation.semi_real import Added, add_contact
-from tauguard.detectors.features.free_stream import SLOW
-from tauguard.detectors.methods.free_motion import CONFIRMATION, FittedFreeMotion, FreeMotion
-from tauguard.detectors.thresholds.alarm import CollisionAlarm
-from tauguard.detectors.thresholds.quiet_start import SERIES
+from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.features.free_bound import SLOW
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FittedFreeMotion, FreeMotion
 from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch, cura6, load_arm, pin_model
 from tauguard.report import Row

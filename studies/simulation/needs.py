@@ -24,7 +24,7 @@ from tauguard.datasets.plans import (
     free_episodes,
     struck_episodes,
 )
-from tauguard.detectors import SrqSvr, figures, matchings, train
+from tauguard.detectors import SrqSvr, detection_metrics, matchings, train
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch
@@ -125,10 +125,12 @@ def _without(job: tuple[Plan, str]) -> TrainedWithout:
     episodes, part = job
     recordings = _simulated(episodes.train, part)
     alarm = train(SrqSvr(), recordings, nominal_arm(recordings), PER_HOUR)
-    found = figures(matchings(alarm, _whole(episodes.judge)))
+    found = detection_metrics(matchings(alarm, _whole(episodes.judge)))
     if not part:
         return TrainedWithout(found, found)
-    return TrainedWithout(found, figures(matchings(alarm, _simulated(episodes.judge, part))))
+    return TrainedWithout(
+        found, detection_metrics(matchings(alarm, _simulated(episodes.judge, part)))
+    )
 
 
 @functools.lru_cache(1)

@@ -14,8 +14,7 @@ from tauguard.cli import main
 from tauguard.cli.listen import Terminal, check_source, report
 from tauguard.datasets.plans import free_episodes, struck_episodes
 from tauguard.detectors import ArmModel, RobotNumbers, make_detector, save_model, train
-from tauguard.detectors.faults.detection import detect_with_faults
-from tauguard.detectors.faults.monitor import Answer, Monitor
+from tauguard.detectors.alarms.monitor import Answer, Monitor, detect_with_faults
 from tauguard.envs import simulate
 from tauguard.live import PlayedStream, StreamClosed, UrServer, UrStream, rtde, ur
 from tauguard.live.packets import Fault, Packets

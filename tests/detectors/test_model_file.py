@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import skops.io
 
-from tauguard.detectors import ArmModel, CollisionAlarm, load_model
+from tauguard.detectors import ArmModel, CollisionAlarm, load_model, save_model
 from tauguard.detectors import model_file as files
 from tauguard.detectors.registry import make_detector
 from tauguard.traces import Trace
@@ -61,7 +61,7 @@ def named(monkeypatch):
 
 def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_to_trust(alarm, tmp_path):
     path = tmp_path / "model.skops"
-    alarm.save(path)
+    save_model(alarm, path)
     assert skops.io.get_untrusted_types(file=path) == []
     assert [p.name for p in tmp_path.iterdir()] == ["model.skops"]
     container = skops.io.load(path)
@@ -75,7 +75,7 @@ def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_to_trust(a
 
 def test_a_module_of_another_is_built_only_if_it_was_named(small, named, tmp_path, unseen):
     path = tmp_path / "model.skops"
-    small.save(path)
+    save_model(small, path)
     with pytest.raises(ValueError, match=r"holds a mypackage:FittedCurrent.*--detector"):
         load_model(path)
     assert make_detector("mypackage:CurrentSize").name == "current-size"
@@ -92,7 +92,7 @@ def test_a_module_of_another_is_built_only_if_it_was_named(small, named, tmp_pat
 
 def test_damaged_files_are_one_line(alarm, tmp_path):
     whole, bad = tmp_path / "model.skops", tmp_path / "bad.skops"
-    alarm.save(whole)
+    save_model(alarm, whole)
     data = whole.read_bytes()
     for content in (b"", data[:100], data[: len(data) // 2], data[:-30], b"hello", b"{}"):
         bad.write_bytes(content)
@@ -102,9 +102,9 @@ def test_damaged_files_are_one_line(alarm, tmp_path):
     with pytest.raises(ValueError, match=r"none\.skops: cannot be read"):
         load_model(tmp_path / "none.skops")
     with pytest.raises(ValueError, match="cannot be written"):
-        alarm.save(tmp_path / "no" / "model.skops")
+        save_model(alarm, tmp_path / "no" / "model.skops")
     with pytest.raises(ValueError, match="threshold inf"):
-        dataclasses.replace(alarm, threshold=np.inf).save(bad)
+        save_model(dataclasses.replace(alarm, threshold=np.inf), bad)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def rewritten(path, change, checked=True):
     [
         (lambda c: c.update(threshold=float("nan")), "unexpected nan"),
         (lambda c: c.update(confirmation=-1.0), "confirmation -1"),
-        (lambda c: c.pop("levels"), "part missing or added: levels"),
+        (lambda c: c.pop("normalisation"), "part missing or added: normalisation"),
         (lambda c: c["detector"].update(type="os:system"), "holds a os:system"),
         (lambda c: c["detector"]["fields"]["front"]["fields"].update(dt=0.0), "dt 0.0"),
         (lambda c: c["detector"]["fields"]["regressor"]["fields"].update(sigma=0.0), "sigma: 0.0"),
@@ -152,7 +152,7 @@ def rewritten(path, change, checked=True):
 )
 def test_contents_that_the_classes_refuse_are_named(alarm, change, says, tmp_path):
     path = tmp_path / "model.skops"
-    alarm.save(path)
+    save_model(alarm, path)
     rewritten(path, change)
     with pytest.raises(ValueError, match=f"model.skops: .*{says}"):
         load_model(path)
@@ -160,7 +160,7 @@ def test_contents_that_the_classes_refuse_are_named(alarm, change, says, tmp_pat
 
 def test_a_change_under_the_old_checksum_is_noticed(alarm, tmp_path):
     path = tmp_path / "model.skops"
-    alarm.save(path)
+    save_model(alarm, path)
     rewritten(path, lambda c: c.update(threshold=1e9), checked=False)
     with pytest.raises(ValueError, match="does not fit its checksum"):
         load_model(path)
@@ -222,7 +222,7 @@ EDITS = {
 @pytest.mark.parametrize("edit", EDITS)
 def test_edits_under_a_fitting_checksum_that_blind_or_deafen_it_are_refused(edit, alarm, tmp_path):
     path = tmp_path / "model.skops"
-    alarm.save(path)
+    save_model(alarm, path)
     rewritten(path, EDITS[edit])
     with pytest.raises(ValueError, match=r"^[^\n]*model\.skops: [^\n]*$"):
         load_model(path)
@@ -231,10 +231,10 @@ def test_edits_under_a_fitting_checksum_that_blind_or_deafen_it_are_refused(edit
 def test_a_key_signs_and_nothing_else_is_read_with_it(small, named, tmp_path, monkeypatch):
     make_detector("mypackage:CurrentSize")
     unsigned, path, key = (tmp_path / name for name in ("unsigned.skops", "model.skops", "key"))
-    small.save(unsigned)
+    save_model(small, unsigned)
     key.write_bytes(b"sixteen bytes or more")
     monkeypatch.setenv("TAUGUARD_MODEL_KEY", str(key))
-    small.save(path)
+    save_model(small, path)
     assert load_model(path).threshold == small.threshold
     with pytest.raises(ValueError, match="not signed, and a key is set"):
         load_model(unsigned)
@@ -242,9 +242,34 @@ def test_a_key_signs_and_nothing_else_is_read_with_it(small, named, tmp_path, mo
     with pytest.raises(ValueError, match="signed with another key, or changed since"):
         load_model(path)
     key.write_bytes(b"another key of bytes")
-    small.save(unsigned)
+    save_model(small, unsigned)
     key.write_bytes(b"short")
     with pytest.raises(ValueError, match="a key of 5 bytes, expected 16 or more"):
         load_model(unsigned)
     monkeypatch.delenv("TAUGUARD_MODEL_KEY")
     assert load_model(unsigned).threshold == small.threshold  # without a key nothing is asked
+
+
+FORMER = {
+    "NoiseModel": "Envelope",
+    "SpeedNormalisation": "SpeedLevels",
+    "noise_model": "envelope",
+    "normalisation": "levels",
+}
+
+
+def with_former_names(fields):
+    """The fields of a class, renamed to what earlier versions called them."""
+    for name, own in list(fields.items()):
+        if isinstance(own, dict) and "type" in own:
+            own["type"] = FORMER.get(own["type"], own["type"])
+            with_former_names(own["fields"])
+        fields[FORMER.get(name, name)] = fields.pop(name)
+
+
+def test_a_file_with_the_names_of_earlier_versions_still_loads(alarm, unseen, tmp_path):
+    path = tmp_path / "model.skops"
+    save_model(alarm, path)
+    rewritten(path, with_former_names)
+    again = load_model(path)
+    assert again.scores(unseen[0]).tobytes() == alarm.scores(unseen[0]).tobytes()

@@ -9,7 +9,7 @@ import pytest
 
 from tauguard.cli import main
 from tauguard.datasets import free_episodes, struck_episodes, write_dataset
-from tauguard.detectors import CollisionAlarm, make_detector, with_rate
+from tauguard.detectors import load_model, make_detector, with_rate
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "detection.md"
 
@@ -41,4 +41,4 @@ def test_the_command_line_trains_and_evaluates_it(mypackage, tmp_path, capsys):
     main(["train", "--traces", folder, *own])
     main(["evaluate", "--traces", folder, *own])
     assert "sensitivity from 16 N m up" in capsys.readouterr().out
-    assert CollisionAlarm.load(model).detector.name == "current-size"
+    assert load_model(model).detector.name == "current-size"

@@ -11,11 +11,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors import CollisionAlarm, calibrate, held_out, model_file
-from tauguard.detectors.evaluation.events import free_rows
+from tauguard.detectors import (
+    CollisionAlarm,
+    calibrate,
+    held_out,
+    load_model,
+    model_file,
+    save_model,
+)
+from tauguard.detectors.events import free_rows
 from tauguard.detectors.features import front_end
 from tauguard.detectors.registry import DETECTORS, make_detector
-from tauguard.detectors.thresholds.speed_levels import SpeedLevels
+from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
 from tauguard.traces import Trace
 
 #: Less training, so that the tests are quick.
@@ -176,10 +183,10 @@ def test_a_file_gives_equal_scores(detector, unseen, tmp_path, monkeypatch):
     monkeypatch.setattr(model_file, "check_alarms", lambda alarm: None)
     path = tmp_path / "model.skops"
     trace = first(unseen[0], 4_000)
-    levels = SpeedLevels(np.array([0.0, 2.0]), np.array([1.0, 3.0]), np.ones(2))
+    levels = SpeedNormalisation(np.array([0.0, 2.0]), np.array([1.0, 3.0]), np.ones(2))
     own = CollisionAlarm(detector, 0.25, 0.005, levels)
-    own.save(path)
-    again = CollisionAlarm.load(path)
+    save_model(own, path)
+    again = load_model(path)
     assert (again.threshold, again.confirmation) == (0.25, 0.005)
     assert (again.detector.name, again.settle) == (detector.name, detector.settle)
     assert again.detector.scores(trace).tobytes() == detector.scores(trace).tobytes()

@@ -102,10 +102,9 @@ def observer(threads):
 
 
 def detector(threads):
-    from tauguard.detectors.features.front_end import FrontEnd
-    from tauguard.detectors.features.scaling import Scaling
-    from tauguard.detectors.methods.kernel_machine import KernelMachine
-    from tauguard.detectors.methods.residual_thresholds import FittedThresholds
+    from tauguard.detectors.features.front_end import FrontEnd, Scaling
+    from tauguard.detectors.scores.baselines import FittedThresholds
+    from tauguard.detectors.scores.kernel import KernelMachine
     from tauguard.traces import Trace
 
     arm, t, q, qd, current = motion()

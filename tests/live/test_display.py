@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from tauguard.detectors.faults.monitor import Answer
+from tauguard.detectors.alarms.monitor import Answer
 from tauguard.live import Sample
 from tauguard.live.display import BackgroundDisplay
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tauguard.detectors.faults.monitor import COLLISION, FAULT, FREE, Answer
+from tauguard.detectors.alarms.monitor import COLLISION, FAULT, FREE, Answer
 from tauguard.live.lateness import Lateness, late_answer, most_behind
 from tauguard.live.packets import Fault, Packets
 from tauguard.traces import Trace

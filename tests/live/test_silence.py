@@ -11,7 +11,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from tauguard.detectors.faults.monitor import Answer
+from tauguard.detectors.alarms.monitor import Answer
 from tauguard.live import LineStream, PlayedStream, Sample, StreamClosed, UrStream, rtde, ur
 from tauguard.live.ros import RosStream
 from tauguard.live.session import listen

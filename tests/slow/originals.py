@@ -101,7 +101,7 @@ def _write_model(path: Path) -> None:
     from slow.small_detector import bare_arm
     from tauguard.datasets import free_episodes
     from tauguard.detectors import CollisionAlarm, save_model
-    from tauguard.detectors.methods.current_threshold import CurrentThreshold
+    from tauguard.detectors.scores.currents import CurrentThreshold
     from tauguard.envs import simulate
 
     trace = simulate(free_episodes(0, 1, 4.0, (30.0,), (0.0,), None)[0])

@@ -60,7 +60,7 @@ def command(
     from tauguard.datasets.real_arms import calibration_notes, check_named, initial_arm
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import check_loads, left_out
-    from tauguard.detectors.calibration.belongs import check_signs, check_weight, torque_per_ampere
+    from tauguard.detectors.calibration.checks import check_signs, check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import identify
     from tauguard.report import write_json
 

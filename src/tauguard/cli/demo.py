@@ -87,7 +87,7 @@ def judged_figures(
     detector: CollisionAlarm, judged: list[Trace], matchings: list[Matching]
 ) -> dict[str, Any]:
     """What was judged, and how well the detector did on it."""
-    from tauguard.detectors import figures
+    from tauguard.detectors import detection_metrics
 
     return {
         "judged_seconds": sum(m.free_seconds for m in matchings),
@@ -95,7 +95,7 @@ def judged_figures(
         "collisions_by_kind": count(judged, lambda c: c.kind),
         "collisions_by_link": count(judged, lambda c: str(c.link)),
         "threshold": detector.threshold,
-        **figures(matchings),
+        **detection_metrics(matchings),
     }
 
 
@@ -113,7 +113,7 @@ def closing(out: Path, summary: dict[str, Any]) -> None:
 
 def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
     """Write the recording, what the viewer shows of it, and the detector into the folder."""
-    from tauguard.detectors import diagnose
+    from tauguard.detectors import diagnose, save_model
     from tauguard.replay import write_rrd
     from tauguard.traces import write_mcap
 
@@ -121,7 +121,7 @@ def leave(out: Path, showcase: Trace, detector: CollisionAlarm) -> None:
     said = diagnose(detector, showcase, shown)
     write_mcap(out / "demo.mcap", showcase, shown)
     write_rrd(out / "demo.rrd", showcase, shown, explained=said)
-    detector.save(out / "model.skops")
+    save_model(detector, out / "model.skops")
 
 
 def count(traces: list[Trace], key: Any) -> dict[str, int]:

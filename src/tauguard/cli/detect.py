@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tauguard.detectors import Diagnosis
+    from tauguard.detectors.alarms.baseline_window import LogDetection
     from tauguard.detectors.diagnosis.severity import ContactTorque, Interval90
-    from tauguard.detectors.thresholds.quiet_start import LogDetection
     from tauguard.traces import Trace
 
 
@@ -125,8 +125,8 @@ def watched(
     from tauguard.datasets.arm_logs import matched, parse_load
     from tauguard.datasets.real_arms import check_robot, is_torque
     from tauguard.detectors import load_model
-    from tauguard.detectors.methods.free_motion import carrying
-    from tauguard.detectors.thresholds.quiet_start import detect_with
+    from tauguard.detectors.alarms.baseline_window import detect_with
+    from tauguard.detectors.alarms.training import carrying
 
     alarm = load_model(model)
     if payload is not None:
@@ -146,8 +146,8 @@ def plainly(
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import matched
     from tauguard.datasets.real_arms import arm_of_log, robot_numbers
-    from tauguard.detectors.calibration.plausible import drive_torque
-    from tauguard.detectors.thresholds.quiet_start import detect_after_quiet
+    from tauguard.detectors.alarms.baseline_window import detect_after_baseline
+    from tauguard.detectors.calibration.checks import drive_torque
 
     numbers, held = robot_numbers(robot, trace.joint_names)
     print_notes(held)
@@ -156,7 +156,7 @@ def plainly(
         robot, columns, plain.gains, plain.viscous, plain.coulomb, trace, numbers
     )
     try:
-        found = detect_after_quiet(
+        found = detect_after_baseline(
             trace,
             arm.robot,
             drive_torque(arm, trace),
@@ -176,7 +176,7 @@ def explained(
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """What each alarm was; its torques alone where the robot's file has no shapes."""
     from tauguard.detectors import Diagnoser
-    from tauguard.detectors.diagnosis.aftermath import AftermathOf
+    from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindows
     from tauguard.detectors.diagnosis.severity import ContactTorque
     from tauguard.models import link_surface
 
@@ -184,7 +184,7 @@ def explained(
     try:
         surface = link_surface(robot)
     except ValueError as error:
-        looked = AftermathOf(detector.arm, detector.arm.envelope, trace)
+        looked = PostAlarmWindows(detector.arm, detector.arm.noise_model, trace)
         contact_torque = [ContactTorque.of(looked.at(alarm.start)) for alarm in alarms]
         return [
             {"summary": one.text(trace.joint_names), **torques(one)} for one in contact_torque
@@ -230,7 +230,7 @@ def summary(
     import numpy as np
 
     from tauguard.detectors import poisson_rate
-    from tauguard.detectors.thresholds.quiet_start import loudest_joint
+    from tauguard.detectors.alarms.baseline_window import loudest_joint
 
     whole = float(trace.t[-1] - found.quiet_until)
     watched = max(whole - found.fault_seconds, trace.dt)

@@ -84,7 +84,7 @@ def evaluated(
     alarm: CollisionAlarm, recordings: Iterable[Trace], wrong: EventFolder | None
 ) -> tuple[list[Matching], dict[str, Any]]:
     """Alarms matched with the truth, and all figures; what went wrong is kept by ``wrong``."""
-    from tauguard.detectors import diagnosis_figures, figures
+    from tauguard.detectors import detection_metrics, diagnosis_metrics
 
     matchings, said = [], []
     for name, one in _judged(alarm, recordings):
@@ -92,7 +92,7 @@ def evaluated(
         said += one.diagnoses(alarm)
         if wrong is not None:
             wrong.add(name, one.matching, (one.trace, one.detection))
-    return matchings, {**figures(matchings), "diagnosis": diagnosis_figures(said)}
+    return matchings, {**detection_metrics(matchings), "diagnosis": diagnosis_metrics(said)}
 
 
 def _judged(

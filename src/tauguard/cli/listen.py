@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tauguard.detectors import CollisionAlarm
-    from tauguard.detectors.faults.monitor import Answer
+    from tauguard.detectors.alarms.monitor import Answer
     from tauguard.live import RobotStream, Sample
     from tauguard.live.session import Session
 
@@ -63,7 +63,7 @@ def command(
     """
     from tauguard.datasets.real_arms import check_robot
     from tauguard.detectors import load_model
-    from tauguard.detectors.faults.monitor import Monitor
+    from tauguard.detectors.alarms.monitor import Monitor
     from tauguard.live.display import BackgroundDisplay
     from tauguard.live.session import listen
 
@@ -114,7 +114,7 @@ def with_load(
 ) -> CollisionAlarm:
     """The alarm of an arm with this load, if it was trained on such signals."""
     from tauguard.datasets.arm_logs import parse_load
-    from tauguard.detectors.methods.free_motion import carrying
+    from tauguard.detectors.alarms.training import carrying
 
     if torque and not (alarm.detector.arm.drive_gain == 1).all():
         raise ValueError(f"--torque: {model} was trained on currents")
@@ -123,7 +123,7 @@ def with_load(
 
 def check_source(source: RobotStream, alarm: CollisionAlarm, model: Path) -> None:
     """Refuse another number of joints or another rate than training's: ``ValueError``."""
-    from tauguard.detectors.detector import same_rate
+    from tauguard.detectors.samples import same_rate
 
     joints, dt = alarm.detector.arm.robot.joints, alarm.detector.dt
     if len(source.joint_names) != joints:

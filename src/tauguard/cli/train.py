@@ -10,8 +10,8 @@ if TYPE_CHECKING:
 
     from tauguard.detectors import ArmModel, CollisionAlarm, FreeScores
     from tauguard.detectors.calibration.recording import Recording
-    from tauguard.detectors.methods.free_logs import JudgedLog, Sifted
-    from tauguard.detectors.methods.free_motion import FittedFreeMotion
+    from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog, CrossValidation
+    from tauguard.detectors.scores.free_motion import FittedFreeMotion
     from tauguard.traces import Trace
 
 
@@ -116,9 +116,9 @@ def labelled_motion(
     """Train on labelled recordings."""
     from tauguard.datasets.recordings import labelled
     from tauguard.detectors import make_detector, save_model, with_guarantee
+    from tauguard.detectors.alarms.training import train_and_score
     from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.detectors.thresholds.guarantee import check_guarantee
-    from tauguard.detectors.thresholds.law import train_and_score
     from tauguard.report import two_digits
 
     # First: what cannot be used, or cannot be guaranteed, is better named before training.
@@ -186,9 +186,9 @@ def free_motion(
     )
     from tauguard.detectors import CollisionAlarm, save_model
     from tauguard.detectors.calibration.arm_file import load_arm
-    from tauguard.detectors.calibration.belongs import check_signs, check_weight
-    from tauguard.detectors.faults import UsualInput
-    from tauguard.detectors.methods.free_motion import CONFIRMATION, FreeMotion
+    from tauguard.detectors.calibration.checks import check_signs, check_weight
+    from tauguard.detectors.faults.inputs import UsualInput
+    from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
 
     read = read_logs(free, columns, robot, torque)
     print_notes(read.notes)
@@ -216,7 +216,7 @@ def free_motion(
 
 def sifted_logs(
     traces: dict[str, Trace], recordings: Sequence[Recording], arm: ArmModel, accept: Sequence[str]
-) -> tuple[dict[str, Trace], list[Recording], Sifted]:
+) -> tuple[dict[str, Trace], list[Recording], CrossValidation]:
     """The logs to learn from; prints a note on each other one, and on what differs in these.
 
     Args:
@@ -230,19 +230,19 @@ def sifted_logs(
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import log_named
-    from tauguard.detectors.methods.free_logs import sift
+    from tauguard.detectors.evaluation.cross_validation import cross_validate
 
     names = list(traces)
     accepted = [log_named(name, f"--accept {name}", names) for name in accept]
     own = dict(zip(names, recordings, strict=True))
-    sifted = sift(own, arm, accepted)
+    sifted = cross_validate(own, arm, accepted)
     print_notes(odd_notes(sifted))
     out = {log.name for log in sifted.left_out}
     kept = [name for name in names if name not in out]
     return {name: traces[name] for name in kept}, [own[name] for name in kept], sifted
 
 
-def odd_notes(sifted: Sifted) -> list[str]:
+def odd_notes(sifted: CrossValidation) -> list[str]:
     """A line on each log that stands out, and on each whose torques differ all along."""
     from tauguard.detectors.evaluation.card_page import times
 
@@ -272,7 +272,7 @@ def odd_notes(sifted: Sifted) -> list[str]:
     return notes
 
 
-def _others(logs: Sequence[JudgedLog]) -> str:
+def _others(logs: Sequence[CrossValidatedLog]) -> str:
     count = sum(len(log.alarms) for log in logs)
     return f"{count or 'none'} in {sum(log.seconds for log in logs) / 60:.1f} min"
 
@@ -292,7 +292,7 @@ def never_moved(traces: list[Trace]) -> list[str]:
 
 
 def show_card(
-    detector: FittedFreeMotion, traces: list[Trace], sifted: Sifted, target: Path | None
+    detector: FittedFreeMotion, traces: list[Trace], sifted: CrossValidation, target: Path | None
 ) -> None:
     """Print what the detector can find, and draw it."""
     from tauguard.detectors.evaluation.card_page import draw, text

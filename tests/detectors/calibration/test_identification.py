@@ -8,9 +8,9 @@ import pytest
 from tauguard.detectors import ArmModel, gravity_torque, mass_matrix
 from tauguard.detectors.calibration.arm_file import load_arm, save_arm
 from tauguard.detectors.calibration.assessment import explained, left_out, residual_rms, start_gains
-from tauguard.detectors.calibration.consistent import is_consistent
 from tauguard.detectors.calibration.identification import identify
 from tauguard.detectors.calibration.recording import Load, Recording, moving_span
+from tauguard.detectors.dynamics.physical_consistency import is_physically_consistent
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tests.detectors.synthetic_arm import (
     COULOMB,
@@ -38,7 +38,7 @@ def test_given_gains_fix_the_scale(found):
     arm = found.arm
     truth = RobotNumbers.from_pin(true_model())
     assert found.scale == "gains"
-    assert is_consistent(arm.robot.inertial)
+    assert is_physically_consistent(arm.robot.inertial)
     poses = np.random.default_rng(5).uniform(-0.8, 0.8, (20, 3))
     np.testing.assert_allclose(
         gravity_torque(arm.robot, poses), gravity_torque(truth, poses), atol=0.4

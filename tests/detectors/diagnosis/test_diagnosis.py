@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 from tauguard.detectors import ArmModel, Diagnoser, RobotNumbers, diagnose
-from tauguard.detectors.diagnosis.aftermath import Aftermath, AftermathOf
 from tauguard.detectors.diagnosis.classification import KINDS, load, signs
+from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow, PostAlarmWindows
 from tauguard.envs import CollisionPlan, Episode, PayloadPick, simulate
 from tauguard.models import cura6, cura6_drive, link_surface, pin_model
 from tauguard.traces import Alarm
@@ -31,7 +31,7 @@ def made(shape, torque, columns=None):
     """The aftermath of a residual ``torque`` times ``shape``, sampled at 1 kHz from -20 ms on."""
     t = (np.arange(len(shape)) - 20) * 1e-3
     still = np.tile(np.array(cura6.HOME), (len(t), 1))
-    return Aftermath(
+    return PostAlarmWindow(
         np.arange(len(t)),
         t,
         still,
@@ -123,7 +123,7 @@ def test_simulated_contacts_and_payload(trace):
 
 
 def test_what_was_known_before_the_alarm_is_kept(trace):
-    looked = AftermathOf(ARM, None, trace).at(4.2)
+    looked = PostAlarmWindows(ARM, None, trace).at(4.2)
     # The estimator takes the payload up within seconds; the aftermath goes on showing it.
     truth = payload_torque(trace.q[looked.rows[-1]], 2.0, [0, 0.098, 0])
     np.testing.assert_allclose(looked.residual[-1], truth, atol=2.0)
@@ -136,14 +136,14 @@ def test_alarms_of_any_detector_are_explained(trace, alarm):
     explained = diagnose(alarm, trace)
     assert len(explained) == len(alarm.detect(trace).alarms)
     arm, surface = alarm.detector.arm, link_surface(XML, 40)
-    learned, used = arm.envelope.weights, Diagnoser.of(arm, surface).envelope
+    learned, used = arm.noise_model.weights, Diagnoser.of(arm, surface).noise_model
     np.testing.assert_array_equal(used.weights[:, 1:], learned[:, 1:])
     np.testing.assert_array_equal(used.weights[:, 0], np.maximum(learned[:, 0], arm.noise))
-    assert Diagnoser.of(ARM, surface).envelope is None
+    assert Diagnoser.of(ARM, surface).noise_model is None
     with pytest.raises(ValueError, match=r"no arm\.xml"):
         diagnose(alarm, replace(trace, attachments={}))
     with pytest.raises(ValueError, match="start 99"):
-        AftermathOf(arm, used, trace).at(99.0)
+        PostAlarmWindows(arm, used, trace).at(99.0)
 
 
 @pytest.mark.parametrize("stride", [1, 10, 42])

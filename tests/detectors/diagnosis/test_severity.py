@@ -2,11 +2,16 @@ import numpy as np
 import pytest
 
 from tauguard.detectors import RobotNumbers
-from tauguard.detectors.diagnosis.aftermath import Aftermath
 from tauguard.detectors.diagnosis.contact_force import contact_belief, link_poses, point_jacobians
-from tauguard.detectors.diagnosis.force_draws import force_draws
 from tauguard.detectors.diagnosis.isolation import Trust
-from tauguard.detectors.diagnosis.severity import COVERAGE, ContactTorque, Interval90, severity
+from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
+from tauguard.detectors.diagnosis.severity import (
+    COVERAGE,
+    ContactTorque,
+    Interval90,
+    force_draws,
+    severity,
+)
 from tauguard.models import cura6, link_surface, pin_model
 
 XML = cura6.arm_xml()
@@ -30,7 +35,9 @@ def seen(torque, seconds, lag, dt=1e-3, after=0.3):
     empty, envelope = np.zeros((len(t), 6, 4)), np.full_like(still, 0.2)
     motionless = np.zeros_like(still)
     rows = np.arange(len(t))
-    return Aftermath(rows, t, still, motionless, np.outer(level, torque), envelope, empty, lag)
+    return PostAlarmWindow(
+        rows, t, still, motionless, np.outer(level, torque), envelope, empty, lag
+    )
 
 
 @pytest.mark.parametrize("lag", [0.002, 0.005, 0.02, 0.04])
@@ -72,7 +79,7 @@ def test_draws_have_the_mean_of_the_closed_form(row):
 def said(link, row, force, seconds=0.05):
     after = seen(contact(link, row, force), seconds, 0.005)
     contact_torque = ContactTorque.of(after)
-    noise = Trust().noise(contact_torque.mean, after.envelope[0])
+    noise = Trust().noise(contact_torque.mean, after.deviation[0])
     return severity(ROBOT, SURFACE, after, believed(contact_torque.mean, noise), 1, Trust())
 
 

@@ -6,8 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from tauguard.detectors.evaluation.events import match
-from tauguard.detectors.evaluation.metrics import delay_figures, figures, poisson_rate, wilson
+from tauguard.detectors.evaluation.matching import match
+from tauguard.detectors.evaluation.metrics import (
+    delay_metrics,
+    detection_metrics,
+    poisson_rate,
+    wilson,
+)
 from tauguard.traces import stratum
 from tauguard.traces.trace import Alarm, Collision
 
@@ -31,7 +36,7 @@ def test_wilson_of_the_dissertation_cell():
 def test_nothing_tried_is_no_figure():
     assert wilson(0, 0) == {"value": None, "low": None, "high": None, "n": 0}
     assert poisson_rate(0, 0.0)["value"] is None
-    assert delay_figures([None])["median"] is None
+    assert delay_metrics([None])["median"] is None
 
 
 @given(st.integers(0, 60), st.floats(0.1, 20))
@@ -59,7 +64,7 @@ def hit(onset, peak):
 def test_figures_of_a_small_trace():
     collisions = [hit(10, 5.0), hit(20, 20.0), hit(30, 40.0), hit(40, 20.0)]
     alarms = [Alarm(20.01, 20.1), Alarm(30.03, 30.2), Alarm(50.0, 50.1)]
-    out = figures([match(alarms, collisions, (0.0, 60.0), case_seconds=3.0)])
+    out = detection_metrics([match(alarms, collisions, (0.0, 60.0), case_seconds=3.0)])
     # 10, 9.5 (3 times) and 19.5 s free: 3 + 3 x 3 + 6 cases
     assert out["confusion"] == {"tp": 2, "fn": 2, "fp": 1, "tn": 17}
     assert out["sensitivity"]["value"] == 0.5
@@ -77,7 +82,7 @@ def test_figures_of_a_small_trace():
 def test_figures_of_several_traces_are_pooled():
     one = match([], [hit(10, 20.0)], (0.0, 60.0))
     two = match([Alarm(10.0, 11.0)], [hit(10, 200.0)], (0.0, 60.0))
-    out = figures([one, two])
+    out = detection_metrics([one, two])
     assert out["sensitivity"]["value"] == 0.5
     assert out["strata"]["128-"]["sensitivity"]["value"] == 1.0
     assert out["false_alarms_per_hour"]["hours"] == pytest.approx(119 / 3600)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tauguard.detectors.faults import FaultCheck, UsualInput
+from tauguard.detectors.faults.inputs import FaultCheck, UsualInput
 from tauguard.traces.trace import Trace
 
 NAMES = ("shoulder", "elbow", "wrist")

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tauguard.detectors.evaluation.events import free_rows
-from tauguard.detectors.features.envelope import Envelope
-from tauguard.detectors.features.scaling import Scaling
+from tauguard.detectors.estimation.noise_model import NoiseModel
+from tauguard.detectors.events import free_rows
+from tauguard.detectors.features.front_end import Scaling
 from tauguard.detectors.features.windows import WindowShape, median_distance
 
 
@@ -58,7 +58,7 @@ def test_windows_are_causal_and_equal_to_a_plain_gather(seed, lag, count):
 def test_scaling_is_its_formula_row_by_row(seed, joints, envelope):
     rng = np.random.default_rng(seed)
     left, qd, acceleration = rng.normal(size=(3, 50, joints)) * 3
-    known = Envelope(rng.uniform(0.1, 1, (joints, 4))) if envelope else None
+    known = NoiseModel(rng.uniform(0.1, 1, (joints, 4))) if envelope else None
     chosen = (0, joints - 1)
     scaling = Scaling(chosen, known, 5.0, 0.7, compress=True)
     truth = 0.7 * left[:, chosen]
@@ -86,15 +86,15 @@ def test_envelope_finds_what_the_noise_grows_with():
     rng = np.random.default_rng(0)
     qd, acceleration = rng.normal(size=(2, 20000, 2))
     truth = np.array([[1.0, 0.5, 0.0, 0.0], [0.2, 0.0, 0.3, 0.1]])
-    scale = Envelope(truth).scale(qd, acceleration)
+    scale = NoiseModel(truth).scale(qd, acceleration)
     left = scale * rng.normal(size=qd.shape)
-    fitted = Envelope.fit(left, qd, acceleration)
+    fitted = NoiseModel.fit(left, qd, acceleration)
     np.testing.assert_allclose(fitted.weights, truth, atol=0.06)
     assert np.std(left / fitted.scale(qd, acceleration), axis=0) == pytest.approx([1, 1], abs=0.03)
 
 
 def test_a_joint_without_any_residual_keeps_a_scale_above_zero():
-    silent = Envelope.fit(np.zeros((100, 1)), np.ones((100, 1)), np.ones((100, 1)))
+    silent = NoiseModel.fit(np.zeros((100, 1)), np.ones((100, 1)), np.ones((100, 1)))
     assert (silent.scale(np.zeros(1), np.zeros(1)) > 0).all()
 
 

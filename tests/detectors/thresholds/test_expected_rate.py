@@ -6,7 +6,7 @@ from scipy import stats
 
 from tauguard.detectors import FreeScores
 from tauguard.detectors.thresholds.expected_rate import ExpectedRate
-from tauguard.detectors.thresholds.rates import tail_level
+from tauguard.detectors.thresholds.tail_model import tail_level
 
 #: Blocks of an hour, and pieces of a block.
 HOUR, PIECES = 7200, 25

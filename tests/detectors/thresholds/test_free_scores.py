@@ -5,7 +5,7 @@ import pytest
 
 from tauguard.detectors import CollisionAlarm, FreeScores
 from tauguard.detectors.thresholds.free_scores import PIECE
-from tauguard.detectors.thresholds.law import threshold_for_rate
+from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.traces import Trace
 
 
@@ -22,7 +22,7 @@ def test_pieces_agree_with_scores_looked_at_one_by_one():
     rng = np.random.default_rng(1)
     score, t = rng.normal(size=20_000), np.arange(20_000) * 1e-3
     trace = Trace(("j",), t, *(x[:, None] for x in (t, np.maximum(t, 0), score)))
-    found = FreeScores.of(CollisionAlarm(Given(), np.inf, confirmation=0.0), trace)
+    found = CollisionAlarm(Given(), np.inf, confirmation=0.0).free_scores(trace)
     assert found.seconds == pytest.approx(20)
     assert len(found.peaks) == 1000
     assert len(found.cases()) == 10
@@ -31,7 +31,7 @@ def test_pieces_agree_with_scores_looked_at_one_by_one():
         assert found.cases()[k] == score[2000 * k : 2000 * (k + 1)].max()
     for speed, high in zip(found.speeds, found.peaks, strict=True):
         assert score[round(speed / 1e-3)] == high
-    short = FreeScores.of(CollisionAlarm(Given(), np.inf, confirmation=3e-3), trace)
+    short = CollisionAlarm(Given(), np.inf, confirmation=3e-3).free_scores(trace)
     lowest = np.lib.stride_tricks.sliding_window_view(score, 3).min(axis=-1)
     assert short.peak == lowest.max()
 
@@ -42,7 +42,7 @@ def test_blocks_and_cases_last_as_long_at_every_sample_rate(hz):
     t = np.arange(round(120 * hz)) / hz
     score = rng.normal(size=len(t))
     trace = Trace(("j",), t, *(x[:, None] for x in (t, t, score)))
-    found = FreeScores.of(CollisionAlarm(Given(), np.inf, confirmation=0.0), trace)
+    found = CollisionAlarm(Given(), np.inf, confirmation=0.0).free_scores(trace)
     assert found.seconds == pytest.approx(120)
     assert len(found.peaks) * found.piece == pytest.approx(120, rel=0.01)
     assert found.seconds / len(found.blocks()[0]) == pytest.approx(0.5, rel=0.05)
@@ -51,7 +51,7 @@ def test_blocks_and_cases_last_as_long_at_every_sample_rate(hz):
     for apart, alarms in ((0.4, 1), (0.9, 2)):
         score[:] = 0
         score[np.searchsorted(t, (5.0, 5.0 + apart))] = 1
-        found = FreeScores.of(CollisionAlarm(Given(), np.inf, confirmation=0.0), trace)
+        found = CollisionAlarm(Given(), np.inf, confirmation=0.0).free_scores(trace)
         assert found.alarms(0.5) == alarms
 
 

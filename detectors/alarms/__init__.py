@@ -1,0 +1,1 @@
+"""From scores to alarms: online and in batch, with faults of the samples."""

@@ -1,0 +1,193 @@
+"""From scores to alarms, the same way for every method, in batch and online."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.arrays import Array
+from tauguard.detectors import _observer
+from tauguard.detectors.events import (
+    CONFIRMATION,
+    confirmation_samples,
+    confirmed,
+    find_alarms,
+    sustained,
+)
+from tauguard.detectors.faults.inputs import UsualInput
+from tauguard.detectors.features.front_end import NativeStream, plain_residual
+from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.samples import same_rate
+from tauguard.detectors.scores.detector import FittedDetector
+from tauguard.detectors.thresholds.free_scores import FreeScores
+from tauguard.detectors.thresholds.speed_normalisation import (
+    SpeedNormalisation,
+    memory_samples,
+    recent_speed,
+)
+from tauguard.traces.trace import Detection, Trace
+
+#: A signal that is finite but absurd has left numbers in the detector that are not.
+LOST = "the score is not a number: a sample was out of any arm's range; begin anew without it"
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionAlarm(Frozen):
+    """A fitted detector with what makes an alarm of its score.
+
+    The alarm is up where the score, normalised over the speed, has stayed above the threshold for
+    the confirmation time; never before the detector has settled.
+    """
+
+    detector: FittedDetector
+    threshold: float  #: of the normalised score
+    confirmation: float = CONFIRMATION  #: t_c [s]
+    normalisation: SpeedNormalisation | None = None  #: None: the score is compared as it is
+    inputs: UsualInput | None = None  #: what its samples look like; None: not known
+
+    def __post_init__(self) -> None:
+        """Check: ``ValueError``."""
+        confirmation_samples(self.confirmation, self.detector.dt)
+        if np.isnan(self.threshold):
+            raise ValueError("threshold: not a number")
+
+    @property
+    def settle(self) -> float:
+        """Seconds at the beginning without an alarm."""
+        return self.detector.settle
+
+    @property
+    def samples(self) -> int:
+        """Successive samples above the threshold that make an alarm."""
+        return confirmation_samples(self.confirmation, self.detector.dt)
+
+    def normalised(self, score: Array, trace: Trace) -> Array:
+        """Scores of a trace relative to the speed normalisation, shape (T,)."""
+        if self.normalisation is None:
+            return score
+        return self.normalisation(score, recent_speed(trace.qd, trace.dt))
+
+    def scores(self, trace: Trace) -> Array:
+        """The normalised score, shape (T,)."""
+        score = self.detector.scores(trace)
+        if not np.isfinite(score).all():
+            raise ValueError(f"{LOST}; first at {trace.t[~np.isfinite(score)][0]:g} s")
+        return self.normalised(score, trace)
+
+    def sustained(self, trace: Trace, score: Array | None = None) -> Array:
+        """What the normalised score has reached throughout the last t_c, shape (T,).
+
+        Above the threshold is an alarm; -inf before the detector has settled.
+
+        Args:
+            trace: of the detector's arm.
+            score: of the detector, before it is normalised, where it is known.
+        """
+        known = self.detector.scores(trace) if score is None else score
+        level = self.normalised(known, trace)
+        return sustained(np.where(self._settled(trace), level, -np.inf), self.samples)
+
+    def free_scores(self, trace: Trace, score: Array | None = None) -> FreeScores:
+        """The normalised scores of a trace's collision-free rows, for a threshold.
+
+        Args:
+            trace: of the detector's arm.
+            score: of the detector, before it is normalised, where it is known.
+
+        Raises:
+            ValueError: the trace is over before the detector has settled.
+        """
+        return FreeScores.of(self.sustained(trace, score), trace, self.settle)
+
+    def _settled(self, trace: Trace) -> NDArray[np.bool_]:
+        return np.asarray(trace.t - trace.t[0] > self.settle - self.detector.dt / 2)
+
+    def detect(self, trace: Trace) -> Detection:
+        """The alarms of a trace; its residual is the plain momentum observer's.
+
+        Raises:
+            ValueError: another number of joints or another sample rate.
+        """
+        score = self.scores(trace)
+        samples = self.samples
+        if not same_rate(trace.dt, self.detector.dt):  # a detector that takes other rates
+            samples = confirmation_samples(self.confirmation, trace.dt)
+        alarm = confirmed((score > self.threshold) & self._settled(trace), samples)
+        return Detection(
+            detector=self.detector.name,
+            t=trace.t,
+            residual=plain_residual(self.detector.arm, trace),
+            score=score,
+            threshold=self.threshold,
+            alarm=alarm,
+            alarms=find_alarms(trace.t, alarm),
+        )
+
+    def stream(self) -> AlarmStream:
+        """The alarm sample by sample, from the next sample on."""
+        return AlarmStream(self)
+
+
+class AlarmStream:
+    """An alarm as the samples of one recording come in.
+
+    Attributes:
+        native: what does it.
+    """
+
+    def __init__(self, alarm: CollisionAlarm) -> None:
+        """Begin anew."""
+        detector, speed = alarm.detector, alarm.normalisation
+        self._dt, self._first = detector.dt, True
+        self.native = _observer.Alarm(
+            native_scores(detector),
+            detector.dt,
+            alarm.settle - detector.dt / 2,
+            alarm.threshold,
+            alarm.samples,
+            memory_samples(detector.dt),
+            [] if speed is None else np.asarray(speed.speed).tolist(),
+            [] if speed is None else np.asarray(speed.base).tolist(),
+            [] if speed is None else np.asarray(speed.unit).tolist(),
+        )
+
+    @property
+    def score(self) -> float:
+        """The normalised score at the last sample, 0 before the first."""
+        return self.native.score
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> bool:
+        """Whether the alarm is up at this sample; equal to :meth:`CollisionAlarm.detect`.
+
+        Args:
+            q: [rad], float64, shape (n,).
+            qd: [rad/s], shape (n,).
+            current: [A], shape (n,).
+            dt: time since the last sample [s] (default: that of the training traces).
+
+        Raises:
+            ValueError: wrong shapes, numbers that are not finite, or another sample rate than the
+                training's.
+        """
+        interval = self._dt if dt is None else dt
+        if not self._first and not same_rate(interval, self._dt):
+            raise ValueError(
+                f"dt {1e3 * interval:g} ms: this detector works at {1e3 * self._dt:g} ms; feed it "
+                "every sample, or train one at this rate"
+            )
+        try:
+            up = self.native.step(q, qd, current, interval)
+        except TypeError:
+            raise ValueError("q, qd, current: expected float64 arrays, one entry a joint") from None
+        self._first = False
+        return up
+
+
+def native_scores(detector: FittedDetector) -> _observer.Scores:
+    """A new stream of the detector in native form; one that is Python's is called back."""
+    stream = detector.stream()
+    if isinstance(stream, NativeStream):
+        return stream.native
+    return _observer.python_scores(detector.stream, detector.arm.robot.joints)

@@ -1,0 +1,236 @@
+"""Free, collision or fault: a detector on samples that cannot always be believed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.detectors import _observer
+from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.events import find_alarms
+from tauguard.detectors.faults.inputs import FAULTS, SPAN, FaultCheck, UsualInput, input_fault
+from tauguard.detectors.faults.torques import TorqueCheck, torque_fault
+from tauguard.detectors.samples import check_interval
+from tauguard.traces.trace import Detection, Trace
+
+FREE, COLLISION, FAULT = "free", "collision", "fault"
+
+#: By the number that the native monitor answers.
+STATES = (FREE, COLLISION, FAULT)
+
+#: So many samples in a row that are missing or faulty are interpolated, or as many as last SPAN;
+#: after more the detector begins anew.
+BRIDGED = 2
+
+#: After a bridged fault nothing is judged until its samples have left the detector's window [s].
+WINDOW = 0.1
+
+
+class Answer(NamedTuple):
+    """What is thought of the robot at one sample."""
+
+    state: str  #: "free", "collision" or "fault"
+    alarm: bool  #: a collision's alarm is up; during a fault: it was up when the fault began
+    score: float  #: of the detector, the last one known
+    reason: str  #: what is wrong with the input; empty without a fault
+
+
+class Monitor:
+    """A detector that says so when it cannot see.
+
+    A sample with a fault never reaches the detector. While faults last, and afterwards until the
+    detector has settled again, the state is ``fault``. A collision whose alarm was up before the
+    fault stays a collision. An alarm that came within 20 ms of the fault is the fault's own.
+
+    Torques that cannot be this arm's are a fault as well; as a hard contact looks the same for half
+    a second, the detector goes on, and an alarm that is up stays a collision with that reason.
+
+    From a sample to its answer it is one native call that allocates nothing but the answer, unless
+    the detector's own stream is Python's.
+    """
+
+    def __init__(self, alarm: CollisionAlarm, usual: UsualInput) -> None:
+        """Begin before the first sample."""
+        torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
+        self._usual = usual
+        self._native = _observer.Monitor(
+            FaultCheck(usual).native,
+            alarm.stream().native,
+            torques.observer.native,
+            torques.native,
+            usual.dt,
+            alarm.settle,
+            SPAN,
+            WINDOW,
+            float(BRIDGED),
+        )
+
+    @property
+    def settled(self) -> bool:
+        """Whether the detector can raise an alarm yet."""
+        return self._native.settled
+
+    def step(self, t: float, q: Array, qd: Array, current: Array) -> Answer:
+        """What to think at this sample.
+
+        Args:
+            t: its time stamp [s].
+            q: [rad], float64, shape (n,).
+            qd: [rad/s], shape (n,).
+            current: [A], shape (n,).
+
+        Raises:
+            ValueError: another number of joints.
+        """
+        state, up, score, number, joint, value, settling = self._native.step(t, q, qd, current)
+        reason = self._reason(number, joint, value, settling) if number else ""
+        return Answer(STATES[state], up, score, reason)
+
+    def _reason(self, number: int, joint: int, value: float, settling: bool) -> str:
+        """What the native monitor says, in words."""
+        if number not in FAULTS:
+            return torque_fault(self._usual.joint_names, number, joint, value)
+        fault = input_fault(self._usual, number, joint, value)
+        return f"settling again after {fault}" if settling else fault
+
+
+#: Spans of one state less than this apart are one [s].
+MERGED = 0.2
+
+
+@dataclass
+class Span:
+    """A stretch of collision or fault, by the robot's clock."""
+
+    state: str  #: "collision" or "fault"
+    start: float  #: [s]
+    end: float  #: [s]
+    reason: str = ""  #: of a fault, its first
+    score: float = 0.0  #: of a collision, its largest
+
+
+@dataclass
+class Spans:
+    """The spans so far; a collision that began within 20 ms before a fault was the fault's own."""
+
+    found: list[Span] = field(default_factory=list)
+    _open: dict[str, Span] = field(default_factory=dict)
+
+    def add(self, t: float, answer: Answer) -> None:
+        """One sample's answer; ``t`` is its time [s]."""
+        if answer.state == FAULT:
+            self._take_back(t)
+        self.mark(COLLISION, answer.alarm, t, "")
+        if answer.alarm and (span := self._open.get(COLLISION)) is not None:
+            span.score = max(span.score, answer.score)
+        self.mark(FAULT, bool(answer.reason), t, answer.reason)
+
+    def of(self, state: str) -> list[Span]:
+        """Those of one state, in order."""
+        return [span for span in self.found if span.state == state]
+
+    def mark(self, state: str, up: bool, t: float, reason: str) -> None:
+        """Open, prolong or close the span of one state."""
+        span = self._open.get(state)
+        if up and span is None and not np.isfinite(t):
+            return  # it begins with the next time that is a number
+        if up and span is None:
+            last = next((span for span in reversed(self.found) if span.state == state), None)
+            if last is not None and t - last.end < MERGED:
+                last.end = t
+            else:
+                last = Span(state, t, t, reason)
+                self.found.append(last)
+            self._open[state] = last
+        elif up and span is not None:
+            span.end = t if np.isfinite(t) else span.end
+        elif span is not None:
+            del self._open[state]
+
+    def _take_back(self, t: float) -> None:
+        """Forget a collision that began just before a fault."""
+        span = self._open.get(COLLISION)
+        if span is not None and not t - span.start > SPAN:
+            self.found.remove(span)
+            del self._open[COLLISION]
+
+
+@dataclass(frozen=True)
+class Monitored:
+    """What a detector and its fault checks say of a log."""
+
+    detection: Detection
+    faults: tuple[Span, ...]  #: in order; while one lasts, no alarm is looked for
+    fault_seconds: float  #: in which the state is "fault": collisions may be missed there
+
+
+def detect_with_faults(alarm: CollisionAlarm, trace: Trace) -> Monitored:
+    """Alarms and faults of a log, as :class:`Monitor` gives them sample by sample.
+
+    Where no sample is at fault this is ``alarm.detect`` to the bit. A detector that does not know
+    what its samples look like names no faults.
+
+    Raises:
+        ValueError: another number of joints or another sample rate.
+    """
+    if alarm.inputs is None:
+        return Monitored(alarm.detect(trace), (), 0.0)
+    if np.isfinite(trace.dt):
+        check_interval("the log", trace, alarm.detector.dt)
+    if not np.isfinite(trace.dt) or _broken(alarm, trace):
+        return _by_sample(alarm, trace)
+    usual = alarm.inputs
+    detection = alarm.detect(trace)
+    torques = TorqueCheck(alarm.detector.arm, usual.dt, usual.ratios)
+    spans, seconds, dt = Spans(), 0.0, trace.dt  # a median: asked once
+    for k, t in enumerate(trace.t):
+        interval = None if k == 0 else float(t - trace.t[k - 1])
+        reason = torques.step(trace.q[k], trace.qd[k], trace.current[k], interval)
+        if t - trace.t[0] < alarm.settle:
+            continue
+        spans.mark(FAULT, bool(reason), float(t), reason)
+        seconds += dt * (bool(reason) and not detection.alarm[k])
+    return Monitored(detection, tuple(spans.of(FAULT)), seconds)
+
+
+def _broken(alarm: CollisionAlarm, trace: Trace) -> bool:
+    """Whether any sample is at fault, missing, or late enough to be interpolated."""
+    assert alarm.inputs is not None
+    check, steps = FaultCheck(alarm.inputs), np.diff(trace.t) / alarm.inputs.dt
+    if (np.abs(steps - 1) > 0.2).any():
+        return True
+    rows = zip(trace.t.tolist(), trace.q, trace.qd, trace.current, strict=True)
+    return any(check.step(*row) is not None for row in rows)
+
+
+def _by_sample(alarm: CollisionAlarm, trace: Trace) -> Monitored:
+    assert alarm.inputs is not None
+    monitor, spans, answers = Monitor(alarm, alarm.inputs), Spans(), []
+    for t, q, qd, current in zip(trace.t.tolist(), trace.q, trace.qd, trace.current, strict=True):
+        answers.append(monitor.step(t, q, qd, current))
+        spans.add(t, answers[-1])
+    up = _kept(trace, answers, spans)
+    shape = np.zeros_like(trace.q)
+    detection = Detection(
+        detector=alarm.detector.name,
+        t=trace.t,
+        residual=shape,
+        score=np.array([a.score for a in answers]),
+        threshold=alarm.threshold,
+        alarm=up,
+        alarms=find_alarms(trace.t, up),
+    )
+    blind = np.array([a.state == FAULT for a in answers])
+    seconds = float(np.diff(trace.t, append=trace.t[-1])[blind].sum())
+    return Monitored(detection, tuple(replace(s) for s in spans.of(FAULT)), seconds)
+
+
+def _kept(trace: Trace, answers: list[Answer], spans: Spans) -> np.ndarray:
+    """The alarms, less those that were taken back."""
+    kept = np.zeros(len(trace.t), dtype=np.bool_)
+    for span in spans.of("collision"):
+        kept |= (trace.t >= span.start) & (trace.t <= span.end)
+    return np.asarray(kept & np.array([a.alarm for a in answers]))

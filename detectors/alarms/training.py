@@ -1,0 +1,156 @@
+"""From collision-free motion to a threshold: the one way, for the command line and all studies.
+
+Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
+(:mod:`.speed_normalisation`), and the threshold is where the tail of their peaks has the rate of
+false alarms that is accepted (:mod:`.rates`), or the one that a calibration set guarantees
+(:mod:`.guarantee`). What else the motion allows: :mod:`.expected_rate`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.calibration.recording import Load
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.events import CONFIRMATION
+from tauguard.detectors.faults.inputs import UsualInput
+from tauguard.detectors.scores.detector import Detector, FittedDetector
+from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.detectors.thresholds.free_scores import FreeScores, speed_normalisation
+from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
+from tauguard.detectors.thresholds.tail_model import threshold_for_rate
+from tauguard.traces.trace import Trace
+
+#: Share of the collision-free training traces that the threshold comes from.
+HELD_OUT = 0.34
+
+
+def held_out(traces: Sequence[Trace], share: float = HELD_OUT) -> tuple[list[Trace], list[Trace]]:
+    """Traces to train on, and collision-free ones for the threshold.
+
+    Returns:
+        The two lists; with fewer than two collision-free traces each holds all traces, and the
+        threshold then comes from motion that the detector was trained on.
+    """
+    free = [i for i, t in enumerate(traces) if not (t.truth and t.truth.collisions)]
+    count = min(len(free) - 1, max(1, round(share * len(free)))) if len(free) > 1 else 0
+    if count == 0:
+        return list(traces), list(traces)
+    # Evenly through the list, which often goes through speeds and payloads in turn.
+    kept = {free[round((k + 0.5) * len(free) / count - 0.5)] for k in range(count)}
+    return [t for i, t in enumerate(traces) if i not in kept], [traces[i] for i in sorted(kept)]
+
+
+def train(
+    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float
+) -> CollisionAlarm:
+    """Fit a detector on a part of the traces and choose its threshold by the rest.
+
+    Args:
+        detector: settings of a method.
+        traces: with truth, of one arm at one sample rate.
+        arm: the model before training.
+        per_hour: false alarms to accept in an hour of motion like the training's.
+
+    Raises:
+        ValueError: traces that do not fit or lack what the method needs.
+    """
+    return train_and_score(detector, traces, arm, per_hour)[0]
+
+
+def train_and_score(
+    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float
+) -> tuple[CollisionAlarm, list[FreeScores]]:
+    """As :func:`train`, with the normalised scores that the threshold comes from."""
+    if not per_hour > 0:
+        raise ValueError(f"per_hour: {per_hour}, expected above 0")
+    own, rest = held_out(traces)
+    alarm, scores = _with_rate(detector.fit(own, arm), rest, per_hour, CONFIRMATION)
+    return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm)), scores
+
+
+def with_rate(
+    detector: FittedDetector,
+    traces: Sequence[Trace],
+    per_hour: float,
+    confirmation: float = CONFIRMATION,
+) -> CollisionAlarm:
+    """Speed levels and the threshold for a rate of false alarms.
+
+    Args:
+        detector: fitted.
+        traces: their collision-free rows count; motion that the detector was not trained on.
+        per_hour: false alarms to accept in an hour of such motion.
+        confirmation: t_c [s].
+
+    Raises:
+        ValueError: no collision-free motion, or a rate that is not above 0.
+    """
+    return _with_rate(detector, traces, per_hour, confirmation)[0]
+
+
+def _with_rate(
+    detector: FittedDetector, traces: Sequence[Trace], per_hour: float, confirmation: float
+) -> tuple[CollisionAlarm, list[FreeScores]]:
+    plain = CollisionAlarm(detector, np.inf, confirmation)
+    found = [plain.free_scores(trace) for trace in long_enough(plain, traces)]
+    normalisation = speed_normalisation(found)
+    scores = [one.over(normalisation) for one in found]
+    return replace(
+        plain, normalisation=normalisation, threshold=threshold_for_rate(scores, per_hour)
+    ), scores
+
+
+def with_guarantee(
+    alarm: CollisionAlarm, traces: Sequence[Trace], per_hour: float, confidence: float = 0.95
+) -> tuple[CollisionAlarm, Guarantee]:
+    """The same alarm with a threshold that calibration episodes guarantee.
+
+    Args:
+        alarm: its threshold is replaced; its speed normalisation must not come from ``traces``.
+        traces: collision-free motion episodes that the detector was not trained on.
+        per_hour: false alarms per hour to accept.
+        confidence: see :func:`~tauguard.detectors.thresholds.guarantee.guaranteed_threshold`.
+
+    Raises:
+        ValueError: an episode with collisions, or too few for the guarantee.
+    """
+    for trace in traces:
+        if trace.truth is not None and trace.truth.collisions:
+            raise ValueError(
+                f"an episode with {len(trace.truth.collisions)} collisions: calibration takes "
+                "collision-free motion"
+            )
+    scores = [alarm.free_scores(trace) for trace in traces]
+    guarantee = guaranteed_threshold(scores, per_hour, confidence)
+    return replace(alarm, threshold=guarantee.threshold), guarantee
+
+
+def long_enough(alarm: CollisionAlarm, traces: Sequence[Trace]) -> list[Trace]:
+    """Traces that last until the detector has settled.
+
+    Raises:
+        ValueError: there are none.
+    """
+    found = [t for t in traces if t.t[-1] - t.t[0] > alarm.settle + alarm.confirmation]
+    if not found:
+        raise ValueError(
+            f"no collision-free motion after the {alarm.settle:g} s that {alarm.detector.name} "
+            "needs to settle"
+        )
+    return found
+
+
+def carrying(alarm: CollisionAlarm, load: Load) -> CollisionAlarm:
+    """The same alarm for an arm with a load in its gripper.
+
+    Raises:
+        ValueError: a detector of another kind: it takes no load.
+    """
+    if not isinstance(alarm.detector, FittedFreeMotion):
+        raise ValueError(f"{alarm.detector.name}: takes no load; only free-motion detectors do")
+    return replace(alarm, detector=alarm.detector.carrying(load))

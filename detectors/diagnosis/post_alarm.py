@@ -1,0 +1,114 @@
+"""The residual around an alarm, with what was known before it held fixed.
+
+The estimator goes on adapting while something touches the arm: a load that stays is soon taken for
+a payload. For a diagnosis the payload, offsets and friction errors of the moment before the alarm
+are kept, so that what came with the alarm stays visible for as long as it lasts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.arrays import Array
+from tauguard.detectors.dynamics.robot import momentum_regressor
+from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel, Estimate, Estimator
+from tauguard.detectors.estimation.noise_model import NoiseModel
+from tauguard.detectors.estimation.observer import DETECTION_GAIN, intervals, low_pass
+from tauguard.traces.trace import Trace
+
+#: Slower logs get an observer of this share of their rate.
+PER_SAMPLE = 0.2
+
+#: What was known this long before the alarm is held [s].
+BEFORE = 0.02
+
+#: The residual is followed this long after the alarm [s], longer where the observer lags more.
+AFTER, LAGS = 0.3, 10.0
+
+#: Time constants of the observer after which a payload's columns have forgotten their start.
+SETTLED = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class PostAlarmWindow:
+    """Samples from shortly before an alarm to some time after it; rows are samples."""
+
+    rows: NDArray[np.int64]  #: of the trace, shape (M,)
+    t: Array  #: since the alarm [s], shape (M,)
+    q: Array  #: [rad], shape (M, n)
+    qd: Array  #: [rad/s], shape (M, n)
+    residual: Array  #: that came with the alarm [N m], shape (M, n)
+    deviation: Array  #: its standard deviation in free motion [N m], shape (M, n)
+    payload: Array  #: residual per unit of payload mass [kg] and moment [kg m], shape (M, n, 4)
+    lag: float = 1 / DETECTION_GAIN  #: of the observer [s]
+
+    @property
+    def level(self) -> Array:
+        """Norm of the residual in units of the noise, shape (M,)."""
+        return np.asarray(np.linalg.norm(self.residual / self.deviation, axis=1))
+
+
+class PostAlarmWindows:
+    """Looks at the alarms of one trace."""
+
+    def __init__(self, arm: ArmModel, noise_model: NoiseModel | None, trace: Trace) -> None:
+        """Run the estimator over the trace.
+
+        Args:
+            arm: what is believed of the arm.
+            noise_model: of its residual in free motion (default: the arm's noise at every speed).
+            trace: of this arm.
+        """
+        assert arm.noise is not None
+        self.arm, self.trace = arm, trace
+        self._noise_model = noise_model or NoiseModel.constant(arm.noise)
+        self._gain = min(DETECTION_GAIN, PER_SAMPLE / trace.dt)
+        self._estimate: Estimate = Estimator(arm, self._gain, trace.dt).run(
+            trace.t, trace.q, trace.qd, trace.current, keep=True
+        )
+
+    def at(self, start: float, after: float = AFTER) -> PostAlarmWindow:
+        """The samples around an alarm that starts at ``start`` [s].
+
+        Raises:
+            ValueError: not within the trace.
+        """
+        trace, known, lag = self.trace, self._estimate, 1 / self._gain
+        after = max(after, LAGS * lag)
+        if not trace.t[0] <= start <= trace.t[-1]:
+            raise ValueError(f"start {start} s: the trace goes from {trace.t[0]} to {trace.t[-1]}")
+        assert known.unknowns is not None
+        begin, first, at, last = np.searchsorted(
+            trace.t, (start - BEFORE - SETTLED * lag, start - BEFORE, start, start + after)
+        )
+        # Slow logs: at least the sample before the alarm's, where there is one.
+        first, begin = min(first, max(at - 1, 0)), min(begin, max(at - 1, 0))
+        columns = self._payload_columns(slice(begin, last + 1))[first - begin :]
+        rows = np.arange(first, first + len(columns))
+        taken = known.residual[first] - known.unexplained[first]
+        carried = (columns - columns[0]) @ known.unknowns[first, :PAYLOAD]
+        return PostAlarmWindow(
+            rows,
+            trace.t[rows] - start,
+            trace.q[rows],
+            trace.qd[rows],
+            known.residual[rows] - taken - carried,
+            self._noise_model.scale(trace.qd[rows], known.acceleration[rows]),
+            columns,
+            lag,
+        )
+
+    def _payload_columns(self, rows: slice) -> Array:
+        """What an unknown payload at the last link adds to the residual."""
+        trace, n = self.trace, self.arm.robot.joints
+        p, beta = momentum_regressor(
+            self.arm.robot, trace.q[rows], trace.qd[rows], link=n - 1, count=PAYLOAD, threads=1
+        )
+        dt = intervals(trace.t[rows], len(p))
+        flat = (len(p), n * PAYLOAD)
+        gains = np.full(n * PAYLOAD, self._gain)
+        passed = low_pass(gains, dt, p.reshape(flat), beta.reshape(flat))
+        return -passed.reshape(len(p), n, PAYLOAD)

@@ -1,0 +1,166 @@
+"""Inertial numbers that a body can have, in coordinates without constraints.
+
+Ten inertial numbers belong to a body of positive density exactly if the pseudo-inertia, the 4 x 4
+matrix of its second moments, is positive definite (Wensing, Kim & Slotine 2018). Its Cholesky
+factor with the logarithms of its diagonal has ten free coordinates (Rucker & Wensing 2022), so that
+least squares over them needs no inequality.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.arrays import Array
+
+_LOWER = np.tril_indices(4)
+
+_DIAGONAL = np.flatnonzero(_LOWER[0] == _LOWER[1])
+
+
+def pseudo_inertia(inertial: Array) -> Array:
+    """Second moments of a body about its link's origin, homogeneous.
+
+    Args:
+        inertial: mass, first moment (3), Ixx Ixy Iyy Ixz Iyz Izz, shape (10,).
+
+    Returns:
+        Shape (4, 4): integrals of x x^T [kg m^2], of x [kg m], and the mass [kg].
+    """
+    m, h, (xx, xy, yy, xz, yz, zz) = inertial[0], inertial[1:4], inertial[4:]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    out = np.empty((4, 4))
+    out[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    out[:3, 3] = out[3, :3] = h
+    out[3, 3] = m
+    return out
+
+
+def inertial_numbers(pseudo: Array) -> Array:
+    """The ten numbers of a pseudo-inertia: the inverse of :func:`pseudo_inertia`, and linear."""
+    moments = pseudo[:3, :3]
+    inertia = np.trace(moments) * np.eye(3) - moments
+    rows, columns = (0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)
+    return np.concatenate([[pseudo[3, 3]], pseudo[:3, 3], inertia[rows, columns]])
+
+
+def is_physically_consistent(inertial: Array) -> bool:
+    """Whether every link's numbers, shape (..., 10), are those of a body of positive density."""
+    flat = np.asarray(inertial, dtype=np.float64).reshape(-1, 10)
+    return all(float(np.linalg.eigvalsh(pseudo_inertia(row))[0]) > 0 for row in flat)
+
+
+def coordinates(inertial: Array, floor: float = 1e-4) -> Array:
+    """Log-Cholesky coordinates of ten numbers, shape (10,).
+
+    Numbers that no body has are moved: eigenvalues of the pseudo-inertia below ``floor`` times
+    their block's scale are raised to it.
+    """
+    pseudo = pseudo_inertia(inertial)
+    mass = max(float(pseudo[3, 3]), 1e-3)
+    length = np.sqrt(max(float(np.trace(pseudo[:3, :3])) / mass, 1e-4))
+    scale = np.array([length, length, length, 1.0]) * np.sqrt(mass)
+    values, vectors = np.linalg.eigh(pseudo / np.outer(scale, scale))
+    raised = (vectors * np.maximum(values, floor)) @ vectors.T * np.outer(scale, scale)
+    factor: Array = np.linalg.cholesky(raised)[_LOWER]
+    factor[_DIAGONAL] = np.log(factor[_DIAGONAL])
+    return factor
+
+
+def from_coordinates(theta: Array) -> tuple[Array, Array]:
+    """Ten inertial numbers of log-Cholesky coordinates, and their derivative, (10,) and (10, 10).
+
+    Column k of the derivative belongs to coordinate k.
+    """
+    entries = theta.copy()
+    entries[_DIAGONAL] = np.exp(entries[_DIAGONAL])
+    factor = np.zeros((4, 4))
+    factor[_LOWER] = entries
+    derivative = np.empty((10, 10))
+    for k, (row, column) in enumerate(zip(*_LOWER, strict=True)):
+        step = np.zeros((4, 4))
+        step[row, column] = entries[k] if row == column else 1.0
+        product = step @ factor.T
+        derivative[:, k] = inertial_numbers(product + product.T)
+    return inertial_numbers(factor @ factor.T), derivative
+
+
+def solve_physically_consistent(
+    matrix: Array, vector: Array, inertial: Array, armature: Array, rounds: int = 60
+) -> Array:
+    """Minimise ``x @ matrix @ x / 2 - vector @ x - sum(log det)`` over bodies that can exist.
+
+    The logarithm of each pseudo-inertia's determinant, a sum of coordinates, keeps flat bodies
+    away: where the data do not care, a body has some thickness. The unknowns x are errors of what
+    is believed (believed less true) of all links' inertial numbers, then of the armatures, then
+    whatever else, which stays free.
+
+    Args:
+        matrix: positive definite, priors included, shape (N, N), N >= 11 n.
+        vector: shape (N,).
+        inertial: believed, shape (n, 10).
+        armature: believed [kg m^2], shape (n,).
+        rounds: Levenberg-Marquardt steps at most.
+
+    Returns:
+        x, shape (N,): every ``inertial - x`` is consistent and every ``armature - x`` above 0.
+    """
+    n = len(inertial)
+    body = 11 * n
+    # What stays free is eliminated: the minimum over it is linear in the rest.
+    own = matrix[body:, body:]
+    coupled = matrix[body:, :body]
+    follows: NDArray[Any] = np.linalg.solve(own, np.column_stack([coupled, vector[body:]]))
+    reduced = matrix[:body, :body] - coupled.T @ follows[:, :body]
+    target = vector[:body] - coupled.T @ follows[:, body]
+    x = _descend(0.5 * (reduced + reduced.T), target, inertial, armature, rounds)
+    return np.concatenate([x, follows[:, body] - follows[:, :body] @ x])
+
+
+def _descend(matrix: Array, vector: Array, inertial: Array, armature: Array, rounds: int) -> Array:
+    """Levenberg-Marquardt over the free coordinates; x of the bodies and armatures alone."""
+    n = len(inertial)
+    start: NDArray[Any] = np.linalg.solve(matrix, vector)
+    wanted = armature - start[10 * n :]
+    least = 1e-3 * max(float(np.abs(wanted).max()), 1e-9)
+    bodies = [coordinates(body) for body in inertial - start[: 10 * n].reshape(n, 10)]
+    state = np.concatenate([*bodies, np.log(np.maximum(wanted, least))])
+    inside = np.zeros(len(state))
+    inside[(10 * np.arange(n)[:, None] + _DIAGONAL).ravel()] = -2.0
+    x, slope = _unknowns(state, inertial, armature)
+    cost, damping = 0.5 * x @ matrix @ x - vector @ x + inside @ state, 1e-3
+    for _ in range(rounds):
+        gradient = slope.T @ (matrix @ x - vector) + inside
+        hessian = slope.T @ matrix @ slope
+        scaled = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
+        trial = state - np.clip(np.linalg.solve(scaled, gradient), -2.0, 2.0)
+        x_new, slope_new = _unknowns(trial, inertial, armature)
+        cost_new = 0.5 * x_new @ matrix @ x_new - vector @ x_new + inside @ trial
+        if cost_new < cost:
+            done = cost - cost_new < 1e-7 * max(abs(cost), 1.0)
+            state, x, slope, cost, damping = trial, x_new, slope_new, cost_new, damping / 3
+            if done:
+                break
+        else:
+            damping *= 4
+            if damping > 1e9:
+                break
+    return x
+
+
+def _unknowns(state: Array, inertial: Array, armature: Array) -> tuple[Array, Array]:
+    """x of the free coordinates, and its derivative by them."""
+    n = len(inertial)
+    x, slope = state.copy(), np.zeros((len(state), len(state)))
+    for link in range(n):
+        at = slice(10 * link, 10 * link + 10)
+        body, derivative = from_coordinates(state[at])
+        x[at] = inertial[link] - body
+        slope[at, at] = -derivative
+    at = slice(10 * n, None)
+    reflected = np.exp(state[at])
+    x[at] = armature - reflected
+    slope[at, at] = -np.diag(reflected)
+    return x, slope

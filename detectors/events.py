@@ -1,0 +1,137 @@
+"""What an alarm is, and which rows of a trace are free of collisions.
+
+The alarm series is True where the score has stayed above the threshold for the confirmation time
+t_c. An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm that starts
+between onset and onset + 0.5 s (clamping: its end) detects that collision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tauguard.arrays import Array, Bools
+from tauguard.traces.trace import Alarm, Collision, Trace
+
+#: Default t_c [s] (Park et al. 2021; the dissertation's value).
+CONFIRMATION = 3e-3
+
+
+def confirmation_samples(confirmation: float, dt: float) -> int:
+    """How many successive True samples stand for ``confirmation`` seconds at interval ``dt`` [s].
+
+    Sample k stands for the interval that ends with it, so n samples are n dt; at least one.
+    """
+    if not (np.isfinite(confirmation) and confirmation >= 0 and dt > 0):
+        raise ValueError(f"confirmation {confirmation} s and dt {dt} s: expected >= 0 and > 0")
+    return max(1, round(confirmation / dt))
+
+
+def confirmed(raw: ArrayLike, samples: int) -> Bools:
+    """True where the last ``samples`` entries of ``raw`` are all True, shape (T,)."""
+    if samples < 1:
+        raise ValueError(f"samples: {samples}, expected 1 or more")
+    truth = np.asarray(raw, dtype=np.bool_)
+    if truth.ndim != 1:
+        raise ValueError(f"raw: shape {truth.shape}, expected (T,)")
+    index = np.arange(len(truth))
+    last_false = np.maximum.accumulate(np.where(truth, -1, index))
+    return np.asarray(index - last_false >= samples)
+
+
+def sustained(score: Array, samples: int) -> Array:
+    """The level that the last ``samples`` scores all reach, shape (T,): an alarm needs it."""
+    if samples <= 1:
+        return score
+    padded = np.concatenate((np.full(samples - 1, -np.inf), score))
+    lowest: Array = np.lib.stride_tricks.sliding_window_view(padded, samples).min(axis=-1)
+    return lowest
+
+
+#: Alarms closer than this are one [s]; the false-alarm rate changes up to fourfold with it.
+MERGE_GAP = 0.5
+
+#: An alarm this long after the onset still detects the collision [s].
+WINDOW = 0.5
+
+#: What follows a collision so closely is not counted as collision-free [s].
+RECOVER = 0.5
+
+#: Length of a non-collision case [s].
+CASE_SECONDS = 2.0
+
+Interval = tuple[float, float]
+
+
+def find_alarms(t: ArrayLike, alarm: ArrayLike, merge_gap: float = MERGE_GAP) -> tuple[Alarm, ...]:
+    """Maximal runs of True, those less than ``merge_gap`` [s] apart as one.
+
+    Args:
+        t: times [s], shape (T,).
+        alarm: the filtered series, shape (T,).
+        merge_gap: [s].
+
+    Returns:
+        Alarms in order; start and end are the times of the first and last True.
+    """
+    times, up = np.asarray(t, dtype=np.float64), np.asarray(alarm, dtype=np.bool_)
+    if times.shape != up.shape or times.ndim != 1:
+        raise ValueError(f"t and alarm: shapes {times.shape} and {up.shape}, expected (T,) twice")
+    edges = np.diff(np.concatenate(([0], up.astype(np.int8), [0])))
+    starts, ends = times[edges[:-1] == 1], times[edges[1:] == -1]
+    if not len(starts):
+        return ()
+    apart = starts[1:] - ends[:-1] >= merge_gap
+    first = np.concatenate(([True], apart))
+    last = np.concatenate((apart, [True]))
+    pairs = zip(starts[first], ends[last], strict=True)
+    return tuple(Alarm(float(start), float(end)) for start, end in pairs)
+
+
+def detection_window(collision: Collision) -> Interval:
+    """When an alarm must start to detect ``collision``: [s], [s]."""
+    end = collision.end if collision.kind == "clamp" else collision.onset + WINDOW
+    return collision.onset, end
+
+
+def occupied(collision: Collision) -> Interval:
+    """The time that is not collision-free: contact and detection window [s], [s]."""
+    return collision.onset, max(collision.end, detection_window(collision)[1])
+
+
+def free_rows(trace: Trace, settle: float = 1.0, recover: float = RECOVER) -> Bools:
+    """Rows outside all known collisions.
+
+    Args:
+        trace: without truth all of it counts as free.
+        settle: seconds to leave out at the beginning.
+        recover: seconds to leave out after each collision.
+    """
+    free = trace.t >= trace.t[0] + settle
+    for collision in trace.truth.collisions if trace.truth else ():
+        low, high = occupied(collision)
+        free &= ~((trace.t >= low - 0.05) & (trace.t <= high + recover))
+    return np.asarray(free)
+
+
+def undisturbed_rows(traces: Sequence[Trace], settle: float) -> list[Bools]:
+    """Collision-free rows to learn free motion from, shape (T,) a trace.
+
+    A collision leaves an estimator that tracks the payload with wrong beliefs. What follows within
+    the time that it needs to settle is no free motion: one such second of a recording can be 80
+    times what all others leave. Where every row is so close to a collision, all count that are
+    outside of them.
+
+    Args:
+        traces: without truth all of a trace counts as free.
+        settle: of the estimator [s].
+    """
+    found = [free_rows(trace, settle, max(settle, RECOVER)) for trace in traces]
+    if any(rows.any() for rows in found):
+        return found
+    return [free_rows(trace, settle) for trace in traces]
+
+
+SERIES = 0.2  # [s]: alarms of a trained detector that are nearer to each other are one

@@ -1,0 +1,70 @@
+"""Checks of joints and sample rates, shared by all methods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tauguard.traces.trace import Trace
+
+
+def common_interval(traces: Sequence[Trace], joint_names: Sequence[str]) -> float:
+    """The sample interval of training traces [s].
+
+    Raises:
+        ValueError: no traces, joints that are not the arm's, or rates that differ (named).
+    """
+    check_joints(traces, joint_names)
+    dt = float(np.median([trace.dt for trace in traces]))
+    for k, trace in enumerate(traces):
+        check_interval(f"trace {k}", trace, dt)
+    return dt
+
+
+def check_joints(traces: Sequence[Trace], joint_names: Sequence[str]) -> None:
+    """Refuse an empty list, traces of another arm and traces of fewer than two samples.
+
+    Raises:
+        ValueError: says which.
+    """
+    if not traces:
+        raise ValueError("no traces to train on")
+    for k, trace in enumerate(traces):
+        if len(trace.joint_names) != len(joint_names):
+            raise ValueError(
+                f"trace {k} has {len(trace.joint_names)} joints, the robot {len(joint_names)}: "
+                f"{', '.join(joint_names)}"
+            )
+        if len(trace.t) < 2:
+            raise ValueError(f"trace {k} has {len(trace.t)} samples: expected 2 or more")
+
+
+def check_trace(trace: Trace, joints: int, dt: float) -> None:
+    """Refuse a trace of another arm or at another rate than training's.
+
+    Raises:
+        ValueError: says what the trace has and what the detector works with.
+    """
+    if len(trace.joint_names) != joints:
+        raise ValueError(f"the trace has {len(trace.joint_names)} joints, this detector {joints}")
+    check_interval("the trace", trace, dt)
+
+
+def check_interval(what: str, trace: Trace, dt: float) -> None:
+    """Refuse a trace that is not sampled every ``dt`` seconds, to a quarter.
+
+    Raises:
+        ValueError: names ``what`` and both intervals.
+    """
+    if len(trace.t) > 1 and not same_rate(trace.dt, dt):
+        raise ValueError(
+            f"{what} has a sample every {1e3 * trace.dt:g} ms, this detector works at "
+            f"{1e3 * dt:g} ms: resample the recording to that, "
+            "or train a detector on recordings of its rate"
+        )
+
+
+def same_rate(dt: float, trained: float) -> bool:
+    """Whether two sample intervals are equal to a quarter."""
+    return 0.8 < dt / trained < 1.25

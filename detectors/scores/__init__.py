@@ -1,0 +1,1 @@
+"""Scores: one number a sample, higher where a collision is more likely."""

@@ -1,0 +1,320 @@
+"""A first-order low-pass that starts at its first sample, in batch and sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.signal import lfilter
+
+from tauguard.arrays import Array
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.events import free_rows
+from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.samples import check_trace, common_interval
+from tauguard.detectors.scores.regressors import Network
+from tauguard.traces.trace import Trace
+
+
+def smoothed(x: Array, rate: float, dt: float) -> Array:
+    """The low-pass of rate ``rate`` [1/s] along the rows of x, from the first row's value."""
+    keep = float(np.exp(-rate * dt))
+    filtered: Array = lfilter([1 - keep], [1, -keep], x - x[:1], axis=0) + x[:1]
+    return filtered
+
+
+class LowPass:
+    """:func:`smoothed`, sample by sample, with equal results."""
+
+    def __init__(self, rate: float, dt: float) -> None:
+        """Take rate [1/s] and sample interval [s]."""
+        self._keep = float(np.exp(-rate * dt))
+        self._first: Array | None = None
+        self._state: Array | float = 0.0
+
+    def step(self, x: Array) -> Array:
+        """The filtered value at this sample, shape as x."""
+        if self._first is None:
+            self._first = x.copy()
+        self._state = self._keep * self._state + (1 - self._keep) * (x - self._first)
+        return self._state + self._first
+
+
+@dataclass(frozen=True)
+class CurrentThreshold:
+    """The fast part of each current, against a threshold that follows how large it has been.
+
+    The fast part is the current less its low-pass at ``slow``; the threshold of a joint is
+    a + b level + c total, with the low-pass of its own |fast part| and of the sum over all joints
+    at ``follow``. The weights are fitted to collision-free motion. The score is the largest ratio
+    of fast part to threshold over the joints.
+    """
+
+    slow: float = 20.0  #: [1/s]
+    follow: float = 4.0  #: [1/s]
+    settle: float = 1.0  #: [s]
+    name: ClassVar[str] = "current-threshold"
+
+    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedCurrentThreshold:
+        """Fit the threshold's weights to the collision-free rows.
+
+        Raises:
+            ValueError: traces that do not fit, or without collision-free motion.
+        """
+        dt = common_interval(traces, arm.robot.joint_names)
+        fast, levels = [], []
+        for trace in traces:
+            rows = np.flatnonzero(free_rows(trace, self.settle))[::5]
+            own, level = _parts(trace.current, self.slow, self.follow, dt)
+            fast.append(np.abs(own[rows]))
+            levels.append(level[rows])
+        size, level = np.concatenate(fast), np.concatenate(levels)
+        if not len(size):
+            raise ValueError("no collision-free motion in the traces")
+        total = level.sum(axis=1)
+        table = [np.column_stack([np.ones_like(total), own, total]) for own in level.T]
+        weights = np.array([nnls(a, b)[0] for a, b in zip(table, size.T, strict=True)])
+        floor = np.maximum(0.1 * size.mean(axis=0), 1e-9)
+        weights[:, 0] = np.maximum(weights[:, 0], floor)
+        return FittedCurrentThreshold(arm, dt, self.settle, self.slow, self.follow, weights)
+
+
+def _parts(current: Array, slow: float, follow: float, dt: float) -> tuple[Array, Array]:
+    """The fast part, and how large it was up to the sample before, shape (T, n) each."""
+    fast = current - smoothed(current, slow, dt)
+    # One sample late: a blow must not raise the threshold that it is compared with.
+    size = np.abs(np.concatenate([fast[:1], fast[:-1]]))
+    return fast, smoothed(size, follow, dt)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCurrentThreshold:
+    """A :class:`~tauguard.detectors.detector.FittedDetector`."""
+
+    arm: ArmModel  #: as it was given: nothing of it is used
+    dt: float  #: [s]
+    settle: float  #: [s]
+    slow: float  #: [1/s]
+    follow: float  #: [1/s]
+    weights: Array  #: a [A], b, c of each joint, shape (n, 3)
+    name: ClassVar[str] = "current-threshold"
+
+    def __post_init__(self) -> None:
+        """Check: ``ValueError``."""
+        if self.weights.shape != (self.arm.robot.joints, 3) or not (self.weights[:, 0] > 0).all():
+            raise ValueError("weights: expected three a joint, the first above 0")
+
+    def scores(self, trace: Trace) -> Array:
+        """The largest ratio over the joints, shape (T,)."""
+        check_trace(trace, len(self.weights), self.dt)
+        return self._score(*_parts(trace.current, self.slow, self.follow, self.dt))
+
+    def _score(self, fast: Array, level: Array) -> Array:
+        a, b, c = self.weights.T
+        score: Array = (np.abs(fast) / (a + b * level + c * level.sum(axis=1, keepdims=True))).max(
+            axis=1
+        )
+        return score
+
+    def stream(self) -> CurrentThresholdStream:
+        """The same, sample by sample."""
+        return CurrentThresholdStream(self)
+
+
+class CurrentThresholdStream:
+    """Sample by sample."""
+
+    def __init__(self, detector: FittedCurrentThreshold) -> None:
+        """Begin anew."""
+        self._detector = detector
+        self._slow = LowPass(detector.slow, detector.dt)
+        self._follow = LowPass(detector.follow, detector.dt)
+        self._size: Array | None = None
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
+        """The score of this sample; the currents alone count."""
+        fast = current - self._slow.step(current)
+        level = self._follow.step(np.abs(fast) if self._size is None else self._size)
+        self._size = np.abs(fast)
+        return float(self._detector._score(fast[None], level[None])[0])
+
+
+#: Rate of the filter that differentiates the velocity [1/s].
+DERIVATIVE = 100.0
+
+#: Friction changes its sign within about this velocity [rad/s].
+REVERSAL = 0.02
+
+#: Added to the sum of |acceleration| when samples are drawn, so that rest is drawn too [rad/s^2].
+STILL = 0.5
+
+
+class Sample(NamedTuple):
+    """Signals of some samples, shape (N, n) each."""
+
+    q: Array
+    qd: Array
+    qdd: Array  #: filtered derivative of the velocity
+    current: Array
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What the network sees."""
+
+    lags: tuple[float, ...]  #: ages of the window's samples [s]
+    memory: float  #: age of the past sample that is fed back [s]; 0: none
+    dt: float  #: [s]
+
+    @property
+    def ages(self) -> tuple[int, ...]:
+        """Ages of the window's samples and, if there is one, of the sample that is fed back."""
+        own = tuple(round(lag / self.dt) for lag in self.lags)
+        return (*own, max(1, round(self.memory / self.dt))) if self.memory > 0 else own
+
+    def of(self, now: Sample, past: Sequence[Sample]) -> Array:
+        """The inputs, shape (N, d).
+
+        Position as sine and cosine, direction of motion, velocity and acceleration at the window's
+        ages, and the past sample's currents and position.
+
+        Args:
+            now: the samples.
+            past: the samples that are :attr:`ages` older.
+        """
+        parts = [np.sin(now.q), np.cos(now.q), np.tanh(now.qd / REVERSAL)]
+        for sample in past[: len(self.lags)]:
+            parts += [sample.qd, sample.qdd]
+        if self.memory > 0:
+            fed = past[-1]
+            parts += [fed.current, fed.q - now.q, np.tanh(fed.qd / REVERSAL)]
+        return np.concatenate(parts, axis=1)
+
+    def base(self, now: Sample, past: Sequence[Sample]) -> Array:
+        """What the network's output is added to [A], shape (N, n)."""
+        return past[-1].current if self.memory > 0 else np.zeros_like(now.current)
+
+    def rows(self, trace: Trace, rows: NDArray[np.intp]) -> tuple[Sample, list[Sample]]:
+        """Samples of a trace and their past; before the first sample is the first."""
+        signals = (trace.q, trace.qd, self.acceleration(trace), trace.current)
+        past = [Sample(*(x[np.maximum(rows - age, 0)] for x in signals)) for age in self.ages]
+        return Sample(*(x[rows] for x in signals)), past
+
+    def acceleration(self, trace: Trace) -> Array:
+        """The filtered derivative of the velocity [rad/s^2], shape (T, n)."""
+        return DERIVATIVE * (trace.qd - smoothed(trace.qd, DERIVATIVE, self.dt))
+
+
+@dataclass(frozen=True)
+class CurrentNetwork:
+    """Predicts every motor's current from the motion; the largest error is the score."""
+
+    lags: tuple[float, ...] = (0.0, 0.025, 0.05)  #: ages of the window's samples [s]
+    memory: float = 0.05  #: age of the past sample that is fed back [s]; 0: none, the static form
+    hidden: tuple[int, ...] = (64, 32)
+    rows: int = 30_000  #: collision-free samples to train on
+    epochs: int = 60
+    seed: int = 0
+    settle: float = 0.5  #: [s]
+    name: str = "current-network"
+
+    @classmethod
+    def static(cls) -> CurrentNetwork:
+        """The form without past currents: an unknown payload is a residual."""
+        return cls(memory=0.0, name="current-network-static")
+
+    def fit(self, traces: Sequence[Trace], arm: ArmModel) -> FittedCurrentNetwork:
+        """Train on collision-free samples of all traces, more of them where the arm accelerates.
+
+        A sample's chance grows with the square root of the sum of |acceleration|: fast starts and
+        stops are rare, and are where the errors are.
+
+        Raises:
+            ValueError: traces that do not fit, or without collision-free motion.
+        """
+        inputs = Inputs(self.lags, self.memory, common_interval(traces, arm.robot.joint_names))
+        x, y = [], []
+        for trace, rows in zip(traces, self._drawn(traces, inputs), strict=True):
+            if len(rows):
+                now, past = inputs.rows(trace, rows)
+                x.append(inputs.of(now, past))
+                y.append(now.current - inputs.base(now, past))
+        network = Network.fit(
+            np.concatenate(x), np.concatenate(y), self.hidden, seed=self.seed, epochs=self.epochs
+        )
+        return FittedCurrentNetwork(self.name, arm, self.settle, inputs, network)
+
+    def _drawn(self, traces: Sequence[Trace], inputs: Inputs) -> list[NDArray[np.intp]]:
+        """Rows of every trace to train on."""
+        rng = np.random.default_rng([self.seed, 7])
+        free = [np.flatnonzero(free_rows(trace, self.settle)) for trace in traces]
+        if not sum(len(rows) for rows in free):
+            raise ValueError("no collision-free motion in the traces")
+        lively = [
+            np.sqrt(np.abs(inputs.acceleration(trace)[rows]).sum(axis=1) + STILL)
+            for trace, rows in zip(traces, free, strict=True)
+        ]
+        total = sum(float(weight.sum()) for weight in lively)
+        drawn = []
+        for rows, weight in zip(free, lively, strict=True):
+            share = min(len(rows), int(np.ceil(self.rows * weight.sum() / total)))
+            if share:
+                rows = rng.choice(rows, share, replace=False, p=weight / weight.sum())
+            drawn.append(np.sort(rows))
+        return drawn
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCurrentNetwork(Frozen):
+    """A :class:`~tauguard.detectors.detector.FittedDetector`."""
+
+    name: str
+    arm: ArmModel  #: as it was given: nothing of it is used
+    settle: float  #: [s]
+    inputs: Inputs
+    network: Network
+
+    @property
+    def dt(self) -> float:
+        """Sample interval [s]."""
+        return self.inputs.dt
+
+    def scores(self, trace: Trace) -> Array:
+        """The largest |measured - predicted current| over the joints [A], shape (T,)."""
+        check_trace(trace, len(self.network.biases[-1]), self.dt)
+        return self._score(*self.inputs.rows(trace, np.arange(len(trace.t))))
+
+    def _score(self, now: Sample, past: Sequence[Sample]) -> Array:
+        predicted = self.inputs.base(now, past) + self.network(self.inputs.of(now, past))
+        score: Array = np.abs(now.current - predicted).max(axis=1)
+        return score
+
+    def stream(self) -> CurrentNetworkStream:
+        """The same, sample by sample."""
+        return CurrentNetworkStream(self)
+
+
+class CurrentNetworkStream:
+    """Sample by sample, with the samples up to the oldest age kept."""
+
+    def __init__(self, detector: FittedCurrentNetwork) -> None:
+        """Begin anew."""
+        self._detector, self._ages = detector, detector.inputs.ages
+        self._low_pass = LowPass(DERIVATIVE, detector.dt)
+        self._kept: list[Sample] = []
+        self._at = 0
+
+    def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> float:
+        """The score of this sample."""
+        acceleration = DERIVATIVE * (qd - self._low_pass.step(qd))
+        now = Sample(*(x[None].copy() for x in (q, qd, acceleration, current)))
+        if not self._kept:
+            self._kept = [now] * (1 + max(self._ages))
+        self._at = (self._at + 1) % len(self._kept)
+        self._kept[self._at] = now
+        past = [self._kept[self._at - age] for age in self._ages]
+        return float(self._detector._score(now, past)[0])

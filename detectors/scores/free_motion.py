@@ -1,0 +1,260 @@
+"""A detector that learns from collision-free motion alone.
+
+Momentum observer at 30/s, slow errors (load, friction) tracked while joints move, and each joint's
+bound (:mod:`~tauguard.detectors.features.free_bound`). The score is the largest ratio of a joint's
+signal to its bound; 1 is the threshold.
+
+The bounds are prior knowledge in units of each joint's friction. Logs move the bound in motion: a
+regression on what is left of the residual in logs that the calibration has not seen, pulled
+towards the prior where the logs show little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from tauguard.arrays import Bools
+from tauguard.detectors import _observer
+from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
+from tauguard.detectors.calibration.recording import Load, Recording, known_load, moves, pieces
+from tauguard.detectors.calibration.regression import filtered
+from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.estimation.observer import intervals
+from tauguard.detectors.events import SERIES, find_alarms, sustained
+from tauguard.detectors.features.free_bound import (
+    PRIOR,
+    SLOW,
+    UNKNOWN_LOAD,
+    Bound,
+    LoadDeviation,
+    friction_level,
+    native,
+    upper_quantile,
+)
+from tauguard.detectors.features.front_end import NativeStream
+from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.samples import check_joints
+from tauguard.traces.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: Confirmation of an alarm [s]: none, since scores pass 1 only once they are confirmed.
+CONFIRMATION = 0.0
+
+#: The quantile of the residual in motion that is learned.
+QUANTILE = 0.99
+
+#: Seconds of motion that the prior is worth, where speed and accelerations are these [rad/s, ...].
+WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0])
+
+#: Time between two rows of the regression [s].
+EVERY = 0.04
+
+#: Calibrations that leave logs out, at most.
+FOLDS = 5
+
+#: Rate of the filter that the calibration looks through [1/s].
+CALIBRATION_RATE = 20.0
+
+#: Seconds at a log's beginning that nothing is learned from, nor an alarm raised in.
+SETTLE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What a detector saw of a trace; rows are samples."""
+
+    t: Array  #: [s], shape (T,)
+    qd: Array  #: [rad/s], shape (T, n)
+    qdd: Array  #: [rad/s^2], shape (T, n)
+    ratio: Array  #: of each joint's signal to its bound, at most 1 until confirmed, shape (T, n)
+    bound: Array  #: [N m], shape (T, n)
+    residual: Array  #: without slow errors [N m], shape (T, n)
+    rest: Bools  #: which joints are at rest, shape (T, n)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedFreeMotion(Frozen):
+    """A calibrated arm and the bounds of its collision-free motion."""
+
+    arm: ArmModel
+    dt: float  #: of the slowest training log [s]
+    bound: Bound
+    load: LoadDeviation  #: how uncertain the carried load is
+    seconds: float  #: of collision-free motion that the bounds rest on
+    alarms: int  #: in the training logs, each under calibration and bounds from the others
+    name: str = "free-motion"
+    settle: float = SETTLE  #: [s]
+
+    def carrying(self, load: Load) -> FittedFreeMotion:
+        """The same detector of the arm with a load in its gripper; ``Load()`` for none."""
+        known = known_load(Recording(None, load))  # type: ignore[arg-type]
+        moment = 0.1 * load.mass if load.mass and load.centre is None else 0.0
+        inertial = self.arm.robot.inertial.copy()
+        inertial[-1] += known
+        arm = replace(self.arm, robot=self.arm.robot.with_inertial(inertial))
+        deviation = LoadDeviation(0.02 * load.mass, moment)
+        return replace(self, arm=arm, load=deviation)
+
+    def scores(self, trace: Trace) -> Array:
+        """The largest ratio of a joint's signal to its bound, shape (T,)."""
+        scores: Array = self.judge(trace).ratio.max(axis=1)
+        return scores
+
+    def stream(self) -> NativeStream:
+        """The same scores sample by sample."""
+        scores = _observer.free_scores(native(self.arm, self.bound, self.load))
+        return NativeStream(scores, self.dt)
+
+    def judge(self, trace: Trace) -> Judged:
+        """Ratios, bounds and residuals of a trace.
+
+        Raises:
+            ValueError: other joints than the arm's.
+        """
+        joints = self.arm.robot.joints
+        if len(trace.joint_names) != joints:
+            raise ValueError(
+                f"the trace has {len(trace.joint_names)} joints, this detector {joints}"
+            )
+        ratio, bound, residual, qdd, rest = (np.empty_like(trace.q) for _ in range(5))
+        steps = np.concatenate([[trace.dt], intervals(trace.t, len(trace.t))])
+        q, qd, current = (np.ascontiguousarray(x) for x in (trace.q, trace.qd, trace.current))
+        native(self.arm, self.bound, self.load).run(
+            steps, q, qd, current, ratio, bound, residual, qdd, rest
+        )
+        return Judged(trace.t, trace.qd, qdd, ratio, bound, residual, rest > 0)
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """Settings of the free-motion detector: there are none to choose."""
+
+    name: str = "free-motion"
+
+    def fit(self, traces: Sequence[Trace | Recording], arm: ArmModel) -> FittedFreeMotion:
+        """Calibrate, then let left-out logs move the prior bounds.
+
+        Args:
+            traces: collision-free, 20 s of motion or more in all; plain traces count as without a
+                load. Long ones are cut, so that each part can be left out once.
+            arm: nominal numbers and drive gains, whose scale holds.
+
+        Raises:
+            ValueError: no or too little motion, or other joints.
+        """
+        recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
+        check_joints([r.trace for r in recordings], arm.robot.joint_names)
+        parts = pieces(recordings, FOLDS)
+        moving = [r for r in parts if moves(r.trace)]
+        standing = [r for r in parts if not moves(r.trace)]
+        if not moving:
+            raise ValueError(
+                "no joint moves in any of these logs: friction and the arm's bounds in motion "
+                "cannot be learned from standing alone; add 20 s of motion"
+            )
+        models, whole = _calibrations(arm, moving)
+        bound = Bound.prior(friction_level(whole, moving))
+        dt = max(r.trace.dt for r in recordings)
+        prior = FittedFreeMotion(whole, dt, bound, UNKNOWN_LOAD, 0.0, 0)
+        left_out = [replace(prior, arm=model) for model in models] + [prior] * len(standing)
+        parts = [*moving, *standing]
+        own_arms = zip(parts, left_out, strict=True)
+        judged = [with_load_of(part, one).judge(part.trace) for part, one in own_arms]
+        alarms = 0
+        for fold in range(FOLDS):
+            own = range(fold, len(parts), FOLDS)
+            if not own:
+                continue
+            fresh = learned(bound, [j for k, j in enumerate(judged) if k not in own])
+            for k in own:
+                judge = with_load_of(parts[k], replace(left_out[k], bound=fresh))
+                alarms += _alarms(judge, parts[k])
+        seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
+        return replace(prior, bound=learned(bound, judged), seconds=seconds, alarms=alarms)
+
+
+def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmModel], ArmModel]:
+    """For each part the calibration from the parts of other folds, and that from all."""
+    bare = replace(arm.friction or REAL_FRICTION, weights=np.empty((0, 0)))
+    data = [filtered(r, arm.robot, arm.drive_gain, bare, CALIBRATION_RATE) for r in parts]
+
+    def calibrated(use: Sequence[int]) -> ArmModel:
+        own, known = [parts[i] for i in use], [data[i] for i in use]
+        return identify(arm, own, friction=bare, rate=CALIBRATION_RATE, data=known).arm
+
+    everything = range(len(parts))
+    whole = calibrated(everything)
+    models = [whole] * len(parts)
+    turns = range(min(FOLDS, len(parts)))
+    for fold in tqdm(turns, desc="leave out", unit="part", disable=None, leave=False):
+        try:
+            model = calibrated([i for i in everything if i % FOLDS != fold])
+        except ValueError:  # too little motion is left without the fold
+            model = whole
+        models[fold::FOLDS] = [model] * len(models[fold::FOLDS])
+    return models, whole
+
+
+def with_load_of(recording: Recording, detector: FittedFreeMotion) -> FittedFreeMotion:
+    """The detector of the arm with the load that a recording is known to carry."""
+    return detector if recording.load is None else detector.carrying(recording.load)
+
+
+def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
+    """The prior bounds moved by what left-out logs show."""
+    return replace(
+        prior, noise=_noise(judged, prior.noise), quantile=_quantiles(judged, prior.friction)
+    )
+
+
+def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
+    """Each joint's quantile of the residual in motion, shape (n, 4)."""
+    rows = [np.flatnonzero(p.t - p.t[0] > 2 * SETTLE)[:: _stride(p)] for p in judged]
+    pairs = list(zip(judged, rows, strict=True))
+
+    def stacked(name: str) -> Array:
+        parts = [np.abs(getattr(p, name)[r]) for p, r in pairs]
+        return np.concatenate([np.empty((0, len(friction))), *parts])
+
+    qd, qdd, residual = stacked("qd"), stacked("qdd"), stacked("residual")
+    hardest = qdd.max(axis=1, initial=0.0)
+    found = np.empty((len(friction), len(PRIOR)))
+    for j, level in enumerate(friction):
+        on = qd[:, j] >= SLOW
+        x = np.column_stack([np.ones(on.sum()), qd[on, j], qdd[on, j], hardest[on]])
+        weight = WORTH / EVERY * USUAL
+        y = residual[on, j] / level
+        found[j] = level * upper_quantile(x, y, QUANTILE, PRIOR, weight)
+    return found
+
+
+def _stride(part: Judged) -> int:
+    return max(1, round(EVERY / float(np.median(np.diff(part.t)))))
+
+
+def _noise(judged: Sequence[Judged], prior: Array) -> Array:
+    """Deviation of a standing joint's residual [N m], shape (n,); ``prior`` where none stands."""
+    changes = []
+    for part in judged:
+        dt = float(np.median(np.diff(part.t)))
+        step, settled = max(1, round(0.05 / dt)), max(1, round(1.0 / dt))
+        still = sustained(part.rest.all(axis=1).astype(float), settled) > 0
+        changes.append((part.residual[step:] - part.residual[:-step])[still[step:]])
+    all_of = np.concatenate(changes or [np.empty((0, len(prior)))])
+    if len(all_of) < 100:
+        return prior
+    noise: Array = np.median(np.abs(all_of), axis=0) / 0.6745 / np.sqrt(2)
+    return np.maximum(noise, 1e-3 * prior)
+
+
+def _alarms(detector: FittedFreeMotion, recording: Recording) -> int:
+    """False alarms in a collision-free recording."""
+    trace = recording.trace
+    above = (detector.scores(trace) > 1) & (trace.t - trace.t[0] > SETTLE)
+    return len(find_alarms(trace.t, above, SERIES))

@@ -1,0 +1,179 @@
+"""Support vector regression with the SRQ kernel on windows of the residual, in two forms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+from sklearn.svm import OneClassSVM
+
+from tauguard.arrays import Array
+from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, Scaling
+from tauguard.detectors.features.windows import Prepared, WindowShape, draw_windows, median_distance
+from tauguard.detectors.frozen import Frozen
+from tauguard.detectors.scores.kernel import KernelMachine, SrqRegressor, srq_kernel
+from tauguard.detectors.scores.regressors import Forest, Network
+from tauguard.detectors.scores.windowed import Regressor, Windowed
+from tauguard.traces.trace import Trace
+
+#: Windows that the scale of the features is found with.
+SAMPLED = 1000
+
+
+@dataclass(frozen=True)
+class SrqSvr(Windowed):
+    """The dissertation's regressor on the residual in standard deviations.
+
+    One factor brings the median distance between windows of collisions and of collision-free
+    motion to ``distance``, a length that the kernel resolves.
+    """
+
+    windows: int = 3000
+    mined: int = 300
+    sigma: float = 3.0  #: of the SRQ kernel
+    C: float = 1.0
+    epsilon: float = 0.02
+    distance: float = 2.0  #: median distance after scaling; 0 leaves the windows as they are
+    vectors: int = 400  #: support vectors that are kept, at most; 0 keeps all
+    name: ClassVar[str] = "srq-svr"
+    mining_gap: ClassVar[float] = 0.1
+    stream_of_seeds: ClassVar[int] = 1
+
+    def learn(self, x: Array, y: Array) -> KernelMachine:
+        """Epsilon-SVR."""
+        return SrqRegressor(self.sigma, self.C, self.epsilon).fit(x, y).machine_
+
+    def finished(self, regressor: Regressor) -> Regressor:
+        """With no more than ``vectors`` support vectors."""
+        assert isinstance(regressor, KernelMachine)
+        few = 0 < self.vectors < len(regressor.vectors)
+        return regressor.reduced(self.vectors) if few else regressor
+
+    def scaling(
+        self,
+        traces: Sequence[Trace],
+        targets: Sequence[Array],
+        front: FrontEnd,
+        shape: WindowShape,
+    ) -> Scaling:
+        """Bring the median distance of windows to ``distance``."""
+        bare = self.bare(traces, front)
+        if self.distance <= 0:
+            return bare
+        rng = np.random.default_rng(self.seed)
+        prepared = self.prepared(traces, targets, front, bare)
+        windows, target = draw_windows(rng, prepared, shape, SAMPLED)
+        spread = median_distance(windows[target > 0], windows[target == 0], rng)
+        return replace(bare, factor=self.distance / spread if spread > 0 else 1.0)
+
+
+@dataclass(frozen=True)
+class PlainSrqSvr(SrqSvr):
+    """The dissertation's form: residuals in N m times one factor, labels 0/1, no friction model.
+
+    Residuals in N m lie some 100 apart, where a kernel of sigma = 3 is diagonal and nothing is
+    learnt; the factor brings the median distance to sigma. ``distance=0`` is the literal form.
+    """
+
+    mined: int = 0
+    distance: float = 3.0
+    vectors: int = 0
+    graded: bool = False
+    front: FrontEndSettings = field(
+        default_factory=lambda: FrontEndSettings(adapt=False, settle=0.5, calibrate=False)
+    )
+    name: ClassVar[str] = "srq-svr-plain"
+
+    def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
+        """Residuals in N m."""
+        return Scaling(front.joints)
+
+
+#: Smallest kernel sum: the logarithm stays finite.
+LEAST = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Remoteness(Frozen):
+    """``-log`` of a kernel sum with weights of 0 or more, without bound far from its vectors."""
+
+    kernels: KernelMachine
+
+    def __call__(self, x: Array) -> Array:
+        """Values at the rows of x, shape (N, d) -> (N,)."""
+        found: Array = -np.log(np.maximum(self.kernels(x), LEAST))
+        return found
+
+
+@dataclass(frozen=True)
+class OneClass(Windowed):
+    """One-class SVM on windows of collision-free motion; collisions in the traces are not used."""
+
+    windows: int = 3_000
+    mined: int = 1_000  #: of the rarest collision-free moments, added in each of two rounds
+    sigma: float = 3.0  #: of the SRQ kernel
+    graded: bool = False
+    outside: float = 0.05  #: share of the training windows that may lie outside
+    name: ClassVar[str] = "one-class"
+
+    def draw(
+        self, rng: np.random.Generator, prepared: Sequence[Prepared], shape: WindowShape
+    ) -> tuple[Array, Array]:
+        """Collision-free windows, as many of a trace as it has rows."""
+        total = sum(int(p.free.sum()) for p in prepared)
+        x = []
+        for p in prepared:
+            rows = np.flatnonzero(p.free)
+            share = min(len(rows), -(-self.windows * len(rows) // total))
+            x.append(shape.of(p.signal, rng.choice(rows, share, replace=False)))
+        return np.concatenate(x), np.zeros(sum(map(len, x)))
+
+    def learn(self, x: Array, y: Array) -> Remoteness:
+        """The machine's decision function, but for its constant, as a remoteness."""
+        model = OneClassSVM(kernel="precomputed", nu=self.outside, cache_size=500)
+        model.fit(srq_kernel(x, x, self.sigma))
+        vectors = np.ascontiguousarray(x[model.support_])
+        weights = np.ascontiguousarray(model.dual_coef_[0])
+        return Remoteness(KernelMachine(vectors, weights, 0.0, self.sigma))
+
+
+@dataclass(frozen=True)
+class Boosting(Windowed):
+    """A forest that ranks windows by the severity of what happens in them."""
+
+    trees: int = 150
+    depth: int = 4
+    rate: float = 0.1
+    name: ClassVar[str] = "boosting"
+
+    def learn(self, x: Array, y: Array) -> Forest:
+        """Stochastic gradient boosting."""
+        return Forest.boosted(
+            x, y, trees=self.trees, depth=self.depth, rate=self.rate, seed=self.seed
+        )
+
+
+@dataclass(frozen=True)
+class WindowNetwork(Windowed):
+    """A feed-forward network that ranks windows by the severity of what happens in them."""
+
+    hidden: tuple[int, ...] = (48, 24)
+    epochs: int = 40
+    name: ClassVar[str] = "window-network"
+
+    def learn(self, x: Array, y: Array) -> OneOutput:
+        """Least squares."""
+        return OneOutput(Network.fit(x, y, self.hidden, seed=self.seed, epochs=self.epochs))
+
+
+@dataclass(frozen=True, eq=False)
+class OneOutput(Frozen):
+    """A network with one output as a function of windows."""
+
+    network: Network
+
+    def __call__(self, x: Array) -> Array:
+        """Values at the rows of x, shape (N, d) -> (N,)."""
+        return self.network(x)[:, 0]

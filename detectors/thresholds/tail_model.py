@@ -1,0 +1,123 @@
+"""Peaks of scores and their tails."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.detectors.thresholds.free_scores import FreeScores
+
+#: The tail's shape where its peaks do not show another. Estimates of 26 simulated arms with two
+#: detectors have means of 0.18 and 0.20 and deviations of 0.12; chance alone makes 0.07. False
+#: alarms come from arms with heavier tails: with 0.25 all arms together have as many as asked.
+USUAL_SHAPE = 0.25
+
+#: Standard errors that an estimated shape must be away from it before it counts.
+BEYOND_CHANCE = 3.0
+
+#: Bounds of an estimated shape: no finite end closer than that of a triangle's, and a variance.
+SHAPES = (-0.5, 0.5)
+
+
+@dataclass(frozen=True)
+class Tail:
+    """A generalised Pareto tail of peaks: the level that a number of them is expected to exceed.
+
+    Unlike an exponential tail it can end: a score that has a highest value is not extrapolated far
+    beyond it.
+    """
+
+    base: float  #: level where the tail begins
+    scale: float  #: 0: nothing is known beyond the base
+    shape: float
+    count: int  #: peaks above the base
+
+    @classmethod
+    def of(cls, peaks: Array, count: int, shapes: tuple[float, float] | None = None) -> Tail:
+        """From the ``count`` largest peaks and the next one.
+
+        Their excesses tell scale and shape by probability-weighted moments (Hosking & Wallis 1987).
+
+        Args:
+            peaks: in descending order, shape (N,), N >= 1.
+            count: at most N - 1 are used.
+            shapes: lowest and highest shape; ``None``: the one nearest to :data:`USUAL_SHAPE` that
+                is within :data:`BEYOND_CHANCE` standard errors of the estimate.
+        """
+        count = min(count, len(peaks) - 1)
+        if count < 2:
+            return cls(float(peaks[0]), 0.0, 0.0, 0)
+        excess = peaks[:count] - peaks[count]
+        mean = float(excess.mean())
+        # The largest comes first: its probability of being exceeded is the smallest.
+        exceeded = (np.arange(1, count + 1) - 0.65) / count
+        weighted = float(np.mean(excess * exceeded))
+        if not mean - 2 * weighted > 1e-12 * max(mean, 1e-300):
+            return cls(float(peaks[0]), 0.0, 0.0, 0)
+        found = 2 - mean / (mean - 2 * weighted)
+        shape = float(np.clip(found, *shapes)) if shapes else _likely_shape(found, count)
+        return cls(float(peaks[count]), mean * (1 - shape), shape, count)
+
+    def level(self, allowed: float) -> float:
+        """The level that ``allowed`` peaks, fewer than ``count``, are expected to exceed."""
+        if not self.scale:
+            return self.base
+        ratio, shape = self.count / allowed, self.shape
+        grown = np.log(ratio) if abs(shape) < 1e-9 else (ratio**shape - 1) / shape
+        return self.base + self.scale * float(grown)
+
+
+def shape_error(count: int) -> float:
+    """Standard error of the shape of ``count`` peaks near the shape 0 (Hosking & Wallis 1987)."""
+    return float(np.sqrt(4 / 3 / max(count, 1)))
+
+
+def _likely_shape(found: float, count: int) -> float:
+    """The shape nearest to the usual one that an estimate of ``count`` peaks allows."""
+    found, margin = float(np.clip(found, *SHAPES)), BEYOND_CHANCE * shape_error(count)
+    return float(np.clip(USUAL_SHAPE, found - margin, found + margin))
+
+
+def tail_level(peaks: Array, allowed: float, count: int) -> float:
+    """The level that ``allowed`` peaks are expected to exceed, along their :class:`Tail`.
+
+    Args:
+        peaks: in descending order, shape (N,), N >= 1.
+        allowed: above 0; at or above ``count`` it is the peak that so many exceed.
+        count: at most N - 1 are used.
+
+    Raises:
+        ValueError: no peaks, or a number allowed that is not above 0.
+    """
+    if not (len(peaks) and allowed > 0):
+        raise ValueError(f"{len(peaks)} peaks, {allowed} allowed: expected some, and above 0")
+    if allowed >= max(min(count, len(peaks) - 1), 1):
+        return float(peaks[min(int(allowed), len(peaks) - 1)])
+    return Tail.of(peaks, count).level(allowed)
+
+
+#: Share of the blocks whose peaks the tail is fitted to.
+TAIL = 0.05
+
+
+def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
+    """The threshold that collision-free motion exceeds ``per_hour`` times an hour.
+
+    Alarms are counted as blocks of the merge gap that exceed the threshold. Rarer alarms than the
+    motion shows are extrapolated along a generalised Pareto tail of the blocks' peaks.
+
+    Args:
+        scores: an episode each.
+        per_hour: false alarms to accept.
+
+    Raises:
+        ValueError: no scores, or a rate that is not above 0.
+    """
+    if not (len(scores) and per_hour > 0):
+        raise ValueError(f"per_hour: {per_hour} of {len(scores)} episodes; expected both above 0")
+    peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
+    hours = sum(one.seconds for one in scores) / 3600
+    return tail_level(peaks, per_hour * hours, max(2, round(TAIL * len(peaks))))

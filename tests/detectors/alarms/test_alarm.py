@@ -1,0 +1,125 @@
+"""A trained alarm as a whole: what it finds, online as in batch, bad input."""
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import pdist
+
+from tauguard.detectors import (
+    ArmModel,
+    PlainSrqSvr,
+    SrqSvr,
+    detection_metrics,
+    held_out,
+    match_detection,
+    train,
+)
+from tauguard.detectors.features.front_end import FrontEndSettings
+
+
+def test_it_finds_collisions_on_unseen_motions_with_unknown_payloads(alarm, unseen):
+    matchings = [match_detection(alarm.detect(trace), trace, skip=3.0) for trace in unseen]
+    out = detection_metrics(matchings)
+    assert out["headline"]["sensitivity"]["n"] >= 6
+    assert out["headline"]["sensitivity"]["value"] >= 0.85
+    assert out["specificity"]["value"] >= 0.6
+    assert out["headline"]["delay_ms"]["median"] < 20
+
+
+def test_online_equals_batch(alarm, unseen):
+    trace = unseen[0]
+    batch, stream, rows = alarm.detect(trace), alarm.stream(), 12_000
+    score, up = np.empty(rows), np.empty(rows, bool)
+    for k in range(rows):
+        dt = trace.t[k] - trace.t[k - 1] if k else None
+        up[k] = stream.step(trace.q[k], trace.qd[k], trace.current[k], dt)
+        score[k] = stream.score
+    assert score.tobytes() == batch.score[:rows].tobytes()
+    np.testing.assert_array_equal(up, batch.alarm[:rows])
+    assert up.any()
+
+
+def test_the_plain_form_is_the_dissertations(training, arm):
+    plain = PlainSrqSvr(windows=600).fit(training, arm)
+    raw = PlainSrqSvr(windows=600, distance=0.0).fit(training, arm)
+    for one in (plain, raw):
+        assert one.scaling.noise_model is None
+        assert one.arm.friction is None
+        assert one.regressor.vectors.shape[1] == 44
+    assert raw.scaling.factor == 1.0
+    # In N m nearly every window stands alone in the kernel's length of 3; one factor mends that.
+    vectors, factor = raw.regressor.vectors, plain.scaling.factor
+    assert len(vectors) > 0.6 * 600
+    gaps = pdist(vectors * factor)
+    assert 0.5 * 3.0 < np.median(gaps) < 2 * 3.0
+    assert np.median(gaps) / factor > 5 * 3.0
+
+
+def test_same_seed_same_detector(training, arm, unseen):
+    settings, some = SrqSvr(windows=300, mined=0), [*training[:3], *training[9:11]]
+    two = [train(settings, list(some), arm, 10.0) for _ in range(2)]
+    assert two[0].threshold == two[1].threshold
+    assert two[0].detect(unseen[0]).score.tobytes() == two[1].detect(unseen[0]).score.tobytes()
+
+
+def test_fewer_vectors_say_nearly_the_same(alarm, unseen):
+    machine = alarm.detector.regressor
+    few = machine.reduced(len(machine.vectors) // 2)
+    windows = alarm.detector.shape.of(
+        alarm.detector.front.scaled(unseen[0], alarm.detector.scaling), np.arange(0, 9000, 3)
+    )
+    error = few(windows) - machine(windows)
+    assert np.sqrt(np.mean(error**2)) < 0.006
+    assert np.abs(error).max() < 0.06
+
+
+def test_held_out_traces_are_collision_free_and_not_trained_on(training):
+    own, rest = held_out(training)
+    assert len(own) + len(rest) == len(training)
+    assert len(rest) == 3
+    assert not any(t.truth.collisions for t in rest)
+    assert not {id(t) for t in own} & {id(t) for t in rest}
+    struck = [t for t in training if t.truth.collisions]
+    assert held_out(struck) == (struck, struck)
+
+
+def test_bad_input(alarm, training, robot, arm, unseen):
+    with pytest.raises(ValueError, match="no traces"):
+        SrqSvr().fit([], arm)
+    front = FrontEndSettings(joints=(7,))
+    with pytest.raises(ValueError, match=r"joints \(7,\): expected some of 1 to 6"):
+        SrqSvr(front=front).fit(training, arm)
+    free = [t for t in training if not t.truth.collisions]
+    with pytest.raises(ValueError, match="hold no collision"):
+        SrqSvr().fit(free[:3], arm)
+    with pytest.raises(ValueError, match=r"drive_gain: shape \(2,\)"):
+        ArmModel(robot, arm.drive_gain[:2])
+    with pytest.raises(ValueError, match="float64 arrays"):
+        alarm.stream().step(unseen[0].q[:1], unseen[0].qd[0], unseen[0].current[0])
+    with pytest.raises(ValueError, match="per_hour: 0"):
+        train(SrqSvr(windows=300, mined=0), training, arm, 0)
+
+
+def test_absurd_samples_are_named_and_not_taken_for_silence(alarm, unseen):
+    from dataclasses import replace
+
+    trace = unseen[0]
+    qd = trace.qd.copy()
+    qd[4000] = 1e200
+    with pytest.raises(ValueError, match=r"score is not a number.*first at 4 s"):
+        alarm.detect(replace(trace, qd=qd))
+    stream = alarm.stream()
+    stream.step(trace.q[0], trace.qd[0], trace.current[0])
+    with pytest.raises(ValueError, match="score is not a number"):
+        [stream.step(trace.q[k], qd[4000], trace.current[k]) for k in range(1, 20)]
+
+
+def test_another_rate_is_refused_in_batch_and_online(alarm, unseen):
+    from dataclasses import replace
+
+    slow = replace(unseen[0], t=unseen[0].t * 10, truth=None)
+    with pytest.raises(ValueError, match="works at 1 ms: resample the recording"):
+        alarm.detect(slow)
+    stream, sample = alarm.stream(), (unseen[0].q[0], unseen[0].qd[0], unseen[0].current[0])
+    stream.step(*sample, None)
+    with pytest.raises(ValueError, match="dt 5 ms: this detector works at 1 ms"):
+        stream.step(*sample, 5e-3)

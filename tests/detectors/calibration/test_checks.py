@@ -1,0 +1,49 @@
+"""Logs that cannot be the arm's are refused by name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tauguard.detectors import ArmModel
+from tauguard.detectors.calibration.checks import check_signs, check_weight, drag, torque_per_ampere
+from tests.detectors.synthetic_arm import GAIN, nominal, record
+
+
+@pytest.mark.parametrize("joint", range(3))
+def test_a_current_of_the_other_sign_is_named(joint):
+    arm, trace = ArmModel(nominal(), GAIN), record(3)
+    check_signs(arm, "log.csv", trace)
+    sign = np.where(np.arange(3) == joint, -1.0, 1.0)
+    with pytest.raises(ValueError, match=rf"^log.csv: friction would push {'abc'[joint]}:"):
+        check_signs(arm, "log.csv", replace(trace, current=trace.current * sign))
+    # A gain of that sign makes up for it.
+    told = replace(arm, drive_gain=GAIN * sign)
+    check_signs(told, "log.csv", replace(trace, current=trace.current * sign))
+
+
+def test_joints_that_hardly_move_say_nothing():
+    trace = record(3, seconds=8.0)
+    still = replace(trace, qd=trace.qd * [1.0, 0.0, 1.0])
+    assert np.isnan(drag(nominal(), still, np.ones(3)))[1]
+    check_signs(ArmModel(nominal(), GAIN), "log", replace(trace, qd=0 * trace.qd))
+
+
+@pytest.mark.parametrize("factor", [0.4, 2.5])
+def test_an_arm_of_another_weight_is_refused(factor):
+    robot, trace = nominal(), record(3)
+    check_weight(robot, robot.with_inertial(1.2 * robot.inertial), [trace])
+    with pytest.raises(ValueError, match=r"file of another arm.*--torque"):
+        check_weight(robot, robot.with_inertial(factor * robot.inertial), [trace])
+
+
+def test_an_arm_without_gravity_says_nothing():
+    robot = replace(nominal(), gravity=np.zeros(3))
+    check_weight(robot, robot.with_inertial(5 * robot.inertial), [record(3)])
+
+
+def test_one_gain_that_nothing_fixes_hides_no_torques():
+    torques = replace(record(3), current=record(3).current * GAIN)
+    found = np.array([1.1, 0.9, 3.0])  # the last joint carries little
+    assert torque_per_ampere(ArmModel(nominal(), found), [torques]) < 1.3
+    assert torque_per_ampere(ArmModel(nominal(), GAIN), [record(3)]) > 6.0

@@ -1,0 +1,233 @@
+"""The free-motion detector on a synthetic arm: quiet in free motion, finds what is added."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tauguard.detectors import ArmModel, CollisionAlarm, load_model, save_model
+from tauguard.detectors.alarms.training import carrying
+from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.detectors.evaluation.semi_real import Added, add_contact
+from tauguard.detectors.evaluation.threshold_card import threshold_card
+from tauguard.detectors.events import SERIES, find_alarms
+from tauguard.detectors.features.free_bound import friction_level
+from tauguard.detectors.scores.free_motion import CONFIRMATION, FreeMotion
+from tests.detectors.synthetic_arm import GAIN, nominal, record
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    return FreeMotion().fit([record(seed) for seed in range(3)], ArmModel(nominal(), GAIN))
+
+
+@pytest.fixture(scope="module")
+def alarm(fitted):
+    return carrying(CollisionAlarm(fitted, 1.0, CONFIRMATION), Load())
+
+
+def test_no_alarm_in_free_motion_that_training_has_not_seen(alarm):
+    for seed in (7, 8):
+        assert alarm.detect(record(seed)).alarms == ()
+
+
+def test_pushes_in_motion_and_at_rest_are_found(alarm):
+    trace = record(7)
+    for start in (4.0, 9.5, 15.0):  # the dwell is from 8 to 10 s
+        struck = add_contact(trace, GAIN, Added(start, 0.5, (12.0, 12.0, 6.0), "push"))
+        first = alarm.detect(struck).alarms[0].start
+        assert start < first < start + 0.3
+
+
+def test_each_push_of_a_series_on_a_standing_arm_is_an_alarm_and_ends(alarm):
+    trace = record(7, dwell=(6.0, 24.0))
+    for start in (12.0, 14.0, 16.0):
+        trace = add_contact(trace, GAIN, Added(start, 0.4, (8.0, 8.0, 4.0), "push"))
+    starts = [one.start for one in alarm.detect(trace).alarms]
+    assert all(any(s < x < s + 0.3 for x in starts) for s in (12.0, 14.0, 16.0))
+    assert max(one.end for one in alarm.detect(trace).alarms) < 18.0
+
+
+def test_what_a_push_leaves_is_taken_up(alarm):
+    """Static friction holds another torque afterwards: a step that stays is one alarm."""
+    trace = record(7, dwell=(6.0, 30.0))
+    step = np.where(trace.t[:, None] > 12.0, 4.0, 0.0) * np.array([1.0, 1.0, 0.5]) / GAIN
+    found = alarm.detect(replace(trace, current=trace.current - step))
+    assert len(found.alarms) == 1
+    assert found.alarms[0].end < 13.5
+
+
+@pytest.mark.parametrize("size", [0.6, 2.0])
+def test_a_push_beside_a_biased_current_is_found(fitted, size):
+    alarm = CollisionAlarm(fitted, 1.0, CONFIRMATION)  # of a load that is not told
+    trace = record(9, seconds=32.0)
+    current = trace.current.copy()
+    current[trace.t >= 14.0, 1] += size * fitted.bound.least[1] / GAIN[1]
+    biased = replace(trace, current=current)
+    for start in (20.0, 25.0):
+        biased = add_contact(biased, GAIN, Added(start, 0.4, (14.0, -18.0, 9.0), "push"))
+    starts = [one.start for one in alarm.detect(biased).alarms]
+    assert [any(s < x < s + 0.3 for x in starts) for s in (20.0, 25.0)] == [True, True]
+    assert any(14.0 < x < 14.5 for x in starts) == (size > 1)  # below the bound it is not seen
+
+
+def test_bounds_follow_motion_and_what_the_logs_taught(alarm):
+    """The native bounds against their formula, from the trace's own speeds."""
+    trace = record(7, dwell=(8.0, 14.0))
+    seen, bound = alarm.detector.judge(trace), alarm.detector.bound
+    # What is judged is one sample late.
+    speed = np.vstack([np.abs(trace.qd[:1]), np.abs(trace.qd[:-1])])
+    slow, t = speed < 0.02, trace.t
+    still = np.flatnonzero(slow.all(axis=1) & (t > 8))
+    stopped = t[still[0]]
+    rows = (t > stopped + 0.3) & (t < 13.5)
+    assert seen.rest[rows].all()
+    # One second after the last motion e times less, the rest as it was learned.
+    first, later = seen.bound[t > stopped + 1.0][0], seen.bound[t > stopped + 3.0][0]
+    assert (first - bound.rest) / (later - bound.rest) == pytest.approx(np.full(3, np.e**2), 0.05)
+    assert (first - bound.rest <= bound.stop * np.exp(-0.95)).all()
+    went = (t > 2) & (speed > 0.02).all(axis=1)
+    linear = np.stack(
+        [np.ones_like(speed), speed, np.abs(seen.qdd), np.abs(seen.qdd).max(1)[:, None] + 0 * speed]
+    )
+    least = np.maximum(np.einsum("ktj,jk->tj", linear, bound.moving), bound.least)
+    above = (seen.bound - least)[went]
+    assert above.min() > -1e-9
+    assert (np.median(above, axis=0) < 0.3 * bound.least).all()  # what slow errors leave
+
+
+def test_one_joint_s_alarm_hides_no_push_on_another(alarm):
+    """Joint 1 is pushed, which loads joint 2 a little; then joint 2 is pushed the other way."""
+    trace = record(7, dwell=(6.0, 24.0))
+    first = add_contact(trace, GAIN, Added(12.0, 2.0, (10.0, 0.8, 0.0), "push"))
+    both = add_contact(first, GAIN, Added(13.1, 0.5, (0.0, -8.0, 0.0), "push"))
+    starts = [one.start for one in find_alarms(trace.t, alarm.detect(both).alarm, SERIES)]
+    assert any(13.1 < start < 13.4 for start in starts)
+
+
+def test_a_joint_that_hunts_hides_no_push_on_another(alarm):
+    """A controller's integral ramps joint 2 until it slips, over and over."""
+    trace = record(7, dwell=(6.0, 30.0))
+    level = alarm.detector.bound.friction
+    phase = (trace.t - 12.0) / 1.5
+    swings = np.where(trace.t > 12.0, np.abs(2 * (phase % 1.0) - 1.0) - 1.0, 0.0)
+    hunting = np.outer(swings, [0.0, level[1], 0.0]) / GAIN
+    trace = replace(trace, current=trace.current + hunting)
+    pushed = add_contact(trace, GAIN, Added(20.3, 0.5, (0.6 * level[0], 0.0, 0.0), "push"))
+    starts = [
+        [one.start for one in find_alarms(t.t, alarm.detect(t).alarm, SERIES)]
+        for t in (trace, pushed)
+    ]
+    assert sum(start > 12.0 for start in starts[0]) < 10  # of 24 ramps
+    assert not any(20.3 < start < 20.6 for start in starts[0])
+    assert any(20.3 < start < 20.6 for start in starts[1])
+
+
+def test_a_blow_counts_once_it_lasts_and_a_gap_confirms_nothing(alarm):
+    """Long at rest: the third sample of 10 ms is confirmed, a second one after a gap is not."""
+    trace, level = record(7, dwell=(6.0, 24.0)), alarm.detector.bound.friction
+    blow = add_contact(trace, GAIN, Added(16.0, 0.1, tuple(1.5 * level), "push"))
+    score = alarm.detector.scores(blow)
+    first = np.flatnonzero((score >= 1.0) & (trace.t > 16.0))[0]
+    assert (score[first : first + 2] == 1.0).all()
+    assert score[first + 2] > 1.0
+    late = np.where(np.arange(len(trace.t)) > first, 0.05, 0.0)
+    stretched = alarm.detector.scores(replace(blow, t=blow.t + late))
+    assert (stretched[first : first + 2] == 1.0).all()
+
+
+def test_few_seconds_leave_the_friction_level_unsure(fitted):
+    logs = [Recording(record(seed)) for seed in range(3)]
+    short = [Recording(record(0, seconds=12.0))]
+    level = friction_level(fitted.arm, logs), friction_level(fitted.arm, short)
+    assert (level[1] > 1.5 * level[0]).all()
+
+
+def test_letting_go_is_no_new_push(alarm):
+    trace = record(7, dwell=(6.0, 24.0))
+    for seconds in (0.4, 0.8):
+        pushed = add_contact(trace, GAIN, Added(12.0, seconds, (8.0, 8.0, 4.0), "push"))
+        found = alarm.detect(pushed).alarms
+        assert len(found) == 1
+        assert found[0].end < 12.0 + seconds + 0.1
+
+
+def test_friction_counts_at_the_load_that_the_logs_show(fitted):
+    bare = fitted.arm.friction.coulomb()
+    assert (fitted.bound.friction >= 0.99 * bare).all()
+
+
+def test_scores_do_not_depend_on_what_comes_after(alarm):
+    trace = record(7)
+    whole = alarm.detector.scores(trace)
+    rows = slice(None, 900)
+    part = replace(
+        trace, t=trace.t[rows], q=trace.q[rows], qd=trace.qd[rows], current=trace.current[rows]
+    )
+    assert np.array_equal(alarm.detector.scores(part), whole[rows])
+
+
+def test_the_stream_gives_the_same_bits(alarm):
+    trace = record(7, seconds=4.0)
+    stream, steps = alarm.detector.stream(), np.diff(trace.t, prepend=trace.t[0] - trace.dt)
+    steps[0] = trace.dt
+    online = [
+        stream.step(*one) for one in zip(trace.q, trace.qd, trace.current, steps, strict=True)
+    ]
+    assert np.array_equal(online, alarm.detector.scores(trace))
+
+
+def test_an_untold_load_is_found_from_motion_and_a_told_one_is_no_contact(fitted):
+    trace = record(9, load=2.0)
+    untold = CollisionAlarm(fitted, 1.0, CONFIRMATION)
+    assert untold.detect(trace).alarms == ()
+    told = carrying(untold, Load(2.0, (0.3, 0.0, 0.05)))
+    assert told.detect(trace).alarms == ()
+    # Told nothing, 2 kg on a light arm are a contact.
+    assert carrying(untold, Load()).detect(trace).alarms
+
+
+def test_a_faster_log_than_training_s_is_quiet_and_its_push_is_found(alarm):
+    fast = record(7, dt=0.002, seconds=6.0)
+    assert alarm.detect(fast).alarms == ()
+    struck = add_contact(fast, GAIN, Added(4.0, 0.5, (12.0, 12.0, 6.0), "push"))
+    assert 4.0 < alarm.detect(struck).alarms[0].start < 4.3
+
+
+def test_the_file_gives_the_same_alarms(alarm, tmp_path):
+    save_model(alarm, tmp_path / "model.skops")
+    trace = record(7, seconds=10.0)
+    again = load_model(tmp_path / "model.skops")
+    assert np.array_equal(again.scores(trace), alarm.scores(trace))
+
+
+def test_thirty_seconds_in_one_log_are_enough():
+    one = FreeMotion().fit([Recording(record(1, seconds=30.0))], ArmModel(nominal(), GAIN))
+    assert one.seconds == pytest.approx(30, abs=0.1)
+
+
+def test_the_card_counts_what_the_bounds_are(fitted):
+    card = threshold_card(fitted, [record(0)])
+    assert (card.standing < card.moving).all()
+    assert (card.moving < card.starting).all()
+    assert card.tool["standing"][0] < card.tool["moving"][0]
+    assert "standing for 2 s" in card.unseen
+    assert set(card.unseen["moving alone"]) == {"a", "b", "c"}
+    assert card.franka == {}  # libfranka speaks to arms of seven joints
+    seven = replace(card, joints=tuple("abcdefg"), starting=np.ones(7), moving=np.ones(7)).franka
+    assert {len(v) for k, v in seven.items() if "torque" in k} == {7}
+    assert {len(v) for k, v in seven.items() if "force" in k} == {6}
+    assert card.false_alarms_per_hour["high"] > 0
+
+
+def test_other_joints_are_refused(alarm):
+    trace = record(7, seconds=4.0)
+    one = replace(
+        trace,
+        joint_names=("a",),
+        q=trace.q[:, :1],
+        qd=trace.qd[:, :1],
+        current=trace.current[:, :1],
+    )
+    with pytest.raises(ValueError, match="the trace has 1 joints, this detector 3"):
+        alarm.detector.scores(one)
