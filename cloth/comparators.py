@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tauguard.cloth import _mesh, impacts
 from tauguard.cloth.groups import Groups
-from tauguard.cloth.loose import Loose
 from tauguard.cloth.mesh import MeshCCD
+from tauguard.cloth.topology import Isolated
 
 #: Narrow phases of earlier work by name.
 COMPARATORS: dict[str, int] = {"naive": 0, "iccd": 1, "dnf": 2, "scd": 3, "vcd": 4}
@@ -38,11 +38,11 @@ class ComparedMeshCCD(MeshCCD):
 
     def _checked_parts(
         self, faces: ArrayLike, edges: ArrayLike, points: ArrayLike, groups: Groups | None
-    ) -> tuple[NDArray[np.int32], Loose]:
-        checked, loose = super()._checked_parts(faces, edges, points, groups)
-        if loose.points.size and self.method in COMPARATORS:
+    ) -> tuple[NDArray[np.int32], Isolated]:
+        checked, isolated = super()._checked_parts(faces, edges, points, groups)
+        if isolated.points.size and self.method in COMPARATORS:
             raise ValueError(f"method {self.method!r} has no queries of points")
-        return checked, loose
+        return checked, isolated
 
     def _collisions(
         self,

@@ -49,9 +49,9 @@ class Frame:
         ee: Colliding edges (rows of ``MeshCCD.edges``), smaller first, shape (K, 2), sorted.
         vf_impacts: Of ``vf``, row by row; all are hits.
         ee_impacts: Of ``ee``, row by row.
-        pe: Colliding loose points and loose edges (rows of ``MeshCCD.edges``), shape (P, 2),
-            sorted. Other vertices meet edges as ends of edges or corners of faces.
-        pp: Colliding loose points, smaller first, shape (Q, 2), sorted.
+        pe: Colliding isolated vertices and isolated edges (rows of ``MeshCCD.edges``), shape
+            (P, 2), sorted. Other vertices meet edges as ends of edges or corners of faces.
+        pp: Colliding isolated vertices, smaller first, shape (Q, 2), sorted.
         pe_impacts: Of ``pe``; weights are of the point and the edge's ends, shape (P, 3).
         pp_impacts: Of ``pp``; weights are ones, shape (Q, 2).
         stats: How the answer was reached.

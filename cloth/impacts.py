@@ -95,7 +95,7 @@ def point_edge(
     Raises:
         ValueError: as :func:`vertex_face`, or another method.
     """
-    found = _solve_loose([0, 1, 2, 2], x_t0, x_t1, method, min_distance)
+    found = _solve_points([0, 1, 2, 2], x_t0, x_t1, method, min_distance)
     weights = np.concatenate(
         [found.weights[:, :2], found.weights[:, 2:].sum(axis=1, keepdims=True)], axis=1
     )
@@ -106,12 +106,12 @@ def point_point(
     x_t0: ArrayLike, x_t1: ArrayLike, method: str = "ab2pf", min_distance: float = 0.0
 ) -> Impacts:
     """First contact of two points, shape (N, 2, 3); see :func:`point_edge`. Weights are ones."""
-    found = _solve_loose([0, 1, 1, 1], x_t0, x_t1, method, min_distance)
+    found = _solve_points([0, 1, 1, 1], x_t0, x_t1, method, min_distance)
     ones = np.where(found.hit[:, None], 1.0, np.nan).repeat(2, axis=1)
     return Impacts(found.hit, found.toi, found.point, found.normal, ones)
 
 
-def _solve_loose(
+def _solve_points(
     corners: list[int], x_t0: ArrayLike, x_t1: ArrayLike, method: str, min_distance: float
 ) -> Impacts:
     n = max(corners) + 1

@@ -21,8 +21,7 @@ from tauguard.cloth import _mesh
 from tauguard.cloth.frame import Frame, FrameStats
 from tauguard.cloth.groups import Groups
 from tauguard.cloth.impacts import Impacts, checked_distance, method_number
-from tauguard.cloth.loose import Loose
-from tauguard.cloth.topology import Topology
+from tauguard.cloth.topology import Isolated, Topology
 from tauguard.geometry import finite, frozen, frozen_indices, thread_count
 
 #: Bounding volumes by name: k, and whether they move with the step or sweep it.
@@ -32,7 +31,7 @@ VOLUMES: dict[str, tuple[int, bool]] = {
     for k in (6, 14, 16, 18, 26)
 } | {"aabb": (6, False), "moving_aabb": (6, True)}
 
-#: What ``find`` and ``candidates`` allow of either kind unless told otherwise.
+#: Default limits of ``find`` and ``candidates``, for each kind.
 MOST_COLLISIONS, MOST_CANDIDATES = 4_000_000, 50_000_000
 
 _NO_GROUPS = (np.zeros(0, dtype=np.int32), np.zeros((0, 0), dtype=np.uint8))
@@ -84,10 +83,10 @@ class MeshCCD:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
         k, moving = VOLUMES[volume]
         self._method, self._volume, self._threads = method, volume, thread_count(threads)
-        faces, loose = self._checked_parts(faces, edges, points, groups)
-        rows = np.concatenate([faces, loose.rows()])
+        faces, isolated = self._checked_parts(faces, edges, points, groups)
+        rows = np.concatenate([faces, isolated.rows()])
         self._mesh = _mesh.Mesh(rows, *_group_arrays(groups), k, moving, self._threads)
-        self._topology = Topology(faces, loose, frozen(self._mesh.edges()), groups)
+        self._topology = Topology(faces, isolated, frozen(self._mesh.edges()), groups)
         self.broad_stats: dict[str, Any] = {}
 
     @property
@@ -106,7 +105,7 @@ class MeshCCD:
     @property
     def points(self) -> NDArray[np.int32]:
         """Those given that no face or edge has. Shape (P,)."""
-        return self._topology.loose.points
+        return self._topology.isolated.points
 
     @property
     def groups(self) -> Groups | None:
@@ -211,16 +210,16 @@ class MeshCCD:
         fraction: float = 0.9,
         limit: int = MOST_COLLISIONS,
     ) -> float:
-        """A share ``s`` of the step with no contact on the way, for a solver to scale its step by.
+        """The fraction ``s`` of a step that is free of contact, for a solver to scale its step by.
 
-        The step from ``x_t0`` to ``x_t0 + s * (x_t1 - x_t0)``, computed so in doubles, is asked
-        again until nothing meets in it: its rounding is covered, and the next step starts apart.
+        The step from ``x_t0`` to ``x_t0 + s * (x_t1 - x_t0)``, as rounded to doubles, is tested
+        again until it has no contact. So rounding cannot add one, and the next step starts apart.
 
         Args:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
             x_t1: Positions at its end. Shape (V, 3).
-            min_distance: To be kept, in the unit of the positions.
-            fraction: Of the way to the first contact, above 0 and below 1.
+            min_distance: Smallest distance allowed, in the unit of the positions.
+            fraction: Part of the path to the first contact that is used, above 0 and below 1.
             limit: As in :meth:`find`.
 
         Returns:
@@ -233,13 +232,13 @@ class MeshCCD:
         if not (isinstance(fraction, Real) and 0 < fraction < 1):
             raise ValueError(f"fraction: {fraction!r:.40}, expected a number above 0 and below 1")
         start, end = self._checked_step(x_t0, x_t1)
-        share, reach = 1.0, end
-        while share > 0:
+        scale, reach = 1.0, end
+        while scale > 0:
             first = self.find(start, reach, min_distance, limit=limit).first_time()
             if first > 1:
-                return share
-            share *= fraction * first
-            reach = start + share * (end - start)
+                return scale
+            scale *= fraction * first
+            reach = start + scale * (end - start)
             if np.array_equal(reach, start):
                 break
         return 0.0
@@ -251,35 +250,35 @@ class MeshCCD:
         edges: ArrayLike | None = None,
         points: ArrayLike | None = None,
     ) -> dict[str, Any]:
-        """Go on with other faces: some gone, some new, some split (cutting, tearing).
+        """Replace the faces: some removed, added or split (cutting, tearing).
 
-        Features that stay keep their places in the hierarchy, new ones settle near features that
-        share their vertices, and the front stays. Every later answer equals that of a new
-        ``MeshCCD`` of ``faces``; edges and faces are numbered as there. The number of vertices may
-        change as well.
+        The hierarchy is updated, not rebuilt, and the front is reused. Later answers, and the
+        numbers of edges and faces, are those of a new ``MeshCCD`` of ``faces``. The number of
+        vertices may change.
 
         Args:
-            faces: Shape (F', 3), the whole new list; rows that were there before count as kept.
+            faces: Shape (F', 3), the complete new list. Rows that were there before count
+                as unchanged.
             groups: For the new vertices; ``None`` keeps the present ones.
-            edges: Loose edges; ``None`` keeps the present ones.
-            points: Loose points; ``None`` keeps the present ones.
+            edges: Isolated edges; ``None`` keeps the present ones.
+            points: Isolated vertices; ``None`` keeps the present ones.
 
         Returns:
-            ``{"vertices", "edges", "faces"}``: (removed, added), where loose edges and points count
-            as faces, too; ``"rebuilt"``: how many of the
-            three trees had no room left and are built anew in the next frame.
+            ``{"vertices", "edges", "faces"}``: (removed, added); isolated edges and vertices count
+            as faces, too. ``"rebuilt"``: how many of the three trees had no room left and are
+            rebuilt in the next frame.
 
         Raises:
             ValueError: as the constructor.
         """
         before = self._topology
         groups = before.groups if groups is None else groups
-        edges = before.loose.edges if edges is None else edges
-        points = before.loose.points if points is None else points
-        checked, loose = self._checked_parts(faces, edges, points, groups)
-        rows = np.concatenate([checked, loose.rows()])
+        edges = before.isolated.edges if edges is None else edges
+        points = before.isolated.points if points is None else points
+        checked, isolated = self._checked_parts(faces, edges, points, groups)
+        rows = np.concatenate([checked, isolated.rows()])
         change = self._mesh.update_topology(rows, *_group_arrays(groups))
-        self._topology = Topology(checked, loose, frozen(change.pop("edge_rows")), groups)
+        self._topology = Topology(checked, isolated, frozen(change.pop("edge_rows")), groups)
         return change
 
     def _check_method(self, method: str) -> None:
@@ -298,9 +297,9 @@ class MeshCCD:
 
     def _checked_parts(
         self, faces: ArrayLike, edges: ArrayLike, points: ArrayLike, groups: Groups | None
-    ) -> tuple[NDArray[np.int32], Loose]:
+    ) -> tuple[NDArray[np.int32], Isolated]:
         checked = _checked_faces(faces, groups)
-        return checked, Loose.of(checked, edges, points, groups)
+        return checked, Isolated.of(checked, edges, points, groups)
 
     def _checked_step(
         self, x_t0: ArrayLike, x_t1: ArrayLike

@@ -1,35 +1,82 @@
-"""Faces, edges, loose parts and groups that belong together."""
+"""Faces, edges, isolated vertices and edges, and groups of one mesh."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tauguard.cloth.groups import Groups
 from tauguard.cloth.impacts import Impacts
-from tauguard.cloth.loose import Loose
+from tauguard.geometry import frozen, frozen_indices
+
+_MOST = np.iinfo(np.int32).max
+
+
+@dataclass(frozen=True, eq=False)
+class Isolated:
+    """Isolated edges (of no face) and isolated vertices (of no face and no edge), sorted, unique.
+
+    Attributes:
+        edges: Smaller vertex first. Shape (L, 2).
+        points: Isolated vertices. Shape (P,).
+    """
+
+    edges: NDArray[np.int32]
+    points: NDArray[np.int32]
+
+    @staticmethod
+    def of(
+        faces: NDArray[np.int32], edges: ArrayLike, points: ArrayLike, groups: Groups | None
+    ) -> Isolated:
+        """Check both lists; leave out edges of faces, and vertices of faces or edges.
+
+        Raises:
+            ValueError: not (L, 2) or (P,) integers from 0, an edge between equal vertices, an edge
+                of two groups, a vertex without a group.
+        """
+        rows = _rows("edges", edges, (None, 2))
+        spots = _rows("points", points, (None,))
+        if (rows[:, 0] == rows[:, 1]).any():
+            row = int(np.argmax(rows[:, 0] == rows[:, 1]))
+            raise ValueError(f"edges: row {row} is {rows[row].tolist()}: it repeats a vertex")
+        if groups is not None:
+            groups.check("edges", rows)
+            groups.check("points", spots[:, None])
+        rows = np.unique(np.sort(rows, axis=1), axis=0)
+        of_faces = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        rows = rows[~np.isin(_keys(rows), _keys(of_faces))]
+        return Isolated(
+            frozen(rows), frozen(np.setdiff1d(spots, np.r_[faces.ravel(), rows.ravel()]))
+        )
+
+    def rows(self) -> NDArray[np.int32]:
+        """As faces without area, for the kernel: (a, b, b) of an edge, (p, p, p) of a point."""
+        return np.concatenate([self.edges[:, [0, 1, 1]], np.repeat(self.points, 3).reshape(-1, 3)])
 
 
 class Topology:
-    """What a :class:`MeshCCD` answers for, and how many vertices its frames have."""
+    """Parts of a :class:`MeshCCD`, and the number of vertices that its frames have."""
 
     def __init__(
         self,
         faces: NDArray[np.int32],
-        loose: Loose,
+        isolated: Isolated,
         edges: NDArray[np.int32],
         groups: Groups | None,
     ) -> None:
-        """All checked; edges are those of the faces and the loose ones, sorted."""
-        self.faces, self.loose, self.edges, self.groups = faces, loose, edges, groups
-        used = max((int(x.max()) for x in (faces, loose.edges, loose.points) if x.size), default=-1)
+        """All checked; edges are those of the faces and the isolated ones, sorted."""
+        self.faces, self.isolated, self.edges, self.groups = faces, isolated, edges, groups
+        used = max(
+            (int(x.max()) for x in (faces, isolated.edges, isolated.points) if x.size), default=-1
+        )
         self._rows = used + 1
         self._vertices: int | None = None
         keys = edges[:, 0].astype(np.int64) << 32 | edges[:, 1]
-        wanted = loose.edges[:, 0].astype(np.int64) << 32 | loose.edges[:, 1]
-        self._row_of_loose = np.searchsorted(keys, wanted).astype(np.int32)
+        wanted = isolated.edges[:, 0].astype(np.int64) << 32 | isolated.edges[:, 1]
+        self._row_of_isolated = np.searchsorted(keys, wanted).astype(np.int32)
 
     def check(self, start: int, end: int) -> None:
         """Raise a ``ValueError`` for numbers of vertices that do not fit."""
@@ -43,7 +90,7 @@ class Topology:
         if self.groups is not None and start != len(self.groups.ids):
             raise ValueError(f"x_t0: {start} vertices, but groups has {len(self.groups.ids)}")
         if start < self._rows:
-            parts = (("faces", self.faces), ("edges", self.edges), ("points", self.loose.points))
+            parts = (("faces", self.faces), ("edges", self.edges), ("points", self.isolated.points))
             name, rows = next((n, r) for n, r in parts if r.size and int(r.max()) >= start)
             row = int(np.argmax((rows >= start).reshape(len(rows), -1).any(axis=1)))
             raise ValueError(
@@ -52,15 +99,15 @@ class Topology:
         self._vertices = start
 
     def parts(self, pairs: NDArray[np.int32], impacts: Impacts) -> dict[str, Any]:
-        """Fields of a frame: what the kernel calls vertex and face, by what the face stands for."""
+        """Fields of a frame from vertex-face pairs, whose last faces are isolated parts."""
         number = pairs[:, 1] - len(self.faces)
-        edges = len(self.loose.edges)
+        edges = len(self.isolated.edges)
         of_face, of_point = number < 0, number >= edges
         of_edge = ~of_face & ~of_point
         ends = pairs[of_edge].copy()
-        ends[:, 1] = self._row_of_loose[number[of_edge]]
+        ends[:, 1] = self._row_of_isolated[number[of_edge]]
         points = pairs[of_point].copy()
-        points[:, 1] = self.loose.points[number[of_point] - edges]
+        points[:, 1] = self.isolated.points[number[of_point] - edges]
         of_ends, of_points = _chosen(impacts, of_edge), _chosen(impacts, of_point)
         w = of_ends.weights
         w = np.concatenate([w[:, :2], w[:, 2:].sum(axis=1, keepdims=True)], axis=1)
@@ -80,3 +127,14 @@ def _chosen(of: Impacts, rows: NDArray[np.bool_]) -> Impacts:
 
 def _weighted(of: Impacts, weights: NDArray[np.float64]) -> Impacts:
     return Impacts(of.hit, of.toi, of.point, of.normal, weights)
+
+
+def _rows(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> NDArray[np.int32]:
+    array = np.asarray(value)
+    if array.size == 0:
+        array = np.zeros([0 if n is None else n for n in shape], dtype=np.int32)
+    return frozen_indices(name, array, shape, _MOST)
+
+
+def _keys(edges: NDArray[np.int32]) -> NDArray[np.int64]:
+    return edges[:, 0].astype(np.int64) << 32 | edges[:, 1]

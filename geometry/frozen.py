@@ -29,14 +29,14 @@ def sealed(array: NDArray[_T]) -> NDArray[_T]:
 def frozen_finite(
     name: str, value: ArrayLike, shape: tuple[int | None, ...]
 ) -> NDArray[np.float64]:
-    """As :func:`finite`, of an own copy: what is checked is what is kept."""
+    """As :func:`finite`, of a private copy, so that nothing can change it after the check."""
     return finite(name, frozen(finite(name, value, shape)), shape)
 
 
 def frozen_indices(
     name: str, value: ArrayLike, shape: tuple[int | None, ...], upper: int
 ) -> NDArray[np.int32]:
-    """As :func:`indices`, of an own copy: what is checked is what is kept."""
+    """As :func:`indices`, of a private copy, so that nothing can change it after the check."""
     return indices(name, frozen(indices(name, value, shape, upper)), shape, upper)
 
 

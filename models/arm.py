@@ -54,7 +54,7 @@ class Facts:
     spread: Array  #: poses are drawn this far around home [rad]
     servo_inertia: Array | None  #: [kg m^2]; None: that of the home pose
     bandwidth: Array  #: of the servo [rad/s]
-    compensation: float  #: share of the known friction that the servo makes up for
+    compensation: float  #: fraction of the known friction that the servo compensates
     tool: str | None  #: site, or None: the last link's origin
     gripper: tuple[str, ...]  #: joints below the flange
     sources: dict[str, str] = field(default_factory=dict)  #: of each part, in words

@@ -53,7 +53,9 @@ def stated_drive(stated: RobotDrive, limit: Array, sources: dict[str, str]) -> D
     given = sources.get("drive", "given" if named else "")
     assumed = [] if constant is not None else [f"{_GAIN:g} N m/A"]
     if stated.like is not None:
-        rest = "ripple, lag, noise and missing friction: the CURA6-like arm's, as shares of limits"
+        rest = (
+            "ripple, lag, noise and missing friction: the CURA6-like arm's, as fractions of limits"
+        )
     sources["drive"] = "; ".join(x for x in (given, *assumed, rest) if x)
     return Drive(gain, ratio, limit / gain if current is None else current, None, friction)
 
@@ -70,9 +72,10 @@ def with_speeds(drive: Drive, speed: Array, lightest: Array) -> Drive:
 def like_cura6(drive: Drive, speed: Array, lossy: Bools) -> Drive:
     """``drive`` with friction, ripple, lag and sensor noise of the CURA6-like arm's class.
 
-    Coulomb friction is a share of the torque limit and viscous friction of the limit over the
-    largest speed; ripple and noise of the currents are shares of the current limit; the rise of the
-    friction with load goes with one over the limit. Each share is the mean over that arm's joints.
+    Coulomb friction is a fraction of the torque limit, viscous friction of that limit over the
+    largest speed. Ripple and noise of the currents are fractions of the current limit. The rise of
+    friction with load is inversely proportional to the limit. Each fraction is the mean over that
+    arm's joints.
 
     Args:
         drive: a joint's friction that it states is kept.

@@ -319,7 +319,7 @@ def _all_of(body: mujoco.MjsBody, gripper: tuple[str, ...]) -> bool:
 
 
 def _branches(moving: list[mujoco.MjsBody]) -> str:
-    """Where it branches, and the way out."""
+    """Where it branches, and what to do about it."""
     parts = []
     for body in moving:
         names = [joint.name for joint in _joints_below(body)]

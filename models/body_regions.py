@@ -30,7 +30,7 @@ class BodyRegion:
 
     @property
     def transient_force(self) -> float:
-        """F_T, largest force of a blow [N]: twice F_QS, and 0 where no blow is allowed."""
+        """F_T, largest force of an impact [N]: twice F_QS, and 0 where no impact is allowed."""
         return 2 * self.quasi_static_force if self.transient else 0.0
 
     @property
@@ -41,7 +41,7 @@ class BodyRegion:
         return tuple(name for name, sure in zip(fields, known, strict=True) if not sure)
 
     def peak_force(self, speed: float, robot_mass: float) -> float:
-        """Peak force [N] of a blow by the standard's two masses and one spring.
+        """Peak force [N] of an impact by the standard's two masses and one spring.
 
         Args:
             speed: relative speed along the contact normal [m/s].
@@ -50,7 +50,7 @@ class BodyRegion:
         return speed * math.sqrt(self._reduced_mass(robot_mass) * self.stiffness)
 
     def speed_limit(self, robot_mass: float) -> float:
-        """Largest relative speed [m/s] at which a blow stays within :attr:`transient_force`."""
+        """Largest relative speed [m/s] at which an impact stays within :attr:`transient_force`."""
         return self.transient_force / math.sqrt(self._reduced_mass(robot_mass) * self.stiffness)
 
     def _reduced_mass(self, robot_mass: float) -> float:

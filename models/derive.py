@@ -12,8 +12,8 @@ from tauguard.arrays import Array
 #: small motors (about 0.002: 1e-5 kg m^2 behind a gear of 101 for 54 N m) and the DLR arm's
 #: (0.016: 3.2 kg m^2 for 200 N m).
 ROTOR_PER_TORQUE = 0.005
-#: Where there is no torque limit either: this share of the joint's largest inertia.
-ROTOR_SHARE = 0.05
+#: Where there is no torque limit either: this fraction of the joint's largest inertia.
+ROTOR_FRACTION = 0.05
 #: A torque limit that nobody states holds the arm this many times, overcomes the friction of the
 #: file twice, and accelerates the largest inertia so [rad/s^2] (a UR10e's base: 27).
 HOLDING_FACTOR, SPARE_ACCELERATION = 2.0, 30.0
@@ -28,7 +28,7 @@ DEFAULT_SPEED, DEFAULT_ACCELERATION = 2.0, 10.0
 POSES = 64
 #: A pose is drawn within this of zero where a joint has no range [rad].
 FREE_RANGE = np.pi
-#: Home keeps this share of a joint's range from both of its ends.
+#: Distance of the home pose from both ends of a joint's range, as a fraction of it.
 HOME_MARGIN = 0.1
 #: A default bandwidth is lowered until the servo's stiffest mode (:func:`stiffest_mode`) changes by
 #: at most this much a step; a stated one may go up to the second number, 2 would be unstable.
@@ -124,8 +124,8 @@ def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) 
     given = model.dof_armature[model.jnt_dofadr[at]]
     hinge = model.jnt_type[at] == mujoco.mjtJoint.mjJNT_HINGE
     masses = inertia_matrices(model, joints, random_poses(model, joints))
-    share = ROTOR_SHARE * masses.diagonal(axis1=1, axis2=2).max(axis=0)
-    guess = np.where(np.isfinite(limit), ROTOR_PER_TORQUE * limit, share)
+    least = ROTOR_FRACTION * masses.diagonal(axis1=1, axis2=2).max(axis=0)
+    guess = np.where(np.isfinite(limit), ROTOR_PER_TORQUE * limit, least)
     return np.where(given > 0, given, np.where(hinge, guess, 0.0))
 
 

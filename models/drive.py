@@ -142,7 +142,7 @@ class Drive:
     ripple: Ripple | None = None
     sensors: Sensors | None = None
     rated_speed: Array | None = None
-    """Up to it the whole torque is there [rad/s], shape (n,); above it the back-EMF takes of the
+    """Up to it the full torque is available [rad/s], shape (n,); above it the back-EMF takes of the
     torque along the motion, all of it at ``no_load_speed``, and brakes beyond."""
     no_load_speed: Array | None = None  #: [rad/s], above the rated speed, shape (n,)
 

@@ -13,17 +13,17 @@ from tauguard.models.scene import Scene
 def reflected_mass(
     scene: Scene, q: ArrayLike, body: int, point: ArrayLike, direction: ArrayLike
 ) -> float:
-    """Mass that a blow meets at a point of the arm [kg]: 1 / (n^T J M^-1 J^T n).
+    """Effective mass of the arm at a point of impact [kg]: 1 / (n^T J M^-1 J^T n).
 
-    Armature included, since a blow is shorter than any drive can answer. (Khatib, "Inertial
+    Armature included, since an impact is shorter than the response of any drive. (Khatib, "Inertial
     properties in robotic manipulation", 1995.)
 
     Args:
         scene: a composed scene.
         q: joint positions [rad], shape (n,).
-        body: id of the struck body.
+        body: id of the body that is hit.
         point: where, in the world frame [m], shape (3,).
-        direction: n, of the blow; its length does not matter, shape (3,).
+        direction: n, of the impact; its length does not matter, shape (3,).
 
     Raises:
         ValueError: a zero direction, or one in which no joint can move the point.

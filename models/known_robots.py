@@ -178,16 +178,17 @@ def find_file(name: str) -> Path:
         path = menagerie_file(menagerie)
         if path is not None:
             return path
-    ways = []
+    installs = []
     if urdf is not None:
-        ways.append("install example-robot-data (the extra `arms`)")
+        installs.append("install example-robot-data (the extra `arms`)")
     if menagerie is not None:
-        ways.append(
+        installs.append(
             "install mujoco-menagerie (the extra `arms`) and run "
             f"`tauguard robot {name} --download` once"
         )
     raise FileNotFoundError(
-        f"arm {name!r}: its model is in no installed package; {', or '.join(ways)}, or give a file"
+        f"arm {name!r}: its model is in no installed package; "
+        f"{', or '.join(installs)}, or give a file"
     )
 
 

@@ -14,8 +14,9 @@ from tauguard.models.drive import Drive
 class Mismatch:
     """One arm out of many: each number is a half-width of a uniform, relative (com: absolute).
 
-    The inertia of a link is scaled as a whole and with its mass, and its principal moments by
-    independent factors of at most a quarter of ``inertia``, so that it stays physically possible.
+    The inertia of a link is scaled with its mass and by a common factor. Its principal moments are
+    scaled by independent factors, each at most a quarter of ``inertia``, so that the inertia stays
+    physically possible.
     """
 
     seed: int
@@ -44,9 +45,9 @@ class Mismatch:
             mass, inertia = body.mass, _inertia_matrix(body)
             scale = 1 + self.mass * rng.uniform(-1, 1)
             shift = self.com * rng.uniform(-1, 1, 3)
-            whole = scale * (1 + self.inertia * rng.uniform(-1, 1))
+            common = scale * (1 + self.inertia * rng.uniform(-1, 1))
             moments, axes = np.linalg.eigh(inertia)
-            moments = _possible(moments * whole * (1 + self.inertia / 4 * rng.uniform(-1, 1, 3)))
+            moments = _possible(moments * common * (1 + self.inertia / 4 * rng.uniform(-1, 1, 3)))
             turn = axes * np.linalg.det(axes)
             quat = np.zeros(4)
             mujoco.mju_mat2Quat(quat, turn.ravel())

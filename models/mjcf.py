@@ -26,7 +26,7 @@ def _precise_library() -> ctypes.CDLL | None:
 def xml_text(spec: mujoco.MjSpec) -> str:
     """The MJCF text of a compiled spec, with every digit.
 
-    MuJoCo writes six digits unless told otherwise, which moves a rotated base by micrometres. The
+    MuJoCo writes six digits by default, which moves a rotated base by micrometres. The
     switch is a private function of its library; where it is missing the text has six digits.
     """
     switch = _precise_library()
@@ -81,7 +81,7 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """The model of ``spec``, without its mesh geoms where these keep it from compiling.
 
     Raises:
-        ValueError: it does not compile either way; MuJoCo's first message.
+        ValueError: it compiles neither with nor without shapes; MuJoCo's first message.
     """
     try:
         return spec.compile()

@@ -23,7 +23,7 @@ class Striker:
     """A ball that flies freely (weightless) and strikes the arm; parked until it is launched."""
 
     radius: float = 0.05  #: [m]
-    mass: float = 2.0  #: [kg]: with the arm's inertia it sets the length of a blow
+    mass: float = 2.0  #: [kg]: with the arm's inertia it sets how long an impact lasts
     stiffness: float = 3e4  #: of its contact [N/m]
     damping: float = 60.0  #: of its contact [N s/m]
 
@@ -35,7 +35,7 @@ class Striker:
 
 @dataclass(frozen=True)
 class Clamp:
-    """A ball that stands still in the arm's way; parked until it is placed."""
+    """A ball at rest in the arm's path; parked until it is placed."""
 
     radius: float = 0.05  #: [m]
     stiffness: float = 2e4  #: of its contact [N/m]

@@ -1,13 +1,13 @@
 """A person of capsules, a body region each, sized by stature.
 
-Lengths are shares of the stature after Drillis & Contini, "Body Segment Parameters" (1966), as in
-Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1. Statures are those of
+Lengths are fractions of the stature after Drillis & Contini, "Body Segment Parameters" (1966), as
+in Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1. Statures are those of
 Huston, "Principles of Biomechanics" (2009). The radii are estimates from girths of adults (no
 source was at hand): verify them where a clearance counts.
 
 Each capsule hangs in a frame that follows the person's motion exactly (a MuJoCo mocap body) and
 may give way in it: three slides with the region's effective mass behind them, held by a weak
-spring. A blow then meets the two masses and the spring of ISO 10218-2 and its peak is the
+spring. An impact then involves the two masses and the spring of ISO 10218-2 and its peak is the
 standard's; a frame alone would weigh infinitely much (a hand's peak 2.8 times too high against
 an arm of 4 kg), and a chain of driven links would weigh what the pose makes of it, for which the
 limits do not hold. Pelvis and legs carry the person and do not give way: against their 40 to 75 kg
@@ -34,13 +34,13 @@ POSTURES = ("standing", "seated")
 #: What a person does: works with the hands and walks, works in place, or stands with arms hanging.
 MOTIONS = ("walk", "work", "still")
 #: Lengths in units of the stature. Trunk: from hip to shoulder; grip: from wrist to palm.
-SHARES = {
+LENGTHS = {
     "hip": 0.530, "trunk": 0.288, "shoulder": 0.1295, "hip_half": 0.055, "neck": 0.052,
     "head": 0.130, "upper_arm": 0.186, "lower_arm": 0.146, "hand": 0.108, "grip": 0.054,
     "thigh": 0.245, "shank": 0.246, "foot": 0.039,
 }  # fmt: skip
 #: A region gives way against this spring [N/m], a heavy one at this frequency [rad/s], and at this
-#: share of critical damping: much slower than a blow. (A hand held still: 300 N/m,
+#: fraction of critical damping: much slower than an impact. (A hand held still: 300 N/m,
 #: Mussa-Ivaldi, Hogan & Bizzi 1985; the rest are estimates.)
 GIVE_STIFFNESS, GIVE_FREQUENCY, GIVE_DAMPING = 300.0, 2 * np.pi, 0.5
 
@@ -58,7 +58,9 @@ class Segment:
 
 
 def _limbs(side: str) -> tuple[Segment, ...]:
-    half = {name: SHARES[name] / 2 for name in ("upper_arm", "lower_arm", "hand", "thigh", "shank")}
+    half = {
+        name: LENGTHS[name] / 2 for name in ("upper_arm", "lower_arm", "hand", "thigh", "shank")
+    }
     return (
         Segment(f"{side}_upper_arm", "upper_arm", half["upper_arm"], 0.030, 0.725),
         Segment(f"{side}_lower_arm", "lower_arm", half["lower_arm"], 0.023, 0.6),
@@ -117,8 +119,8 @@ class Person:
         return self.posture == "seated"
 
     def length(self, name: str) -> float:
-        """One of :data:`SHARES` [m]."""
-        return SHARES[name] * self.stature
+        """One of :data:`LENGTHS` [m]."""
+        return LENGTHS[name] * self.stature
 
     @property
     def hip_height(self) -> float:
@@ -203,7 +205,7 @@ def add_person(spec: mujoco.MjSpec, person: Person) -> dict[str, PersonPart]:
 
 
 def _add_slides(body: mujoco.MjsBody, mass: float) -> None:
-    """Three slides that give way to a blow and come back."""
+    """Three slides that yield to an impact and return."""
     stiffness = max(GIVE_STIFFNESS, mass * GIVE_FREQUENCY**2)
     damping = 2 * GIVE_DAMPING * float(np.sqrt(stiffness * mass))
     for axis in np.eye(3):

@@ -82,7 +82,7 @@ class Robot:
     max_speed: float | Numbers | None = None  #: [rad/s]
     max_acceleration: float | Numbers | None = None  #: [rad/s^2]
     bandwidth: float | Numbers | None = None  #: of the servo [rad/s]
-    friction_compensation: float = 1.0  #: share of the known friction that the servo makes up for
+    friction_compensation: float = 1.0  #: fraction of the known friction that the servo compensates
     drive: RobotDrive = RobotDrive()  #: noqa: RUF009
 
     def __post_init__(self) -> None:

@@ -44,8 +44,9 @@ class SceneSpec:
     """What a scene holds."""
 
     timestep: float = 1e-3
-    """[s]. At 1 ms the peak force of a blow is within 2 % of the two-mass model, at 2 ms 7 % off at
-    half the cost: ``tauguard bench impact`` chose it, the integrator and the contact parameters."""
+    """[s]. At 1 ms the peak force of an impact is within 2 % of the two-mass model; at 2 ms it is
+    7 % off at half the cost. ``tauguard bench impact`` is the source of this choice, of the
+    integrator and of the contact parameters."""
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  #: [m/s^2]
     mismatch: Mismatch | None = None  #: how the simulated arm differs from the nominal one
     payload: bool = False  #: a body at the flange whose mass ``set_payload`` changes
@@ -89,7 +90,7 @@ class Scene:
     """A compiled scene and where its parts are."""
 
     model: mujoco.MjModel
-    text: SpecText  #: of the whole scene, see :attr:`xml`
+    text: SpecText  #: of the scene, see :attr:`xml`
     spec: SceneSpec
     arm_text: SpecText  #: of the nominal arm alone, see :attr:`arm_xml`
     joint_names: tuple[str, ...]
@@ -104,7 +105,7 @@ class Scene:
 
     @property
     def xml(self) -> str:
-        """MJCF text of the whole scene, self-contained."""
+        """MJCF text of the scene, self-contained."""
         return str(self.text)
 
     @property

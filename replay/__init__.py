@@ -2,7 +2,7 @@
 
 import os
 
-# Rerun reports its use to its makers unless it is told not to; who wants that sets it to 1.
+# Rerun reports its use to its makers by default; set the variable to 1 to allow that.
 os.environ.setdefault("RERUN_ANALYTICS", "0")
 
 from tauguard.replay.rrd import write_rrd

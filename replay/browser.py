@@ -100,7 +100,7 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
     server: _Server
 
     def do_GET(self) -> None:
-        """A file of the folder, the page, or the way to the viewer."""
+        """A file of the folder, the page, or the address of the viewer."""
         path = unquote(self.path.partition("?")[0])
         if path.startswith("/open/"):
             self.send_response(http.HTTPStatus.FOUND)

@@ -38,7 +38,7 @@ def write_contacts_rrd(
     """Write a recording that ``rerun FILE`` opens: bodies, cloth, contacts, and notes in time.
 
     Args:
-        path: The ``.rrd`` file; it appears whole or not at all.
+        path: The ``.rrd`` file; written atomically.
         model: ``mujoco.MjModel``.
         t: Rising [s]. Shape (T,).
         positions: Of the bodies. Shape (T, nbody, 3), m.

@@ -14,7 +14,7 @@ CROWDED = 8.0
 
 
 def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, title: str) -> None:
-    """Draw a stretch of a recording as PNG; the file appears whole or not at all.
+    """Draw a stretch of a recording as PNG; the file is written atomically.
 
     Args:
         path: of the picture.

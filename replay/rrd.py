@@ -60,7 +60,7 @@ def write_rrd(
     otherwise, so the recording begins at the first detection of a collision, if there is one.
 
     Args:
-        path: the ``.rrd`` file; it appears whole or not at all.
+        path: the ``.rrd`` file; written atomically.
         trace: what to show.
         detection: what a detector said about it.
         model: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by

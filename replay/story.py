@@ -27,7 +27,7 @@ def alarm_of(collision: Collision, alarms: tuple[Alarm, ...]) -> Alarm | None:
 def first_moment(trace: Trace, detection: Detection | None) -> float:
     """Where to begin [s]: the first alarm of a detected collision, else the first sample.
 
-    At the collision's end, if the alarm comes later: what was struck is to be seen.
+    At the collision's end, if the alarm comes later: the body that was hit is visible.
     """
     if trace.truth is None or detection is None:
         return float(trace.t[0])

@@ -35,7 +35,7 @@ MEDIA_TYPES = {".xml": "text/xml", ".json": "application/json", ".toml": "applic
 def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = None) -> None:
     """Write a trace, and what a detector said about it, as one MCAP file.
 
-    The file appears whole or not at all: it is written beside ``path`` and renamed.
+    The file is replaced atomically: it is written beside ``path`` and renamed.
 
     Raises:
         ValueError: a field of the wrong shape, a time below 0 or beyond what nanoseconds in 64
@@ -74,7 +74,7 @@ def read_mcap(path: str | Path) -> tuple[Trace, Detection | None]:
     path = Path(path)
     data = path.read_bytes()
     expected = (
-        "expected a whole MCAP file written by tauguard "
+        "expected a complete MCAP file written by tauguard "
         "(logs of other programs: tauguard.datasets.read_log)"
     )
     with reading(path, expected):

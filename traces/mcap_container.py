@@ -1,4 +1,4 @@
-"""MCAP files whose topics are tables: whole chunks of messages packed and unpacked at once.
+"""MCAP files whose topics are tables: a chunk of messages is packed and unpacked at once.
 
 The container format is the public one (mcap.dev/spec), and the records are the ``mcap`` package's
 own; only the inside of a chunk and its message index, which that package handles a message at a

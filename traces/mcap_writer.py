@@ -1,4 +1,4 @@
-"""The writer of MCAP files whose topics are tables: whole chunks of messages packed at once."""
+"""The writer of MCAP files whose topics are tables: a chunk of messages is packed at once."""
 
 from __future__ import annotations
 

@@ -16,12 +16,12 @@ KINDS = ("strike", "clamp", "pulse")
 
 @dataclass(frozen=True)
 class Collision:
-    """One labelled collision: what struck the arm, when, where and how hard."""
+    """One labelled collision: what hit the arm, when, where and how hard."""
 
     kind: str  #: "strike" (a moving obstacle), "clamp" (a fixed one) or "pulse" (a wrench pulse)
     onset: float  #: time of the first sample with a contact force above 0 N [s]
     end: float  #: time of the last such sample [s]
-    link: int  #: the struck link, 1-based: link i moves with joint i
+    link: int  #: the link that was hit, 1-based: link i moves with joint i
     point: Array  #: where, at the sample of peak force, world frame [m], shape (3,)
     force: Array  #: peak contact force on the arm, world frame [N], shape (3,)
     peak_tau: float  #: largest ``|tau_ext|`` over joints 1-4 [N m]: the severity axis
@@ -34,7 +34,7 @@ class Truth:
     tau_ext: Array  #: torque of contacts and applied wrenches at the joints [N m], shape (T, n)
     contact_force: Array  #: norm of the net external contact force on the arm [N], shape (T,)
     collisions: tuple[Collision, ...]
-    payload: Array  #: mass carried at the flange and not told to the observer [kg], shape (T,)
+    payload: Array  #: mass carried at the flange, unknown to the observer [kg], shape (T,)
     contact_link: NDArray[np.int64]  #: link of the largest contact force, 0 for none, shape (T,)
     contact_point: Array  #: its point, world frame [m], NaN where there is none, shape (T, 3)
     contact_vector: Array  #: its force on the arm, world frame [N], 0 for none, shape (T, 3)

@@ -7,7 +7,7 @@ namespace {
 
 template <int ArityA, int ArityB>
 void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::int32_t* ids_b,
-          const std::int32_t* vb, Mask hits, const Groups& groups, const Loose& loose,
+          const std::int32_t* vb, Mask hits, const Groups& groups, const Isolated& isolated,
           CandidateBlock& out) {
   std::int32_t a[ArityA];
   for (int j = 0; j < ArityA; ++j) a[j] = va[j * lanes + i];
@@ -25,7 +25,7 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
     pair[1] = swap ? id_a : id_b;
     bool meet = !groups.any() || groups.meet(groups.of_vertex[a[0]], groups.of_vertex[vb[lane]]);
     out.kept_apart += !meet;
-    if (ArityA == 1) meet = meet && loose.meet(a[0], id_b, vb[lane], vb[lanes + lane]);
+    if (ArityA == 1) meet = meet && isolated.meet(a[0], id_b, vb[lane], vb[lanes + lane]);
     row += 4 * meet;
     pair += 2 * meet;
   }
@@ -35,7 +35,7 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
 }  // namespace
 
 void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
-                     const Groups& groups, const Loose& loose, CandidateBlock& out) {
+                     const Groups& groups, const Isolated& isolated, CandidateBlock& out) {
   static const OverlapKernels& kernels = overlap_kernels();
   const bool edges = &a == &b, same = edges && leaves.a == leaves.b;
   LeafLanes left = a.lanes_of(leaves.a);
@@ -52,9 +52,9 @@ void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves
     const int i = __builtin_ctz(rows);
     const Mask hits = found.lanes_of[i];
     if (edges) {
-      emit<2, 2>(ids_a, va, i, ids_b, vb, hits, groups, loose, out);
+      emit<2, 2>(ids_a, va, i, ids_b, vb, hits, groups, isolated, out);
     } else {
-      emit<1, 3>(ids_a, va, i, ids_b, vb, hits, groups, loose, out);
+      emit<1, 3>(ids_a, va, i, ids_b, vb, hits, groups, isolated, out);
     }
   }
 }

@@ -21,9 +21,10 @@ struct CandidateBlock {
                 kept_apart = 0;  // left out: sharing a vertex; of groups that do not meet
 };
 
-// Loose edges and points among the faces (topology.hpp): from which face on, and which vertices are
-// loose points. Those alone meet them, and each two points once.
-struct Loose {
+// Isolated edges and vertices stand behind the triangles (topology.hpp): `first` is the number of
+// the first of them, `point` marks the isolated vertices. Only isolated vertices are tested with
+// them, and each pair of isolated vertices once.
+struct Isolated {
   std::int32_t first;
   const std::uint8_t* point;
   bool meet(std::int32_t vertex, std::int32_t face, std::int32_t a, std::int32_t b) const {
@@ -35,6 +36,6 @@ struct Loose {
 // may meet. Edges come smaller number first; vertices and faces come vertex first. `out` must not
 // be full.
 void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
-                     const Groups& groups, const Loose& loose, CandidateBlock& out);
+                     const Groups& groups, const Isolated& isolated, CandidateBlock& out);
 
 }  // namespace tauguard::cloth

@@ -6,13 +6,13 @@
 #include <limits>
 #include <optional>
 
+#include "bernstein.hpp"
 #include "binary.hpp"
-#include "forms.hpp"
 
 namespace tauguard::cloth {
 namespace {
 
-using Vector = std::array<Form<1>, 3>;
+using Vector = std::array<Bernstein<1>, 3>;
 
 // Coordinates k of four vertices at both ends, [vertex][end], in units of a power of two (each axis
 // its own); false where they do not fit.
@@ -23,7 +23,7 @@ bool on_axis(const Ends& x, const std::int32_t* row, int k, FixedInt<2> (*out)[2
   return as_integers(values, 8, out[0]);
 }
 
-Form<2> cross(const Vector& a, const Vector& b, int k) {
+Bernstein<2> cross(const Vector& a, const Vector& b, int k) {
   const int i = (k + 1) % 3, j = (k + 2) % 3;
   return a[i] * b[j] - a[j] * b[i];
 }
@@ -43,7 +43,7 @@ class Hull {
   }
 
   double first_contact() {
-    const Form<3> cubic =
+    const Bernstein<3> cubic =
         corner_[0][0] * side(1, 0) + corner_[0][1] * side(1, 1) + corner_[0][2] * side(1, 2);
     if (cubic.zero()) return first_contact_in_plane();
     const auto roots = roots_of(cubic);
@@ -55,7 +55,7 @@ class Hull {
                           silent = std::numeric_limits<double>::quiet_NaN();
 
   const Vector& after(int i) const { return corner_[(i + 1) % corners_]; }
-  const Form<2>& side(int i, int k) {
+  const Bernstein<2>& side(int i, int k) {
     auto& known = sides_[i][k];
     if (!known) known = cross(corner_[i], after(i), k);
     return *known;
@@ -63,7 +63,7 @@ class Hull {
 
   // Sets open_ where a sign is unknown; what is returned then is of no use.
   template <class Time>
-  int sign(const Form<2>& q, const Time& t) {
+  int sign(const Bernstein<2>& q, const Time& t) {
     const int s = sign_at(q, t);
     open_ = open_ || s == unknown_sign;
     return s;
@@ -79,7 +79,7 @@ class Hull {
   template <class Time>
   bool contains_origin(const Time& t) {
     for (int k = 0; k < 3; ++k) {
-      Form<2> area = side(0, k);
+      Bernstein<2> area = side(0, k);
       for (int i = 1; i < corners_; ++i) area = area + side(i, k);
       const int s = sign(area, t);
       if (s == 0) continue;
@@ -105,19 +105,20 @@ class Hull {
   }
 
   double first_contact_in_plane() {
-    const FormRoot<2> start{0, 0};
+    const BernsteinRoot<2> start{0, 0};
     const bool touching = contains_origin(start);
     if (open_ || touching) return touching && !open_ ? 0 : silent;
-    std::array<FormRoot<2>, 16> times;
+    std::array<BernsteinRoot<2>, 16> times;
     int count = 0;
     bool complete = true;
     for (int i = 0; i < corners_; ++i) {
       int k = 0;
       while (k < 3 && side(i, k).zero()) ++k;
-      const Form<2>* moving[2] = {k < 3 ? &side(i, k) : raised(i), k < 3 ? nullptr : raised(i + 1)};
-      for (const Form<2>* form : moving) {
-        if (!form) continue;
-        const auto roots = roots_of(*form);
+      const Bernstein<2>* moving[2] = {k < 3 ? &side(i, k) : raised(i),
+                                       k < 3 ? nullptr : raised(i + 1)};
+      for (const Bernstein<2>* side : moving) {
+        if (!side) continue;
+        const auto roots = roots_of(*side);
         std::copy_n(roots.all.begin(), roots.count, times.begin() + count);
         count += roots.count;
         complete = complete && roots.complete;
@@ -128,10 +129,11 @@ class Hull {
     return first_of(times.data(), count, complete);
   }
 
-  // A corner's first coordinate that is not zero throughout, as a form of degree 2; null: none.
-  const Form<2>* raised(int i) {
+  // A corner's first coordinate that is not zero throughout, as a polynomial of degree 2; null:
+  // none.
+  const Bernstein<2>* raised(int i) {
     i %= corners_;
-    for (const Form<1>& x : corner_[i]) {
+    for (const Bernstein<1>& x : corner_[i]) {
       if (x.zero()) continue;
       const FixedInt<4> a(x.c[0]), b(x.c[1]);
       raised_[i].c = {a, a + b, b};
@@ -141,9 +143,9 @@ class Hull {
   }
 
   int corners_;
-  std::array<Form<2>, 4> raised_;
+  std::array<Bernstein<2>, 4> raised_;
   std::array<Vector, 4> corner_;
-  std::array<std::array<std::optional<Form<2>>, 3>, 4> sides_{};
+  std::array<std::array<std::optional<Bernstein<2>>, 3>, 4> sides_{};
   bool open_ = false;
 };
 

@@ -66,7 +66,7 @@ void MeshCcd::copy(const double* x_t0, const double* x_t1, std::size_t n) {
   if (n < topology_.rows() || (groups_.any() && n < groups_.of_vertex.size()))
     throw std::invalid_argument("x_t0: fewer vertices than the mesh has");
   lines_.resize(std::max<std::size_t>(n, 1));
-  loose_ = loose_points(topology_, n);
+  isolated_ = isolated_vertices(topology_, n);
   double wild = 0;  // NaN where an entry is not finite
   for (std::size_t i = 0; i < n; ++i) {
     double* line = lines_[i].value;
@@ -138,7 +138,7 @@ void MeshCcd::for_each_block(Kind kind, const Take& take) {
   const auto& pairs = vf ? *vf_pairs_ : *ee_pairs_;
   const FeatureTree &a = vf ? vertices_ : edges_, &b = vf ? faces_ : edges_;
   BroadCounts& counts = vf ? stats_.vf : stats_.ee;
-  const Loose loose{static_cast<std::int32_t>(topology_.triangles), loose_.data()};
+  const Isolated isolated{static_cast<std::int32_t>(topology_.triangles), isolated_.data()};
   std::mutex mutex;
   geometry::interruptible_for(
       pairs.size(), threads_, chunk_pairs, [&](auto begin, auto end, auto chunk) {
@@ -151,7 +151,7 @@ void MeshCcd::for_each_block(Kind kind, const Take& take) {
             prefetch(a, pairs[i + 1].a);
             prefetch(b, pairs[i + 1].b);
           }
-          leaf_candidates(a, b, pairs[i], groups_, loose, block);
+          leaf_candidates(a, b, pairs[i], groups_, isolated, block);
           if (block.size >= CandidateBlock::full || (i + 1 == end && block.size > 0)) {
             geometry::poll_interrupt();
             candidates += block.size;

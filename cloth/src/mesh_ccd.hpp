@@ -73,7 +73,7 @@ class MeshCcd {
   void forget();
 
   std::vector<Line> lines_;
-  std::vector<std::uint8_t> loose_;
+  std::vector<std::uint8_t> isolated_;
   Topology topology_;
   Groups groups_;
   VolumeKind volume_;

@@ -67,15 +67,15 @@ void Topology::set(std::vector<std::int32_t> face_vertices) {
   }
 }
 
-std::vector<std::uint8_t> loose_points(const Topology& topology, std::size_t n) {
+std::vector<std::uint8_t> isolated_vertices(const Topology& topology, std::size_t n) {
   if (topology.triangles == topology.faces.size()) return {};
-  std::vector<std::uint8_t> loose(n, 0);
+  std::vector<std::uint8_t> isolated(n, 0);
   for (std::size_t i = topology.triangles; i < topology.faces.size(); ++i) {
     const std::int32_t* row = topology.faces.of(i);
-    loose[row[0]] = row[0] == row[1];
+    isolated[row[0]] = row[0] == row[1];
   }
-  for (const auto v : topology.edges.vertices) loose[v] = 0;
-  return loose;
+  for (const auto v : topology.edges.vertices) isolated[v] = 0;
+  return isolated;
 }
 
 std::vector<std::int32_t> match_sorted(const Features& before, const Features& after) {

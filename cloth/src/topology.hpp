@@ -9,8 +9,9 @@
 
 namespace tauguard::cloth {
 
-// A loose edge stands among the faces as (a, b, b), a loose point as (p, p, p), after all
-// triangles: vertex and face then is point and edge, or point and point.
+// An isolated edge belongs to no face, an isolated vertex to no face and no edge. They stand behind
+// all triangles in `faces`, as (a, b, b) and (p, p, p): a vertex-face query of such a row is one of
+// a point and an edge, or of two points.
 struct Topology {
   Features vertices{1, {}}, edges{2, {}}, faces{3, {}};
   // Positions must have at least so many rows.
@@ -18,13 +19,13 @@ struct Topology {
     return vertices.vertices.empty() ? 0 : std::size_t(vertices.vertices.back()) + 1;
   }
   std::size_t triangles = 0;
-  // faces: rows of three different vertices, then the loose ones. Edges: rows (smaller, larger) in
-  // lexicographic order.
+  // faces: rows of three different vertices, then isolated edges and vertices. Edges: rows
+  // (smaller, larger) in lexicographic order.
   void set(std::vector<std::int32_t> face_vertices);
 };
 
-// Of vertices 0 to n - 1: 1 for the loose points.
-std::vector<std::uint8_t> loose_points(const Topology& topology, std::size_t n);
+// 1 for each isolated vertex, 0 for the others. Shape (n).
+std::vector<std::uint8_t> isolated_vertices(const Topology& topology, std::size_t n);
 
 // For every old feature the number of the equal new one, or -1. Rows must be sorted and unique.
 std::vector<std::int32_t> match_sorted(const Features& before, const Features& after);

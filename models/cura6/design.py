@@ -31,7 +31,7 @@ class Link:
 
     pos: tuple[float, float, float]  #: of the joint in the parent's frame [m]
     axis: str  #: "y" or "z"
-    reach: float  #: joint range, both ways [rad]
+    reach: float  #: joint range, in both directions [rad]
     speed: float  #: largest joint speed [rad/s]
     torque: float  #: largest joint torque [N m]
     rotor: float  #: inertia of motor and gear at the joint (rotor inertia x gear^2) [kg m^2]
@@ -151,10 +151,10 @@ def inertial(link: Link) -> tuple[float, np.ndarray, np.ndarray]:
         across = (3 * part.radius**2 + length**2) / 12
         line = np.outer(along, along)
         tensors.append(across * (np.eye(3) - line) + part.radius**2 / 2 * line)
-    share = np.array(weights) / sum(weights) * link.mass
-    centre = (share[:, None] * np.array(centres)).sum(axis=0) / link.mass
+    masses = np.array(weights) / sum(weights) * link.mass
+    centre = (masses[:, None] * np.array(centres)).sum(axis=0) / link.mass
     total = np.zeros((3, 3))
-    for m, c, tensor in zip(share, centres, tensors, strict=True):
+    for m, c, tensor in zip(masses, centres, tensors, strict=True):
         d = c - centre
         total += m * (tensor + np.dot(d, d) * np.eye(3) - np.outer(d, d))
     return link.mass, centre, total

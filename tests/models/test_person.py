@@ -6,16 +6,18 @@ import pytest
 
 from tauguard.models import Person, SceneSpec, compose
 from tauguard.models.body_regions import BODY_REGIONS
-from tauguard.models.person import SEGMENTS, SHARES, STATURES
+from tauguard.models.person import LENGTHS, SEGMENTS, STATURES
 
 
 def test_lengths_are_those_of_the_table():
     """Winter, figure 4.1: heights of knee, hip, shoulder and chin are sums of the lengths."""
-    assert SHARES["foot"] + SHARES["shank"] == pytest.approx(0.285)
-    assert SHARES["foot"] + SHARES["shank"] + SHARES["thigh"] == pytest.approx(0.530)
-    assert SHARES["hip"] + SHARES["trunk"] == pytest.approx(0.818)
-    assert SHARES["hip"] + SHARES["trunk"] + SHARES["neck"] == pytest.approx(0.870)
-    assert SHARES["hip"] + SHARES["trunk"] + SHARES["neck"] + SHARES["head"] == pytest.approx(1.0)
+    assert LENGTHS["foot"] + LENGTHS["shank"] == pytest.approx(0.285)
+    assert LENGTHS["foot"] + LENGTHS["shank"] + LENGTHS["thigh"] == pytest.approx(0.530)
+    assert LENGTHS["hip"] + LENGTHS["trunk"] == pytest.approx(0.818)
+    assert LENGTHS["hip"] + LENGTHS["trunk"] + LENGTHS["neck"] == pytest.approx(0.870)
+    assert LENGTHS["hip"] + LENGTHS["trunk"] + LENGTHS["neck"] + LENGTHS["head"] == pytest.approx(
+        1.0
+    )
 
 
 def test_every_capsule_is_a_region_of_the_limits():

@@ -178,7 +178,7 @@ def test_losses_like_the_cura6s_are_shares_of_the_limits(arm):
     noise = drive.sensors.current_noise / drive.current_limit
     assert noise == pytest.approx(np.mean(own.sensors.current_noise / own.current_limit))
     assert drive.ripple.amplitude.shape == (len(like.joints), len(own.ripple.cycles))
-    assert "shares of limits" in like.sources["drive"]
+    assert "fractions of limits" in like.sources["drive"]
     stated = Robot(str(arm(5)), drive=RobotDrive(like="cura6", coulomb=0.5))
     assert load_arm(stated).facts.drive.friction.coulomb == pytest.approx(0.5)
     with pytest.raises(ValueError, match=r'drive\.like .*expected "cura6"'):

@@ -130,13 +130,13 @@ def found(frame):
 
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("volume", ["moving_k_dop14", "k_dop18"])
-def test_frames_of_loose_parts_have_every_pair(seed, volume):
+def test_frames_of_isolated_parts_have_every_pair(seed, volume):
     faces, rods, points, x = parts(np.random.default_rng(seed))
     ccd = MeshCCD(faces, volume=volume, edges=rods, points=points)
     assert ccd.points.tolist() == [8, 9, 10, 11, 12]
-    loose = [[1, 4], [4, 5], [5, 6], [6, 7]]
-    assert all(e in ccd.edges.tolist() for e in loose)
-    truth = all_pairs(faces, ccd.edges, loose, range(8, 13), range(13), x)
+    isolated = [[1, 4], [4, 5], [5, 6], [6, 7]]
+    assert all(e in ccd.edges.tolist() for e in isolated)
+    truth = all_pairs(faces, ccd.edges, isolated, range(8, 13), range(13), x)
     assert found(ccd.find(*x)) == truth
     assert found(MeshCCD(faces, method="exact", edges=rods, points=points).find(*x)) == truth
     assert found(ccd.find(*x, fresh=True)) == truth
@@ -166,7 +166,7 @@ def test_wires_and_particles_alone_and_changed():
     assert found(ccd.find(*x)) == found(MeshCCD([[0, 1, 2]]).find(*x))
 
 
-def test_groups_keep_loose_parts_apart():
+def test_groups_keep_isolated_parts_apart():
     x = np.zeros((2, 3, 3))
     x[0, 0, 2], x[1, 0, 2], x[:, 1, 0], x[:, 2, 0] = 1, -1, -1, 1
     apart = Groups([0, 1, 1], [[True, False], [False, True]])
@@ -191,12 +191,12 @@ def test_groups_keep_loose_parts_apart():
         ({"points": [7], "method": "vcd"}, "method 'vcd': there are ab2pf, exact"),
     ],
 )
-def test_bad_loose_parts_are_named(kw, message):
+def test_bad_isolated_parts_are_named(kw, message):
     with pytest.raises(ValueError, match=message):
         MeshCCD([[0, 1, 2]], **kw)
 
 
-def test_positions_must_reach_to_every_loose_part():
+def test_positions_must_reach_to_every_isolated_part():
     x = np.zeros((4, 3))
     for kw, name in (({"edges": [[3, 9]]}, "edges: row"), ({"points": [9]}, "points: row")):
         with pytest.raises(ValueError, match=name):
@@ -228,7 +228,7 @@ def test_a_fraction_outside_0_1_is_refused(fraction):
 
 
 def test_an_obj_with_vertices_of_no_face_is_named(tmp_path):
-    file = tmp_path / "loose.obj"
+    file = tmp_path / "isolated.obj"
     file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\n")
     with pytest.warns(UserWarning, match="1 of 4 vertices belong to no face"):
         vertices, _ = read_mesh(file)

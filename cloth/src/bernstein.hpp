@@ -1,11 +1,11 @@
-// Polynomials on [0, 1] with integer coefficients of fixed width, their roots and signs at them:
-// what exact_polynomial.hpp does, for the many queries whose numbers are short and whose roots are
-// simple.
+// Bernstein polynomials on [0, 1] with integer coefficients of fixed width: their roots, and signs
+// of one at a root of another. exact_polynomial.hpp does the same with integers of any length; here
+// are the many queries whose coefficients are short and whose roots are simple.
 //
-// A form of degree n is the sum of c_i (1 - t)^(n - i) t^i: Bernstein's basis without its
-// binomials. A product is a convolution, the sign variations of the c_i bound the number of roots
-// in (0, 1) (Descartes), and t -> t / 2 keeps integers integers (Vincent). Times are multiples of
-// 2^-52.
+// A polynomial of degree n is the sum of c_i (1 - t)^(n - i) t^i: the Bernstein basis without its
+// binomial factors. A product is a convolution, the sign variations of the c_i bound the number of
+// roots in (0, 1) (Descartes), and t -> t / 2 keeps integers integers (Vincent). Times are
+// multiples of 2^-52.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ constexpr std::int64_t end_of_time = std::int64_t{1} << time_bits;
 // below 2^236, of the sum of its sides below 2^238, of the cubic below 2^356, and of the remainders
 // below 2^834.
 template <int degree>
-struct Form {
+struct Bernstein {
   std::array<FixedInt<2 * degree>, degree + 1> c;
 
   bool zero() const {
@@ -45,20 +45,20 @@ struct Form {
     }
     return count;
   }
-  friend Form operator+(const Form& a, const Form& b) {
-    Form r;
+  friend Bernstein operator+(const Bernstein& a, const Bernstein& b) {
+    Bernstein r;
     for (int i = 0; i <= degree; ++i) r.c[i] = a.c[i] + b.c[i];
     return r;
   }
-  friend Form operator-(const Form& a, const Form& b) {
-    Form r;
+  friend Bernstein operator-(const Bernstein& a, const Bernstein& b) {
+    Bernstein r;
     for (int i = 0; i <= degree; ++i) r.c[i] = a.c[i] - b.c[i];
     return r;
   }
 };
 template <int a, int b>
-Form<a + b> operator*(const Form<a>& x, const Form<b>& y) {
-  Form<a + b> r;
+Bernstein<a + b> operator*(const Bernstein<a>& x, const Bernstein<b>& y) {
+  Bernstein<a + b> r;
   for (int i = 0; i <= a; ++i)
     for (int j = 0; j <= b; ++j) r.c[i + j] = r.c[i + j] + x.c[i] * y.c[j];
   return r;
@@ -66,7 +66,7 @@ Form<a + b> operator*(const Form<a>& x, const Form<b>& y) {
 
 // The sign at time t 2^-52: 52 bits more a degree.
 template <int degree>
-int sign_at(const Form<degree>& f, std::int64_t t) {
+int sign_at(const Bernstein<degree>& f, std::int64_t t) {
   using Wide = FixedInt<3 * degree>;
   const std::uint64_t s = end_of_time - t;
   Wide sum(f.c[0]);
@@ -78,13 +78,13 @@ int sign_at(const Form<degree>& f, std::int64_t t) {
   return sum.sign();
 }
 
-// The parts before and after the middle, 2^degree times the form each.
-inline void halve(const Form<2>& f, Form<2>& left, Form<2>& right) {
+// The parts before and after the middle, 2^degree times the polynomial each.
+inline void halve(const Bernstein<2>& f, Bernstein<2>& left, Bernstein<2>& right) {
   const auto sum = f.c[0] + f.c[1] + f.c[2];
   left.c = {f.c[0].times(4), f.c[0].times(4) + f.c[1].times(2), sum};
   right.c = {sum, f.c[2].times(4) + f.c[1].times(2), f.c[2].times(4)};
 }
-inline void halve(const Form<3>& f, Form<3>& left, Form<3>& right) {
+inline void halve(const Bernstein<3>& f, Bernstein<3>& left, Bernstein<3>& right) {
   const auto sum = f.c[0] + f.c[1] + f.c[2] + f.c[3];
   left.c = {f.c[0].times(8), f.c[0].times(12) + f.c[1].times(4),
             f.c[0].times(6) + f.c[1].times(4) + f.c[2].times(2), sum};
@@ -96,29 +96,29 @@ constexpr int unknown_sign = 2;
 
 // A root: at lo exactly, or the only one of `of` in the open interval (lo, hi), where it is simple.
 template <int degree>
-struct FormRoot {
+struct BernsteinRoot {
   std::int64_t lo, hi;  // in 2^-52
-  const Form<degree>* of = nullptr;
+  const Bernstein<degree>* of = nullptr;
 };
 
 template <int degree>
-struct FormRoots {
-  std::array<FormRoot<degree>, degree> all;  // ascending
+struct BernsteinRoots {
+  std::array<BernsteinRoot<degree>, degree> all;  // ascending
   int count = 0;
   bool complete = true;  // false: there may be others
-  void add(FormRoot<degree> r) { all[count++] = r; }
+  void add(BernsteinRoot<degree> r) { all[count++] = r; }
 };
 
 // The one root of `part` in (0, 1), in double precision.
-inline double estimate(const Form<3>& part, int before) {
+inline double estimate(const Bernstein<3>& part, int before) {
   double b[4] = {part.c[0].to_double(), part.c[1].to_double() / 3, part.c[2].to_double() / 3,
                  part.c[3].to_double()};
   if (b[0] == 0) b[0] = before * 0x1p-300;
   if (b[3] == 0) b[3] = -before * 0x1p-300;
   return root(b);
 }
-inline double estimate(const Form<2>& part, int before) {
-  Form<3> raised;
+inline double estimate(const Bernstein<2>& part, int before) {
+  Bernstein<3> raised;
   const auto& c = part.c;
   raised.c = {FixedInt<6>(c[0]), FixedInt<6>(c[0] + c[1]), FixedInt<6>(c[1] + c[2]),
               FixedInt<6>(c[2])};
@@ -128,8 +128,8 @@ inline double estimate(const Form<2>& part, int before) {
 // Adds the roots of f inside (start, start + length), of which `part` is the restriction. Parts are
 // halved five times at most, which the width allows for.
 template <int degree>
-void add_roots_inside(const Form<degree>& f, const Form<degree>& part, std::int64_t start,
-                      std::int64_t length, FormRoots<degree>& roots) {
+void add_roots_inside(const Bernstein<degree>& f, const Bernstein<degree>& part, std::int64_t start,
+                      std::int64_t length, BernsteinRoots<degree>& roots) {
   const int variations = part.variations();
   if (variations == 0) return;
   if (variations > 1) {
@@ -137,7 +137,7 @@ void add_roots_inside(const Form<degree>& f, const Form<degree>& part, std::int6
       roots.complete = false;
       return;
     }
-    Form<degree> left, right;
+    Bernstein<degree> left, right;
     halve(part, left, right);
     const std::int64_t half = length / 2;
     add_roots_inside(f, left, start, half, roots);
@@ -156,7 +156,7 @@ void add_roots_inside(const Form<degree>& f, const Form<degree>& part, std::int6
     const int at_lo = lo == start ? before : sign_at(f, lo),
               at_hi = hi == start + length ? -before : sign_at(f, hi);
     if (at_lo == 0 || at_hi == 0)
-      return roots.add(at_lo == 0 ? FormRoot<degree>{lo, lo} : FormRoot<degree>{hi, hi});
+      return roots.add(at_lo == 0 ? BernsteinRoot<degree>{lo, lo} : BernsteinRoot<degree>{hi, hi});
     if (at_lo == before && at_hi == -before) return roots.add({lo, hi, &f});
   }
   roots.complete = false;
@@ -164,8 +164,8 @@ void add_roots_inside(const Form<degree>& f, const Form<degree>& part, std::int6
 
 // The roots of f in [0, 1]; f must not be zero, and outlive them.
 template <int degree>
-FormRoots<degree> roots_of(const Form<degree>& f) {
-  FormRoots<degree> roots;
+BernsteinRoots<degree> roots_of(const Bernstein<degree>& f) {
+  BernsteinRoots<degree> roots;
   if (f.c[0].sign() == 0) roots.add({0, 0});
   add_roots_inside(f, f, 0, end_of_time, roots);
   if (f.c[degree].sign() == 0) roots.add({end_of_time, end_of_time});
@@ -173,21 +173,21 @@ FormRoots<degree> roots_of(const Form<degree>& f) {
 }
 
 template <int degree>
-Form<degree> reversed(const Form<degree>& f) {
-  Form<degree> r = f;
+Bernstein<degree> reversed(const Bernstein<degree>& f) {
+  Bernstein<degree> r = f;
   std::reverse(r.c.begin(), r.c.end());
   return r;
 }
 
-// With a positive factor m, m f = q l + r (1 - t)^(n - 1) for a form l and r of degree 1: where q
+// With a positive factor m, m f = q l + r (1 - t)^(n - 1) for l and r of degree 1: where q
 // is zero, f has the sign of r. The last coefficient of q must not be zero.
-inline std::array<FixedInt<14>, 2> remainder(const Form<3>& f, const Form<2>& q) {
+inline std::array<FixedInt<14>, 2> remainder(const Bernstein<3>& f, const Bernstein<2>& q) {
   const auto& [q0, q1, q2] = q.c;
   const auto& [f0, f1, f2, f3] = f.c;
   const FixedInt<10> l0 = q2 * f2 - q1 * f3;  // m = q2^2, l1 = q2 f3
   return {q2 * (q2 * f0) - q0 * l0, q2 * (q2 * f1 - q0 * f3) - q1 * l0};
 }
-inline std::array<FixedInt<8>, 2> remainder(const Form<2>& f, const Form<2>& q) {
+inline std::array<FixedInt<8>, 2> remainder(const Bernstein<2>& f, const Bernstein<2>& q) {
   const auto& [q0, q1, q2] = q.c;
   const auto& [f0, f1, f2] = f.c;
   const auto r0 = q2 * f0 - q0 * f2, r1 = q2 * f1 - q1 * f2;  // m = |q2|
@@ -198,7 +198,7 @@ inline std::array<FixedInt<8>, 2> remainder(const Form<2>& f, const Form<2>& q) 
 // The sign of q at the one root of f in (lo, hi), where q has one root as well, and its own signs
 // at both ends.
 template <int degree>
-int sign_where_both_change(const Form<2>& q, int at_lo, int at_hi, const Form<degree>& f,
+int sign_where_both_change(const Bernstein<2>& q, int at_lo, int at_hi, const Bernstein<degree>& f,
                            std::int64_t lo, std::int64_t hi) {
   if (q.c[2].sign() == 0)
     return sign_where_both_change(reversed(q), at_hi, at_lo, reversed(f), end_of_time - hi,
@@ -225,7 +225,7 @@ int sign_where_both_change(const Form<2>& q, int at_lo, int at_hi, const Form<de
 
 // The sign of a quadratic at a root; unknown_sign where that takes a narrower interval, or Sturm.
 template <int degree>
-int sign_at(const Form<2>& q, const FormRoot<degree>& root) {
+int sign_at(const Bernstein<2>& q, const BernsteinRoot<degree>& root) {
   if (q.zero()) return 0;
   const int at_lo = sign_at(q, root.lo);
   if (!root.of) return at_lo;
