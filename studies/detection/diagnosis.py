@@ -128,7 +128,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
             payload_events(test, speed, trained, size.payloads),
         ):
             for event in events:
-                judged.append(judge(event, trained[event.arm], surface))
+                judged.append(answered(event, trained[event.arm], surface))
                 sample = sample or (event if event.alarm is not None else None)
     contacts = [j for j in judged if j.collision is not None]
     rows = [*link_rows(contacts), *contact_rows(contacts)]
@@ -145,7 +145,7 @@ def trained_for(seed: int, arm: int, size: Size) -> CollisionAlarm:
     return with_rate(detector, [simulate(e) for pool in pools for _, e in pool], PER_HOUR)
 
 
-def judge(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Judged:
+def answered(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Judged:
     """All methods' answers to one event."""
     known = (event.kind, event.speed, event.collision, event.mass)
     if event.alarm is None:

@@ -19,7 +19,7 @@ from studies.framework.pareto import svg
 from studies.framework.rows import Point, groups
 from studies.framework.study import Part, all_parts, find, package
 from tauguard.atomic_write import write_atomic
-from tauguard.report import Row, write_json
+from tauguard.report import Row, versions, write_json
 from tauguard.report.page import folded, page, picture, tables
 
 #: Other JSON files that the folder of a report holds.
@@ -89,12 +89,16 @@ def command(
     missing, kept = Missing(), out / "hard-cases.json"
     if not bound:
         failed = collect(out, [n for n in all_parts() if n in asked], quick=quick, seed=seed)
-        write_json(kept, {"name": kept.stem, "rows": run(load_cases(), adapters())})
     elif not out.is_dir():
         raise ValueError(f"--bound --out {out}: no such folder")
-    cases: list[Row] = []
+    found: dict[str, Any] = {"rows": []}
     if kept.exists():
-        cases = missing.attempt("hard cases", lambda: json.loads(kept.read_text())["rows"], cases)
+        found = missing.attempt("hard cases", lambda: json.loads(kept.read_text()), found)
+    if not bound and found.get("versions") != versions():
+        rows = run(load_cases(), adapters())
+        found = {"name": kept.stem, "versions": versions(), "rows": rows}
+        write_json(kept, found)
+    cases = found["rows"]
     links = (
         missing.attempt("mistakes", lambda: recorded.mistakes(out, seed), "") if mistakes else ""
     )
@@ -263,8 +267,8 @@ class Report:
         machines: dict[str, list[str]] = {}
         for name, one in self.found.items():
             on = one["machine"]
-            versions = ", ".join(f"{package} {v}" for package, v in one["versions"].items())
-            text = f"{on['processor']}, {on['cores']} cores, {on['system']}: {versions}"
+            with_what = ", ".join(f"{package} {v}" for package, v in one["versions"].items())
+            text = f"{on['processor']}, {on['cores']} cores, {on['system']}: {with_what}"
             machines.setdefault(text, []).append(name)
         lines = [f"{len(self.found)} of {len(self.parts)} parts of studies."]
         for text, names in machines.items():

@@ -84,7 +84,6 @@ def test_a_sample_online_has_the_score_of_the_batch(bench):
     assert fewer[-1]["us"]["median"] < full["us"]["median"]
 
 
-@pytest.mark.slow
 def test_diagnosis_names_links_kinds_and_forces(bench):
     file, _ = bench("diagnosis")
     tables = {row["study"] for row in file["rows"]}

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tauguard.report import versions
+
 ROOT = Path(__file__).resolve().parents[2]
 FRAMEWORK = ROOT / "studies" / "framework"
 INIT = """
@@ -209,10 +211,15 @@ def test_a_cache_that_cannot_be_made_is_one_line(checkout):
 
 
 def test_the_report_runs_what_is_not_there_and_says_what_failed(checkout):
+    case = {"case": "c", "library": "tauguard", "kind": "scene", "expected": "1", "answer": "2"}
+    case |= {"right": False, "why": "a hard one", "origin": "here", "explained": "soft"}
+    (checkout.folder / "page").mkdir()
+    kept = {"versions": versions(), "rows": [case]}  # of this build: they are not run again
+    (checkout.folder / "page" / "hard-cases.json").write_text(json.dumps(kept))
     done = checkout("report", "--out", "page", "--quick", "--no-mistakes")
     assert done.returncode == 1
     text = (checkout.folder / "page" / "index.html").read_text()
-    for part in ("Study: first-good", "how far", "0 of 1 asked", "All "):
+    for part in ("Study: first-good", "how far", "0 of 1 asked", "a hard one"):
         assert part in text
     assert "<td>40 µs</td><td>1 wrong</td><td>theirs</td><td>80 µs</td>" in text
     assert "<th>found</th></tr><tr><td>7</td>" in text
@@ -259,7 +266,7 @@ def test_files_that_no_part_wrote_are_named_and_not_written_over(checkout, stran
     assert len(done.stderr.splitlines()) == len(strange)
     page = (folder / "index.html").read_text()
     assert "not read: mine.json" in page
-    ran = checkout("report", "--out", "page", "--quick", "--no-mistakes", "--study", *strange)
+    ran = checkout("bench", "all", "--out", "page", "--quick")
     for name, (text, why) in strange.items():
         (line,) = [line for line in done.stderr.splitlines() if f" {name}: {name}.json" in line]
         assert why in line
