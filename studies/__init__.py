@@ -16,9 +16,14 @@ STUDIES = (
     "faults",
 )
 
-#: What was a study and is a slow test now: its name there.
-SLOW_TESTS = {
-    "mutants": "damaged",
-    "kills": "'interrupted or generate'",
-    "endurance": "endurance",
+_SLOW = "is a slow test now: run `pytest -m slow -k {}` in a checkout"
+_NOTE = "has ended; its result is docs/notes/2026-11-23-{}.md"
+#: What was a study once, and what to do instead.
+FORMER = {
+    "mutants": _SLOW.format("damaged"),
+    "kills": _SLOW.format("'interrupted or generate'"),
+    "endurance": _SLOW.format("endurance"),
+    "detection_ladder": _NOTE.format("from-the-dissertation"),
+    "detection_parts": _NOTE.format("thresholds"),
+    "detection_conformal": "is a row of false_alarms now: `tauguard bench false_alarms`",
 }

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import ModuleType
 
-from studies import SLOW_TESTS, STUDIES
+from studies import FORMER, STUDIES
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,8 @@ def find(name: str, part: str | None = None) -> dict[str, Part]:
         return found
     if found:
         raise ValueError(f"--part goes with a whole study: {', '.join(STUDIES)}")
-    if name in SLOW_TESTS:
-        hint = f"run `pytest -m slow -k {SLOW_TESTS[name]}` in a checkout"
-        raise ValueError(f"{name} is a slow test now: {hint}")
+    if name in FORMER:
+        raise ValueError(f"{name} {FORMER[name]}")
     known = [*STUDIES, *(one.alias for one in parts.values() if one.alias), *parts]
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
     if near:

@@ -89,7 +89,9 @@ def checkout(tmp_path):
     shutil.copy(FRAMEWORK.parent / "__main__.py", studies)
     with (studies / "framework" / "mistakes.py").open("a") as module:
         module.write(RECORDED)  # instead of training a detector for minutes
-    (studies / "__init__.py").write_text(f"STUDIES = {tuple(STUDIES)!r}\nSLOW_TESTS = {{}}\n")
+    (studies / "__init__.py").write_text(
+        f"STUDIES = {tuple(STUDIES)!r}\nFORMER = {{'old': 'has ended'}}\n"
+    )
     for study, parts in STUDIES.items():
         (studies / study).mkdir()
         named = ", ".join(
@@ -156,6 +158,7 @@ def test_an_option_runs_the_parts_that_take_it(checkout):
     [
         (["frist"], "no study 'frist': did you mean first?"),
         (["nothing"], "no study 'nothing': there are first, second"),
+        (["old"], "old has ended"),
         (["first", "--part", "bad"], "first has no part 'bad': there are good, jobs"),
         (["second", "--part", "refused"], "no detector of that name"),
         (["own_good", "--json", "none/f.json"], "no folder none; make it first"),
