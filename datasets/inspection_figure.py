@@ -32,7 +32,7 @@ def draw(path: Path, folder: Path, report: Mapping[str, Any]) -> None:
     _speeds(axes[1, 0], every)
     _collision(axes[1, 1], folder, every)
     splits = ", ".join(f"{k} {v['hours']:.3g} h" for k, v in report["splits"].items())
-    figure.suptitle(f"{report['name']}: {splits}")
+    figure.suptitle(f"{report['name']}: {splits}", parse_math=False)  # names may have dollar signs
     with atomic_file(path) as stream:
         figure.savefig(stream, dpi=110, format=path.suffix[1:] or "png")
     plt.close(figure)

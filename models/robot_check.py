@@ -1,4 +1,4 @@
-"""Robot files of strangers: what they name stays in their folder, and MuJoCo tries them elsewhere.
+"""Untrusted robot files: they name files of their own folder only, and are compiled apart first.
 
 MuJoCo's compiler can crash on XML that looks valid, so a file is compiled in a process of limited
 memory and time first.
@@ -28,7 +28,7 @@ def checked_robot(path: Path) -> Path:
 
     Raises:
         ValueError: a file outside the robot's folder is named, or MuJoCo crashes or needs more than
-            10 s or 1 GiB.
+            1 GiB, 3 s of processor time or 10 s.
         OSError: cannot be read.
     """
     stamp = os.stat(path)

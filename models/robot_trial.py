@@ -1,4 +1,4 @@
-"""MuJoCo compiles a stranger's robot in a process of its own first, of limited memory and time.
+"""MuJoCo compiles an untrusted robot in a process of its own first, with limited memory and time.
 
 One process is kept for a while: it has loaded MuJoCo, and forks a child for each robot.
 """
@@ -16,6 +16,9 @@ from select import select
 
 #: Limits of one trial beyond what MuJoCo takes by itself [bytes, s].
 MOST_MEMORY, MOST_SECONDS = 1 << 30, 10.0
+#: Processor time of one trial [s]. What passes is compiled again here, up to twice, so that all of
+#: it stays below ``MOST_SECONDS`` on an idle processor.
+MOST_WORK = 3
 #: Longest time in which MuJoCo is loaded, on a busy machine [s].
 LOADING = 60.0
 #: A process that nobody asks ends after so long [s].
@@ -30,20 +33,22 @@ spec.compile()
 _SERVER = """
 import json, os, signal, sys
 import mujoco
-memory, idle, work = int(sys.argv[1]), int(sys.argv[2]), compile(sys.argv[3], "trial", "exec")
+memory, idle, seconds = map(int, sys.argv[1:4])
+work = compile(sys.argv[4], "trial", "exec")
 def limit():
     import resource
     with open("/proc/self/statm") as statm:
         most = int(statm.read().split()[0]) * resource.getpagesize() + memory
-    for kind, soft in ((resource.RLIMIT_AS, most), (resource.RLIMIT_CPU, 20)):
+    for kind, soft in ((resource.RLIMIT_AS, most), (resource.RLIMIT_CPU, seconds)):
         hard = resource.getrlimit(kind)[1]
         resource.setrlimit(kind, (soft if hard < 0 else min(soft, hard), hard))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 def trial(what):
     try:
         exec(work, {"mujoco": mujoco, "what": what, "os": os, "signal": signal})
-    except ValueError:
-        pass
+    except ValueError as error:
+        if "allocate" in str(error):  # refused for the limit of memory, not for what it says
+            raise
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 print("ready", flush=True)
 while True:
@@ -116,13 +121,16 @@ class Trial:
             return None
         if not answer:
             self._end()
+        elif os.WIFSIGNALED(int(answer)) and os.WTERMSIG(int(answer)) == signal.SIGXCPU:
+            return f"MuJoCo needs more than {MOST_WORK} s of processor time for it"
         return (
             f"MuJoCo does not survive it (a crash, or more than {MOST_MEMORY >> 30} GiB of memory)"
         )
 
     def _running(self) -> subprocess.Popen[bytes] | None:
         if self._process is None or self._process.poll() is not None:
-            command = [sys.executable, "-c", _SERVER, str(MOST_MEMORY), str(IDLE), self._work]
+            limits = map(str, (MOST_MEMORY, IDLE, MOST_WORK))
+            command = [sys.executable, "-c", _SERVER, *limits, self._work]
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,

@@ -23,8 +23,10 @@ from urllib.parse import quote, unquote
 
 #: Both servers listen here only; the viewer is waited for this long [s].
 HOST, PATIENCE = "127.0.0.1", 20.0
-#: What is served of a folder.
+#: Endings of the files that are served.
 SERVED = (".rrd", ".html", ".png")
+#: Pages load nothing from elsewhere and send nothing there, whoever wrote them.
+POLICY = "default-src 'self' data: 'unsafe-inline'; form-action 'none'; base-uri 'none'"
 
 
 class BrowserReplay:
@@ -100,32 +102,55 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
     server: _Server
 
     def do_GET(self) -> None:
-        """A file of the folder, the page, or the address of the viewer."""
+        """A file of the folder, the page, or a redirection to the viewer."""
         path = unquote(self.path.partition("?")[0])
-        if path.startswith("/open/"):
+        if not self._addressed():
+            self.send_error(http.HTTPStatus.MISDIRECTED_REQUEST)
+        elif path.startswith("/open/"):
             self.send_response(http.HTTPStatus.FOUND)
             self.send_header("Location", _viewed(self.server.viewer, self.server.address, path[6:]))
             self.end_headers()
-        elif path == "/" or path.endswith(SERVED):
+        elif self._own_file():
             super().do_GET()
         else:
             self.send_error(http.HTTPStatus.NOT_FOUND)
 
+    def _addressed(self) -> bool:
+        """Whether the request names this server as its host.
+
+        Otherwise a page of another host, whose name was pointed at 127.0.0.1 after it was loaded
+        (DNS rebinding), could read the folder.
+        """
+        port = self.server.server_address[1]
+        return self.headers.get_all("Host") in ([f"{HOST}:{port}"], [f"localhost:{port}"])
+
+    def _own_file(self) -> bool:
+        """Whether the path is a regular file of the folder that is served and behind no link."""
+        file, folder = Path(self.translate_path(self.path)), Path(self.directory)
+        if file == folder:
+            file = folder / "index.html"
+        if file.suffix not in SERVED or not file.is_relative_to(folder):
+            return False
+        below = [file, *file.parents][: len(file.relative_to(folder).parts)]
+        return file.is_file() and not any(part.is_symlink() for part in below)
+
     def do_HEAD(self) -> None:
-        """Nobody asks for heads alone."""
+        """Heads alone are not served."""
         self.send_error(http.HTTPStatus.METHOD_NOT_ALLOWED)
 
     def list_directory(self, path: str | os.PathLike[str]) -> None:
-        """Nothing but what has a name is shown."""
+        """No folder is listed."""
         self.send_error(http.HTTPStatus.NOT_FOUND)
 
     def end_headers(self) -> None:
         """The viewer, and no other page, may read the files."""
         self.send_header("Access-Control-Allow-Origin", self.server.viewer)
+        self.send_header("Content-Security-Policy", POLICY)
+        self.send_header("X-Content-Type-Options", "nosniff")
         super().end_headers()
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing of each request."""
+        """Requests are not logged."""
 
 
 def _viewed(viewer: str, files: str, name: str) -> str:

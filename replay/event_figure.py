@@ -47,7 +47,9 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
         )
         score.axhline(detection.threshold, color="black", linestyle="--", label="threshold")
         _shade(score, trace, detection)
-        score.set(title=title, ylabel=f"score of\n{detection.detector}")
+        names = {"parse_math": False}  # a name may have dollar signs
+        score.set_title(title, **names)
+        score.set_ylabel(f"score of\n{detection.detector}", **names)
         _spread(score, detection)
         figure.legend(*score.get_legend_handles_labels(), loc="outside lower center", ncols=5)
         fastest = np.abs(trace.qd).max(axis=1)

@@ -53,12 +53,14 @@ def load_model(source: Any) -> Any:
     A URDF whose meshes are not at hand is drawn as sticks between its joints.
 
     Raises:
-        ValueError: the file or text is no such model; one line from MuJoCo's parser.
+        ValueError: the file or text is no such model, or compiling it takes too much (see
+            :func:`tauguard.models.robot_check.checked_robot`); one line.
         OSError: the file is missing.
     """
     import mujoco
 
     from tauguard.models.mjcf import compiled
+    from tauguard.models.robot_check import checked_robot, checked_text
 
     if isinstance(source, mujoco.MjModel):
         return source
@@ -66,6 +68,13 @@ def load_model(source: Any) -> Any:
     if not is_text and not Path(source).is_file():
         raise FileNotFoundError(f"{source}: no such file; expected an MJCF or URDF file")
     name = "the attached MJCF" if is_text else str(source)
+    try:
+        if is_text:
+            checked_text(source)
+        else:
+            checked_robot(Path(source))
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}" if is_text else str(error)) from error
     try:
         parse = mujoco.MjSpec.from_string if is_text else mujoco.MjSpec.from_file
         spec = parse(str(source))

@@ -167,6 +167,21 @@ def test_a_robot_file_on_which_mujoco_would_crash_is_one_line(tmp_path, monkeypa
     robot.write_text(ARM % "  ")
     with pytest.raises(ValueError, match="more than 1 GiB of memory"):
         compiled(str(robot))
+    monkeypatch.setattr(robot_check, "TRIAL", Trial("while True: pass", 60.0))
+    robot.write_text(ARM % "   ")
+    with pytest.raises(ValueError, match="more than 3 s of processor time"):
+        compiled(str(robot))
+
+
+def test_a_robot_file_with_a_texture_of_gigabytes_is_refused_in_ten_seconds(tmp_path):
+    robot = tmp_path / "arm.xml"
+    size = 'builtin="checker" width="30000" height="30000"'
+    robot.write_text(ARM % f'<asset><texture name="t" type="2d" {size}/></asset>')
+    for load in (compiled, load_arm):
+        began = time.monotonic()
+        with pytest.raises(ValueError, match="more than 1 GiB of memory"):
+            load(str(robot))
+        assert time.monotonic() - began < 10
 
 
 @pytest.mark.parametrize(("kind", "workers"), list(interrupted.TRIALS))

@@ -3,10 +3,12 @@
 import dataclasses
 import http.client
 import io
+import os
 import socket
 import struct
 import threading
 import time
+from html.parser import HTMLParser
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import SimpleNamespace
@@ -45,9 +47,9 @@ def replay(tmp_path_factory):
         yield running
 
 
-def answer(replay, path):
+def answer(replay, path, **headers):
     connection = http.client.HTTPConnection(*replay.address[7:].split(":"), timeout=10)
-    connection.request("GET", path)
+    connection.request("GET", path, headers=headers)
     response = connection.getresponse()
     return response, response.read()
 
@@ -65,6 +67,84 @@ def test_the_folders_recordings_and_its_page_are_served_and_nothing_else(replay)
         assert answer(replay, path)[0].status == 404
 
 
+def test_no_link_leads_out_of_the_folder(tmp_path):
+    outside, folder = tmp_path / "outside", tmp_path / "served"
+    for place in (outside, folder, folder / "own"):
+        place.mkdir()
+        (place / "a.rrd").write_bytes(b"RRF2")
+    (folder / "file.rrd").symlink_to(outside / "a.rrd")
+    (folder / "inner.rrd").symlink_to(folder / "a.rrd")
+    (folder / "folder").symlink_to(outside)
+    (folder / "index.html").symlink_to(outside / "a.rrd")
+    (folder / "text.txt").write_text("not served")
+    os.mkfifo(folder / "pipe.rrd")
+    with BrowserReplay(folder) as running:
+        for path in ("/a.rrd", "/own/a.rrd", "/a.rrd?x", "/./own//a.rrd"):
+            assert answer(running, path)[1] == b"RRF2", path
+        for path in ("/file.rrd", "/inner.rrd", "/folder/a.rrd", "/", "/index.html", "/pipe.rrd"):
+            assert answer(running, path)[0].status == 404, path
+        for path in ("/text.txt%23.rrd", "/text.txt#.rrd", "/own/", "/own", "/a.rrd/"):
+            assert answer(running, path)[0].status == 404, path
+    (tmp_path / "link").symlink_to(folder)  # the folder itself may be named by a link
+    with BrowserReplay(tmp_path / "link") as running:
+        assert answer(running, "/a.rrd")[1] == b"RRF2"
+        assert answer(running, "/file.rrd")[0].status == 404
+
+
+def test_only_its_own_host_names_are_answered(replay):
+    port = replay.address.rpartition(":")[2]
+    for own in (f"127.0.0.1:{port}", f"localhost:{port}"):
+        assert answer(replay, "/a%20b.rrd", Host=own)[0].status == 200
+    for other in ("evil.example", f"evil.example:{port}", "127.0.0.1", "127.0.0.1:1", ""):
+        for path in ("/a%20b.rrd", "/", "/open/a%20b.rrd"):
+            response, body = answer(replay, path, Host=other)
+            assert response.status == 421, (other, path)
+            assert b"RRF2" not in body
+    host = ("127.0.0.1", int(port))
+    for lines in ("", f"Host: 127.0.0.1:{port}\r\nHost: evil.example\r\n"):
+        with socket.create_connection(host, timeout=10) as client:
+            client.sendall(f"GET /a%20b.rrd HTTP/1.0\r\n{lines}\r\n".encode())
+            assert b" 421 " in client.recv(100)
+
+
+def test_pages_load_and_send_nothing_elsewhere(replay):
+    response, _ = answer(replay, "/")
+    assert "default-src 'self'" in response.headers["Content-Security-Policy"]
+
+
+class Tags(HTMLParser):
+    """The tags of a page, their attributes, and its text."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.found, self.text = [], ""
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.found.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.text += data
+
+
+EVIL = """<script>alert(1)</script>"'><img src=x onerror=alert(2)> $\\frac{$ &lt; \u202e"""
+
+
+def test_every_name_on_a_page_is_text(tmp_path):
+    trace, said = with_a_false_alarm()
+    collisions = tuple(dataclasses.replace(c, kind=EVIL) for c in trace.truth.collisions)
+    truth = dataclasses.replace(trace.truth, collisions=collisions)
+    trace = dataclasses.replace(trace, truth=truth, meta={"speed": "40"})
+    said = dataclasses.replace(said, detector=EVIL)
+    folder = EventFolder(tmp_path / EVIL.replace("/", "_"), late=0.01)
+    folder.add(EVIL, match_detection(said, trace), (trace, said))
+    page = Tags(folder.finish().read_text())
+    assert EVIL in page.text
+    assert [tag for tag, _ in page.found].count("script") == 1  # our own
+    assert all(attrs["src"] != "x" for tag, attrs in page.found if tag == "img")
+    assert not any(name.startswith("on") for _, attrs in page.found for name in attrs)
+
+
 def test_a_browser_that_leaves_early_prints_nothing(tmp_path, capfd):
     (tmp_path / "large.rrd").write_bytes(bytes(50_000_000))
     with BrowserReplay(tmp_path) as running:
@@ -72,7 +152,7 @@ def test_a_browser_that_leaves_early_prints_nothing(tmp_path, capfd):
         before = threading.active_count()
         with socket.create_connection((host, int(port)), timeout=10) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-            probe.sendall(b"GET /large.rrd HTTP/1.0\r\n\r\n")
+            probe.sendall(f"GET /large.rrd HTTP/1.0\r\nHost: {host}:{port}\r\n\r\n".encode())
             assert probe.recv(100).startswith(b"HTTP/1.0 200")
         end = time.monotonic() + 10
         while threading.active_count() > before and time.monotonic() < end:
