@@ -6,11 +6,11 @@ STUDY = Study(
     "generating, storing and reading datasets, and detectors trained from their files",
     {
         "generation": Part(
-            "datasets.study", "generation: rate beside mujoco.rollout, bytes, reading, memory"
+            "datasets.generation", "generation: rate beside mujoco.rollout, bytes, reading, memory"
         ),
         "entries": Part(
             "datasets.entries",
-            "every detector on tauguard-collisions-v1, and trained by path beside from traces",
+            "every detector of the registry on tauguard-collisions-v1",
             ("keep",),
             alias="entries",
         ),

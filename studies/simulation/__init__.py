@@ -12,7 +12,7 @@ STUDY = Study(
     "what each modelled thing of a scene costs and brings, and the environments around it",
     {
         "scene": Part(
-            "simulation.study",
+            "simulation.scene",
             "what each part of a scene costs, and what the time step costs in accuracy",
         ),
         "needs": Part(

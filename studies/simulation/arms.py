@@ -1,4 +1,4 @@
-"""Any arm: what is simulated well of arms that nothing was developed on."""
+"""Any arm: servo, residual, divergences, false alarms and a collision, arm by arm."""
 
 from __future__ import annotations
 
@@ -32,8 +32,10 @@ ARMS = ("cura6", "ur3", "ur5", "ur10", "ur10e", "panda", "xarm7", "z1", "j2s6s20
 SPEEDS = (20.0, 50.0, 100.0)
 #: A joint moves above this speed [rad/s]: below it static friction hides what it may.
 MOVING = 0.1
-#: A blow's peak torque [N m], at most these shares of the strongest joint's limit; links to try.
-BLOW, BLOW_SHARE, LINKS = (15.0, 60.0), (0.1, 0.4), (4, 3, 5, 2)
+#: Peak torque of the collision [N m], at most these fractions of the strongest joint's limit.
+PEAK, FRACTION = (15.0, 60.0), (0.1, 0.4)
+#: Links that the collision is tried on, in this order.
+LINKS = (4, 3, 5, 2)
 #: Operational space control: integral [1/s^3] and seconds, without and with friction.
 IDEAL_HOLD, HOLD = (0.0, 3.0), (1500.0, 5.0)
 #: Actions an episode of random actions.
@@ -44,8 +46,8 @@ DATA = "TAUGUARD_DATA"
 #: What the columns mean.
 NOTES = {
     "arms": "compile: processor seconds of one environment. servo: largest rms speed error of any "
-    "joint over a random motion at 20, 50 and 100 % of the largest speed, as a share of it. "
-    "residual: the plain observer's largest, of any joint, as a share of its torque limit, without "
+    "joint over a random motion at 20, 50 and 100 % of the largest speed, as a fraction of it. "
+    "residual: the plain observer's largest of any joint over its torque limit, without "
     "contact: while the joint moves, and at all (static friction of the file is in it). diverged: "
     "of random episodes in all five control modes. alarms: without contact, in the seconds named. "
     "tool: how far operational space control leaves the tool from its goal, on ideal drives and on "
@@ -59,7 +61,7 @@ def measure(quick: bool, seed: int, robot: str = "") -> list[Row]:
     Args:
         quick: fewer arms and episodes.
         seed: of motions and actions.
-        robot: names or files, parted by commas, instead of :data:`ARMS`.
+        robot: names or files, separated by commas, instead of :data:`ARMS`.
     """
     wanted = [name.strip() for name in robot.split(",")] if robot else list(ARMS)
     if quick and not robot:
@@ -77,8 +79,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
         left.bar(at + 0.27 * (k - 1), values, 0.25, label=f"{speed:g} % of the speed")
     right.bar(at, [row["residual moving"] for row in known], 0.5)
     right.axhline(0.02, color="black", linewidth=0.8)
-    left.set_ylabel("rms speed error, share of the largest speed")
-    right.set_ylabel("largest residual, share of the torque limit")
+    left.set_ylabel("rms speed error, fraction of the largest speed")
+    right.set_ylabel("largest residual, fraction of the torque limit")
     left.legend()
     for axes in (left, right):
         axes.set_xticks(at, [Path(str(row["arm"])).stem for row in known], rotation=45)
@@ -86,7 +88,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
 
 def _row(name: str, quick: bool, seed: int) -> Row:
     row: Row = {"study": "arms", "arm": Path(name).stem if os.path.isfile(name) else name}
-    source = _at_hand(name)
+    own = Path(os.environ.get(DATA, ""), name, f"{name}.urdf")
+    source = str(own) if DATA in os.environ and own.is_file() else name
     began = time.process_time()
     try:
         compiled = compile_scene(Settings(robot=source, obstacles=("hand",), detector="observer"))
@@ -96,18 +99,11 @@ def _row(name: str, quick: bool, seed: int) -> Row:
     seconds = 6.0 if quick else 30.0
     for speed in SPEEDS:
         row[f"servo {speed:g} %"] = _servo_error(source, speed, seconds, seed)
-    return (
-        row
-        | _free(compiled, source, seconds, seed)
-        | _random(source, quick, seed)
-        | _tool(compiled, source)
-        | _strike(compiled, source, seed)
-    )
-
-
-def _at_hand(name: str) -> str:
-    file = Path(os.environ.get(DATA, ""), name, f"{name}.urdf")
-    return str(file) if DATA in os.environ and file.is_file() else name
+    row |= _free(compiled, source, seconds, seed) | _random(source, quick, seed)
+    if len(compiled.scene.joint_names) >= 6:
+        row["tool, ideal [mm]"] = tool_error(source, True, *IDEAL_HOLD)
+        row["tool [mm]"] = tool_error(source, False, *HOLD)
+    return row | _strike(compiled, source, seed)
 
 
 def _servo_error(source: str, speed: float, seconds: float, seed: int) -> float:
@@ -128,9 +124,9 @@ def _judged(compiled: CompiledScene, trace: Trace) -> tuple[Array, NDArray[np.bo
 def _free(compiled: CompiledScene, source: str, seconds: float, seed: int) -> Row:
     trace = Simulation(Episode(seed=seed + 1, seconds=seconds, speed=60.0, arm=source)).run()
     residuals, _ = _judged(compiled, trace)
-    share = np.abs(residuals) / compiled.torque_limit
-    moving = np.where(np.abs(trace.qd) > MOVING, share, 0.0)
-    return {"residual moving": float(moving.max()), "residual": float(share.max())}
+    fraction = np.abs(residuals) / compiled.torque_limit
+    moving = np.where(np.abs(trace.qd) > MOVING, fraction, 0.0)
+    return {"residual moving": float(moving.max()), "residual": float(fraction.max())}
 
 
 def _random(source: str, quick: bool, seed: int) -> Row:
@@ -168,23 +164,11 @@ def _random(source: str, quick: bool, seed: int) -> Row:
     }
 
 
-def _tool(compiled: CompiledScene, source: str) -> Row:
-    if len(compiled.scene.joint_names) < 6:
-        return {"tool, ideal [mm]": None, "tool [mm]": None}
-    return {
-        "tool, ideal [mm]": tool_error(source, True, *IDEAL_HOLD),
-        "tool [mm]": tool_error(source, False, *HOLD),
-    }
-
-
 def _strike(compiled: CompiledScene, source: str, seed: int) -> Row:
-    """One blow, scaled by the arm's torque, against the fourth link or the next that has a surface.
-
-    A link may lie wholly within another's shape: the Z1's fourth does.
-    """
+    """One collision, scaled by the arm's torque, on the first of the links that has a surface."""
     limits = compiled.torque_limit[:4][np.isfinite(compiled.torque_limit[:4])]
     low, high = (
-        min(b, s * max(limits, default=np.inf)) for b, s in zip(BLOW, BLOW_SHARE, strict=True)
+        min(p, f * max(limits, default=np.inf)) for p, f in zip(PEAK, FRACTION, strict=True)
     )
     links = [link for link in LINKS if link <= len(compiled.scene.joint_names)]
     for link in links:

@@ -2,7 +2,7 @@
 
 The shipped detector is trained on recordings whose simulation lacks one part, and its threshold
 comes from them. It is then judged twice on other motion: in the same poorer simulation (what one
-would believe) and in the whole one (what holds). A part whose absence moves neither can be left
+would believe) and in the whole one (what holds). A part whose absence changes neither can be left
 out of data for this detector.
 """
 
@@ -11,19 +11,13 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from studies.framework import Workers, time_in_turn
-from tauguard.datasets.plans import (
-    SPEEDS,
-    TRAINING_PAYLOADS,
-    TRAINING_SPEEDS,
-    free_episodes,
-    struck_episodes,
-)
+from tauguard.datasets import plans
 from tauguard.detectors import SrqSvr, detection_metrics, matchings, train
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs import Episode, simulate
@@ -38,150 +32,104 @@ if TYPE_CHECKING:
 
 #: False alarms an hour that the thresholds aim at.
 PER_HOUR = 10.0
-#: What is left out beside parts of the drives: how the arm differs from its design, and loads.
+#: Left out beside parts of the drives: the arm's deviation from its design, and loads.
 OTHERS = ("model errors", "payloads")
-#: Carried where a detector is judged [g].
+#: Loads where a detector is judged [g].
 PAYLOADS = (0.0, 1016.0, 4039.0, 2298.0, 782.0)
-
-#: What the columns mean.
+#: Episodes to train on (with 5 collisions each, collision-free of 40 s) and to judge on (with 8
+#: collisions each, collision-free of 50 s).
+FULL, QUICK = (12, 18, 9, 24), (2, 3, 1, 1)
 NOTES = {
     "needs": "srq-svr trained on simulations without a part, 10 false alarms an hour aimed at, and "
     "judged on other motion of the whole simulation and (believed) of the one without the part. "
-    "from_16: share found of the collisions from 16 N m up; delay: median of those [ms]. cost: "
+    "from_16: fraction found of the collisions from 16 N m up; delay: median of those [ms]. cost: "
     "processor time of a sample over that of the whole simulation, taken in turn.",
 }
-
-
-@dataclass(frozen=True)
-class Size:
-    """How much is simulated of every kind."""
-
-    slices: int  #: with 5 collisions each, to train on
-    free: int  #: collision-free ones of 40 s, to train on
-    judged: int  #: with 8 collisions each
-    quiet: int  #: collision-free ones of 50 s, judged
-    parts: tuple[str, ...]
-
-
-FULL = Size(12, 18, 9, 24, (*PARTS, *OTHERS))
-QUICK = Size(2, 3, 1, 1, ("friction",))
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The episodes of an arm, to train on and to judge on."""
-
-    train: tuple[Episode, ...]
-    judge: tuple[Episode, ...]
-
-
-def plan(size: Size, seed: int) -> Plan:
-    """Episodes of one arm that differs from its design; nothing is both trained and judged on."""
-    arm, own = Mismatch(seed=70_000 + seed), 3000 + 4 * seed
-    loads = TRAINING_PAYLOADS
-    return Plan(
-        train=(
-            *struck_episodes(own, size.slices, 5, TRAINING_SPEEDS, loads, arm),
-            *free_episodes(own, size.free, 40.0, TRAINING_SPEEDS, loads[::2], arm),
-        ),
-        judge=(
-            *struck_episodes(own + 1, size.judged, 8, SPEEDS, PAYLOADS, arm),
-            *free_episodes(own + 2, size.quiet, 50.0, SPEEDS, PAYLOADS, arm),
-        ),
-    )
+Episodes = tuple[Episode, ...]
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
     """A row for the whole simulation and one for each part that is left out."""
-    size = QUICK if quick else FULL
-    episodes = plan(size, seed)
+    training, judging = episodes(QUICK if quick else FULL, seed)
+    parts = ("nothing", *(("friction",) if quick else (*PARTS, *OTHERS)))
     with Workers() as each:
-        jobs = [(episodes, part) for part in ("", *size.parts)]
-        found = dict(zip(("nothing", *size.parts), each(_without, jobs), strict=True))
-    cost = costs(episodes.judge[-1], size.parts, 3 if quick else 9)
-    return [_row(part, one, cost[part]) for part, one in found.items()]
+        found = list(each(judged_without, [(training, judging, part) for part in parts]))
+    cost = costs(judging[-1], parts, 3 if quick else 9)
+    return [
+        {"study": "needs", "left out": part, "cost": cost[part], **row}
+        for part, row in zip(parts, found, strict=True)
+    ]
+
+
+def episodes(size: tuple[int, int, int, int], seed: int) -> tuple[Episodes, Episodes]:
+    """Episodes to train on and to judge on, of one arm that deviates from its design."""
+    arm, own, loads = Mismatch(seed=70_000 + seed), 3000 + 4 * seed, plans.TRAINING_PAYLOADS
+    struck, free, judged, quiet = size
+    slow, speeds = plans.TRAINING_SPEEDS, plans.SPEEDS
+    training = (
+        *plans.struck_episodes(own, struck, 5, slow, loads, arm),
+        *plans.free_episodes(own, free, 40.0, slow, loads[::2], arm),
+    )
+    judging = (
+        *plans.struck_episodes(own + 1, judged, 8, speeds, PAYLOADS, arm),
+        *plans.free_episodes(own + 2, quiet, 50.0, speeds, PAYLOADS, arm),
+    )
+    return training, judging
 
 
 def costs(episode: Episode, parts: Sequence[str], repeats: int) -> dict[str, dict[str, float]]:
     """Processor time of an episode without each part over that of the whole one, in turn."""
-    calls = {
-        part: functools.partial(_simulated, (episode,), "" if part == "nothing" else part)
-        for part in ("nothing", *parts)
-    }
+    calls = {part: functools.partial(recordings, (episode,), part) for part in parts}
     taken = time_in_turn(calls, repeats, time.process_time)
     whole = taken["nothing"]["median"]
     return {part: {key: s / whole for key, s in one.items()} for part, one in taken.items()}
 
 
-@dataclass(frozen=True)
-class TrainedWithout:
-    """A detector from simulations without a part, judged in them."""
-
-    found: dict[str, Any]  #: judged in the whole simulation
-    believed: dict[str, Any]  #: judged in the one without the part
-
-
-def _without(job: tuple[Plan, str]) -> TrainedWithout:
-    episodes, part = job
-    recordings = _simulated(episodes.train, part)
-    alarm = train(SrqSvr(), recordings, nominal_arm(recordings), PER_HOUR)
-    found = detection_metrics(matchings(alarm, _whole(episodes.judge)))
-    if not part:
-        return TrainedWithout(found, found)
-    return TrainedWithout(
-        found, detection_metrics(matchings(alarm, _simulated(episodes.judge, part)))
-    )
+def judged_without(job: tuple[Episodes, Episodes, str]) -> dict[str, Any]:
+    """The results of a detector from simulations without a part, judged in both simulations."""
+    training, judging, part = job
+    traces = recordings(training, part)
+    alarm = train(SrqSvr(), traces, nominal_arm(traces), PER_HOUR)
+    found = detection_metrics(matchings(alarm, whole_recordings(judging)))
+    believed = found
+    if part != "nothing":
+        believed = detection_metrics(matchings(alarm, recordings(judging, part)))
+    return {
+        "from_16": found["headline"]["sensitivity"],
+        "delay": found["headline"]["delay_ms"]["median"],
+        "false_per_hour": found["false_alarms_per_hour"],
+        "believed_from_16": believed["headline"]["sensitivity"],
+        "believed_false": believed["false_alarms_per_hour"],
+    }
 
 
 @functools.lru_cache(1)
-def _whole(episodes: tuple[Episode, ...]) -> list[Trace]:
-    """Recordings of the whole simulation, made once a process for all the parts that it judges."""
-    return _simulated(episodes, "")
+def whole_recordings(judging: Episodes) -> list[Trace]:
+    """Recordings of the whole simulation, made once a process for all the parts."""
+    return recordings(judging, "nothing")
 
 
-def _simulated(episodes: Sequence[Episode], part: str) -> list[Trace]:
+def recordings(chosen: Episodes, part: str) -> list[Trace]:
     """Recordings without the part."""
-    without = (part,) if part in PARTS else ()
-    return [simulate(poorer(episode, part), without=without) for episode in episodes]
-
-
-def poorer(episode: Episode, part: str) -> Episode:
-    """The episode without what is no part of the drives."""
-    if part == "model errors":
-        return replace(episode, mismatch=None)
-    if part == "payloads":
-        return replace(episode, payload_g=0.0)
-    return episode
-
-
-def _row(part: str, one: TrainedWithout, cost: dict[str, float]) -> Row:
-    found, head = one.found, one.found["headline"]
-    return {
-        "study": "needs",
-        "left out": part,
-        "cost": cost,
-        "from_16": head["sensitivity"],
-        "delay": head["delay_ms"]["median"],
-        "false_per_hour": found["false_alarms_per_hour"],
-        "believed_from_16": one.believed["headline"]["sensitivity"],
-        "believed_false": one.believed["false_alarms_per_hour"],
+    absent: dict[str, dict[str, Any]] = {
+        "model errors": {"mismatch": None},
+        "payloads": {"payload_g": 0.0},
     }
+    poorer = [replace(episode, **absent.get(part, {})) for episode in chosen]
+    return [simulate(episode, without=(part,) if part in PARTS else ()) for episode in poorer]
 
 
 def draw(rows: list[Row], figure: Figure) -> None:
     """False alarms and misses, believed and found, by what was left out."""
     left, right = figure.subplots(1, 2, sharey=True)
+    labels = ("in the whole simulation", "in the poorer one")
     for axes, keys, title in (
         (left, ("false_per_hour", "believed_false"), "false alarms per hour"),
-        (right, ("from_16", "believed_from_16"), "share found from 16 N m up"),
+        (right, ("from_16", "believed_from_16"), "fraction found from 16 N m up"),
     ):
-        for key, marker, label in zip(
-            keys, "os", ("in the whole simulation", "in the poorer one"), strict=True
-        ):
-            shift = 0.12 if marker == "s" else -0.12
-            colour = "C0" if marker == "o" else "C1"
-            style = {"fmt": marker, "color": colour, "label": label, "capsize": 3}
-            at = np.arange(len(rows)) + shift
+        for k, (key, label) in enumerate(zip(keys, labels, strict=True)):
+            style = {"fmt": "os"[k], "color": f"C{k}", "label": label, "capsize": 3}
+            at = np.arange(len(rows)) + (-0.12, 0.12)[k]
             errorbars(axes, at, (row[key] for row in rows), across=True, **style)
         axes.set(xlabel=title)
         axes.grid(alpha=0.3)

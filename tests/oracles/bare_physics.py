@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -11,12 +12,15 @@ import numpy as np
 from mujoco import rollout
 from mujoco.batch import Batch
 
+from tauguard.arrays import Array
 from tauguard.detectors import RobotNumbers, inverse_dynamics
-from tauguard.envs import Motion
+from tauguard.envs import Motion, Simulation
 from tauguard.envs.gym.base import ArmEnv
 from tauguard.models import SceneSpec, compose, pin_model
 
 REACH = "tauguard:tauguard/Reach-v0"
+#: Steps from one state of a recorded motion to the next at which a rollout begins.
+PIECE = 100
 
 
 def reach(seed: int, **keywords: Any) -> ArmEnv:
@@ -118,3 +122,31 @@ def rollout_along(motion: Motion) -> Any:
     return lambda: rollout.rollout(
         scene.model, data, initial_state=state, control=tau[None], control_spec=applied
     )
+
+
+def rollout_pieces(simulation: Simulation, q: Array, qd: Array) -> tuple[float, float]:
+    """Processor seconds of ``mujoco.rollout`` over the same motion, and its largest error [rad].
+
+    The same scene is stepped as often, in pieces of :data:`PIECE` steps that begin at states of the
+    recorded motion, under the feed-forward torques: without drives, friction, controller, contacts
+    or labels.
+    """
+    scene, model = simulation.scene, simulation.scene.model
+    feed: Any = simulation._feed_forward
+    pieces = len(q) // PIECE
+    data = mujoco.MjData(model)
+    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    initial = np.empty((pieces, mujoco.mj_stateSize(model, kind)))
+    for piece in range(pieces):
+        data.qpos[scene.qpos_adr] = q[piece * PIECE]
+        data.qvel[scene.dof_adr] = qd[piece * PIECE]
+        mujoco.mj_getState(model, data, initial[piece], kind)
+    control = np.zeros((pieces, PIECE, model.nv))
+    control[:, :, scene.dof_adr] = feed[: pieces * PIECE].reshape(pieces, PIECE, -1)
+    spec = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+    began = time.process_time()
+    states, _ = rollout.rollout(model, data, initial, control, control_spec=spec)
+    spent = time.process_time() - began
+    positions = states[:, -1, 1 + scene.qpos_adr]
+    wanted = q[PIECE : pieces * PIECE + 1 : PIECE]
+    return spent, float(np.abs(positions[: len(wanted)] - wanted).max(initial=0.0))

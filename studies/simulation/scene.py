@@ -1,14 +1,16 @@
-"""What each listed thing of a scene costs per step, and what the time step costs in accuracy."""
+"""What each modelled thing of a scene costs per step, and error against cost of the time step."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from oracles.bare_physics import rollout_along
-from studies.framework import time_in_turn
+from studies.framework import table_rows, time_in_turn
+from tauguard.arrays import Array
 from tauguard.envs import Motion, SimulationLoop, random_motion
 from tauguard.envs.episodes.simulate import workspace
 from tauguard.models import (
@@ -30,8 +32,6 @@ if TYPE_CHECKING:
 
 #: Time step of the reference [s].
 REFERENCE = 1e-4
-
-#: What the columns of each table mean.
 NOTES = {
     "cost": "wall time of a step of 1 ms along one motion, one thread, median [least, most]. The "
     "peer is MuJoCo's own rollout of the bare arm, given the motion's torques; each other row is "
@@ -50,7 +50,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def costs(motion: Motion, repeats: int) -> list[Row]:
-    """Microseconds a step: MuJoCo alone, then with one thing more each."""
+    """Microseconds a step: MuJoCo alone, then with one more thing each."""
     drive = cura6_drive()
     ideal = replace(drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None)
     bare = SceneSpec(labels=False)
@@ -78,37 +78,40 @@ def costs(motion: Motion, repeats: int) -> list[Row]:
         {
             "study": "cost",
             "scene": name,
-            "us_per_step": {k: 1e6 * v / steps for k, v in figure.items()},
-            "ratio_to_rollout": figure["median"] / base,
+            "us_per_step": {k: 1e6 * v / steps for k, v in one.items()},
+            "ratio_to_rollout": one["median"] / base,
         }
-        for name, figure in taken.items()
+        for name, one in taken.items()
     ]
 
 
-def loop_call(scene: Scene, motion: Motion) -> Any:
+def loop_call(scene: Scene, motion: Motion) -> Callable[[], Any]:
     """One run of the simulation loop along the motion."""
     loop = SimulationLoop(scene, cura6_drive())
     still = np.zeros_like(motion.q)
 
-    def call() -> None:
+    def call() -> Any:
         loop.reset(motion.q[0])
-        loop.run(motion.q, motion.qd, still)
+        return loop.run(motion.q, motion.qd, still)
 
     return call
 
 
 def timesteps(seed: int, seconds: float) -> list[Row]:
-    """Largest joint error at the end of each millisecond against the reference step, and cost."""
+    """Largest joint error, every 2 ms, against the reference step, and cost."""
     rows: list[Row] = []
-    reference = follow(seed, seconds, REFERENCE)
-    for timestep in (2e-4, 5e-4, 1e-3, 2e-3):
-        scene, motion = moved(seed, seconds, timestep)
+    paths: dict[float, Array] = {}
+    for timestep in (REFERENCE, 2e-4, 5e-4, 1e-3, 2e-3):
+        scene = compose(SceneSpec(labels=False, timestep=timestep))
+        rng = np.random.default_rng(seed)
+        motion = random_motion(rng, workspace(scene), seconds, 30.0, timestep)
         call = loop_call(scene, motion)
+        paths[timestep] = call().q[:: round(2e-3 / timestep)].copy()
+        if timestep == REFERENCE:
+            continue
+        n = min(len(paths[timestep]), len(paths[REFERENCE]))
+        error = np.abs(paths[timestep][:n] - paths[REFERENCE][:n]).max()
         taken = time_in_turn({"loop": call}, 3)["loop"]
-        got = follow(seed, seconds, timestep)
-        coarse, fine = round(2e-3 / timestep), round(2e-3 / REFERENCE)
-        n = min(len(got[::coarse]), len(reference[::fine]))
-        error = np.abs(got[::coarse][:n] - reference[::fine][:n]).max()
         rows.append(
             {
                 "study": "timestep",
@@ -120,44 +123,18 @@ def timesteps(seed: int, seconds: float) -> list[Row]:
     return rows
 
 
-def moved(seed: int, seconds: float, timestep: float) -> tuple[Scene, Motion]:
-    """A scene at a time step and the same motion sampled at it."""
-    scene = compose(SceneSpec(labels=False, timestep=timestep))
-    rng = np.random.default_rng(seed)
-    return scene, random_motion(rng, workspace(scene), seconds, 30.0, timestep)
-
-
-def follow(seed: int, seconds: float, timestep: float) -> np.ndarray:
-    """Joint positions of a run at a time step, shape (T, n)."""
-    scene, motion = moved(seed, seconds, timestep)
-    loop = SimulationLoop(scene, cura6_drive())
-    loop.reset(motion.q[0])
-    return loop.run(motion.q, motion.qd, np.zeros_like(motion.q)).q
-
-
 def draw(rows: list[Row], figure: Figure) -> None:
     """Cost of each thing as bars; error against cost over the time step."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     left, right = figure.subplots(1, 2)
-    cost = [row for row in rows if row["study"] == "cost"]
-    names = [row["scene"] for row in cost]
-    left.barh(names, [row["us_per_step"]["median"] for row in cost], color="C0")
+    cost = table_rows(rows, "cost")
+    left.barh([row["scene"] for row in cost], [row["us_per_step"]["median"] for row in cost])
     left.invert_yaxis()
-    left.set(xlabel="microseconds a step", title="What a scene's parts cost")
-    steps = [row for row in rows if row["study"] == "timestep"]
-    x = [row["us_per_simulated_ms"]["median"] for row in steps]
-    y = [row["q_error_rad"] for row in steps]
-    right.loglog(x, y, "o", color="C1")
-    right.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    right.xaxis.set_major_formatter("{x:g}")
-    right.xaxis.set_minor_formatter(NullFormatter())
+    left.set(xlabel="microseconds a step", title="Cost of a scene's parts")
+    for row in table_rows(rows, "timestep"):
+        at = (row["us_per_simulated_ms"]["median"], row["q_error_rad"])
+        right.loglog(*at, "o", color="C1")
+        right.annotate(f" {row['timestep_ms']:g} ms", at)
     right.margins(x=0.15)
-    for row, a, b in zip(steps, x, y, strict=True):
-        right.annotate(f" {row['timestep_ms']:g} ms", (a, b))
-    right.set(
-        xlabel="microseconds per simulated millisecond",
-        ylabel="largest joint error against 0.1 ms [rad]",
-        title="Time step: speed against error",
-    )
+    right.set(xlabel="microseconds per simulated millisecond", ylabel="largest joint error [rad]")
+    right.set_title("Time step against 0.1 ms")
     right.grid(alpha=0.3)

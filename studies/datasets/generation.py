@@ -1,0 +1,203 @@
+"""Generation of datasets: rate beside ``mujoco.rollout``, bytes, reading of a column, memory."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyarrow.parquet as pq
+
+from oracles.bare_physics import rollout_pieces
+from studies.framework import number, table_rows, time_in_turn
+from tauguard.datasets.columns_of_shards import RESIDUAL, rounded, schema, stored, table
+from tauguard.datasets.configuration import load, parse
+from tauguard.datasets.generation import generate_dataset
+from tauguard.datasets.schedule import Planned, planned
+from tauguard.datasets.shard import residual_of, writing
+from tauguard.detectors import RobotNumbers
+from tauguard.envs import Simulation
+from tauguard.envs.plant import untimed
+from tauguard.models import pin_model
+from tauguard.report import Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "tauguard-collisions-v1"
+#: Parts of the work, in their order; rows a second whose bytes are measured.
+PARTS, RATES = ("prepare", "targets", "steps", "labels", "observer", "writing"), (1000, 500, 100)
+#: Generates a configuration in a process of its own and prints the peak memory [MiB] of it and of
+#: its largest worker. ``ru_maxrss`` counts what the parent had at the start, ``/proc`` does not.
+PROGRAM = """
+import json, resource, sys
+from pathlib import Path
+from tauguard.datasets.configuration import Configuration
+from tauguard.datasets.generation import generate_dataset
+if __name__ == "__main__":
+    generate_dataset(Configuration.from_json(Path(sys.argv[1]).read_text()), Path(sys.argv[2]), 2)
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    status = Path("/proc/self/status")
+    if status.exists():
+        own = int(status.read_text().partition("VmHWM:")[2].split()[0])
+    worker = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    print(json.dumps([own / 1024, worker / 1024]))
+"""
+NOTES = {
+    "rate": "Episodes of tauguard-collisions-v1 under another seed; processor time of one core, 1 "
+    "kHz, observer and writing included. us: a sample of each part; steps include the attempts at "
+    "a collision until its severity is the one asked for. rollout: mujoco.rollout on the same "
+    "scene from the same states, without drives, controller, contacts or labels; its joints differ "
+    "from the motion by `rollout away` after 0.1 s.",
+    "size": "MB (1e6 bytes) an hour of tauguard-collisions-v1 under another seed.",
+    "read": "one column of one shard by pyarrow, MB of float32 a second, median of 7.",
+    "memory": "Peak resident memory [MiB] of the command and of the largest of two workers; "
+    "episodes of 1 s, 20 a shard.",
+}
+
+
+def measure(quick: bool, seed: int) -> list[Row]:
+    """All rows; the quick run has few episodes."""
+    rows = rate_rows(quick, seed) + size_rows(quick, seed)
+    return rows + [memory_row(n, seed) for n in ((10, 50) if quick else (100, 1000, 10_000))]
+
+
+def rate_rows(quick: bool, seed: int) -> list[Row]:
+    """Microseconds a sample of episodes without and with collisions, and the rate of their mix.
+
+    The episodes are of a seed that nothing was developed on; every arm of the first split and the
+    arm of the last one take part.
+    """
+    configuration = replace(load(NAME), seed=987_000 + seed)
+    count = 1 if quick else 4
+    first, *_, last = configuration.splits
+    splits = (first,) if quick else (first, last)
+    rows: list[Row] = []
+    for kind in ("free", "struck"):
+        found = []
+        for split in splits:
+            every = (planned(configuration, split, n) for n in range(split.episodes))
+            fitting = (one for one in every if bool(one.episode.collisions) == (kind == "struck"))
+            found += [timed_parts(next(fitting)) for _ in range(count)]
+        samples = sum(one["samples"] for one in found)
+        us = {p: 1e6 * sum(one[p] for one in found) / samples for p in (*PARTS, "rollout")}
+        whole = sum(us[part] for part in PARTS)
+        each = [one["samples"] / 1000 / sum(one[p] for p in PARTS) for one in found]
+        row: Row = {"study": "rate", "episodes": kind, "n": len(found)}
+        row |= {"x real time a core": 1000 / whole, "least": min(each), "most": max(each)}
+        row |= {f"{part} [us]": value for part, value in us.items()}
+        row |= {"rollout / ours": us["rollout"] / whole}
+        rows.append(row | {"rollout away [rad]": max(one["error"] for one in found)})
+    mixed = 2 / sum(1 / row["x real time a core"] for row in rows)
+    half: Row = {"study": "rate", "episodes": "half struck", "x real time a core": mixed}
+    return [*rows, half | {"hours a minute, 2 cores": mixed * 2 / 60}]
+
+
+def timed_parts(one: Planned) -> dict[str, float]:
+    """Processor seconds of each part, of the rollout, and simulated samples, of one episode."""
+    spent = dict.fromkeys(PARTS, 0.0)
+    with untimed():
+        with clock(spent, "prepare"):
+            simulation = Simulation(one.episode)
+        striking: Any = simulation.striking
+        count_time(spent, "steps", simulation.loop, "run")
+        count_time(spent, "targets", striking._aim, "find")
+        with clock(spent, "labels"):
+            trace = simulation.run()
+        spent["labels"] -= spent["steps"] + spent["targets"]
+        with clock(spent, "observer"):
+            robot = RobotNumbers.from_pin(pin_model(simulation.scene.arm_xml))
+            residual = residual_of(trace, robot, simulation.nominal)
+        like = schema(len(trace.joint_names), True)
+        with clock(spent, "writing"):
+            shard = table(stored(trace, 1), one.number, rounded(RESIDUAL, residual), like)
+            with pq.ParquetWriter(io.BytesIO(), like, **writing(like)) as writer:
+                writer.write_table(shard, len(trace.t))
+    seen: Any = simulation._rollout
+    peer, error = rollout_pieces(simulation, seen.q, seen.qd)
+    return {**spent, "rollout": peer, "error": error, "samples": float(len(trace.t))}
+
+
+@contextmanager
+def clock(spent: dict[str, float], part: str) -> Iterator[None]:
+    """Add the processor time of the block to the part."""
+    began = time.process_time()
+    yield
+    spent[part] += time.process_time() - began
+
+
+def count_time(spent: dict[str, float], part: str, owner: object, name: str) -> None:
+    """Let a method of one object count the processor time that it takes."""
+    method: Callable[..., object] = getattr(owner, name)
+
+    def counted(*arguments: object, **options: object) -> object:
+        with clock(spent, part):
+            return method(*arguments, **options)
+
+    setattr(owner, name, counted)
+
+
+def size_rows(quick: bool, seed: int) -> list[Row]:
+    """MB an hour with and without residual, and the rate of reading one column."""
+    whole, rows = load(NAME), []
+    split = replace(whole.splits[0], episodes=12)
+    if quick:
+        split = replace(split, episodes=1, seconds=20.0, collisions=5)
+    for rate, residual in ((rate, residual) for rate in RATES for residual in (False, True)):
+        asked = replace(whole, seed=seed, rate=rate, residual=residual, splits=(split,))
+        with tempfile.TemporaryDirectory() as folder:
+            generate_dataset(asked, Path(folder) / "made", workers=1)
+            files = sorted(Path(folder).glob("made/data/*.parquet"))
+            size = sum(path.stat().st_size for path in files) / 1e6
+            name = f"{rate} Hz{', residual' if residual else ''}"
+            rows.append({"study": "size", "rows a second": name, "MB an hour": size / asked.hours})
+            if rate == max(RATES) and residual:
+                n = pq.ParquetFile(files[0]).metadata.num_rows
+                call = {"read": partial(pq.read_table, files[0], columns=["current_2"])}
+                seconds = time_in_turn(call, repeats=7)["read"]["median"]
+                read = {"study": "read", "rows": n, "pyarrow [MB/s]": 4e-6 * n / seconds}
+    return [*rows, read]
+
+
+def memory_row(count: int, seed: int) -> Row:
+    """Peak resident memory of the command and of its largest worker, for so many episodes."""
+    split = {"name": "train", "episodes": count, "seconds": 1.0, "struck": 0.0, "speeds": [30]}
+    split |= {"arms": ["cura6"], "individuals": [0]}
+    top = {"name": "short", "seed": seed, "rate": 100, "episodes_per_shard": 20}
+    with tempfile.TemporaryDirectory() as folder:
+        text, program = Path(folder) / "configuration.json", Path(folder) / "run.py"
+        text.write_text(parse({**top, "splits": [split]}).to_json())
+        program.write_text(PROGRAM)
+        command = [sys.executable, str(program), str(text), str(Path(folder) / "data")]
+        done = subprocess.run(command, capture_output=True, check=True)
+    own, worker = json.loads(done.stdout)
+    return {"study": "memory", "episodes": count, "command [MiB]": own, "worker [MiB]": worker}
+
+
+def draw(rows: list[Row], figure: Figure) -> None:
+    """Where the time of a sample goes, and bytes an hour."""
+    left, right = figure.subplots(1, 2)
+    timed = [row for row in table_rows(rows, "rate") if f"{PARTS[0]} [us]" in row]
+    names, bottom = [str(row["episodes"]) for row in timed], [0.0] * len(timed)
+    for part in PARTS:
+        values = [number(row[f"{part} [us]"]) or 0.0 for row in timed]
+        left.bar(names, values, bottom=bottom, label=part)
+        bottom = [b + v for b, v in zip(bottom, values, strict=True)]
+    for k, row in enumerate(timed):
+        left.hlines(row["rollout [us]"], k - 0.4, k + 0.4, "black", "dashed")
+    left.axhline(1000 / 60, color="grey", linewidth=1)
+    left.set(ylabel="us a sample", title="grey: 60 x real time; dashed: rollout")
+    left.legend()
+    sizes = table_rows(rows, "size")
+    right.barh([row["rows a second"] for row in sizes], [row["MB an hour"] for row in sizes])
+    right.invert_yaxis()
+    right.set(xlabel="MB an hour")
