@@ -7,9 +7,6 @@ import json
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow.parquet as pq
 
 from oracles.bare_physics import rollout_pieces
+from oracles.processor_time import clock, count_time
 from studies.framework import number, table_rows, time_in_turn
 from tauguard.datasets.columns_of_shards import RESIDUAL, rounded, schema, stored, table
 from tauguard.datasets.configuration import load, parse
@@ -125,25 +123,6 @@ def timed_parts(one: Planned) -> dict[str, float]:
     seen: Any = simulation._rollout
     peer, error = rollout_pieces(simulation, seen.q, seen.qd)
     return {**spent, "rollout": peer, "error": error, "samples": float(len(trace.t))}
-
-
-@contextmanager
-def clock(spent: dict[str, float], part: str) -> Iterator[None]:
-    """Add the processor time of the block to the part."""
-    began = time.process_time()
-    yield
-    spent[part] += time.process_time() - began
-
-
-def count_time(spent: dict[str, float], part: str, owner: object, name: str) -> None:
-    """Let a method of one object count the processor time that it takes."""
-    method: Callable[..., object] = getattr(owner, name)
-
-    def counted(*arguments: object, **options: object) -> object:
-        with clock(spent, part):
-            return method(*arguments, **options)
-
-    setattr(owner, name, counted)
 
 
 def size_rows(quick: bool, seed: int) -> list[Row]:

@@ -116,10 +116,8 @@ def draw(rows: list[Row], figure: Figure) -> None:
     """Error over time of every pair that has an exact distance, ours and coal's."""
     axes = figure.subplots()
     known = [row for row in table_rows(rows, "distance") if row["known"]]
-    for name, ns, error_of in (
-        ("tauguard", "distance_ns", "error"),
-        ("coal", "coal_ns", "coal_error"),
-    ):
+    columns = ("tauguard", "distance_ns", "error"), ("coal", "coal_ns", "coal_error")
+    for name, ns, error_of in columns:
         # An error of exactly zero is drawn at the lower rim, one above the size at the upper.
         errors = np.clip([row[error_of] for row in known], 1e-18, 1.0)
         axes.loglog([number(row[ns]) for row in known], errors, "o", label=name, alpha=0.7)

@@ -273,7 +273,5 @@ def draw(rows: list[Row], figure: Figure) -> None:
         bars = axes.bar(at + 0.4 * k - 0.2, us, 0.38, label=outcome)
         axes.axhline(part[0]["coal_mean_us"], color=bars[0].get_facecolor(), ls="--", lw=1)
     axes.set_xticks(at, names)
-    wrong = round(max(count(row["disagree"]) for row in cells))
-    axes.set(ylabel="us a pose, mean", yscale="log")
-    axes.set_title(f"{cells[0]['mesh']}, coal dashed; {wrong} answers differ")
+    axes.set(ylabel="us a pose, mean", yscale="log", title=f"{cells[0]['mesh']}, coal dashed")
     axes.legend()

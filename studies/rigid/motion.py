@@ -12,19 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from oracles import coal_peer
 from oracles.coal_motion import MovingDistance, advanced_times
 from oracles.convex_impact import AxisGap, bracket, impact_errors
-from oracles.convex_pairs import farthest, random_bodies, random_motions, take
+from oracles.convex_pairs import farthest, moving_pairs, random_bodies, random_motions, take
 from studies.framework import table_rows
 from studies.rigid import peer
 from studies.rigid.bars import count, error, within
 from studies.rigid.distance import ROUNDED
 from tauguard.report import Row
-from tauguard.rigid import Boxes, Impacts, Motion, Tetrahedra, time_of_impact
-from tauguard.rigid.shapes import Bodies
+from tauguard.rigid import Impacts, time_of_impact
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,28 +62,9 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
     ]
 
 
-def pairs(rng: np.random.Generator, kind: str, n: int) -> tuple[Bodies, Bodies, Motion, Motion]:
-    """Bodies about 2 m apart that move by up to 2 m and turn by less than half a turn."""
-
-    def body() -> Bodies:
-        if kind == "tetrahedra":
-            return Tetrahedra(rng.uniform(-1, 1, (n, 4, 3)))
-        rotation = np.tile(np.eye(3), (n, 1, 1))
-        return Boxes(np.zeros((n, 3)), rng.uniform(0.2, 1, (n, 3)), rotation)
-
-    def motion() -> Motion:
-        pose = np.tile(np.eye(4), (n, 1, 1))
-        seed = int(rng.integers(1 << 31))
-        pose[:, :3, :3] = Rotation.random(n, random_state=seed).as_matrix()
-        pose[:, :3, 3] = rng.uniform(-2.5, 2.5, (n, 3))
-        return Motion(pose, rng.uniform(-2, 2, (n, 3)), rng.uniform(-1.8, 1.8, (n, 3)))
-
-    return body(), body(), motion(), motion()
-
-
 def impact_rows(rng: np.random.Generator, kind: str, n: int) -> list[Row]:
     """Times and errors of ``time_of_impact``, and of advancement over coal's distance."""
-    a, b, ma, mb = pairs(rng, kind, n)
+    a, b, ma, mb = moving_pairs(rng, kind, n)
     early, touch = bracket(a, b, ma, mb)
 
     def call(index: NDArray[np.intp]) -> Impacts:

@@ -1,10 +1,7 @@
 """Bounding volumes compared: build, update, overlap test and tightness (figure 1.1).
 
-The bodies are pieces of the mesh of about 64 triangles, as the nodes of a tree hold them, placed
-near the origin under random poses. A ball and an oriented box are moved by a pose; bounds along
-fixed directions (axis-aligned box, 18-DOP) are computed again from the posed corners; a hull's
-vertices are posed. The hull's build (Qhull) and update (NumPy) are not native; all else is, with
-one thread.
+The bodies are pieces of the mesh of about 64 triangles, under random poses near the origin. A ball
+and an oriented box are moved by a pose; an axis-aligned box and an 18-DOP are computed again.
 """
 
 from __future__ import annotations
@@ -15,27 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from scipy.spatial.transform import Rotation
 
+from oracles.hull_volumes import HullVolumes, enclosed
 from oracles.surfaces import pieces
 from studies.framework import table_rows, time_in_turn
 from studies.rigid.bars import count, error, per
 from studies.rigid.mesh import load
-from tauguard.arrays import Array
 from tauguard.report import Row, rate
-from tauguard.rigid import Hulls
 from tauguard.rigid.comparators import VOLUMES
 from tauguard.rigid.queries import native_overlap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: The 18-DOP's directions, one of each pair.
-DIRECTIONS = np.array(
-    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, -1, 0], [1, 0, 1], [1, 0, -1], [0, 1, 1],
-     [0, 1, -1]], dtype=np.float64,
-)  # fmt: skip
 NOTES = {
     "figure 1.1 volumes": "us a body to build and to update, ns a test of a pair. tightness: "
     "volume over the hull's, median; false_hits: of the pairs whose hulls are apart, those that "
@@ -72,9 +62,8 @@ def measure(quick: bool, seed: int) -> list[Row]:
         volume.meet(pairs, found)
         rows.append({**times, "tightness": float(np.median(ratios)), **errors(found, hit)})
     calls = (hulls.fit, partial(hulls.place, pose), partial(native_overlap, *sides, "auto"))
-    rows.append(
-        {**columns("hull", calls, n, len(pairs), 3), "tightness": 1.0, **errors(hit, hit)},
-    )
+    hull = columns("hull", calls, n, len(pairs), 3)
+    rows.append({**hull, "tightness": 1.0, **errors(hit, hit)})
     missed = [count(row["missed"]) for row in rows]
     return [*rows, error("pairs of hulls that meet, called clear", 0, missed)]
 
@@ -100,59 +89,6 @@ def errors(found: NDArray[np.bool_], hit: NDArray[np.bool_]) -> Row:
         "false_hits": rate(int((found & ~hit).sum()), int((~hit).sum())),
         "missed": rate(int((~found & hit).sum()), int(hit.sum())),
     }
-
-
-class HullVolumes:
-    """The convex hulls of the pieces."""
-
-    def __init__(self, corners: Array, offsets: NDArray[np.int64]) -> None:
-        """Build them all."""
-        self.points = [part.reshape(-1, 3) for part in np.split(corners, offsets[1:-1])]
-        self.fit()
-
-    def fit(self) -> None:
-        """Qhull on every piece; a flat one keeps all its corners and has no volume."""
-        kept, self.size = [], np.zeros(len(self.points))
-        for i, points in enumerate(self.points):
-            try:
-                hull = ConvexHull(points)
-                kept.append(points[hull.vertices])
-                self.size[i] = hull.volume
-            except QhullError:
-                kept.append(points)
-        self.counts, self.vertices = (
-            np.array([len(points) for points in kept]),
-            np.concatenate(kept),
-        )
-
-    def place(self, pose: Array) -> Array:
-        """The vertices in the world. Shape (V, 3)."""
-        rotation = np.repeat(pose[:, :3, :3], self.counts, axis=0)
-        moved = np.einsum("nij,nj->ni", rotation, self.vertices)
-        return np.asarray(moved + np.repeat(pose[:, :3, 3], self.counts, axis=0))
-
-    def sides(self, pose: Array, pairs: NDArray[np.int64]) -> tuple[Hulls, Hulls]:
-        """Both columns of the pairs as batches."""
-        placed = np.split(self.place(pose), np.cumsum(self.counts)[:-1])
-
-        def side(column: NDArray[np.int64]) -> Hulls:
-            points = np.concatenate([placed[i] for i in column])
-            return Hulls(points, np.cumsum([0, *self.counts[column]]))
-
-        return side(pairs[:, 0]), side(pairs[:, 1])
-
-
-def enclosed(name: str, numbers: Array) -> float:
-    """The volume that a bounding volume's numbers enclose [m^3]."""
-    if name == "sphere":
-        return float(4 / 3 * np.pi * numbers[3] ** 3)
-    if name == "aabb":
-        return float(np.prod(numbers[3:] - numbers[:3]))
-    if name == "obb":
-        return float(8 * np.prod(numbers[3:6]))
-    planes = np.r_[np.c_[DIRECTIONS, -numbers[9:]], np.c_[-DIRECTIONS, numbers[:9]]]
-    corners = HalfspaceIntersection(planes, np.zeros(3)).intersections  # the piece's mean is inside
-    return float(ConvexHull(corners).volume)
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

@@ -43,25 +43,23 @@ STUDY = Study(
 def points(rows: Sequence[Row]) -> Iterator[Point]:
     """Time steps of the arm, impacts on a rail, and an environment's step beside rollout's."""
     for row in table_rows(rows, "timestep"):
-        question = "Time step of the arm under position control"
+        name, axis = f"{row['timestep_ms']:g} ms", "largest joint error [rad]"
         yield from _point(
-            row, question, f"{row['timestep_ms']:g} ms", "q_error_rad", "largest joint error [rad]"
+            row, "Time step of the arm under position control", name, "q_error_rad", axis
         )
     for row in table_rows(rows, "rail"):
-        method = ", ".join(str(row[key]) for key in ("timestep_ms", "integrator", "contact"))
+        name = ", ".join(str(row[key]) for key in ("timestep_ms", "integrator", "contact"))
         question, axis = "An impact on a rail beside the two-mass model", "error of the peak force"
-        yield from _point(row, question, method, "peak_force_error", axis)
-    steps = table_rows(rows, "step")
-    peers = [row for row in steps if str(row.get("what")).startswith("mujoco.rollout")]
-    for own in (row for row in steps if row.get("what") == "the environment"):
+        yield from _point(row, question, name, "peak_force_error", axis)
+    steps = {str(row["what"]): row for row in table_rows(rows, "step")}
+    if steps:
         question = "10 ms of an arm with drives, observations and rewards"
-        if not peers:
-            raise ValueError("no row of mujoco.rollout")
-        strayed, us = peers[0]["q_difference_rad"], number(own["us_per_action"]) or 0.0
-        error = f"joints within {f'{strayed:.0e}' if strayed else '0'} rad of rollout's"
-        yield Point(question, "the environment", us, math.nan, error, "ours")
-        us, method = number(peers[0]["us_per_action"]) or 0.0, "mujoco.rollout of the bare physics"
-        yield Point(question, method, us, math.nan, "same motion", "peer")
+        peer, own = steps["mujoco.rollout, forces given"], steps["the environment"]
+        us = [number(row["us_per_action"]) or 0.0 for row in (own, peer)]
+        error = f"joints within {peer['q_difference_rad']:.0e} rad of rollout's"
+        yield Point(question, "the environment", us[0], math.nan, error, "ours")
+        method = "mujoco.rollout of the bare physics"
+        yield Point(question, method, us[1], math.nan, "same motion", "peer")
 
 
 def _point(row: Row, question: str, method: str, error: str, axis: str) -> Iterator[Point]:

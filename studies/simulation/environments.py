@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector import SyncVectorEnv
 
 from oracles.bare_physics import REACH, bare, batched, driven, reach, recorded
-from oracles.reaction_swings import SPEEDS, swing
+from oracles.reaction_swings import SPEEDS, spread, swing
 from studies.framework import answer, number, table_rows, time_in_turn
 from tauguard.contacts import registered
 from tauguard.datasets import demo_plan, simulate_all
@@ -183,14 +183,6 @@ def reactions(count: int, seed: int, known: Mapping[str, Any]) -> list[Row]:
                     }
                 )
     return rows
-
-
-def spread(values: list[float]) -> dict[str, float | None]:
-    """Median, smallest and largest of those that are finite."""
-    known = [v for v in values if np.isfinite(v)]
-    if not known:
-        return {"median": None, "low": None, "high": None}
-    return {"median": float(np.median(known)), "low": min(known), "high": max(known)}
 
 
 def draw(rows: list[Row], figure: Figure) -> None:

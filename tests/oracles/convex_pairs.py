@@ -113,3 +113,24 @@ def pairs_by_outcome(
         )
         for hit, parts in found.items()
     ]
+
+
+def moving_pairs(
+    rng: np.random.Generator, kind: str, n: int
+) -> tuple[Bodies, Bodies, Motion, Motion]:
+    """Bodies about 2 m apart that move by up to 2 m and turn by less than half a turn."""
+
+    def body() -> Bodies:
+        if kind == "tetrahedra":
+            return Tetrahedra(rng.uniform(-1, 1, (n, 4, 3)))
+        rotation = np.tile(np.eye(3), (n, 1, 1))
+        return Boxes(np.zeros((n, 3)), rng.uniform(0.2, 1, (n, 3)), rotation)
+
+    def motion() -> Motion:
+        pose = np.tile(np.eye(4), (n, 1, 1))
+        seed = int(rng.integers(1 << 31))
+        pose[:, :3, :3] = Rotation.random(n, random_state=seed).as_matrix()
+        pose[:, :3, 3] = rng.uniform(-2.5, 2.5, (n, 3))
+        return Motion(pose, rng.uniform(-2, 2, (n, 3)), rng.uniform(-1.8, 1.8, (n, 3)))
+
+    return body(), body(), motion(), motion()

@@ -78,3 +78,11 @@ def swing_metrics(
         force / region.transient_force,
     )
     return dict(zip(OUTCOMES, found, strict=True))
+
+
+def spread(values: list[float]) -> dict[str, float | None]:
+    """Median, smallest and largest of those that are finite."""
+    known = [v for v in values if np.isfinite(v)]
+    if not known:
+        return {"median": None, "low": None, "high": None}
+    return {"median": float(np.median(known)), "low": min(known), "high": max(known)}

@@ -5,8 +5,10 @@ import pytest
 
 from oracles.convex_distance import relative_error
 from oracles.convex_impact import bracket, impact_errors
-from oracles.convex_pairs import pairs_by_outcome, shifted, take
+from oracles.convex_pairs import moving_pairs, pairs_by_outcome, shifted, take
+from oracles.hull_volumes import HullVolumes, enclosed
 from tauguard.rigid import Boxes, Motion, PlaneCache, Tetrahedra, overlap, time_of_impact
+from tauguard.rigid.comparators import VOLUMES
 
 PAIRS = [("tetrahedra", "tetrahedra"), ("boxes", "boxes"), ("parallelepipeds", "tetrahedra")]
 
@@ -43,19 +45,7 @@ def test_a_wrong_time_of_impact_would_show():
 
 @pytest.mark.parametrize("kind", ["boxes", "tetrahedra"])
 def test_moving_bodies_are_never_late_never_missed_and_close(kind):
-    rng, n = np.random.default_rng(4), 300
-
-    def body():
-        if kind == "tetrahedra":
-            return Tetrahedra(rng.uniform(-1, 1, (n, 4, 3)))
-        return Boxes(np.zeros((n, 3)), rng.uniform(0.2, 1, (n, 3)), np.tile(np.eye(3), (n, 1, 1)))
-
-    def motion():
-        pose = np.tile(np.eye(4), (n, 1, 1))
-        pose[:, :3, 3] = rng.uniform(-2.5, 2.5, (n, 3))
-        return Motion(pose, rng.uniform(-2, 2, (n, 3)), rng.uniform(-1.8, 1.8, (n, 3)))
-
-    given = body(), body(), motion(), motion()
+    given = moving_pairs(np.random.default_rng(4), kind, 300)
     row = impact_errors(*bracket(*given), time_of_impact(*given).time_of_impact)
     assert row["hits"] > 10
     assert [row[name]["value"] for name in ("missed", "false", "late")] == [0, 0, 0]
@@ -82,3 +72,17 @@ def test_an_error_between_points_without_extent_is_a_number():
     truth, size = np.zeros(2), np.array([0.0, 2.0])
     assert relative_error(np.array([0.0, 0.5]), truth, size) == 0.25
     assert relative_error(np.array([1e-300, 0.5]), truth, size) == np.inf
+
+
+def test_the_size_of_a_volume_is_that_of_geometry():
+    cube = np.array(
+        [[[x, y, z] for z in (-1.0, 1.0)] + [[x, y, 0.0]] for x in (-1, 1) for y in (-1, 1)]
+    )
+    expected = {"sphere": 4 / 3 * np.pi * 3**1.5, "aabb": 8.0, "k_dop": 8.0}
+    for name, value in expected.items():
+        volume = VOLUMES[name](cube, np.array([0, 4]))
+        volume.fit()
+        numbers = np.empty((1, volume.numbers))
+        volume.write(numbers)
+        assert enclosed(name, numbers[0]) == pytest.approx(value)
+    assert HullVolumes(cube, np.array([0, 4])).size[0] == pytest.approx(8.0)
