@@ -248,7 +248,7 @@ int main(int argc, char** argv) {
   Random random(4);
   const Tally tally = scenes(random, 2 * effort);
   const int pairs = shapes(random, effort), flexes = simplices(random, effort);
-  std::printf("guarded steps %d (%d rolled_back), shapes %d, simplices %d: %d wrong\n", tally.steps,
+  std::printf("guarded steps %d (%d rolled back), shapes %d, simplices %d: %d wrong\n", tally.steps,
               tally.rolled_back, pairs, flexes, failures);
   return failures != 0;
 }

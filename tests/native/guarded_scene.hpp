@@ -84,10 +84,11 @@ inline Engine engine_of(const Scene& scene, mjData* end, mjData* other) {
   double* margins[] = {m->pair_margin, m->geom_margin, m->flex_margin};
   double* solrefs[] = {m->pair_solref, m->geom_solref, m->flex_solref};
   double* solimps[] = {m->pair_solimp, m->geom_solimp, m->flex_solimp};
+  double* frictions[] = {m->pair_friction, m->geom_friction, m->flex_friction};
   int* priorities[] = {nullptr, m->geom_priority, m->flex_priority};
   for (int k = 0; k < 3; ++k)
     e.margin[k] = margins[k], e.solref[k] = solrefs[k], e.solimp[k] = solimps[k],
-    e.priority[k] = priorities[k];
+    e.friction[k] = frictions[k], e.priority[k] = priorities[k];
   e.pair_geom1 = m->pair_geom1, e.pair_geom2 = m->pair_geom2;
   e.flex_vertbodyid = m->flex_vertbodyid, e.flex_vert = m->flex_vert;
   e.time = &d->time, e.qpos = d->qpos, e.qvel = d->qvel, e.energy = d->energy;

@@ -107,7 +107,8 @@ inline std::shared_ptr<Scores> scores_of(Random& random, int kind, const Chain& 
   const std::size_t count = 1 + random() % 11, size = n * count, vectors = random() % 40;
   const Numbers z = uniforms(random, vectors * size, -1, 1), c = uniforms(random, vectors, -1, 1);
   return std::make_shared<KernelScores>(std::move(residual), Window(n, 1 + random() % 8, count),
-                                        KernelSum(z.data(), c.data(), vectors, size, 0.1, 3));
+                                        KernelSum(z.data(), c.data(), vectors, size, 0.1, 3),
+                                        random() % 2);
 }
 
 struct MonitoredArm {
