@@ -49,7 +49,7 @@ class State:
     Between two states a body's point y moves as ``xpos + t dx + exp(t [w]x) xmat y``, t in [0, 1],
     with dx the difference of both xpos and w the shortest rotation vector from one xmat to the
     other (what ``mj_integratePos`` does with a free joint); a flex vertex moves linearly. That
-    path is what checkers answer about and what a referee judges.
+    path is what checkers answer about, and the ground truth too.
 
     Attributes:
         time: [s].

@@ -1,4 +1,4 @@
-"""Several checkers on one run of a scene, beside MuJoCo and a referee: who saw what, and when."""
+"""Several checkers on one run of a scene, beside MuJoCo's contacts and the ground truth."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from tauguard.contacts.checker import (
     geom_kinds,
     pair_kind,
 )
+from tauguard.contacts.ground_truth import GroundTruth
 from tauguard.contacts.mujoco_checker import MujocoChecker
-from tauguard.contacts.referee import Referee
 from tauguard.contacts.report import Report, Score
 from tauguard.contacts.run import Run
 from tauguard.contacts.scenes import SCENES, ContactScene
@@ -33,13 +33,13 @@ def compare(
     timestep: float | None = None,
     seconds: float | None = None,
     options: Mapping[str, Mapping[str, Any]] | None = None,
-    referee: bool = True,
+    ground_truth: bool = True,
     fine: int | None = None,
     keep: bool = False,
 ) -> Report:
     """Run a scene in MuJoCo as it is and let every checker judge every step.
 
-    The checkers only look on. All of them, and the referee, are told the same path: see
+    The checkers only look on. All of them, and the ground truth, get the same path: see
     :class:`tauguard.contacts.State`.
 
     Args:
@@ -48,15 +48,16 @@ def compare(
         timestep: Of MuJoCo [s]; ``None``: the scene's.
         seconds: How long [s]; ``None``: the scene's own time.
         options: By checker, what to hand to its factory.
-        referee: Whether the referee judges (slow); without it there is no precision or recall.
+        ground_truth: Whether true contacts are computed (slow); without them there is no precision
+            or recall.
         fine: A second yardstick: the scene is also run with steps this many times shorter, up to
             its first contact (from there on the two runs part); ``None``: it is not.
         keep: Whether the report keeps the states, for a recording.
 
     Raises:
-        ValueError: an unknown scene or checker, a geom that a checker or the referee cannot
-            handle, a checker's contact that is not of the model or the step, options of a checker
-            that is not asked for, a timestep or duration that is not above 0, a ``fine`` below 1.
+        ValueError: an unknown scene or checker, a geom that a checker or the ground truth
+            cannot handle, a checker's contact that is not of the model or the step, options of a
+            checker that is not asked for, a timestep or duration that is not above 0, a ``fine`` below 1.
     """
     if isinstance(scene, str):
         if scene not in SCENES:
@@ -78,9 +79,9 @@ def compare(
     }
     # MuJoCo's own contacts are the yardstick of leads and depths, asked for or not.
     yardstick = chosen.get("mujoco") or MujocoChecker(model)
-    judging = Referee(model) if referee else None
-    judged = judging.covers if judging is not None else None
-    run = _simulate(model, data, scene, duration, {**chosen, "mujoco": yardstick}, judging, keep)
+    truth = GroundTruth(model) if ground_truth else None
+    judged = truth.covers if truth is not None else None
+    run = _simulate(model, data, scene, duration, {**chosen, "mujoco": yardstick}, truth, keep)
     scores = tuple(score(model, name, one.covers, judged, run) for name, one in chosen.items())
     first = _first_contact(scene, model.opt.timestep / fine, duration) if fine else None
     if first is not None:
@@ -96,7 +97,7 @@ def _report(
         timestep=float(run.model.opt.timestep),
         steps=len(run.step_seconds),
         scores=scores,
-        outcomes=judge(run.model, run.times, run.verdicts, run.contacts["mujoco"]),
+        outcomes=judge(run.model, run.times, run.touches, run.contacts["mujoco"]),
         first_contact=first,
         disagreements=tuple(d for s in scores for d in s.disagreements),
         step_us=1e6 * float(np.median(run.step_seconds)),
@@ -111,7 +112,7 @@ def _simulate(
     scene: ContactScene,
     duration: float,
     checkers: Mapping[str, Checker],
-    referee: Referee | None,
+    truth: GroundTruth | None,
     keep: bool,
 ) -> Run:
     scratch = mujoco.MjData(model)
@@ -132,8 +133,8 @@ def _simulate(
             found = asked(one, before, after)
             run.seconds[name].append(time.process_time() - clock)
             run.contacts[name].append(_fitting(name, model, found))
-        if referee is not None:
-            run.verdicts.append(referee.judge(before, after))
+        if truth is not None:
+            run.touches.append(truth.touches(before, after))
         run.times.append(after.time)
         if keep:
             run.states.append(after)

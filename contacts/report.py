@@ -7,19 +7,19 @@ from typing import Any
 
 import mujoco
 
-from tauguard.contacts.referee import Pair
+from tauguard.contacts.ground_truth import Pair
 from tauguard.contacts.run import Run
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Where a checker and the referee differ."""
+    """Where a checker and the ground truth differ."""
 
     checker: str
     kind: str  #: "missed": an event without a report; "false": a report without a touch
     time: float  #: [s]
     partners: tuple[str, str]
-    depth: float  #: that the referee saw, or the checker claimed [m]
+    depth: float  #: the true one, or the one that the checker reported [m]
 
     def __str__(self) -> str:
         names = " and ".join(self.partners)
@@ -39,14 +39,14 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Score:
-    """How one checker did. ``None``: there was nothing to count, or no referee.
+    """How one checker did. ``None``: there was nothing to count, or no ground truth.
 
     Attributes:
         checker: Its name.
         events: Contacts of two partners, from touch to parting, over the pairs it covers.
         recalled: Of them, seen: a report within a step of them.
         reports: Steps and partners that it reported.
-        correct: Of them, those that the referee agrees with or does not care about.
+        correct: Of them, those that are true, or no deeper than the tolerance.
         steps: Steps and partners that touch beyond the tolerance.
         steps_found: Of them, reported in that very step.
         delay_ms: From an event's onset to its first report, median [ms].
@@ -99,8 +99,8 @@ class Score:
 class Report:
     """The comparison of several checkers on one run of a scene.
 
-    Printed, it is a table of a line a checker. precision: share of its reports that the referee
-    agrees with. recall: share of the contacts that it reported within a step. events: contacts of
+    Printed, it is a table of a line a checker. precision: fraction of its reports that are
+    true. recall: fraction of the true contacts that it reported within a step. events: contacts of
     the pairs that it covers. delay_ms: from the touch to its first report; lead_ms: how much
     earlier than MuJoCo. depth_mm, normal_deg: difference from MuJoCo's. us_per_step: of one check;
     share: the same over ``mj_step``'s.
@@ -174,7 +174,7 @@ class Report:
         lost = sum(not o.held for o in self.outcomes)
         lines.append(
             f"{self.scene}: {self.steps} steps of {1e3 * self.timestep:g} ms, mj_step takes "
-            f"{self.step_us:.0f} us; contacts by the referee: {len(self.outcomes)}, of which "
+            f"{self.step_us:.0f} us; true contacts: {len(self.outcomes)}, of which "
             f"MuJoCo did not list {missed} and did not hold {lost}"
         )
         lines += [

@@ -9,10 +9,10 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.contacts.checker import Contacts, State
-from tauguard.contacts.referee import Verdicts
+from tauguard.contacts.ground_truth import Touches
 
 #: Surfaces closer than this touch [m]: swept checkers stop within 1e-10 of the shapes' size, and
-#: the referee's tolerance is a thousand times larger.
+#: the ground truth's tolerance is a thousand times larger.
 TOUCHING = 1e-8
 
 
@@ -24,7 +24,7 @@ class Run:
         model: MjModel.
         times: Of the states [s].
         contacts: By checker, one :class:`Contacts` a step.
-        verdicts: Of the referee, one a step; empty without one.
+        touches: The true ones, one item a step; empty without ground truth.
         seconds: By checker, what each call took [s].
         step_seconds: What each ``mj_step`` took [s].
         state_seconds: What copying each state took [s].
@@ -34,7 +34,7 @@ class Run:
     model: Any
     times: list[float]
     contacts: dict[str, list[Contacts]]
-    verdicts: list[Verdicts] = field(default_factory=list)
+    touches: list[Touches] = field(default_factory=list)
     seconds: dict[str, list[float]] = field(default_factory=dict)
     step_seconds: list[float] = field(default_factory=list)
     state_seconds: list[float] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""How a checker did in one run, against the referee and beside MuJoCo."""
+"""How a checker did in one run, beside the ground truth and MuJoCo."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.contacts.checker import KINDS, Contacts, geom_kinds
-from tauguard.contacts.referee import TOLERANCE, Event, Pair, Verdicts, events, pair_of
+from tauguard.contacts.ground_truth import TOLERANCE, Event, Pair, Touches, events, pair_of
 from tauguard.contacts.report import Disagreement, Outcome, Score, pair_names
 from tauguard.contacts.run import TOUCHING, Run
 
@@ -23,10 +23,10 @@ _Rows = dict[tuple[int, ...], tuple[float, float, NDArray[np.float64]]]
 def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run) -> Score:
     """Precision, recall, lead, differences and cost of one checker.
 
-    Recall counts events (a contact of two partners from touch to parting, don't-care ones left
-    out), precision counts reports (a step and two partners); both only over kinds of pairs that the
-    checker and the referee cover; no figure is of others than the checker covers. A report is a
-    row whose surfaces touch; margins are not scored.
+    Recall counts events: contacts of two partners from touch to parting, without those that stay
+    within the tolerance. Precision counts reports: a step and two partners whose surfaces touch;
+    margins are not scored. Both count only kinds of pairs that the checker and the ground truth
+    cover; all other metrics count the kinds that the checker covers.
     """
     kinds = geom_kinds(model)
     given = run.contacts[name]
@@ -36,13 +36,13 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
     wrong: list[Disagreement] = []
     if judged is not None:
         both = covers & judged
-        verdicts = [_covered(v, kinds, both) for v in run.verdicts]
-        truth = [e for e in events(model, run.times, verdicts) if e.counts]
+        touches = [_covered(v, kinds, both) for v in run.touches]
+        truth = [e for e in events(model, run.times, touches) if e.counts]
         step = float(model.opt.timestep)
         seen = [e.seen(reports.get(e.pair, []), step) for e in truth]
         asked = [one.where(_mask(one.geom, kinds, both)) for one in mine]
-        right, total, false = _precision(model, run, asked, verdicts)
-        positive, found = _steps(model, mine, verdicts)
+        right, total, false = _precision(model, run, asked, touches)
+        positive, found = _steps(model, mine, touches)
         counted = {
             "events": len(truth),
             "recalled": sum(seen),
@@ -76,20 +76,20 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
 
 
 def judge(
-    model: Any, times: Sequence[float], verdicts: Sequence[Verdicts], mine: Sequence[Contacts]
+    model: Any, times: Sequence[float], touches: Sequence[Touches], mine: Sequence[Contacts]
 ) -> tuple[Outcome, ...]:
     """What MuJoCo made of every event: did it list it, and did it hold?
 
     Held: listed, never deeper than the thinner partner's inner radius (planes and cloth have
     none), and no geom or triangle is pushed the other way from one step to the next.
     """
-    if not verdicts:
+    if not touches:
         return ()
     step = float(model.opt.timestep)
     reports = _reports(model, times, mine)
     tracks = _tracks(model, times, mine)
     out = []
-    for event in events(model, times, verdicts):
+    for event in events(model, times, touches):
         if not event.counts:
             continue
         generated = event.seen(reports.get(event.pair, []), step)
@@ -123,10 +123,10 @@ def _reports(
     return dict(out)
 
 
-def _covered(verdicts: Verdicts, kinds: Sequence[str], covers: Covers) -> Verdicts:
-    keep = _mask(verdicts.geom, kinds, covers)
+def _covered(touches: Touches, kinds: Sequence[str], covers: Covers) -> Touches:
+    keep = _mask(touches.geom, kinds, covers)
     fields = ("geom", "flex", "time", "depth", "counts")
-    return Verdicts(*(getattr(verdicts, name)[keep] for name in fields))
+    return Touches(*(getattr(touches, name)[keep] for name in fields))
 
 
 def _mask(geom: Any, kinds: Sequence[str], covers: Covers) -> NDArray[np.bool_]:
@@ -148,35 +148,35 @@ def _precision(
     model: Any,
     run: Run,
     mine: Sequence[Contacts],
-    verdicts: Sequence[Verdicts],
+    touches: Sequence[Touches],
 ) -> tuple[int, int, list[tuple[float, Pair, float]]]:
-    """Reports that the referee agrees with (or does not care about), all reports, the others."""
+    """Reports that are true or within the tolerance, all reports, and the false ones."""
     right = total = 0
     false = []
-    for k, (contacts, verdict) in enumerate(zip(mine, verdicts, strict=True)):
+    for k, (contacts, touch) in enumerate(zip(mine, touches, strict=True)):
         touching = _touching(contacts)
         said: dict[Pair, float] = {}
         rows = zip(_pairs(model, touching.geom, touching.flex), touching.distance, strict=True)
         for pair, distance in rows:
             said[pair] = min(said.get(pair, np.inf), float(distance))
-        true = set(_pairs(model, verdict.geom, verdict.flex))
+        true = set(_pairs(model, touch.geom, touch.flex))
         for pair, distance in said.items():
             total += 1
             if pair in true or distance > -TOLERANCE:
-                right += 1  # no deeper than the tolerance: nobody's mistake
+                right += 1  # no deeper than the tolerance: not scored
             else:
                 false.append((run.times[k], pair, -distance))
     return right, total, false
 
 
-def _steps(model: Any, mine: Sequence[Contacts], verdicts: Sequence[Verdicts]) -> tuple[int, int]:
+def _steps(model: Any, mine: Sequence[Contacts], touches: Sequence[Touches]) -> tuple[int, int]:
     """Steps and pairs that touch beyond the tolerance, and those reported in that very step."""
     positive = found = 0
-    for contacts, verdict in zip(mine, verdicts, strict=True):
+    for contacts, touch in zip(mine, touches, strict=True):
         true = {
             pair
             for pair, counts in zip(
-                _pairs(model, verdict.geom, verdict.flex), verdict.counts, strict=True
+                _pairs(model, touch.geom, touch.flex), touch.counts, strict=True
             )
             if counts
         }

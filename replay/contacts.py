@@ -117,7 +117,7 @@ def _blueprint(eye: rrb.EyeControls3D | None) -> rrb.Blueprint:
                     origin="seen",
                     name="contacts seen in a step, by checker (colours as in the scene)",
                 ),
-                rrb.TextLogView(origin="notes", name="disagreements with the referee"),
+                rrb.TextLogView(origin="notes", name="disagreements with the ground truth"),
             ),
             column_shares=[3, 2],
         ),

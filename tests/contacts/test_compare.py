@@ -164,24 +164,24 @@ def test_recall_of_the_arm_between_boxes_is_one():
 
 
 def test_a_finely_stepped_run_is_a_second_yardstick():
-    report = compare(bounce(2.001), ["mujoco", "rigid"], seconds=0.46, referee=False, fine=20)
+    report = compare(bounce(2.001), ["mujoco", "rigid"], seconds=0.46, ground_truth=False, fine=20)
     impact = 0.9 / 2.001
     assert impact <= report.first_contact <= impact + 1e-4
     assert report["rigid"].first == pytest.approx(impact, abs=1e-6)
     assert impact < report["mujoco"].first <= impact + 2e-3
     off = 1e3 * (report["rigid"].first - report.first_contact)
     assert report["rigid"].first_error_ms == pytest.approx(off)
-    never = compare(bounce(2.0), ["rigid"], seconds=0.1, referee=False, fine=2)
+    never = compare(bounce(2.0), ["rigid"], seconds=0.1, ground_truth=False, fine=2)
     assert never.first_contact is None
     assert never["rigid"].first is None
     assert never["rigid"].first_error_ms is None
-    flat = compare(bounce(2.001), ["cloth"], seconds=0.46, referee=False, fine=2)
+    flat = compare(bounce(2.001), ["cloth"], seconds=0.46, ground_truth=False, fine=2)
     assert flat.first_contact is not None  # of a ball and a plane, which cloth does not cover
     assert flat["cloth"].first_error_ms is None
 
 
-def test_without_a_referee_there_is_cost_but_no_judgement():
-    report = compare(bounce(2.0), ["rigid"], seconds=0.05, referee=False)
+def test_without_ground_truth_there_is_cost_but_no_judgement():
+    report = compare(bounce(2.0), ["rigid"], seconds=0.05, ground_truth=False)
     assert report["rigid"].recall is None
     assert report["rigid"].events is None
     assert report.steps == 25

@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tauguard.contacts._contacts import simplices
-from tauguard.contacts.referee import triangles as closed
+from tauguard.contacts.ground_truth import triangles as closed
 
 PAIR = np.array([[0, 0]], dtype=np.int32)
 ONE = np.array([[0, 1, 2]], dtype=np.int32)

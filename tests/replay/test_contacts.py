@@ -63,7 +63,7 @@ def test_a_comparison_is_drawn(tmp_path):
     write_contacts_rrd(tmp_path / "a.rrd", **report.recording())
     assert (tmp_path / "a.rrd").stat().st_size > 10_000
     with pytest.raises(ValueError, match="keep=True"):
-        compare(ball_cloth(), ["cloth"], seconds=0.002, referee=False).recording()
+        compare(ball_cloth(), ["cloth"], seconds=0.002, ground_truth=False).recording()
 
 
 def test_what_does_not_fit_is_named(run, tmp_path):

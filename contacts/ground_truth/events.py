@@ -1,4 +1,4 @@
-"""From verdicts step by step to events, and which of them a checker saw."""
+"""From touches step by step to events, and which of them a checker saw."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tauguard.contacts.referee.judge import Verdicts
+from tauguard.contacts.ground_truth.touches import Touches
 
 #: Shorter gaps than this between touching steps are part of one event, and never less than two
 #: steps [s].
@@ -32,7 +32,7 @@ class Event:
 
 
 def pair_of(model: Any, geom: Any, flex: Any) -> Pair:
-    """The partners of one row of contacts or verdicts: bodies of geoms, or flexes."""
+    """The partners of one row of contacts or touches: bodies of geoms, or flexes."""
     partners = [
         ("flex", int(f)) if g < 0 else ("body", int(model.geom_bodyid[g]))
         for g, f in zip(geom, flex, strict=True)
@@ -41,29 +41,29 @@ def pair_of(model: Any, geom: Any, flex: Any) -> Pair:
     return first, second
 
 
-def events(model: Any, times: Sequence[float], verdicts: Sequence[Verdicts]) -> list[Event]:
+def events(model: Any, times: Sequence[float], touches: Sequence[Touches]) -> list[Event]:
     """The events of a run, by onset.
 
     Args:
         model: the scene's.
-        times: of the states, one more than ``verdicts`` [s].
-        verdicts: of the steps between them.
+        times: of the states, one more than ``touches`` [s].
+        touches: of the steps between them.
 
     Raises:
         ValueError: numbers that do not fit.
     """
-    if len(times) != len(verdicts) + 1:
+    if len(times) != len(touches) + 1:
         raise ValueError(
-            f"times: {len(times)} states, expected {len(verdicts) + 1}, one more than verdicts"
+            f"times: {len(times)} states, expected {len(touches) + 1}, one more than touches"
         )
     open_: dict[Pair, Event] = {}
     done: list[Event] = []
-    for step, verdict in enumerate(verdicts):
+    for step, touch in enumerate(touches):
         begin, length = times[step], times[step + 1] - times[step]
-        for k in range(len(verdict)):
-            pair = pair_of(model, verdict.geom[k], verdict.flex[k])
-            onset, end = begin + float(verdict.time[k]) * length, begin + length
-            depth, counts = float(verdict.depth[k]), bool(verdict.counts[k])
+        for k in range(len(touch)):
+            pair = pair_of(model, touch.geom[k], touch.flex[k])
+            onset, end = begin + float(touch.time[k]) * length, begin + length
+            depth, counts = float(touch.depth[k]), bool(touch.counts[k])
             last = open_.get(pair)
             if last is not None and onset - last.end <= max(GAP, 2 * length):
                 onset, depth = min(last.onset, onset), max(last.depth, depth)

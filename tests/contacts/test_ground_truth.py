@@ -1,4 +1,4 @@
-"""The referee against closed forms, coal, dense samples and MuJoCo's own choice of pairs."""
+"""The ground truth against closed forms, coal, dense samples and MuJoCo's own choice of pairs."""
 
 import coal
 import mujoco
@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tauguard.contacts import State
-from tauguard.contacts.referee import Event, Referee, Verdicts, events
-from tauguard.contacts.referee import triangles as tri
-from tauguard.contacts.referee.pairs import geom_pairs
-from tauguard.contacts.referee.search import search
+from tauguard.contacts.ground_truth import Event, GroundTruth, Touches, events
+from tauguard.contacts.ground_truth import triangles as tri
+from tauguard.contacts.ground_truth.pairs import geom_pairs
+from tauguard.contacts.ground_truth.search import search
 from tauguard.contacts.scenes import ball_cloth, sphere_plate
 
 SHAPES = {
@@ -57,7 +57,7 @@ def test_a_ball_in_free_flight_touches_the_cloth_when_the_formula_says(speed, im
     before = State.of(model, data)
     flight = 2 * (0.005 + 0.003) / speed
     data.qpos[-5] -= speed * flight
-    verdict = Referee(model).judge(before, State.of(model, data))
+    verdict = GroundTruth(model).touches(before, State.of(model, data))
     assert len(verdict) == 1
     assert verdict.counts.all()
     assert verdict.flex.tolist() == [[-1, 0]]
@@ -69,7 +69,7 @@ def test_a_sphere_through_a_thin_plate_is_seen_within_one_step():
     model, data = scene.start()
     before = State.of(model, data)
     data.qpos[2] -= 1.0
-    verdict = Referee(model).judge(before, State.of(model, data))
+    verdict = GroundTruth(model).touches(before, State.of(model, data))
     assert verdict.time[0] == pytest.approx(0.005, abs=1e-8)
 
 
@@ -82,7 +82,7 @@ def test_a_turning_capsule_meets_a_sphere_at_the_analytic_angle():
     mujoco.mju_mulQuat(turned, np.array([np.cos(0.6), 0, 0, np.sin(0.6)]), flat)
     start = [0, 0, 0, *flat, *pose(ball)]
     end = [0, 0, 0, *turned, *pose(ball)]
-    verdict = Referee(model).judge(state(model, start), state(model, end))
+    verdict = GroundTruth(model).touches(state(model, start), state(model, end))
     # The ball's centre to the rod's axis at angle a, less both radii.
     angle = np.linspace(0, 1.2, 2_000_001)
     along = np.clip(0.15 * np.cos(angle) + 0.25 * np.sin(angle), -0.2, 0.2)
@@ -92,7 +92,7 @@ def test_a_turning_capsule_meets_a_sphere_at_the_analytic_angle():
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(list(SHAPES)), st.sampled_from(list(SHAPES)))
 @settings(max_examples=60, deadline=None)
-def test_what_dense_samples_see_the_referee_sees(seed, first, second):
+def test_what_dense_samples_see_the_ground_truth_has(seed, first, second):
     rng = np.random.default_rng(seed)
     model = free_bodies(first, second)
     ends = [
@@ -100,7 +100,7 @@ def test_what_dense_samples_see_the_referee_sees(seed, first, second):
         for _ in range(2)
     ]
     states = [state(model, q) for q in ends]
-    verdict = Referee(model).judge(*states)
+    verdict = GroundTruth(model).touches(*states)
     data, depth, first_s = mujoco.MjData(model), 0.0, np.inf
     vel = np.zeros(model.nv)
     mujoco.mj_differentiatePos(model, vel, 1.0, *ends)
@@ -127,7 +127,7 @@ def test_a_graze_below_the_tolerance_does_not_count(gap, rows, counts):
     """A ball passes another at a closest distance of ``gap`` in the middle of the step."""
     model = free_bodies("sphere", "sphere")
     apart = 0.2 + gap
-    verdict = Referee(model).judge(
+    verdict = GroundTruth(model).touches(
         state(model, [*pose([-0.3, apart, 0]), *pose([0, 0, 0])]),
         state(model, [*pose([0.3, apart, 0]), *pose([0, 0, 0])]),
     )
@@ -180,7 +180,7 @@ def test_a_sheet_meets_every_kind_of_geom(kind):
     data.qpos[2] += 0.001 - lowest + 0.05
     before = State.of(model, data)
     data.qpos[2] -= 0.4
-    verdict = Referee(model).judge(before, State.of(model, data))
+    verdict = GroundTruth(model).touches(before, State.of(model, data))
     assert verdict.geom.tolist() == [[0, -1]]
     assert verdict.time[0] * 0.4 == pytest.approx(0.05, abs=3e-6)
 
@@ -219,8 +219,8 @@ def test_the_search_does_not_miss_a_short_dip():
     assert found.depth[0] > 1e-5
 
 
-def verdicts(*rows):
-    return Verdicts(
+def touches_of(*rows):
+    return Touches(
         np.array([[0, 1]] * len(rows)).reshape(-1, 2),
         np.full((len(rows), 2), -1),
         np.array([r[0] for r in rows]),
@@ -231,8 +231,13 @@ def verdicts(*rows):
 
 def test_short_gaps_are_one_event_and_long_ones_two():
     model = free_bodies("sphere", "sphere")
-    steps = [verdicts((0.5, 1e-3)), *[verdicts()] * 4, verdicts((0.0, 2e-3)), *[verdicts()] * 9]
-    steps.append(verdicts((0.25, 5e-6)))
+    steps = [
+        touches_of((0.5, 1e-3)),
+        *[touches_of()] * 4,
+        touches_of((0.0, 2e-3)),
+        *[touches_of()] * 9,
+    ]
+    steps.append(touches_of((0.25, 5e-6)))
     times = [1e-3 * k for k in range(len(steps) + 1)]
     found = events(model, times, steps)
     pair = (("body", 1), ("body", 2))
@@ -245,7 +250,7 @@ def test_short_gaps_are_one_event_and_long_ones_two():
     assert found[0].seen([7e-3], 1e-3)
     assert not found[0].seen([7.1e-3], 1e-3)
     assert not Event(pair, 1.0, 1.1, 0.0, True).seen([], 1e-3)
-    with pytest.raises(ValueError, match="one more than verdicts"):
+    with pytest.raises(ValueError, match="one more than touches"):
         events(model, times[:-1], steps)
 
 
@@ -254,4 +259,4 @@ def test_a_flex_that_it_cannot_judge_is_named():
       <geom size="1"/><flexcomp name="rope" type="grid" dim="1" count="5 1 1" spacing=".2 .2 .2">
       <edge equality="true"/><pin id="0"/></flexcomp></worldbody></mujoco>""")
     with pytest.raises(ValueError, match=r"rope.*dim 1"):
-        Referee(model)
+        GroundTruth(model)

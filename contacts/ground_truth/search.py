@@ -60,7 +60,7 @@ def search(
     da, db = sample(rows, a), sample(rows, b)
     while len(rows):
         length = bound[rows] * (b - a)
-        # After the first touch only a depth is looked for that tips the verdict.
+        # After the first touch only a depth is looked for that tips the touch.
         known = (deepest[rows] < -tolerance) | ((da + db - length) / 2 > -tolerance)
         settled = known & (a >= first[rows])
         open_ = (da + db <= length) & ~settled

@@ -1,4 +1,4 @@
-"""The referee: which pairs touch on the very path that checkers are told, and when."""
+"""Which pairs touch on the very path that checkers get, and when."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.contacts.checker import State, geom_kinds, pair_kind
-from tauguard.contacts.referee import triangles
-from tauguard.contacts.referee.motion import Step
-from tauguard.contacts.referee.pairs import Index, flex_geoms, geom_pairs
-from tauguard.contacts.referee.search import Found, search
+from tauguard.contacts.ground_truth import triangles
+from tauguard.contacts.ground_truth.motion import Step
+from tauguard.contacts.ground_truth.pairs import Index, flex_geoms, geom_pairs
+from tauguard.contacts.ground_truth.search import Found, search
 
-#: A pair that is never deeper than this is nobody's mistake, reported or not [m].
+#: A pair that is never deeper than this is not scored, reported or not [m].
 TOLERANCE = 1e-5
 #: Kinds of geoms that a flex may meet here.
 FLEX_MEETS = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 
 
 @dataclass(frozen=True, eq=False)
-class Verdicts:
+class Touches:
     """Pairs that touch within one step, one a row.
 
     Attributes:
@@ -46,8 +46,8 @@ class Verdicts:
         return len(self.time)
 
 
-class Referee:
-    """Judges every pair of a scene: rigid geoms against one another and against flexes.
+class GroundTruth:
+    """True contacts of every pair of a scene: rigid geoms against one another and against flexes.
 
     Rigid pairs by ``mj_geomDistance`` at poses in between, flex elements (triangles of thickness
     2 ``flex_radius``) in closed form against spheres, capsules and planes, by coal's GJK against
@@ -77,7 +77,7 @@ class Referee:
                 if model.flex_dim[flex] != 2 or kinds[geom] not in FLEX_MEETS:
                     raise ValueError(
                         f"flex {name!r} (dim {model.flex_dim[flex]}) and geom "
-                        f"{geom} ({kinds[geom]}): the referee judges flexes of dim 2 against "
+                        f"{geom} ({kinds[geom]}): the ground truth knows flexes of dim 2 against "
                         f"{', '.join(FLEX_MEETS)}"
                     )
                 self._meets.append((flex, geom, kinds[geom]))
@@ -91,7 +91,7 @@ class Referee:
             if kind not in ("plane", "sphere", "capsule")
         }
 
-    def judge(self, before: State, after: State) -> Verdicts:
+    def touches(self, before: State, after: State) -> Touches:
         """The pairs that touch anywhere between both states."""
         step = Step.between(self.model, before, after)
         rows = self._rigid(step)
@@ -99,7 +99,7 @@ class Referee:
             rows += self._soft(step, flex, geom, kind)
         rows.sort()
         columns: list[Any] = list(zip(*rows, strict=True)) if rows else [[] for _ in range(5)]
-        return Verdicts(
+        return Touches(
             geom=np.array(columns[0], dtype=np.int32).reshape(-1, 2),
             flex=np.array(columns[1], dtype=np.int32).reshape(-1, 2),
             time=np.array(columns[2], dtype=np.float64),
@@ -108,7 +108,7 @@ class Referee:
         )
 
     def _rigid(self, step: Step) -> list[tuple[Any, ...]]:
-        """Rows of :class:`Verdicts` of the rigid pairs."""
+        """Rows of :class:`Touches` of the rigid pairs."""
         i, j = self._pairs.T
         center, xmat = step.poses(np.arange(self.model.ngeom), np.zeros(self.model.ngeom))
         bound = (
@@ -130,7 +130,7 @@ class Referee:
 
         found = search(distance, bound[near], TOLERANCE)
         return [
-            ((int(i[k]), int(j[k])), (-1, -1), *_verdict(found, k))
+            ((int(i[k]), int(j[k])), (-1, -1), *_row(found, k))
             for k in np.flatnonzero(np.isfinite(found.time))
         ]
 
@@ -197,6 +197,6 @@ class Referee:
         return self._hulls[geom]
 
 
-def _verdict(found: Found, k: Any) -> tuple[float, float, bool]:
+def _row(found: Found, k: Any) -> tuple[float, float, bool]:
     depth = float(found.depth[k])
     return float(found.time[k]), depth, depth > TOLERANCE

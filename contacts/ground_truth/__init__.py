@@ -1,0 +1,6 @@
+"""The ground truth of `compare`: the contacts on the path that checkers get; shares no code."""
+
+from tauguard.contacts.ground_truth.events import Event, Pair, events, pair_of
+from tauguard.contacts.ground_truth.touches import TOLERANCE, GroundTruth, Touches
+
+__all__ = ["TOLERANCE", "Event", "GroundTruth", "Pair", "Touches", "events", "pair_of"]
