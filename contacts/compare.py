@@ -57,7 +57,8 @@ def compare(
     Raises:
         ValueError: an unknown scene or checker, a geom that a checker or the ground truth
             cannot handle, a checker's contact that is not of the model or the step, options of a
-            checker that is not asked for, a timestep or duration that is not above 0, a ``fine`` below 1.
+            checker that is not asked for, a timestep or duration that is not above 0, a ``fine``
+            below 1.
     """
     if isinstance(scene, str):
         if scene not in SCENES:
