@@ -23,13 +23,18 @@ def glossary() -> set[str]:
 
 
 def test_what_the_map_names_is_there():
-    table = (ROOT / "CONTRIBUTING.md").read_text().partition("## Where to change what")[2]
-    rows = [line.split("|") for line in table.partition("\n\nOne ")[0].splitlines()[4:]]
-    assert len(rows) > 8
+    text = (ROOT / "CONTRIBUTING.md").read_text().partition("## Where to change what")[2]
+    lines = text.partition("\n\nOne ")[0].splitlines()
+    rows = [
+        line.split("|") for line in lines if line.startswith("| ") and " file | name |" not in line
+    ]
+    assert len(rows) > 20
     for _, _, files, names, _ in rows:
-        text = "".join((ROOT / file).read_text() for file in re.findall(r"`([^`]+)`", files))
+        paths = [ROOT / file for file in re.findall(r"`([^`]+)`", files)]
+        text = "".join(path.read_text() for path in paths if path.is_file())
+        assert text or "NAME" in files, files
         for name in re.findall(r"`(\w+)`", names):
-            assert re.search(rf"^(class |struct )?(\w+, )*{name}\b", text, re.MULTILINE), name
+            assert re.search(rf"\b{name}\b", text) or "NAME" in files, name
 
 
 def test_every_public_name_of_detection_has_its_term():
