@@ -33,9 +33,8 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
     for row in table_rows(rows, "scenes"):
         cost, error = number(row.get("us_per_step")), number(row.get("first_error_ms"))
         if cost and error is not None:
-            name = str(row["checker"])
-            role = "peer" if name.startswith(PEERS) else ""
-            yield Point(question, name, cost, abs(error), "", role, *axes)
+            role = "peer" if row["checker"].startswith(PEERS) else ""
+            yield Point(question, row["checker"], cost, abs(error), "", role, *axes)
     question = "Steps over fast contacts, random scenes"
     axes = ("time over the longest fixed step that holds", "fraction of scenes with tunnelling")
     thrown = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]

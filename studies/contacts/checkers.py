@@ -132,9 +132,8 @@ def _fly(
 def _cost(quick: bool) -> list[Row]:
     """The arm into cloth of 40 x 40 vertices: what a checker adds to MuJoCo's step."""
     seconds = 0.3 if quick else 0.6
-    report = compare(
-        arm_cloth(count=40), CHECKERS, timestep=2e-3, seconds=seconds, ground_truth=False
-    )
+    scene = arm_cloth(count=40)
+    report = compare(scene, CHECKERS, timestep=2e-3, seconds=seconds, ground_truth=False)
     copied = {"run": "quick" if quick else "full", "state_us": report.state_us}
     return [
         {

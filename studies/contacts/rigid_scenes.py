@@ -46,13 +46,13 @@ def plate(rng: np.random.Generator) -> Drawn:
 def pair(rng: np.random.Generator) -> Drawn:
     """Two convex bodies of any kinds, head on or past each other's middle."""
     spec, timestep, speed = world(rng, INTEGRATORS)
-    reaches = []
-    for name in ("first", "body"):
-        body = free_body(spec, name)
-        reaches.append(shape(rng, spec, body, name, between(rng, 5e-3, 0.5)))
-    gap = sum(reaches) + 0.005 + rng.random() * speed * timestep
+    reaches = [
+        shape(rng, spec, free_body(spec, name), name, between(rng, 5e-3, 0.5))
+        for name in ("first", "body")
+    ]
+    distance = sum(reaches) + 0.005 + rng.random() * speed * timestep
     aside = rng.normal(size=2) * 0.2 * min(reaches) * rng.integers(2)
-    return thrown(rng, spec, timestep, speed, [*aside, gap], gap, slide=0.0)
+    return thrown(rng, spec, timestep, speed, [*aside, distance], distance, slide=0.0)
 
 
 def chain(rng: np.random.Generator) -> Drawn:
