@@ -91,7 +91,11 @@ def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) 
     dt, constant = float(model.opt.timestep), scene.drive.electrical_time_constant
     physics = make_physics(model, data)
     decay = float(np.exp(-dt / constant)) if constant else 0.0
-    return _plant.Plant(physics, _joints(scene, nominal, gains), dt=dt, decay=decay)
+    plant = _plant.Plant(physics, _joints(scene, nominal, gains), dt=dt, decay=decay)
+    for obj in scene.spec.objects:
+        if obj.path:
+            plant.carry(int(model.body(obj.name).mocapid[0]), np.array(obj.path))
+    return plant
 
 
 def make_physics(model: mujoco.MjModel, data: mujoco.MjData) -> _plant.Physics:

@@ -16,6 +16,7 @@ from tauguard.models.payload import set_payload
 from tauguard.models.person import STATURES, Person
 from tauguard.models.robot import Robot, RobotDrive
 from tauguard.models.scene import Scene, SceneSpec, compose, with_drive, without_losses
+from tauguard.models.scene_objects import SceneObject, Shape, load_objects
 
 __all__ = [
     "BODY_REGIONS",
@@ -36,8 +37,10 @@ __all__ = [
     "Robot",
     "RobotDrive",
     "Scene",
+    "SceneObject",
     "SceneSpec",
     "Sensors",
+    "Shape",
     "Striker",
     "Table",
     "add_payload",
@@ -51,6 +54,7 @@ __all__ = [
     "drive_text",
     "link_surface",
     "load_arm",
+    "load_objects",
     "pin_model",
     "reflected_mass",
     "set_payload",

@@ -31,6 +31,7 @@ from tauguard.models.obstacles import (
 from tauguard.models.payload import add_payload_body
 from tauguard.models.person import Person, add_person
 from tauguard.models.robot import Robot
+from tauguard.models.scene_objects import SceneObject, add_object, hold
 
 #: Integrators by MuJoCo's names.
 INTEGRATORS = {
@@ -62,6 +63,7 @@ class SceneSpec:
     region_labels: bool = False  #: a contact sensor on every body region, after the links
     table: Table | None = None
     cloth: Cloth | None = None
+    objects: tuple[SceneObject, ...] = ()  #: things of your own
     drive: Drive | None = field(default=None, compare=False)
     """The nominal drive; without it the arm has its own, see :class:`tauguard.models.arm.Facts`."""
 
@@ -222,6 +224,12 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
         obstacles[proxy.region] = proxy
     for name, obstacle in obstacles.items():
         add_obstacle(whole, obstacle, name)
+    parts: dict[str, Springy] = {**obstacles}
+    for obj in spec.objects:
+        if obj.touchable:
+            parts |= {geom.name: obj for geom in add_object(whole, obj)}
+        else:
+            hold(whole, whole.body(arm.links[-1]), arm.flange(), obj)
     if spec.table is not None:
         add_table(whole, spec.table)
     if spec.floor:
@@ -231,21 +239,28 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     if spec.labels:
         for i, link in enumerate(arm.links, start=1):
             _add_label(whole, link, f"contact_link{i}")
-    parts: dict[str, Springy] = {**obstacles}
     if spec.person is not None:
         parts |= add_person(whole, spec.person)
     if spec.region_labels:
         for name in region_names(spec):
-            _add_label(whole, name, f"contact_{name}")
+            label_region(whole, spec, name, arm.links[0])
     if parts:
         add_pairs(whole, arm.shapes(), parts)
-    return tuple(obstacles)
+    moving = (obj.name for obj in spec.objects if obj.moves)
+    return (*obstacles, *moving)
 
 
 def region_names(spec: SceneSpec) -> tuple[str, ...]:
-    """Bodies that are regions of people: the proxies, then the person's."""
+    """Bodies that the arm must not press too hard: the proxies, the person's, then the objects."""
     person = () if spec.person is None else tuple(part.name for part in spec.person.parts())
-    return (*(proxy.region for proxy in spec.proxies), *person)
+    objects = (obj.name for obj in spec.objects if obj.touchable)
+    return (*(proxy.region for proxy in spec.proxies), *person, *objects)
+
+
+def label_region(whole: mujoco.MjSpec, spec: SceneSpec, name: str, arm: str = "") -> None:
+    """A contact sensor on a region; on an object, only of contacts with the arm from a link on."""
+    own = any(obj.name == name for obj in spec.objects)
+    _add_label(whole, name, f"contact_{name}", subtree=own, against=arm if own else "")
 
 
 def _drive(spec: SceneSpec, arm: Arm) -> Drive:
@@ -260,7 +275,9 @@ def _drive(spec: SceneSpec, arm: Arm) -> Drive:
     return drive if spec.mismatch is None else spec.mismatch.perturb_drive(drive)
 
 
-def _add_label(spec: mujoco.MjSpec, link: str, name: str) -> None:
+def _add_label(
+    spec: mujoco.MjSpec, link: str, name: str, subtree: bool = False, against: str = ""
+) -> None:
     """A sensor of the net external contact wrench on a link: found, force, torque, position.
 
     Its ten numbers are how many contacts there are (1), the force (3) and torque (3) that the
@@ -278,9 +295,11 @@ def _add_label(spec: mujoco.MjSpec, link: str, name: str) -> None:
     sensor = spec.add_sensor(
         name=name,
         type=mujoco.mjtSensor.mjSENS_CONTACT,
-        objtype=mujoco.mjtObj.mjOBJ_BODY,
+        objtype=mujoco.mjtObj.mjOBJ_XBODY if subtree else mujoco.mjtObj.mjOBJ_BODY,
         objname=link,
     )
+    if against:
+        sensor.reftype, sensor.refname = mujoco.mjtObj.mjOBJ_XBODY, against
     netforce = 3
     sensor.intprm = [sum(1 << int(field) for field in fields), netforce, 1]
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from tauguard.models import Mismatch
+from tauguard.models import Mismatch, SceneObject
 from tauguard.traces import KINDS
 
 
@@ -78,6 +78,7 @@ class Episode:
     ideal_drive: bool = False  #: no friction, ripple, lag or sensor errors
     timestep: float = 1e-3  #: [s]
     arm: str = "cura6"  #: a name or a file, see :func:`tauguard.models.load_arm`
+    objects: tuple[SceneObject, ...] = ()  #: things of your own around the arm
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names what is wrong and what would work."""
@@ -99,7 +100,10 @@ class Episode:
 
     def to_json(self) -> str:
         """The episode as JSON text, from which :meth:`from_json` makes an equal one."""
-        return json.dumps(dataclasses.asdict(self), sort_keys=True)
+        values = dataclasses.asdict(self)
+        if not self.objects:  # the text, and its hash, of an episode without any is as ever
+            del values["objects"]
+        return json.dumps(values, sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Episode:
@@ -121,6 +125,7 @@ class Episode:
             )
             for c in values.get("collisions", ())
         )
+        values["objects"] = tuple(SceneObject(**o) for o in values.get("objects", ()))
         values["picks"] = tuple(PayloadPick(**p) for p in values.get("picks", ()))
         if values.get("mismatch") is not None:
             values["mismatch"] = Mismatch(**values["mismatch"])

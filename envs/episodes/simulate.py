@@ -54,6 +54,7 @@ def workspace(scene: Scene) -> Workspace:
     limited = model.jnt_limited[ids].astype(bool)[:, None]
     limits = np.where(limited, model.jnt_range[ids], [-np.inf, np.inf])
     links = [int(b) for b in scene.link_bodies[2:]]
+    arm = np.flatnonzero(np.isin(model.geom_bodyid, scene.link_bodies))
 
     def clearance(q: Array) -> tuple[float, float]:
         data.qpos[scene.qpos_adr] = q
@@ -68,7 +69,12 @@ def workspace(scene: Scene) -> Workspace:
 
     def allowed(q: Array) -> bool:
         low, near = clearance(q)
-        return bool(low > least[0] and near > least[1])
+        if not (low > least[0] and near > least[1]):
+            return False
+        if not scene.spec.objects:
+            return True
+        mujoco.mj_fwdPosition(model, data)
+        return not (data.contact.dist[np.isin(data.contact.geom, arm).any(axis=1)] <= 0).any()
 
     return Workspace(
         low=np.maximum(facts.home - spread, limits[:, 0]),
@@ -91,7 +97,8 @@ def scene_for(episode: Episode, visuals: bool = True) -> Scene:
             payload=carries,
             striker=Striker() if "strike" in kinds else None,
             clamp=Clamp() if "clamp" in kinds else None,
-            labels=bool(kinds & {"strike", "clamp"}),
+            labels=bool(kinds & {"strike", "clamp"} or episode.objects),
+            objects=episode.objects,
         ),
         visuals,
     )

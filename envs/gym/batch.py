@@ -379,7 +379,7 @@ def _surroundings(
             _plant.Tool(site=site, body=body, first=first) for site, body, first in compiled.tools
         ],
         regions=[_region(compiled, region) for region in compiled.regions],
-        person_begin=next((k for k, r in enumerate(compiled.regions) if r.mocap >= 0), -1),
+        person_begin=-1 if person is None else len(scene.spec.proxies),
         person=anatomy(person),
         sensor_begin=_sensor(model, "contact_link1") if labels else -1,
         low=[entry.low for entry in observations],

@@ -24,6 +24,7 @@ from tauguard.models import (
     Mismatch,
     Person,
     Scene,
+    SceneObject,
     SceneSpec,
     compose,
     derive,
@@ -39,6 +40,8 @@ SPAN = 0.6
 #: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
 #: a torso at less.
 HAND_SPEED, BODY_SPEED = 0.8, 0.3
+#: A free object falls this fast at most [m/s]: from a metre.
+FALL_SPEED = 4.5
 
 
 @dataclass(frozen=True)
@@ -138,9 +141,18 @@ def compile_scene(
         arm=settings.robot,
         table=settings.table,
         cloth=settings.cloth,
+        objects=settings.objects,
     )
     bare = compose(
-        replace(spec, payload=False, labels=False, region_labels=False, cloth=None, mismatch=None),
+        replace(
+            spec,
+            payload=False,
+            labels=False,
+            region_labels=False,
+            cloth=None,
+            objects=(),
+            mismatch=None,
+        ),
         visuals=False,
     )
     layout = Layout.of(bare, arm_reach(bare), moved)
@@ -176,8 +188,8 @@ def _people(
         elif item == PERSON:
             person = layout.person(places.person(bare, layout))
         else:
-            by_hand = isinstance(item, BodyProxy)
-            proxies.append(item if by_hand else places.proxy(item, bare, layout))
+            own = item if isinstance(item, BodyProxy) else places.proxy(item, bare, layout)
+            proxies.append(own)
     return tuple(proxies), person
 
 
@@ -246,12 +258,13 @@ def nominal_drive(settings: Settings, bare: Scene) -> Drive:
 
 
 def _regions(scene: Scene, reach: float) -> tuple[RegionInfo, ...]:
-    """The proxies, then the person's."""
+    """The proxies, the person's, then the objects."""
     spec = scene.spec
     person = () if spec.person is None else spec.person.parts()
     return (
         *(_region(scene, proxy, reach) for proxy in spec.proxies),
         *(_segment(scene, part) for part in person),
+        *(_object(scene, obj) for obj in spec.objects if obj.touchable),
     )
 
 
@@ -290,6 +303,33 @@ def _region(scene: Scene, proxy: BodyProxy, reach: float) -> RegionInfo:
         speed=BODY_SPEED if slow else HAND_SPEED,
         unconfirmed=limits.unconfirmed,
     )
+
+
+def _object(scene: Scene, obj: SceneObject) -> RegionInfo:
+    body = scene.model.body(obj.name)
+    return RegionInfo(
+        name=obj.name,
+        body=int(body.id),
+        joint=-1,
+        quasi_static=math.inf if obj.quasi_static_limit is None else obj.quasi_static_limit,
+        transient=math.inf if obj.transient_limit is None else obj.transient_limit,
+        mocap=-1,
+        held=obj.motion == "fixed",
+        stiffness=obj.stiffness,
+        radius=math.inf,  # a pressure is estimated on people only
+        span=0.0,
+        speed=_path_speed(obj),
+        unconfirmed=(),
+    )
+
+
+def _path_speed(obj: SceneObject) -> float:
+    """Largest speed along a path [m/s]; of a free object what it may fall with."""
+    if not obj.path:
+        return FALL_SPEED if obj.motion == "free" else 0.0
+    rows = np.array(obj.path)
+    steps = np.diff(rows, axis=0)
+    return float((np.linalg.norm(steps[:, 1:], axis=1) / steps[:, 0]).max())
 
 
 def region_pressure(compiled: CompiledScene, force: Array) -> Array:

@@ -12,7 +12,7 @@ from tauguard.models import Drive, Scene
 from tauguard.models.arm import ARM_BITS, OBSTACLE_BITS
 from tauguard.models.mjcf import SpecText
 from tauguard.models.obstacles import Springy, add_pairs
-from tauguard.models.scene import _add_label, lean_model, region_names
+from tauguard.models.scene import _add_label, label_region, lean_model, region_names
 
 #: The second arm stands here in the first one's frame [m] and faces it.
 PLACE = (1.1, 0.0, 0.0)
@@ -48,10 +48,17 @@ def add_second_arm(scene: Scene, place: tuple[float, float, float] = PLACE) -> S
         for i, link in enumerate(links, start=len(first) + 1):
             _add_label(whole, link, f"contact_link{i}")
         for name in region_names(scene.spec):
-            _add_label(whole, name, f"contact_{name}")
+            label_region(whole, scene.spec, name)
     person = () if scene.spec.person is None else scene.spec.person.parts()
     parts: dict[str, Springy] = {proxy.region: proxy for proxy in scene.spec.proxies}
     parts |= {part.name: part for part in person}
+    parts |= {
+        geom.name: obj
+        for obj in scene.spec.objects
+        if obj.touchable
+        for geom in whole.geoms
+        if geom.name.startswith(f"{obj.name}_")
+    }
     if parts:
         add_pairs(whole, shapes, parts)
     return _located(scene, whole, links)

@@ -11,7 +11,17 @@ from typing import Any
 import numpy as np
 
 from tauguard.envs.gym.randomization import distributions
-from tauguard.models import BODY_REGIONS, BodyProxy, Cloth, Mismatch, Person, Robot, Table
+from tauguard.models import (
+    BODY_REGIONS,
+    BodyProxy,
+    Cloth,
+    Mismatch,
+    Person,
+    Robot,
+    SceneObject,
+    Table,
+    load_objects,
+)
 from tauguard.models.scene import INTEGRATORS
 
 #: Control modes, in the native order; their units stand in :mod:`tauguard.envs.gym.actions`.
@@ -36,6 +46,7 @@ class Settings:
     obstacles: tuple[str | BodyProxy | Person, ...] = ()  #: "person", body regions, or such by hand
     table: Table | None = None  #: a board that the arm can touch
     cloth: Cloth | None = None  #: a hanging cloth
+    objects: tuple[SceneObject, ...] = ()  #: things of your own, or the TOML file that lists them
     detector: Any = None  #: one of :data:`DETECTORS`, a model file, or a ``CollisionAlarm``
     checkers: tuple[str, ...] = ()  #: contact checkers that watch every physics step
     labels: bool = True  #: contact sensors: without them force, cost and tau_ext stay 0
@@ -71,6 +82,7 @@ class Settings:
             one = isinstance(value, str | BodyProxy | Person)
             object.__setattr__(self, name, (value,) if one else tuple(value))
         _check_obstacles(self.obstacles)
+        object.__setattr__(self, "objects", _objects(self.objects))
         object.__setattr__(self, "randomize", distributions(self.randomize or {}))
         if isinstance(self.detector, os.PathLike):
             object.__setattr__(self, "detector", os.fspath(self.detector))
@@ -110,6 +122,19 @@ def _check_obstacles(obstacles: tuple[Any, ...]) -> None:
     people = [item for item in obstacles if item == PERSON or isinstance(item, Person)]
     if len(people) > 1:
         raise ValueError(f"obstacles: {len(people)} persons; expected at most one")
+
+
+def _objects(value: Any) -> tuple[SceneObject, ...]:
+    if isinstance(value, str | os.PathLike):
+        return load_objects(os.fspath(value))
+    found = (value,) if isinstance(value, SceneObject) else tuple(value)
+    for item in found:
+        if not isinstance(item, SceneObject):
+            raise ValueError(f"objects: {item!r}; expected SceneObjects, or a TOML file of them")
+    names = [item.name for item in found]
+    if len(set(names)) < len(names):
+        raise ValueError(f"objects: {', '.join(names)}; expected each name once")
+    return found
 
 
 def one_of(name: str, value: object, known: tuple[str, ...]) -> None:

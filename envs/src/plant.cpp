@@ -309,6 +309,19 @@ void bind_plant(nb::module_& m) {
             p.surround(around, rows);
           },
           "around"_a, "controls"_a, "rows"_a, nb::kw_only(), "substeps"_a)
+      .def(
+          "carry",
+          [](Plant& p, int mocap, Matrix path) {
+            if (path.shape(1) != 4 || path.shape(0) < 2)
+              throw nb::value_error("path: expected two or more rows of time and position");
+            Carried c{mocap, {}};
+            for (std::size_t k = 0; k < path.shape(0); ++k) {
+              const double* row = path.data() + 4 * k;
+              c.path.push_back({row[0], row[1], row[2], row[3]});
+            }
+            p.carried.push_back(std::move(c));
+          },
+          "mocap"_a, "path"_a)
       .def("reset", &Plant::reset)
       .def("relax", &Plant::relax)
       .def("step", &step_one, "action"_a)

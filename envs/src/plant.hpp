@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <type_traits>
@@ -15,6 +16,22 @@
 #include "surroundings.hpp"
 
 namespace tauguard::envs {
+
+// A body that follows a path: rows of time [s] and position [m]; after the last it begins anew.
+struct Carried {
+  int mocap = -1;
+  std::vector<std::array<double, 4>> path;
+
+  Vec3 at(double t) const {
+    const double period = path.back()[0];
+    t -= period * std::floor(t / period);
+    std::size_t k = 1;
+    while (k + 1 < path.size() && path[k][0] <= t) ++k;
+    const auto &a = path[k - 1], &b = path[k];
+    const double s = (t - a[0]) / (b[0] - a[0]);
+    return {a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]), a[3] + s * (b[3] - a[3])};
+  }
+};
 
 class Plant {
  public:
@@ -29,6 +46,7 @@ class Plant {
 
   Controls controls;
   int substeps = 1;
+  std::vector<Carried> carried;
 
   // Makes it an environment's: where results go and what surrounds the arm.
   void surround(Surroundings around, Rows rows) {
@@ -49,6 +67,7 @@ class Plant {
     sound_ = true;
     impossible_ = false;
     fastest_ = 0;
+    carry();
   }
 
   // The same for an environment, after the data was forwarded too: the reference is where the arm
@@ -232,9 +251,18 @@ class Plant {
       current[i] = drives_.states[i].current;
     }
     if (peopled()) move_person();
+    carry();
     physics_.step();
     sound_ = physics_.sound();
     ++count_;
+  }
+
+  void carry() {
+    for (const Carried& c : carried) {
+      const Vec3 p = c.at(static_cast<double>(count_) * drives_.dt);
+      double* place = physics_.mocap_position(c.mocap);
+      place[0] = p.x, place[1] = p.y, place[2] = p.z;
+    }
   }
 
   bool peopled() const { return around_.person_begin >= 0; }

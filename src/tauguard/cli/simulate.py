@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ def command(
     mismatch_seed: int | None = 0,
     checkers: tuple[str, ...] = (),
     robot: str = "cura6",
+    objects: Path | None = None,
     workers: int | None = None,
     json: Path | None = None,
 ) -> None:
@@ -44,12 +46,13 @@ def command(
         checkers: contact checkers (mujoco, cloth, rigid) that watch every step; their contacts go
             into the recordings and the replay.
         robot: which arm, by name or file: see `tauguard robot`.
+        objects: TOML file of things around the arm, see the page "Build a scene of your own".
         workers: processes (default: all processors).
         json: write what was simulated here as JSON.
     """
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
     from tauguard.datasets.plans import torque_scale
-    from tauguard.models import Mismatch
+    from tauguard.models import Mismatch, load_objects
     from tauguard.report import write_json
 
     if episodes < 1:
@@ -66,6 +69,9 @@ def command(
         if collisions
         else free_episodes(first + seed, episodes, seconds, speeds, payloads_g, arm, robot=robot)
     )
+    if objects is not None:
+        around = load_objects(objects)
+        planned = [replace(episode, objects=around) for episode in planned]
     paths = write_dataset(planned, out, workers, checkers)
     rows = [described(path, episode) for path, episode in zip(paths, planned, strict=True)]
     if json is not None:

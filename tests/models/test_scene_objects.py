@@ -1,0 +1,163 @@
+"""Things of your own in a scene: where they are, what they weigh, what touching them exerts."""
+
+import json
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+
+from tauguard.envs import Episode, simulate
+from tauguard.models import SceneObject, SceneSpec, Shape, compose, load_objects
+
+REACH = "tauguard:tauguard/Reach-v0"
+BALL = Shape("sphere", (0.05,))
+
+
+def make(*objects, **keywords):
+    return gym.make(REACH, obstacles=(), objects=objects, **keywords).unwrapped
+
+
+def test_a_moving_object_is_where_its_path_says_at_every_physics_step():
+    path = ((0, 1.0, 1.0, 0.0), (0.5, 1.2, 1.0, 0.3), (0.8, 1.0, 1.0, 0.0))
+    env = make(SceneObject("cart", (BALL,), path=path))
+    env.reset(seed=0)
+    times, places = np.array(path)[:, 0], np.array(path)[:, 1:]
+    for _ in range(120):
+        env.step(np.zeros(6))
+        t = (np.arange(10) * 1e-3 + env.data.time - 0.01 - 1e-9) % times[-1] + 1e-9
+        wanted = np.transpose([np.interp(t, times, column) for column in places.T])
+        seen = env.batch.region["position"][0, :, 0]
+        # A row is the state before its step, and MuJoCo places mocap bodies in the step.
+        assert np.abs(seen[1:] - wanted[:-1]).max() < 2e-3
+    assert env.regions[0].name == "cart"
+
+
+def test_a_loose_part_comes_to_rest_in_a_bin_and_weighs_what_it_says():
+    floor = Shape("box", (0.2, 0.2, 0.01))
+    part = SceneObject("part", (BALL,), motion="free", mass=0.7, position=(0.6, 0.5, 0.2))
+    env = make(SceneObject("bin", (floor,), position=(0.6, 0.5, 0.0)), part)
+    env.reset(seed=0)
+    for _ in range(150):
+        _, _, _, _, info = env.step(np.zeros(6))
+    assert env.model.body("part").mass == pytest.approx(0.7)
+    assert env.data.body("part").xpos == pytest.approx([0.6, 0.5, 0.06], abs=2e-3)
+    # The bin carries the part; only what the arm does to them counts.
+    assert info["region_force"].tolist() == [0, 0]
+
+
+def test_a_held_part_is_the_arms_and_the_controller_does_not_know_it():
+    held = SceneObject("part", (BALL,), motion="held", mass=1.5, position=(0, 0, 0.1))
+    bare, scene = compose(SceneSpec()), compose(SceneSpec(objects=(held,)))
+    assert scene.model.body_mass.sum() == pytest.approx(bare.model.body_mass.sum() + 1.5)
+    assert scene.arm_model.body_mass.sum() == pytest.approx(bare.arm_model.body_mass.sum())
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_kinematics(scene.model, data)
+    flange = data.site("flange")
+    wanted = flange.xpos + 0.1 * flange.xmat.reshape(3, 3)[:, 2]
+    assert data.geom("part_0").xpos == pytest.approx(wanted, abs=1e-6)
+    assert scene.model.geom("part_0").bodyid[0] == scene.link_bodies[-1]
+
+
+def test_the_force_on_an_object_is_what_mujoco_says_and_costs_beyond_its_limits():
+    """The tool sinks onto a block; the truth is mj_contactForce of every contact with it."""
+    start = make()
+    start.reset(seed=0)
+    x, y, z = start.batch.observation[0, 18:21]
+    block = SceneObject(
+        "block",
+        (Shape("box", (0.2, 0.2, 0.05)),),
+        position=(x, y, z - 0.25),
+        quasi_static_limit=20.0,
+        transient_limit=50.0,
+    )
+    env = make(block, control="cartesian")
+    env.reset(seed=0)
+    cost = touched = 0.0
+    for _ in range(100):
+        _, _, _, _, info = env.step(np.array([0, 0, -1, 0, 0, 0]))
+        model, data, total = env.model, env.data, np.zeros(3)
+        for k in range(data.ncon):
+            force = np.zeros(6)
+            mujoco.mj_contactForce(model, data, k, force)
+            total += data.contact[k].frame.reshape(3, 3).T @ force[:3]
+        last = np.linalg.norm(total)
+        assert info["region_force"][0] >= last - 1e-6
+        touched, cost = max(touched, info["region_force"][0]), cost + info["cost"]
+    assert touched > 50
+    assert cost > 0
+    assert info["cost_sum"] == pytest.approx(cost)
+    assert env.regions[info["region"] - 1].name == "block"
+
+
+def test_fragments_specs_and_meshes(tmp_path):
+    fragment = (
+        '<mujoco><worldbody><geom type="box" size=".1 .1 .1" pos="0 0 .1"/></worldbody></mujoco>'
+    )
+    file = tmp_path / "box.xml"
+    file.write_text(fragment)
+    mesh = tmp_path / "part.ply"
+    trimesh.creation.box((0.2, 0.2, 0.2)).export(mesh)
+    spec = mujoco.MjSpec.from_string(fragment)
+    far = {"position": (0.0, 2.0, 0.0)}
+    for obj in (
+        SceneObject("a", mjcf=fragment, **far),
+        SceneObject("a", mjcf=str(file), **far),
+        SceneObject.from_spec("a", spec, **far),
+        SceneObject("a", (Shape("mesh", file=str(mesh), position=(0, 0, 0.1)),), **far),
+    ):
+        scene = compose(SceneSpec(objects=(obj,)))
+        data = mujoco.MjData(scene.model)
+        mujoco.mj_kinematics(scene.model, data)
+        assert data.geom("a_0").xpos == pytest.approx([0, 2, 0.1], abs=1e-6)
+        assert scene.model.npair > 0
+        mujoco.MjModel.from_xml_string(scene.xml)  # the text stands alone
+
+
+def test_a_toml_file_gives_the_same_objects_and_names_what_is_wrong(tmp_path):
+    path = tmp_path / "cell.toml"
+    path.write_text(
+        '[[object]]\nname = "block"\nposition = [1, 0, 0]\nstiffness = 2e4\n'
+        'shapes = [{ kind = "box", size = [0.1, 0.1, 0.1] }]\n'
+    )
+    block = SceneObject(
+        "block", (Shape("box", (0.1, 0.1, 0.1)),), position=(1.0, 0.0, 0.0), stiffness=2e4
+    )
+    assert load_objects(path) == (block,)
+    path.write_text('[[object]]\nname = "block"\nshape = []\n')
+    with pytest.raises(ValueError, match=r"cell\.toml: no key 'shape'; expected some of name, sh"):
+        load_objects(path)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"shapes": ()}, "expected either shapes or mjcf"),
+        ({"motion": "flying"}, "motion 'flying'; expected one of fixed, held, free"),
+        ({"path": ((0, 0, 0, 0),)}, "two or more rows"),
+        ({"path": ((0, 0, 0, 0), (0, 1, 0, 0))}, "times that grow"),
+        ({"stiffness": 0.0}, "stiffness"),
+        ({"name": "a b"}, "expected a name of letters"),
+    ],
+)
+def test_values_that_cannot_be_are_named(values, message):
+    with pytest.raises(ValueError, match=message):
+        SceneObject(**({"name": "a", "shapes": (BALL,)} | values))
+
+
+def test_an_object_in_an_episode_is_hit_labelled_and_in_its_text():
+    wall = SceneObject(
+        "ram", (Shape("box", (0.05, 0.6, 0.6)),), stiffness=2e4,
+        path=((0, 1.6, 0.0, 0.5), (2.0, 0.35, 0.0, 0.5), (4.0, 1.6, 0.0, 0.5)),
+    )  # fmt: skip
+    episode = Episode(3, seconds=2.5, objects=(wall,))
+    assert Episode.from_json(episode.to_json()) == episode
+    assert "objects" not in json.loads(Episode(3).to_json())
+    trace = simulate(episode)
+    assert trace.truth.collisions
+    at = trace.truth.obstacle_names.index("ram")
+    assert trace.truth.obstacle_poses[-1, at, 0, 3] == pytest.approx(0.66, abs=0.01)
+    quiet = trace.truth.contact_force == 0
+    assert 0 < quiet.sum() < len(quiet)
+    assert (trace.truth.tau_ext[quiet] == 0).all()
