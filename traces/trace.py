@@ -42,6 +42,14 @@ class Truth:
     obstacle_poses: Array = field(default_factory=lambda: np.empty((0, 0, 4, 4)))
     """World poses of the obstacles, homogeneous, shape (T, len(obstacle_names), 4, 4)."""
 
+    def __repr__(self) -> str:
+        """In a line."""
+        peak = float(np.max(self.contact_force, initial=0.0))
+        return (
+            f"Truth({len(self.contact_force)} samples, {len(self.collisions)} collisions, "
+            f"largest contact force {peak:.0f} N)"
+        )
+
 
 @dataclass(frozen=True)
 class Trace:
@@ -96,6 +104,17 @@ class Trace:
         if back.size:
             raise ValueError(f"t: not increasing at row {back[0] + 1}")
 
+    def __repr__(self) -> str:
+        """In a line: how long, of which arm, what is known."""
+        arm = self.meta.get("arm", "") or self.meta.get("environment", "")
+        known = "no truth" if self.truth is None else f"{len(self.truth.collisions)} collisions"
+        long = self.t[-1] - self.t[0] if len(self.t) else 0.0
+        step = f" every {1e3 * self.dt:g} ms" if len(self.t) > 1 else ""
+        return (
+            f"Trace({f'{arm}, ' if arm else ''}{len(self.joint_names)} joints, {len(self.t)} "
+            f"samples{step}, {long:.2f} s, {known})"
+        )
+
     @property
     def dt(self) -> float:
         """Median sample interval [s]."""
@@ -126,3 +145,7 @@ class Detection:
     threshold: float
     alarm: Bools  #: after the output filter, shape (T,)
     alarms: tuple[Alarm, ...]
+
+    def __repr__(self) -> str:
+        """In a line."""
+        return f"Detection({self.detector}, {len(self.t)} samples, {len(self.alarms)} alarms)"

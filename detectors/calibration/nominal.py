@@ -6,12 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from tauguard.arrays import Array
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.estimation.observer import PLAIN_GAIN, observe
 from tauguard.models import (
     Drive,
+    Robot,
     SceneSpec,
     compiled,
     compose,
@@ -25,6 +29,8 @@ from tauguard.traces import Trace
 #: Slopes of a robot file's ``frictionloss`` [rad/s]: MuJoCo's constraint has no presliding, and
 #: slips from some 1e-3 rad/s times that loss over the inertia [N m, kg m^2].
 DRY = (0.003, 0.01)
+#: The Coulomb level of :func:`residual` rises around standstill over this speed [rad/s].
+STANDSTILL = 0.05
 
 
 def nominal_arm(traces: Sequence[Trace]) -> ArmModel:
@@ -35,20 +41,25 @@ def nominal_arm(traces: Sequence[Trace]) -> ArmModel:
     Raises:
         ValueError: no nominal arm is attached to the recordings.
     """
-    attached = traces[0].attachments
-    if "arm.xml" not in attached:
+    if "arm.xml" not in traces[0].attachments:
         raise ValueError("no arm.xml attached: train on recordings that tauguard simulated")
-    name = traces[0].meta.get("arm", "cura6")
+    return _believed(*_attached(traces[0]))
+
+
+def _attached(trace: Trace) -> tuple[str, Drive]:
+    """MJCF and nominal drive of the arm of a trace."""
+    attached = trace.attachments
+    if "arm.xml" not in attached:
+        raise ValueError("no arm.xml attached to the trace: name its robot, robot='ur5e'")
+    name = trace.meta.get("arm", "cura6")
     if "drive.json" in attached:
-        drive = drive_of(attached["drive.json"])
-    elif name in cura6.NAMES:
-        drive = cura6_drive(name)
-    else:
-        raise ValueError(
-            f"arm {name}: an earlier tauguard made these recordings, which did not keep the "
-            "numbers of its drive (drive.json) with them; make them again"
-        )
-    return _believed(attached["arm.xml"], drive)
+        return attached["arm.xml"], drive_of(attached["drive.json"])
+    if name in cura6.NAMES:
+        return attached["arm.xml"], cura6_drive(name)
+    raise ValueError(
+        f"arm {name}: an earlier tauguard made these recordings, which did not keep the "
+        "numbers of its drive (drive.json) with them; make them again"
+    )
 
 
 def nominal_design(name: str = "cura6") -> ArmModel:
@@ -59,6 +70,37 @@ def nominal_design(name: str = "cura6") -> ArmModel:
     """
     scene = compose(SceneSpec(arm=name))
     return _believed(scene.arm_xml, scene.facts.drive)
+
+
+def residual(trace: Trace, robot: str | Robot | None = None, gain: ArrayLike = PLAIN_GAIN) -> Array:
+    """The momentum observer's estimate of the external torque along a trace [N m], shape (T, n).
+
+    Args:
+        trace: of an arm.
+        robot: a name, a file or a robot; the default is what tauguard attached to the trace.
+        gain: of the observer [1/s], a number or one a joint.
+
+    Raises:
+        ValueError: nothing is attached and no robot is named, or a robot of other joints.
+        FileNotFoundError: no such robot.
+    """
+    if robot is None:
+        xml, drive = _attached(trace)
+    else:
+        scene = compose(SceneSpec(arm=robot), visuals=False)
+        xml, drive = scene.arm_xml, scene.facts.nominal
+    if len(drive.gain) != trace.q.shape[1]:
+        raise ValueError(
+            f"robot: {len(drive.gain)} joints, the trace has {trace.q.shape[1]}: "
+            f"{', '.join(trace.joint_names)}"
+        )
+    torques = trace.meta.get("effort") == "torque"
+    tau = trace.current if torques else drive.gain * trace.current
+    if drive.friction is not None:
+        level = drive.friction.coulomb * np.tanh(trace.qd / STANDSTILL)
+        tau = tau - level - drive.friction.viscous * trace.qd
+    numbers = RobotNumbers.from_pin(pin_model(compiled(xml)))
+    return observe(numbers, trace.t, trace.q, trace.qd, tau, gain)
 
 
 def _believed(xml: str, drive: Drive) -> ArmModel:

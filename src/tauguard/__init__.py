@@ -5,13 +5,43 @@ neither MuJoCo nor Pinocchio): ``models``, ``traces``, ``geometry``, ``cloth``, 
 ``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``,
 ``report``, ``hard_cases``.
 
+``tauguard.residual(trace)`` and ``tauguard.plot(trace)`` look at a recording by hand.
+
 tauguard is a research tool, not a certified safety function.
 """
 
+import importlib
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
 from tauguard.environments import register_environments
 
+if TYPE_CHECKING:
+    from tauguard.detectors.calibration.nominal import residual
+    from tauguard.replay.plot import plot
+
+__all__ = ["plot", "residual"]
 __version__ = version("tauguard")
 
 register_environments()
+
+#: Loaded when they are first asked for.
+_PACKAGES = (
+    "cloth", "contacts", "datasets", "detectors", "envs", "geometry", "hard_cases", "live",
+    "models", "replay", "report", "rigid", "traces",
+)  # fmt: skip
+_FUNCTIONS = {"plot": "tauguard.replay.plot", "residual": "tauguard.detectors.calibration.nominal"}
+
+
+def __getattr__(name: str) -> Any:
+    """A package, or one of the functions that need no package's name."""
+    if name in _PACKAGES:
+        return importlib.import_module(f"tauguard.{name}")
+    if name in _FUNCTIONS:
+        return getattr(importlib.import_module(_FUNCTIONS[name]), name)
+    raise AttributeError(f"module 'tauguard' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Everything, loaded or not."""
+    return sorted({*globals(), *_PACKAGES, *_FUNCTIONS})

@@ -13,6 +13,8 @@ from typing import Any
 def on_demand(package: str) -> Callable[[str], Any]:
     """A ``__getattr__`` for ``package``: its imports under ``if TYPE_CHECKING:``, one at a time.
 
+    ``dir`` and completion list those names, too, without importing any.
+
     Type checkers see those imports as they stand; at run time a name costs its own module only, so
     that a light part of a package does not load what the heavy ones need.
     """
@@ -26,6 +28,8 @@ def on_demand(package: str) -> Callable[[str], Any]:
         setattr(sys.modules[package], name, value)
         return value
 
+    module = sys.modules[package]
+    vars(module)["__dir__"] = lambda: sorted(vars(module).keys() | where.keys())
     return __getattr__
 
 

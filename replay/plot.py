@@ -1,0 +1,54 @@
+"""A figure of a recording: currents, what contacts do, what a detector says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.traces import Detection, Trace
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def plot(trace: Trace, detection: Detection | None = None) -> Figure:
+    """The recording as a matplotlib figure; collisions are shaded, alarms are lines.
+
+    Args:
+        trace: what was recorded.
+        detection: what a detector said about it.
+
+    Raises:
+        ValueError: a detection of another recording.
+    """
+    from matplotlib.figure import Figure
+
+    if detection is not None and len(detection.t) != len(trace.t):
+        raise ValueError(f"detection: {len(detection.t)} samples, the trace has {len(trace.t)}")
+    rows: list[tuple[str, Array]] = [
+        ("position [rad]", trace.q),
+        ("current [A]", trace.current),
+    ]
+    if trace.truth is not None:
+        rows.append(("external torque, truth [N m]", trace.truth.tau_ext))
+    if detection is not None:
+        rows.append(("residual [N m]", detection.residual))
+        rows.append(("score", np.stack([detection.score], axis=1)))
+    figure = Figure(figsize=(10, 1.9 * len(rows)), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(len(rows), 1, sharex=True))
+    for panel, (name, values) in zip(panels, rows, strict=True):
+        for k in range(values.shape[1]):
+            label = trace.joint_names[k] if values.shape[1] > 1 else None
+            panel.plot(trace.t, values[:, k], linewidth=0.8, label=label)
+        panel.set_ylabel(name)
+        for hit in trace.truth.collisions if trace.truth is not None else ():
+            panel.axvspan(hit.onset, hit.end, color="tab:red", alpha=0.15, linewidth=0)
+        for alarm in detection.alarms if detection is not None else ():
+            panel.axvline(alarm.start, color="black", linewidth=0.8, linestyle="--")
+    if detection is not None:
+        panels[-1].axhline(detection.threshold, color="tab:gray", linewidth=0.8)
+    panels[0].legend(ncol=len(trace.joint_names), fontsize="small", loc="upper right")
+    panels[-1].set_xlabel("time [s]")
+    return figure

@@ -1,0 +1,86 @@
+"""What one types by hand: completion, a residual, a figure, values that print in a line."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tauguard
+from tauguard.envs import CollisionPlan, Episode, simulate
+from tauguard.models import cura6_drive, drive_text
+from tests.models.arms import random_arm
+
+
+@pytest.fixture(scope="module")
+def trace():
+    plan = CollisionPlan("pulse", 1.0, 3, strength=60.0)
+    return simulate(Episode(4, seconds=2.0, collisions=(plan,), ideal_drive=True))
+
+
+@pytest.mark.parametrize(
+    "package", ["cloth", "contacts", "datasets", "detectors", "envs", "models", "rigid", "traces"]
+)
+def test_dir_lists_every_public_name_and_loads_none(package):
+    code = (
+        f"import sys, tauguard.{package} as p; before = set(sys.modules); names = dir(p);"
+        "assert set(p.__all__) <= set(names), set(p.__all__) - set(names);"
+        "assert set(sys.modules) == before"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_package_itself_completes_without_loading_a_package():
+    code = (
+        "import sys, tauguard; names = dir(tauguard);"
+        "assert {'cloth', 'envs', 'plot', 'residual'} <= set(names);"
+        "assert 'mujoco' not in sys.modules and 'tauguard.envs' not in sys.modules;"
+        "assert tauguard.rigid.__name__ == 'tauguard.rigid'"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    with pytest.raises(AttributeError, match="'tauguard' has no attribute 'wings'"):
+        tauguard.wings  # noqa: B018
+
+
+def test_the_residual_of_an_ideal_arm_is_the_true_external_torque(trace):
+    """A lossless arm without sensor errors: the observer lags by its gain and errs in nothing."""
+    lossless = drive_text(replace(cura6_drive(), friction=None))
+    ideal = replace(trace, attachments={**trace.attachments, "drive.json": lossless})
+    found = tauguard.residual(ideal, gain=500.0)
+    truth = trace.truth.tau_ext
+    lagged = np.zeros_like(truth)
+    for k in range(1, len(truth)):  # first order, 500 rad/s
+        lagged[k] = lagged[k - 1] + (1 - np.exp(-0.5)) * (truth[k - 1] - lagged[k - 1])
+    assert np.abs(truth).max() > 5
+    assert np.abs(found - lagged).max() < 0.05 * np.abs(truth).max()
+    named = tauguard.residual(trace, robot="cura6", gain=500.0)
+    # The named arm has friction, which this trace has not: at rest both agree.
+    still = np.abs(trace.qd).max(axis=1) < 1e-6
+    assert still.sum() > 50
+    assert np.abs(named - found)[still].max() < 1.0
+
+
+def test_a_robot_of_other_joints_and_a_trace_without_one_are_named(trace, tmp_path):
+    path = tmp_path / "arm.xml"
+    path.write_text(random_arm(1, "none"))
+    bare = replace(trace, attachments={})
+    with pytest.raises(ValueError, match="name its robot, robot='ur5e'"):
+        tauguard.residual(bare)
+    joints = random_arm(1, "none").count("<joint ")
+    if joints != 6:
+        with pytest.raises(ValueError, match=r"the trace has 6: joint1"):
+            tauguard.residual(trace, robot=str(path))
+
+
+def test_a_figure_has_a_panel_for_everything_and_shades_the_collisions(trace, tmp_path):
+    figure = tauguard.plot(trace)
+    assert [axes.get_ylabel() for axes in figure.axes][-1] == "external torque, truth [N m]"
+    assert all(axes.patches for axes in figure.axes)
+    figure.savefig(tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+def test_values_print_in_a_line(trace):
+    assert repr(trace) == "Trace(6 joints, 2000 samples every 1 ms, 2.00 s, 1 collisions)"
+    assert repr(trace.truth).startswith("Truth(2000 samples, 1 collisions, largest contact force 6")
