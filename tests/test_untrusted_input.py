@@ -34,7 +34,7 @@ def damaged_files(tmp_path_factory):
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("kind", FORMATS)
 def test_mutants_end_in_a_right_answer_or_in_one_line(kind, damaged_files):
-    # `pytest -m slow -k damaged` tries ten thousand, in a process of limited memory.
+    # `pytest -m slow -k damaged_file` tries ten thousand, in a process of limited memory.
     for number in range(20):
         outcome = damaged_files.tried(kind, (7, number))
         assert outcome.ok, (number, outcome)
