@@ -20,7 +20,7 @@ _SLOW = "is a slow test now: run `pytest -m slow -k {}` in a checkout"
 _NOTE = "has ended; its result is docs/notes/2026-11-23-{}.md"
 #: What was a study once, and what to do instead.
 FORMER = {
-    "mutants": _SLOW.format("damaged"),
+    "mutants": _SLOW.format("damaged_file"),
     "kills": _SLOW.format("'interrupted or generate'"),
     "endurance": _SLOW.format("endurance"),
     "detection_ladder": _NOTE.format("from-the-dissertation"),

@@ -134,13 +134,9 @@ def _random(source: str, quick: bool, seed: int) -> Row:
     copies, rounds = (4, 1) if quick else (20, 10)
     diverged = alarms = episodes = 0
     for control in CONTROLS:
+        options: dict[str, Any] = {"robot": source, "control": control, "detector": "observer"}
         envs: Any = gymnasium.make_vec(
-            "tauguard/Reach-v0",
-            num_envs=copies,
-            robot=source,
-            control=control,
-            obstacles=(),
-            detector="observer",
+            "tauguard/Reach-v0", num_envs=copies, obstacles=(), **options
         )
         rng = np.random.default_rng(seed)
         for k in range(rounds):
