@@ -30,14 +30,14 @@ class ArmLogs:
 
 
 def log_files(logs: Sequence[Path]) -> list[Path]:
-    """The files themselves; for a folder the ``.csv`` and ``.mcap`` files in it.
+    """The files themselves; for a folder the ``.csv`` and ``.mcap`` files in it and below.
 
     Raises:
         ValueError: there are none, or two have one name.
     """
     files: list[Path] = []
     for path in logs:
-        inside = sorted([*path.glob("*.csv"), *path.glob("*.mcap")]) if path.is_dir() else [path]
+        inside = sorted([*path.rglob("*.csv"), *path.rglob("*.mcap")]) if path.is_dir() else [path]
         if not inside:
             raise ValueError(f"{path}: no .csv or .mcap files in it")
         files += inside

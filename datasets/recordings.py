@@ -71,8 +71,8 @@ def write_dataset(
 
     Raises:
         OSError: the folder cannot be made or written, or a worker died.
-        ValueError: an unknown checker; a file of that name holds another episode or other checkers
-            (nothing is overwritten).
+        ValueError: an unknown checker; a file holds the episode with other checkers (nothing is
+            overwritten).
     """
     from tauguard.contacts import registered  # here, as it takes long to import
 
@@ -80,8 +80,7 @@ def write_dataset(
         if name not in registered():
             raise ValueError(f"checkers {name!r}: expected some of {', '.join(registered())}")
     folder.mkdir(parents=True, exist_ok=True)
-    width = max(5, len(str(len(episodes))))
-    paths = [folder / f"episode-{i:0{width}d}.mcap" for i in range(len(episodes))]
+    paths = [_place(folder, i, episode) for i, episode in enumerate(episodes)]
     missing = [i for i, path in enumerate(paths) if not _holds(path, episodes[i], checkers)]
     traces = simulate_all([episodes[i] for i in missing], workers, checkers=checkers)
     remove_parts(folder)
@@ -91,15 +90,19 @@ def write_dataset(
     return paths
 
 
+def _place(folder: Path, number: int, episode: Episode) -> Path:
+    """The file of an episode; runs with other settings have other names beside it."""
+    kind = "episode" if episode.collisions or episode.objects else "free"
+    old = folder / f"episode-{number:05d}.mcap"  # as it was called before
+    if old.exists() and read_mcap(old)[0].meta.get("config_sha256") == episode.config_hash:
+        return old
+    return folder / f"{kind}-{number:05d}-{episode.config_hash[:6]}.mcap"
+
+
 def _holds(path: Path, episode: Episode, checkers: Sequence[str]) -> bool:
     if not path.exists():
         return False
     trace, _ = read_mcap(path)
-    if trace.meta.get("config_sha256") != episode.config_hash:
-        raise ValueError(
-            f"{path}: holds another episode than this seed and these settings give; "
-            "choose another folder or remove it"
-        )
     seen = [one.checker for one in trace.contacts]
     if seen != list(checkers):
         raise ValueError(
@@ -110,7 +113,7 @@ def _holds(path: Path, episode: Episode, checkers: Sequence[str]) -> bool:
 
 
 def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
-    """The labelled recordings in a folder, in the order of their file names.
+    """The labelled recordings in a folder and those below it, in the order of their paths.
 
     Args:
         folder: of MCAP recordings, or a dataset of `tauguard generate`, of which the first split is
@@ -118,7 +121,7 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
         arm: in a dataset with several arms, the one whose episodes are read.
 
     Returns:
-        Traces with truth; ``meta["log"]`` is the file's name.
+        Traces with truth; ``meta["log"]`` is the file's path below the folder.
 
     Raises:
         ValueError: no recordings there, or one without truth; the message names it.
@@ -130,7 +133,7 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
         return training_episodes(folder, arm)
     if arm is not None:
         raise ValueError(f"--arm {arm}: {folder} is no dataset, so its recordings are of one arm")
-    paths = sorted(folder.glob("*.mcap"))
+    paths = sorted(folder.rglob("*.mcap"))
     if not paths:
         raise ValueError(f"{folder}: no .mcap files; `tauguard simulate --out` writes some")
     traces = []
@@ -140,5 +143,5 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
             raise ValueError(f"{path}: no truth in it; simulated recordings have one")
         with reading(path):  # as for logs: a gap is not counted as time without an alarm
             checked(trace, lambda row: f"sample {row}")
-        traces.append(replace(trace, meta={**trace.meta, "log": path.name}))
+        traces.append(replace(trace, meta={**trace.meta, "log": str(path.relative_to(folder))}))
     return traces

@@ -14,6 +14,7 @@ import pytest
 
 from tauguard.cli import COMMANDS, main
 from tauguard.cli.evaluate import evaluated, name_of
+from tauguard.cli.replay import newest
 from tauguard.traces import Detection, Trace, Truth
 
 
@@ -79,11 +80,20 @@ def test_bad_input_is_one_line(capsys, tmp_path):
 
 
 def test_what_replay_cannot_show_is_said(capsys, tmp_path):
-    (tmp_path / "demo.rrd").touch()
-    folder, file = str(tmp_path), str(tmp_path / "demo.rrd")
-    assert "a folder; --web shows it" in fails(capsys, "replay", folder)
-    assert "a recording already; --web shows it" in fails(capsys, "replay", file)
-    assert f"name one of its recordings ({file})" in fails(capsys, "replay", "--web", folder)
+    assert "no index.html in it" in fails(capsys, "replay", str(tmp_path))
+    assert "no such file" in fails(capsys, "replay", str(tmp_path / "none.rrd"))
+
+
+def test_of_a_folder_of_recordings_the_newest_is_shown(tmp_path, capsys):
+    for name, time in (("b/a.mcap", 5), ("c.mcap", 9), ("a.mcap", 7)):
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        file.touch()
+        os.utime(file, (time, time))
+    assert newest(tmp_path) == tmp_path / "c.mcap"
+    assert "3 recordings; shown is the newest, c.mcap" in capsys.readouterr().out
+    (tmp_path / "index.html").touch()
+    assert newest(tmp_path) == tmp_path
 
 
 def test_replay_replaces_no_recording(capsys, tmp_path):
@@ -98,20 +108,20 @@ def test_replay_replaces_no_recording(capsys, tmp_path):
 
 
 def test_simulate_train_evaluate(tmp_path, capsys):
-    struck, free = tmp_path / "all", tmp_path / "all" / "free"
+    struck = tmp_path / "all"
     common = ("--workers", "1", "--payloads-g", "0", "1000", "--speeds", "30")
-    run("simulate", "--out", str(struck), "--episodes", "2", "--collisions", "5", *common)
-    free_flags = ("--episodes", "2", "--collisions", "0", "--seconds", "40", *common)
-    run("simulate", "--out", str(free), *free_flags)
-    for path in free.glob("*.mcap"):
-        path.rename(struck / f"free-{path.name}")
+    flags = ("--episodes", "2", "--collisions", "5", "--free", "2", "--seconds", "40")
+    run("simulate", "--out", str(struck), *flags, *common)
+    assert len(list(struck.glob("free-*.mcap"))) == 2
     model, figures = tmp_path / "model.skops", tmp_path / "figures.json"
     run("train", "--traces", str(struck), "--model", str(model))
     flags = ("--json", str(figures), "--figure", str(tmp_path / "f.png"))
     flags += ("--events", str(tmp_path / "wrong"), "--late", "0.001")
     run("evaluate", "--traces", str(struck), "--model", str(model), *flags)
     page = (tmp_path / "wrong" / "index.html").read_text()
-    assert "<td>episode-00000.mcap</td>" in page  # the file, not a number of our own
+    assert (
+        f"<td>{sorted(struck.iterdir())[0].name}</td>" in page
+    )  # the file, not a number of our own
     row = json.loads(figures.read_text())["rows"][0]
     assert 8 <= row["confusion"]["tp"] + row["confusion"]["fn"] <= 10
     # Judged on what it was trained on: blows from 16 N m up are not missed.

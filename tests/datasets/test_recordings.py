@@ -1,5 +1,7 @@
 """Planned episodes and their generation: in order, resumable, equal for any number of workers."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from tauguard.datasets import (
     struck_episodes,
     write_dataset,
 )
+from tauguard.datasets.recordings import labelled
 from tauguard.traces import STRATA, read_mcap
 
 
@@ -57,19 +60,33 @@ def test_workers_change_nothing(episodes):
 
 def test_a_second_run_continues_and_keeps_whole_files(episodes, tmp_path):
     write_dataset(episodes[:1], tmp_path, workers=1)
-    first = tmp_path / "episode-00000.mcap"
+    (first,) = tmp_path.iterdir()
     before = first.stat().st_mtime_ns, first.read_bytes()
     paths = write_dataset(episodes, tmp_path, workers=1)
     assert (first.stat().st_mtime_ns, first.read_bytes()) == before
-    assert [p.name for p in paths] == [f"episode-0000{i}.mcap" for i in range(3)]
+    assert [re.sub("[0-9a-f]{6}[.]", "*.", p.name) for p in paths] == [
+        f"{'episode' if e.collisions else 'free'}-0000{i}-*.mcap" for i, e in enumerate(episodes)
+    ]
     trace, _ = read_mcap(paths[2])
     assert trace.meta["config_sha256"] == episodes[2].config_hash
 
 
 def test_another_datasets_files_are_not_overwritten(episodes, tmp_path):
-    write_dataset(episodes[:1], tmp_path, workers=1)
-    with pytest.raises(ValueError, match="holds another episode"):
-        write_dataset(episodes[1:2], tmp_path, workers=1)
+    (first,) = write_dataset(episodes[:1], tmp_path, workers=1)
+    before = first.read_bytes()
+    (second,) = write_dataset(episodes[1:2], tmp_path, workers=1)
+    assert second != first
+    assert first.read_bytes() == before
+
+
+def test_a_file_under_its_earlier_name_is_kept_and_folders_are_read_whole(episodes, tmp_path):
+    (path,) = write_dataset(episodes[:1], tmp_path, workers=1)
+    old = path.rename(tmp_path / "episode-00000.mcap")
+    assert write_dataset(episodes[:1], tmp_path, workers=1) == [old]
+    (tmp_path / "below").mkdir()
+    old.rename(tmp_path / "below" / "a.mcap")
+    write_dataset(episodes[1:2], tmp_path, workers=1)
+    assert next(trace.meta["log"] for trace in labelled(tmp_path)) == "below/a.mcap"
 
 
 def test_checkers_write_their_contacts_and_are_part_of_what_a_file_is(episodes, tmp_path):

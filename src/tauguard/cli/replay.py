@@ -24,13 +24,12 @@ def command(
 ) -> None:
     """Turn an MCAP recording into an .rrd that shows the arm moving beside its signals.
 
-    With --web it is shown in a browser; so is an .rrd file, or the folder of `evaluate --events` or
-    `report`. With --web or --open an .rrd of PATH's name that is newer than PATH is shown as it is,
-    unless --out, --robot or --whole asks for another.
+    An .rrd file, or the folder of `evaluate --events` or `report`, is shown in a browser; of a
+    folder of MCAP recordings the newest is. With --web or --open an .rrd of PATH's name that is
+    newer than PATH is shown as it is, unless --out, --robot or --whole asks for another.
 
     Args:
-        path: an MCAP file written by tauguard; with --web also an .rrd file or a folder of them,
-            with --open also an .rrd file.
+        path: an MCAP file written by tauguard, an .rrd file, or a folder of either.
         out: the recording (default: PATH with the ending .rrd, if there is none yet).
         robot: MJCF or URDF file of the robot (default: the one attached to PATH).
         whole: keep what comes before the first detection.
@@ -38,10 +37,8 @@ def command(
         web: serve it and rerun's web viewer on 127.0.0.1, until interrupted.
         port: with --web, of the page (default: a free one).
     """
-    shown = path
-    if not web and (path.is_dir() or (path.suffix == ".rrd" and not open)):
-        kind = "a folder" if path.is_dir() else "a recording already"
-        raise ValueError(f"{path}: {kind}; --web shows it in a browser")
+    web = web or path.is_dir() or (path.suffix == ".rrd" and not open)
+    path = shown = newest(path)
     if not (path.is_dir() or path.suffix == ".rrd"):
         asked = out or robot or whole
         there = path.with_suffix(".rrd")
@@ -54,6 +51,18 @@ def command(
     elif open:
         viewer = Path(sys.executable).with_name("rerun")
         subprocess.run([viewer, "--bind", "127.0.0.1", shown], check=False)
+
+
+def newest(path: Path) -> Path:
+    """The newest MCAP recording in a folder that has no page to show; else ``path``."""
+    if not path.is_dir() or (path / "index.html").exists():
+        return path
+    found = sorted(path.rglob("*.mcap"), key=lambda file: file.stat().st_mtime)
+    found = found or sorted(path.rglob("*.rrd"), key=lambda file: file.stat().st_mtime)
+    if not found:
+        return path
+    print(f"{path}: {len(found)} recordings; shown is the newest, {found[-1].name}")
+    return found[-1]
 
 
 def _fits(recording: Path, file: Path) -> bool:

@@ -17,6 +17,7 @@ def command(
     out: Path,
     episodes: int = 10,
     collisions: int = 8,
+    free: int = 0,
     seconds: float = 20.0,
     speeds: tuple[float, ...] = (10.0, 30.0, 60.0),
     payloads_g: tuple[float, ...] | None = None,
@@ -36,6 +37,7 @@ def command(
         out: folder of the recordings (made if it does not exist).
         episodes: how many.
         collisions: injected into each episode; 0 gives collision-free ones.
+        free: collision-free episodes beside them, for thresholds.
         seconds: length of a collision-free episode (struck ones are as long as they need).
         speeds: percent of the maximum joint speed, cycled.
         payloads_g: grams at the flange that the observer does not know, cycled
@@ -57,8 +59,8 @@ def command(
 
     if episodes < 1:
         raise ValueError(f"--episodes {episodes}: expected 1 or more")
-    if collisions < 0:
-        raise ValueError(f"--collisions {collisions}: expected 0 or more")
+    if min(collisions, free) < 0:
+        raise ValueError(f"--collisions {collisions}, --free {free}: expected 0 or more")
     if payloads_g is None:
         scale = torque_scale(robot)
         payloads_g = tuple(scale * load for load in LOADS)
@@ -69,6 +71,8 @@ def command(
         if collisions
         else free_episodes(first + seed, episodes, seconds, speeds, payloads_g, arm, robot=robot)
     )
+    if free and collisions:
+        planned += free_episodes(first + seed, free, seconds, speeds, payloads_g, arm, robot=robot)
     if objects is not None:
         around = load_objects(objects)
         planned = [replace(episode, objects=around) for episode in planned]
