@@ -1,6 +1,7 @@
-"""A dataset's card for the Hugging Face hub, and its Croissant metadata.
+"""A dataset's card for the Hugging Face hub, its Croissant metadata, and their checksums.
 
-Both are computed from ``dataset.json`` and the manifest alone: one dataset, one card.
+Card and metadata are computed from ``dataset.json`` and the manifest alone: one dataset, one card.
+Shards and arms have checksums elsewhere, in the manifest and in ``dataset.json``.
 """
 
 from __future__ import annotations
@@ -12,10 +13,17 @@ from typing import Any
 from tauguard.atomic_write import write_atomic
 from tauguard.datasets.columns_of_shards import JOINT_SIGNALS, MEANING, RESIDUAL, schema
 from tauguard.datasets.configuration import Configuration
-from tauguard.datasets.dataset_folder import configuration_in, lines, read_head
+from tauguard.datasets.dataset_folder import (
+    CARD,
+    CROISSANT,
+    SUMS,
+    checksums,
+    configuration_in,
+    lines,
+    read_head,
+)
 from tauguard.datasets.inspection import SplitSummary, summarised
 
-CARD, CROISSANT = "README.md", "croissant.json"
 LICENSE, LICENSE_URL = "apache-2.0", "https://www.apache.org/licenses/LICENSE-2.0"
 
 #: The card; the header is what the Hugging Face hub reads.
@@ -77,11 +85,12 @@ By tauguard {tauguard} on MuJoCo {mujoco}, from the configuration with the SHA-2
 
 
 def write_cards(folder: Path) -> None:
-    """Write both files into the dataset's folder; a file with the right content is left alone."""
+    """Write card, metadata and checksums; a file with the right content is left alone."""
     configuration = configuration_in(folder)
     summary = summarised(folder)
     _write(folder / CARD, card(configuration, read_head(folder), summary))
     _write(folder / CROISSANT, croissant(folder, configuration, summary))
+    _write(folder / SUMS, checksums(folder))
 
 
 def _write(path: Path, text: str) -> None:

@@ -15,11 +15,14 @@ from tauguard.datasets.code_identity import code, computed_bits, versions
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.robots import check_unchanged, nominal_texts
 from tauguard.datasets.schedule import stated_balance
-from tauguard.datasets.shard import fault, manifest_path, read_lines
+from tauguard.datasets.shard import digest, fault, manifest_path, read_lines
 
 #: Version of the folder's layout; readers refuse newer ones.
 FORMAT = 2
 HEAD = "dataset.json"
+#: Checksums of the files that no other file has a checksum of; written when all else is there.
+SUMS = "SHA256SUMS"
+CARD, CROISSANT = "README.md", "croissant.json"
 #: Endings of an arm's files in ``arms``, by the name of the trace's attachment.
 _ENDINGS = {"arm.xml": ".xml", "drive.json": ".drive.json"}
 
@@ -94,6 +97,31 @@ def faults(folder: Path) -> Iterator[tuple[str, int, str | None]]:
     """Split, number and fault (None: intact) of every shard; reads every byte."""
     for split, number in shards(configuration_in(folder)):
         yield split, number, fault(folder, split, number)
+
+
+def checksums(folder: Path) -> str:
+    """SHA-256 of head, card and metadata, as ``sha256sum --check`` reads them."""
+    return "".join(f"{digest(folder / name)}  {name}\n" for name in (HEAD, CARD, CROISSANT))
+
+
+def changed(folder: Path) -> list[tuple[str, str]]:
+    """Which of head, card and metadata, or the checksums themselves, are not as written.
+
+    A dataset without checksums was made by an earlier version, or is not complete: nothing is
+    found then.
+    """
+    if not (folder / SUMS).is_file():
+        return []
+    there = (folder / SUMS).read_bytes()
+    found = []
+    for name in (HEAD, CARD, CROISSANT):
+        if not (folder / name).is_file():
+            found.append((name, "missing"))
+        elif f"{digest(folder / name)}  {name}\n".encode() not in there:
+            found.append((name, f"not the file that {SUMS} lists"))
+    if not found and there != checksums(folder).encode():
+        found.append((SUMS, "damaged"))
+    return found
 
 
 @contextlib.contextmanager
@@ -203,6 +231,7 @@ def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> 
         (folder / name).mkdir(exist_ok=True)
     for name, text in _arm_files(configuration).items():
         _write_once(folder / "arms" / name, text)
+    (folder / SUMS).unlink(missing_ok=True)
     _write_once(folder / HEAD, json.dumps(head, indent=1, sort_keys=True) + "\n")
 
 

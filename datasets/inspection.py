@@ -13,8 +13,13 @@ import numpy as np
 from tauguard.datasets.columns_of_shards import collision_line, stored
 from tauguard.datasets.configuration import Configuration
 from tauguard.datasets.dataset_folder import (
+    CARD,
+    CROISSANT,
+    HEAD,
+    SUMS,
     arm_texts,
     arms_of,
+    changed,
     configuration_in,
     faults,
     lines,
@@ -145,8 +150,13 @@ def missing(folder: Path) -> list[str]:
 
 
 def verified(folder: Path) -> list[tuple[str, str]]:
-    """Damaged or missing shards and arms, and what is wrong with each; reads every byte."""
-    found = [
+    """Names and faults of damaged or missing files; reads every byte.
+
+    Raises:
+        ValueError: ``dataset.json`` is so damaged that the other files are not known.
+    """
+    found = changed(folder)
+    found += [
         (data_path(split, number), wrong)
         for split, number, wrong in faults(folder)
         if wrong is not None
@@ -157,6 +167,13 @@ def verified(folder: Path) -> list[tuple[str, str]]:
         except ValueError as error:
             found.append((f"arms/{arm}", str(error)))
     return found
+
+
+def unchecked(folder: Path) -> list[str]:
+    """Files of a complete dataset that no checksum covers: it was made by an earlier version."""
+    if (folder / SUMS).is_file():
+        return []
+    return [name for name in (HEAD, CARD, CROISSANT) if (folder / name).is_file()]
 
 
 def off_balance(stated: Balance, one: SplitSummary) -> list[str]:

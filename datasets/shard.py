@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
@@ -127,14 +128,15 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
     Raises:
         ValueError: it is not what was written.
     """
-    try:
-        *lines, last = path.read_text(encoding="utf-8").splitlines() or [""]
-        check = hashlib.sha256("".join(f"{line}\n" for line in lines).encode()).hexdigest()
-        whole = json.loads(last) == {"sha256_of_lines": check} and bool(lines)
-        found = [json.loads(line) for line in lines]
-    except (ValueError, RecursionError):
-        whole, found = False, []
-    if not whole:
+    *lines, last, end = [b""] * 2 + path.read_bytes().split(b"\n")  # at least three
+    lines = lines[2:]
+    check = hashlib.sha256(b"".join(line + b"\n" for line in lines)).hexdigest()
+    written = json.dumps({"sha256_of_lines": check}).encode()
+    found: list[dict[str, Any]] = []
+    if lines and last == written and end == b"":
+        with contextlib.suppress(ValueError, RecursionError):
+            found = [json.loads(line) for line in lines]
+    if not found:
         raise ValueError(
             f"{path}: damaged, its checksum does not fit; the same `tauguard generate` that made "
             "the dataset makes it again"

@@ -7,8 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tauguard.datasets.card import CARD, CROISSANT
-from tauguard.datasets.dataset_folder import lines
+from tauguard.datasets.dataset_folder import CARD, CROISSANT, lines
 from tauguard.datasets.exports.lerobot import Moments, write_lerobot
 from tauguard.datasets.exports.minari import write_minari
 from tauguard.datasets.reader import read

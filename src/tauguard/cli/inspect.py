@@ -22,12 +22,13 @@ def command(
 ) -> None:
     """Show the content of a generated dataset; with --verify read every byte of it.
 
-    Exit code 1: --verify found damaged or missing shards, or splits share what they must not. The
-    command that generated the dataset makes such shards again, and only those.
+    Exit code 2: --verify found damaged or missing files or leaks between splits, or an episode
+    that was simulated again has other bytes. The command that generated the dataset writes damaged
+    files again, and only those.
 
     Args:
         folder: of the dataset.
-        verify: compare every shard with its checksum in the manifest.
+        verify: compare every file with its checksum.
         json: write the figures here.
         figure: draw the figures here (PNG).
         episode: simulate this episode again, split/number (from 0), from its line of the manifest,
@@ -38,6 +39,7 @@ def command(
             has its hash and the numbers that training needs, not its shapes.
     """
     from tauguard.datasets import inspection
+    from tauguard.datasets.dataset_folder import HEAD
     from tauguard.report import write_json
 
     if (mcap or robot) is not None and episode is None:
@@ -45,8 +47,12 @@ def command(
     if episode is not None:
         again(folder, episode, mcap, robot)
         return
+    damaged = dict(inspection.verified(folder)) if verify else None
+    if damaged and HEAD in damaged:
+        raise ValueError(f"{folder}: " + "; ".join(f"{k}: {v}" for k, v in damaged.items()))
     report = inspection.report(folder)
-    report["damaged"] = dict(inspection.verified(folder)) if verify else None
+    report["damaged"] = damaged
+    report["unchecked"] = inspection.unchecked(folder) if verify else []
     print(page(report))
     if figure is not None:
         from tauguard.datasets.inspection_figure import draw
@@ -55,7 +61,7 @@ def command(
     if json is not None:
         write_json(json, report)
     if report["damaged"] or (verify and report["leaks"]):
-        raise SystemExit(1)
+        raise SystemExit(2)
 
 
 def page(report: Mapping[str, Any]) -> str:
@@ -111,12 +117,14 @@ def verdict(report: Mapping[str, Any]) -> list[str]:
     if not report["leaks"]:
         lines.append("splits share no motion, and nothing that they call unseen")
     if damaged is None:
-        lines.append("shards not checked (--verify reads every byte)")
+        lines.append("files not checked (--verify reads every byte)")
     elif damaged:
         lines += [f"DAMAGED: {name}: {wrong}" for name, wrong in damaged.items()]
-        lines.append("`tauguard generate` with the same configuration makes these again")
+        lines.append("`tauguard generate` with the same configuration writes these again")
     else:
-        lines.append("every shard is whole, byte for byte")
+        lines.append("every file is intact, byte for byte")
+    for name in report["unchecked"]:
+        lines.append(f"{name}: not checked; `tauguard generate` of this version adds checksums")
     return lines
 
 
@@ -133,4 +141,4 @@ def again(folder: Path, name: str, mcap: Path | None, robot: Path | None) -> Non
         write_mcap(mcap, trace)
         print(f"{mcap}: the episode with its scene; `tauguard replay` shows it")
     if not same:
-        raise SystemExit(1)
+        raise SystemExit(2)
