@@ -110,8 +110,10 @@ def changed(folder: Path) -> list[tuple[str, str]]:
     A dataset without checksums was made by an earlier version, or is not complete: nothing is
     found then.
     """
-    if not (folder / SUMS).is_file():
+    if not (folder / SUMS).exists():
         return []
+    if not (folder / SUMS).is_file():
+        return [(SUMS, "no file")]
     there = (folder / SUMS).read_bytes()
     found = []
     for name in (HEAD, CARD, CROISSANT):

@@ -1,0 +1,156 @@
+"""Every command answers damaged input with an answer or one line and exit code 2."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from slow.damaged import damage
+from tauguard.cli import main
+from tauguard.datasets.configuration import load
+from tauguard.datasets.generation import generate_dataset
+from tauguard.replay import write_rrd
+from tauguard.traces import read_mcap, write_mcap
+from tests.detectors.synthetic_arm import GAIN, XML, record
+
+COLUMNS = {"t": 0, "q": [1, 2, 3], "qd": [4, 5, 6], "current": [7, 8, 9]}
+TINY = """
+name = "tiny"
+seed = 7
+rate = 250
+episodes_per_shard = 1
+[episodes]
+seconds = 6.6
+arms = ["cura6"]
+speeds = [50]
+payloads_g = [0]
+[[splits]]
+name = "train"
+episodes = 2
+individuals = [0]
+[[splits]]
+name = "test"
+episodes = 1
+individuals = [10]
+"""
+
+
+@pytest.fixture(scope="module")
+def intact(tmp_path_factory):
+    """A folder with a small file of every kind that commands take."""
+    folder = tmp_path_factory.mktemp("intact")
+    (folder / "arm.xml").write_text(XML)
+    (folder / "columns.json").write_text(json.dumps(COLUMNS))
+    (folder / "tiny.toml").write_text(TINY)
+    for seed in range(2):
+        trace = record(seed)
+        table = np.column_stack([trace.t, trace.q, trace.qd, trace.current])
+        np.savetxt(folder / f"log{seed}.csv", table, delimiter=",", fmt="%.9g")
+    generate_dataset(load(folder / "tiny.toml"), folder / "dataset", workers=1)
+    free = ("--free", "log0.csv", "log1.csv", *FREE, *GAINS, "--model", "free.skops")
+    traces = ("--traces", "mcap", "--model", "model.skops", "--detector", "residual-thresholds")
+    struck = ("--out", "mcap", "--episodes", "3", "--collisions", "1", "--workers", "1")
+    for command, flags in (("train", free), ("simulate", struck), ("train", traces)):
+        assert run(command, folder, *flags) == 0
+    trace, detection = read_mcap(folder / "mcap" / "episode-00000.mcap")
+    short = folder / "short.mcap"
+    write_mcap(short, trace, detection)
+    write_rrd(folder / "short.rrd", trace, detection)
+    return folder
+
+
+#: Files and folders that commands make.
+MADE = {"new", "new.skops", "new.xml", "mcap", "free.skops", "model.skops"}
+#: Without these a folder is another one, or not complete yet: no error.
+OPTIONAL = ("mcap/episode-00001.mcap", "dataset/SHA256SUMS", "dataset/manifest/train-000000.jsonl")
+
+
+def run(command, folder, *flags):
+    """Run a command on the folder's files; its exit code."""
+    there = {path.name for path in folder.iterdir()} | MADE
+    arguments = [str(folder / flag) if flag in there else flag for flag in flags]
+    try:
+        main([command, *arguments])
+    except SystemExit as stop:
+        return stop.code or 0
+    return 0
+
+
+FREE = ("--robot", "arm.xml", "--columns", "columns.json")
+GAINS = ("--gains", *(str(g) for g in GAIN))
+#: Command, its flags, and the files of it that are damaged in turn.
+COMMANDS = [
+    ("detect", ("log1.csv", *FREE, "--model", "free.skops"), ("log1.csv", "arm.xml", "free.skops")),
+    ("detect", ("log1.csv", *FREE, *GAINS), ("log1.csv", "arm.xml", "columns.json")),
+    ("calibrate", ("log0.csv", "log1.csv", *FREE, *GAINS, "--out", "new.xml"),
+     ("log1.csv", "arm.xml", "columns.json")),
+    ("train", ("--free", "log0.csv", "log1.csv", *FREE, *GAINS, "--model", "new.skops"),
+     ("log0.csv", "arm.xml", "columns.json")),
+    ("train", ("--traces", "mcap", "--detector", "residual-thresholds", "--model", "new.skops"),
+     ("mcap/episode-00001.mcap",)),
+    ("train", ("--traces", "dataset", "--detector", "residual-thresholds", "--model", "new.skops"),
+     ("dataset/dataset.json", "dataset/data/train-000001.parquet",
+      "dataset/manifest/train-000001.jsonl", "dataset/arms/cura6.xml")),
+    ("evaluate", ("--traces", "mcap", "--model", "model.skops"),
+     ("mcap/episode-00001.mcap", "model.skops")),
+    ("evaluate", ("--data", "dataset", "--model", "model.skops"),
+     ("dataset/dataset.json", "dataset/data/test-000000.parquet", "model.skops")),
+    ("generate", ("tiny.toml", "--out", "new", "--quick", "--workers", "1"), ("tiny.toml",)),
+    ("inspect", ("dataset", "--verify"), ("dataset/dataset.json", "dataset/README.md",
+     "dataset/SHA256SUMS", "dataset/data/test-000000.parquet",
+     "dataset/manifest/train-000000.jsonl", "dataset/arms/cura6.xml")),
+    ("inspect", ("dataset",), ("dataset/dataset.json", "dataset/manifest/train-000000.jsonl")),
+    ("inspect", ("dataset", "--episode", "train/0"),
+     ("dataset/dataset.json", "dataset/data/train-000000.parquet",
+      "dataset/manifest/train-000000.jsonl")),
+    ("export", ("dataset", "--out", "new"),
+     ("dataset/dataset.json", "dataset/data/train-000001.parquet", "dataset/arms/cura6.xml")),
+    ("robot", ("arm.xml",), ("arm.xml",)),
+    ("replay", ("short.mcap", "--out", "new"), ("short.mcap",)),
+    ("replay", ("short.mcap", "--out", "new", "--robot", "arm.xml"), ("arm.xml",)),
+    ("play-ur", ("log1.csv", "--columns", "columns.json", "--port", "0"),
+     ("log1.csv", "columns.json")),
+    ("listen", ("--play", "log1.csv", *FREE, "--model", "free.skops", "--seconds", "0.1"),
+     ("log1.csv", "arm.xml", "free.skops", "columns.json")),
+]  # fmt: skip
+CASES = [(c, flags, name) for c, flags, names in COMMANDS for name in names]
+
+
+def worst(data):
+    """Damages that no reader may take for an answer."""
+    yield b""
+    yield data[: len(data) // 2]
+    yield b"\x00\xff\xfe" * 400
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(("command", "flags", "name"), CASES, ids=[f"{c} {n}" for c, _, n in CASES])
+def test_damaged_input_is_exit_code_2(intact, tmp_path, capsys, command, flags, name):
+    folder = shutil.copytree(intact, tmp_path / "files")
+    path = folder / name
+    data = path.read_bytes()
+    rng = np.random.default_rng(len(command) + len(name))
+    for certain, damaged in (
+        *((True, d) for d in worst(data)),
+        *((False, damage(data, rng)) for _ in range(3)),
+    ):
+        path.write_bytes(damaged)
+        for made in ("new", "new.skops", "new.xml"):
+            place = folder / made
+            shutil.rmtree(place) if place.is_dir() else place.unlink(missing_ok=True)
+        capsys.readouterr()
+        code = run(command, folder, *flags)
+        said = capsys.readouterr().err.splitlines()
+        cut_table = name.endswith(".csv") and damaged and data.startswith(damaged)
+        if certain and not cut_table:
+            assert code == 2, damaged[:60]
+        assert code in (0, 2), said
+        lines = [line for line in said if line.startswith(f"tauguard {command}")]
+        assert "Traceback" not in " ".join(said)
+        assert not code or len(lines) == 1 or command == "inspect", said
+    path.unlink()
+    path.mkdir()
+    assert run(command, folder, *flags) == 2 or "manifest" in name
+    path.rmdir()
+    assert run(command, folder, *flags) in ((0, 2) if name in OPTIONAL else (2,))
