@@ -233,12 +233,18 @@ def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> 
         (folder / name).mkdir(exist_ok=True)
     for name, text in _arm_files(configuration).items():
         _write_once(folder / "arms" / name, text)
-    (folder / SUMS).unlink(missing_ok=True)
-    _write_once(folder / HEAD, json.dumps(head, indent=1, sort_keys=True) + "\n")
+    text = json.dumps(head, indent=1, sort_keys=True) + "\n"
+    if not _holds(folder / HEAD, text):
+        (folder / SUMS).unlink(missing_ok=True)  # they are of another head; the end writes new ones
+        write_atomic(folder / HEAD, text)
+
+
+def _holds(path: Path, text: str) -> bool:
+    return path.is_file() and path.read_bytes() == text.encode()
 
 
 def _write_once(path: Path, text: str) -> None:
-    if not path.is_file() or path.read_bytes() != text.encode():
+    if not _holds(path, text):
         write_atomic(path, text)
 
 
