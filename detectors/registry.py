@@ -32,7 +32,7 @@ from tauguard.detectors.scores.currents import (
     Inputs,
 )
 from tauguard.detectors.scores.detector import Detector
-from tauguard.detectors.scores.free_motion import FittedFreeMotion
+from tauguard.detectors.scores.free_motion import FittedFreeMotion, FreeMotion
 from tauguard.detectors.scores.kernel import KernelMachine
 from tauguard.detectors.scores.learned import (
     Boosting,
@@ -60,6 +60,7 @@ DETECTORS: dict[str, Callable[[], Detector]] = {
     "one-class": OneClass,
     "window-network": WindowNetwork,
     "boosting": Boosting,
+    "free-motion": FreeMotion,
 }
 
 #: Classes that a model file may hold, by their names there.

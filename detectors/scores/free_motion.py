@@ -123,7 +123,7 @@ class FittedFreeMotion(Frozen):
                 f"the trace has {len(trace.joint_names)} joints, this detector {joints}"
             )
         ratio, bound, residual, qdd, rest = (np.empty_like(trace.q) for _ in range(5))
-        steps = np.concatenate([[trace.dt], intervals(trace.t, len(trace.t))])
+        steps = np.concatenate([[self.dt], intervals(trace.t, len(trace.t))])
         q, qd, current = (np.ascontiguousarray(x) for x in (trace.q, trace.qd, trace.current))
         native(self.arm, self.bound, self.load).run(
             steps, q, qd, current, ratio, bound, residual, qdd, rest
@@ -141,14 +141,17 @@ class FreeMotion:
         """Calibrate, then let left-out logs move the prior bounds.
 
         Args:
-            traces: collision-free, 20 s of motion or more in all; plain traces count as without a
-                load. Long ones are cut, so that each part can be left out once.
+            traces: 20 s of collision-free motion or more in all. Plain traces count as without a
+                load; of labelled ones the load is unknown, and those with collisions are left out.
+                Long ones are cut, so that each part can be left out once.
             arm: nominal numbers and drive gains, whose scale holds.
 
         Raises:
             ValueError: no or too little motion, or other joints.
         """
-        recordings = [r if isinstance(r, Recording) else Recording(r) for r in traces]
+        recordings = [r for r in map(_recording, traces) if not _has_collisions(r.trace)]
+        if traces and not recordings:
+            raise ValueError("no trace without collisions: free motion is all that this learns")
         check_joints([r.trace for r in recordings], arm.robot.joint_names)
         parts = pieces(recordings, FOLDS)
         moving = [r for r in parts if moves(r.trace)]
@@ -177,6 +180,17 @@ class FreeMotion:
                 alarms += _alarms(judge, parts[k])
         seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
         return replace(prior, bound=learned(bound, judged), seconds=seconds, alarms=alarms)
+
+
+def _recording(trace: Trace | Recording) -> Recording:
+    """A log with what is known of its load: nothing, if it is labelled."""
+    if isinstance(trace, Recording):
+        return trace
+    return Recording(trace) if trace.truth is None else Recording(trace, None)
+
+
+def _has_collisions(trace: Trace) -> bool:
+    return trace.truth is not None and bool(trace.truth.collisions)
 
 
 def _calibrations(arm: ArmModel, parts: Sequence[Recording]) -> tuple[list[ArmModel], ArmModel]:

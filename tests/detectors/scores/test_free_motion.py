@@ -170,7 +170,7 @@ def test_scores_do_not_depend_on_what_comes_after(alarm):
 def test_the_stream_gives_the_same_bits(alarm):
     trace = record(7, seconds=4.0)
     stream, steps = alarm.detector.stream(), np.diff(trace.t, prepend=trace.t[0] - trace.dt)
-    steps[0] = trace.dt
+    steps[0] = alarm.detector.dt
     online = [
         stream.step(*one) for one in zip(trace.q, trace.qd, trace.current, steps, strict=True)
     ]
