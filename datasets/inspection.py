@@ -190,6 +190,12 @@ def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
     return lines
 
 
+def class_order(value: str) -> tuple[float, str]:
+    """Numbers and ranges by size, words by letters."""
+    head = value.split("-")[0]
+    return (float(head), value) if head.replace(".", "").isdigit() else (0.0, value)
+
+
 def report(folder: Path) -> dict[str, Any]:
     """Everything that `tauguard inspect` shows, as plain values."""
     head = read_head(folder)

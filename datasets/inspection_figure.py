@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tauguard.atomic_write import atomic_file
+from tauguard.datasets.inspection import class_order
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +48,7 @@ def _classes(axes: Axes, report: Mapping[str, Any]) -> None:
             for into, counts in ((planned, one["planned"]), (achieved, one["achieved"])):
                 for value, count in counts.get(what, {}).items():
                     into[value] = into.get(value, 0) + count
-        for value in sorted(planned.keys() | achieved.keys(), key=_order):
+        for value in sorted(planned.keys() | achieved.keys(), key=class_order):
             labels.append({"link": f"link {value}", "severity": f"{value} N m"}.get(what, value))
             there.append(achieved.get(value, 0))
             wanted.append(planned.get(value, 0))
@@ -58,11 +59,6 @@ def _classes(axes: Axes, report: Mapping[str, Any]) -> None:
     axes.invert_yaxis()
     axes.set(xlabel="collisions", title="Classes, as planned and as they came out")
     axes.legend(loc="lower right")
-
-
-def _order(value: str) -> tuple[float, str]:
-    head = value.split("-")[0]
-    return (float(head), value) if head.replace(".", "").isdigit() else (0.0, value)
 
 
 def _severity(axes: Axes, every: list[dict[str, Any]]) -> None:

@@ -91,19 +91,15 @@ def page(report: Mapping[str, Any]) -> str:
 
 def classes(name: str, one: Mapping[str, Any]) -> list[str]:
     """Collisions of a split by class, as achieved and as planned."""
+    from tauguard.datasets.inspection import class_order
+
     lines = [f"{name}: collisions there (planned)"]
     for what in ("kind", "link", "severity"):
         there, wanted = one["achieved"].get(what, {}), one["planned"].get(what, {})
-        both = sorted(there.keys() | wanted.keys(), key=order)
+        both = sorted(there.keys() | wanted.keys(), key=class_order)
         cells = "  ".join(f"{v} {there.get(v, 0)} ({wanted.get(v, 0)})" for v in both)
         lines.append(f"  {what:<9} {cells}")
     return lines
-
-
-def order(value: str) -> tuple[float, str]:
-    """Numbers and ranges by size, words by letters."""
-    head = value.split("-")[0]
-    return (float(head), value) if head.replace(".", "").isdigit() else (0.0, value)
 
 
 def verdict(report: Mapping[str, Any]) -> list[str]:
