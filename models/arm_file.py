@@ -45,6 +45,7 @@ class ArmFile:
     gripper: tuple[str, ...]  #: joints below the flange
     model: mujoco.MjModel  #: of ``spec``, compiled without its shapes
     mended: tuple[str, ...]  #: links of a URDF whose inertia no body can have
+    sticks: tuple[str, ...]  #: links without collision geometry, which got a capsule
 
 
 def read_arm(
@@ -96,12 +97,12 @@ def read_arm(
     _mark_tools(spec, tool)
     spec.fuse_static()
     links, joints = _chain(spec, gripper)
-    _let_collide(spec, links)
+    sticks = _let_collide(spec, links)
     model = SpecText(spec).dynamics()
     at = [names.index(name) for name in joints]
     home = None if keyframe is None else keyframe[[address[name] for name in joints]]
     speed = np.array([speeds.get(name, np.inf) for name in joints])
-    return ArmFile(spec, links, joints, limits[at], speed, home, gripper, model, mended)
+    return ArmFile(spec, links, joints, limits[at], speed, home, gripper, model, mended, sticks)
 
 
 def _mark_tools(spec: mujoco.MjSpec, tool: str | None) -> None:
@@ -332,8 +333,12 @@ def _branches(moving: list[mujoco.MjsBody]) -> str:
     )
 
 
-def _let_collide(spec: mujoco.MjSpec, links: tuple[str, ...]) -> None:
-    """Every colliding geom of the file gets the arm's bits; links without one get a capsule."""
+def _let_collide(spec: mujoco.MjSpec, links: tuple[str, ...]) -> tuple[str, ...]:
+    """Every colliding geom of the file gets the arm's bits; links without one get a capsule.
+
+    Returns the names of the latter.
+    """
+    sticks = []
     for geom in spec.geoms:
         if geom.contype or geom.conaffinity:
             geom.contype, geom.conaffinity = ARM_BITS, OBSTACLE_BITS
@@ -341,6 +346,7 @@ def _let_collide(spec: mujoco.MjSpec, links: tuple[str, ...]) -> None:
         body = spec.body(link)
         if any(geom.contype for geom in body.geoms):
             continue
+        sticks.append(link)
         reach = np.array(spec.body(links[i + 1]).pos) if i + 1 < len(links) else np.zeros(3)
         long = float(np.linalg.norm(reach)) > 2 * STICK_RADIUS
         kind = mujoco.mjtGeom.mjGEOM_CAPSULE if long else mujoco.mjtGeom.mjGEOM_SPHERE
@@ -348,3 +354,4 @@ def _let_collide(spec: mujoco.MjSpec, links: tuple[str, ...]) -> None:
         stick.contype, stick.conaffinity = ARM_BITS, OBSTACLE_BITS
         if long:
             stick.fromto = [0, 0, 0, *reach]
+    return tuple(sticks)

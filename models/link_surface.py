@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
+from tauguard.models.arm_file import read_arm
 from tauguard.models.nominal import compiled
 
 #: Points on each link, and lines that may be tried for each of them (thin links are often missed).
@@ -95,6 +96,36 @@ def link_surface(
             "with its shapes"
         )
     return LinkSurface(np.concatenate(links), np.concatenate(places), np.concatenate(normals))
+
+
+def arm_surface(
+    path: Path, joints: tuple[str, ...], points: int = POINTS
+) -> tuple[LinkSurface, tuple[str, ...]]:
+    """The surface of the arm in a robot file, and the links whose shape is a capsule only.
+
+    Meshes of a URDF are looked for from its folder upwards. A link without a shape that MuJoCo
+    reads is a capsule of 50 mm radius along it; how far the last one reaches, nobody knows.
+
+    Args:
+        path: MJCF or URDF file.
+        joints: names of the arm's joints; every other joint is welded at zero.
+        points: wanted on each link.
+
+    Raises:
+        ValueError: not a robot that MuJoCo can read, without one of the joints, no serial chain of
+            them, or a last link without a shape.
+    """
+    file = read_arm(path, joints)
+    if file.joints != joints:
+        raise ValueError(
+            f"{path}: its joints, base to tip, are {', '.join(file.joints)}; expected "
+            f"{', '.join(joints)}"
+        )
+    if file.links[-1] in file.sticks:
+        raise ValueError(
+            f"{path}: no shape found of the last link, {file.links[-1]}, or its mesh is not there"
+        )
+    return link_surface(file.spec, points), file.sticks
 
 
 def _touchable(model: mujoco.MjModel, body: int) -> NDArray[np.intp]:

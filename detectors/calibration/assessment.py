@@ -11,6 +11,7 @@ from tqdm import tqdm
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.identification import REAL_FRICTION, Beliefs, identify
 from tauguard.detectors.calibration.recording import Recording, moving_span
+from tauguard.detectors.calibration.regression import filtered
 from tauguard.detectors.dynamics.friction import FrictionModel
 from tauguard.detectors.dynamics.robot import RobotNumbers, momentum_terms
 from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
@@ -158,11 +159,14 @@ def left_out(
             arm, recordings, scale=scale, friction=friction, beliefs=beliefs, rate=rate
         )
         arm = ArmModel(arm.robot, whole.arm.drive_gain)
+    rest = (beliefs or Beliefs()).rest
+    data = [filtered(r, arm.robot, arm.drive_gain, friction, rate, rest) for r in recordings]
     found = []
     turns = tqdm(recordings, desc="leave out", unit="log", disable=None, leave=False)
     for k, recording in enumerate(turns):
         others = [*recordings[:k], *recordings[k + 1 :]]
-        part = identify(arm, others, friction=friction, beliefs=beliefs, rate=rate)
+        own = [*data[:k], *data[k + 1 :]]
+        part = identify(arm, others, friction=friction, beliefs=beliefs, rate=rate, data=own)
         found.append(residual_rms(part.arm, recording.trace, rate, stop=stop))
     return found
 

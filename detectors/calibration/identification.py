@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.recording import Recording, is_known, known_load, moving_span
@@ -157,9 +158,22 @@ def identify(
     """
     beliefs = beliefs or Beliefs()
     _check(recordings, arm.robot, scale)
-    if scale == "gains":
-        found, _ = _fit(arm, recordings, scale, friction, beliefs, rate, data, 2)
-        return found
+    # A hundred unknowns: threads of the linear algebra cost more time than they save.
+    with threadpool_limits(1, "blas"):
+        if scale == "gains":
+            return _fit(arm, recordings, scale, friction, beliefs, rate, data, 2)[0]
+        return _identify_scale(arm, recordings, scale, friction, beliefs, rate)
+
+
+def _identify_scale(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    scale: str,
+    friction: FrictionModel,
+    beliefs: Beliefs,
+    rate: float,
+) -> Identified:
+    """As :func:`identify`, where gains are found, too."""
     # A torque per ampere that may change with the current takes up what a load does: it stays out
     # while the scale is sought.
     constant = replace(friction, saturation=False, weights=np.empty((0, 0)))
@@ -191,9 +205,15 @@ def _fit(
     level: Array = np.ones(robot.joints)
     known = [known_load(recording) for recording in recordings]
     loads = np.array(known)
+    # Friction whose load is the model's own does not see the gains: they scale the currents alone.
+    rescaled = friction.modelled and not friction.saturation
+    first: Sequence[Filtered] = ()
     for turn in range(rounds):
-        if data is None or not held:
+        if data is None or not (held or rescaled):
             data = [filtered(r, robot, gain, friction, rate, beliefs.rest) for r in recordings]
+        elif not held:
+            data = [d.with_gain(gain / arm.drive_gain) for d in first]
+        first = first or data
         if turn and friction.modelled:  # loads that were not given are known by now
             data = [
                 d if is_known(r) else filtered(r, robot, gain, friction, rate, beliefs.rest, load)

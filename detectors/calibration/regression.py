@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,13 @@ from tauguard.detectors.events import confirmed, free_rows
 from tauguard.traces.trace import Trace
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Filtered:
-    """Everything that the regression needs of one recording, behind the observer's filter."""
+    """Everything that the regression needs of one recording, behind the observer's filter.
+
+    The normal equations of each joint are kept once they are made: rounds of least squares, and
+    calibrations that leave one recording out, differ in how they weigh the joints only.
+    """
 
     torque: Array  #: nominal rigid-body torque less payload [N m], (R, n)
     current: Array  #: gain times current [N m], (R, n)
@@ -31,6 +35,42 @@ class Filtered:
     armature: Array  #: (R, n)
     friction: Array  #: (R, n, columns)
     weight: Array  #: of each row and joint, (R, n)
+
+    def with_gain(self, factor: Array) -> Filtered:
+        """The same at gains that are ``factor`` times as large, (n,); friction is not scaled."""
+        return replace(self, current=self.current * factor)
+
+    def design(self, joint: int, known: Array, measured: bool = False) -> Array:
+        """Columns of one joint; ``known`` is the load that the torque scales with.
+
+        ``measured``: see :class:`System`.
+        """
+        load = self.inertial[:, joint, -INERTIAL:]
+        return np.column_stack(
+            [
+                -self.inertial[:, joint],
+                -self.armature[:, joint],
+                self.friction[:, joint],
+                -self.current[:, joint] if measured else self.torque[:, joint] + load @ known,
+                load,
+            ]
+        )
+
+    def target(self, joint: int) -> Array:
+        """What the unknowns are to explain [N m], shape (R,)."""
+        out: Array = self.current[:, joint] - self.torque[:, joint]
+        return out
+
+    def normal(self, joint: int, known: Array, measured: bool = False) -> tuple[Array, Array]:
+        """Normal equations of one joint with its rows' own weights, shapes (k, k) and (k,)."""
+        kept = self.__dict__.setdefault("_normal", {})
+        key = joint, known.tobytes(), measured
+        if key not in kept:
+            x, weight = self.design(joint, known, measured), self.weight[:, joint]
+            weighed = x * (weight**2)[:, None]
+            kept[key] = x.T @ weighed, self.target(joint) @ weighed
+        found: tuple[Array, Array] = kept[key]
+        return found
 
 
 def filtered(
@@ -174,32 +214,13 @@ class System:
         body = np.arange(INERTIAL * self.n)
         return np.concatenate([body, [INERTIAL * self.n + joint], own, [self.gain + joint], load])
 
-    def design(self, data: Filtered, joint: int, known: Array) -> Array:
-        """Columns of one joint; ``known`` is the load that the torque scales with."""
-        last = slice(INERTIAL * (self.n - 1), INERTIAL * self.n)
-        load = data.inertial[:, joint, last]
-        return np.column_stack(
-            [
-                -data.inertial[:, joint],
-                -data.armature[:, joint],
-                data.friction[:, joint],
-                -data.current[:, joint] if self.measured else data.torque[:, joint] + load @ known,
-                load,
-            ]
-        )
-
-    def target(self, data: Filtered, joint: int) -> Array:
-        """What the unknowns are to explain [N m], shape (R,)."""
-        out: Array = data.current[:, joint] - data.torque[:, joint]
-        return out
-
     def add(self, data: Filtered, recording: int, weight: Array, known: Array) -> None:
         """Take up a recording; ``weight`` is one over each joint's error [1/(N m)], shape (n,)."""
         for joint in range(self.n):
-            at, x = self.places(joint, recording), self.design(data, joint, known)
-            w = (weight[joint] * data.weight[:, joint])[:, None] ** 2
-            self.matrix[np.ix_(at, at)] += x.T @ (w * x)
-            self.vector[at] += x.T @ (w[:, 0] * self.target(data, joint))
+            at = self.places(joint, recording)
+            matrix, vector = data.normal(joint, known, self.measured)
+            self.matrix[np.ix_(at, at)] += weight[joint] ** 2 * matrix
+            self.vector[at] += weight[joint] ** 2 * vector
 
     def solve(self, deviations: Array) -> Array:
         """The unknowns around 0, shape (size,); those with a deviation of 0 are held there."""
@@ -212,6 +233,6 @@ class System:
         """What the solution does not explain [N m], shape (R, n)."""
         out = np.empty_like(data.current)
         for joint in range(self.n):
-            fit = self.design(data, joint, known) @ solution[self.places(joint, recording)]
-            out[:, joint] = self.target(data, joint) - fit
+            x = data.design(joint, known, self.measured)
+            out[:, joint] = data.target(joint) - x @ solution[self.places(joint, recording)]
         return out

@@ -46,6 +46,24 @@ def inertial_numbers(pseudo: Array) -> Array:
     return np.concatenate([[pseudo[3, 3]], pseudo[:3, 3], inertia[rows, columns]])
 
 
+def _linear() -> Array:
+    """:func:`inertial_numbers` of symmetric matrices as a tensor, shape (10, 4, 4)."""
+    out = np.zeros((10, 4, 4))
+    for row in range(4):
+        for column in range(4):
+            unit = np.zeros((4, 4))
+            unit[row, column] += 0.5
+            unit[column, row] += 0.5
+            out[:, row, column] = inertial_numbers(unit)
+    return out
+
+
+_LINEAR = _linear()
+#: Which entry of the Cholesky factor each coordinate is, shape (10, 4, 4).
+_UNIT = np.zeros((10, 4, 4))
+_UNIT[np.arange(10), _LOWER[0], _LOWER[1]] = 1.0
+
+
 def is_physically_consistent(inertial: Array) -> bool:
     """Whether every link's numbers, shape (..., 10), are those of a body of positive density."""
     flat = np.asarray(inertial, dtype=np.float64).reshape(-1, 10)
@@ -70,21 +88,26 @@ def coordinates(inertial: Array, floor: float = 1e-4) -> Array:
 
 
 def from_coordinates(theta: Array) -> tuple[Array, Array]:
-    """Ten inertial numbers of log-Cholesky coordinates, and their derivative, (10,) and (10, 10).
+    """Inertial numbers of log-Cholesky coordinates, and their derivative.
 
-    Column k of the derivative belongs to coordinate k.
+    Args:
+        theta: coordinates of one body or of several, shape (..., 10).
+
+    Returns:
+        Ten numbers each, shape (..., 10), and shape (..., 10, 10), whose column k belongs to
+        coordinate k.
     """
     entries = theta.copy()
-    entries[_DIAGONAL] = np.exp(entries[_DIAGONAL])
-    factor = np.zeros((4, 4))
-    factor[_LOWER] = entries
-    derivative = np.empty((10, 10))
-    for k, (row, column) in enumerate(zip(*_LOWER, strict=True)):
-        step = np.zeros((4, 4))
-        step[row, column] = entries[k] if row == column else 1.0
-        product = step @ factor.T
-        derivative[:, k] = inertial_numbers(product + product.T)
-    return inertial_numbers(factor @ factor.T), derivative
+    entries[..., _DIAGONAL] = np.exp(entries[..., _DIAGONAL])
+    factor = np.zeros((*theta.shape[:-1], 4, 4))
+    factor[..., _LOWER[0], _LOWER[1]] = entries
+    numbers = np.einsum("irc,...rk,...ck->...i", _LINEAR, factor, factor)
+    # d(L L^T) = dL L^T + L dL^T, and the numbers of a matrix are those of its symmetric part.
+    derivative = 2 * np.einsum("krc,...lc->...krl", _UNIT, factor)
+    derivative = np.einsum("irl,...krl->...ik", _LINEAR, derivative)
+    scale = np.ones_like(entries)
+    scale[..., _DIAGONAL] = entries[..., _DIAGONAL]
+    return numbers, derivative * scale[..., None, :]
 
 
 def solve_physically_consistent(
@@ -154,11 +177,11 @@ def _unknowns(state: Array, inertial: Array, armature: Array) -> tuple[Array, Ar
     """x of the free coordinates, and its derivative by them."""
     n = len(inertial)
     x, slope = state.copy(), np.zeros((len(state), len(state)))
+    bodies, derivatives = from_coordinates(state[: 10 * n].reshape(n, 10))
+    x[: 10 * n] = (inertial - bodies).ravel()
     for link in range(n):
         at = slice(10 * link, 10 * link + 10)
-        body, derivative = from_coordinates(state[at])
-        x[at] = inertial[link] - body
-        slope[at, at] = -derivative
+        slope[at, at] = -derivatives[link]
     at = slice(10 * n, None)
     reflected = np.exp(state[at])
     x[at] = armature - reflected

@@ -1,13 +1,18 @@
 """Collisions in logs: a push that is added to the currents is found, what is not there is not."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from tauguard.cli import main
+from tauguard.cli.detect import explained
+from tauguard.detectors import ArmModel, FrictionModel, RobotNumbers
+from tauguard.detectors.events import Alarm
 from tauguard.models import pin_model
+from tauguard.traces import Trace
 
 ARM = """
 <mujoco><worldbody>
@@ -153,3 +158,43 @@ def test_a_real_collision_free_file_raises_few_alarms(data_dir, tmp_path, capsys
     assert figures["alarms"] <= 1
     assert 29 < figures["watched_seconds"] < 30
     assert (tmp_path / "out" / "detect.rrd").exists()
+
+
+URDF = """<robot name="arm"><link name="base"/>
+  <link name="a"><inertial><origin xyz=".2 0 0"/><mass value="4"/>
+    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
+    {shape}</link>
+  <link name="b"><inertial><origin xyz=".2 0 0"/><mass value="2"/>
+    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz=".2 0 0"/><geometry><box size=".4 .1 .1"/></geometry></collision></link>
+  <joint name="j1" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" effort="50" velocity="2"/></joint>
+  <joint name="j2" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+    <origin xyz=".4 0 0"/><limit lower="-3" upper="3" effort="50" velocity="2"/></joint>
+</robot>"""
+BOX = '<collision><origin xyz=".2 0 0"/><geometry><box size=".4 .1 .1"/></geometry></collision>'
+
+
+@pytest.mark.parametrize(("shape", "said"), [(BOX, ()), ("", ("no shape found of a",))])
+def test_a_urdf_gives_link_and_force_of_each_alarm(tmp_path, shape, said):
+    robot = tmp_path / "arm.urdf"
+    robot.write_text(URDF.format(shape=shape))
+    rng = np.random.default_rng(0)
+    t = np.arange(1000) / 250
+    tau = 0.05 * rng.standard_normal((1000, 2))  # gravity asks for nothing about vertical axes
+    pushed = (t >= 2) & (t < 2.4)
+    tau[pushed] -= np.array([0.7 * 30, 0.3 * 30])  # 30 N along y, 0.3 m out on link b
+    trace = Trace(("j1", "j2"), t, np.zeros((1000, 2)), np.zeros((1000, 2)), tau)
+    arm = ArmModel(
+        RobotNumbers.from_pin(pin_model(robot)),
+        np.ones(2),
+        FrictionModel.coulomb_viscous([0.0, 0.0], [0.0, 0.0]),
+        np.array([0.1, 0.1]),
+    )
+    alarms = SimpleNamespace(detection=SimpleNamespace(alarms=[Alarm(2.02, 2.4)]))
+    (event,), notes = explained(SimpleNamespace(arm=arm), trace, alarms, robot)
+    assert event["link"] == 2
+    assert event["force_n"][1] == pytest.approx(30, rel=0.35)
+    assert event["peak_force_n"]["low"] < 30 < event["peak_force_n"]["high"]
+    assert len(notes) == len(said)
+    assert all(text in note for text, note in zip(said, notes, strict=True))

@@ -1,8 +1,10 @@
+import re
+
 import mujoco
 import numpy as np
 import pytest
 
-from tauguard.models import cura6, link_surface, pin_model
+from tauguard.models import arm_surface, cura6, link_surface, pin_model
 
 ARM = """<mujoco><worldbody><body name="a" pos="0.1 0.2 0.3" euler="20 30 40"><joint name="j"
  pos="0.05 0 0"/><geom type="sphere" size="0.1" pos="0.2 0 0"/>
@@ -68,3 +70,43 @@ def test_bad_input_is_named():
         )
     with pytest.raises(ValueError, match="points 0"):
         link_surface(cura6.arm_xml(), points=0)
+
+
+URDF = """<robot name="arm"><link name="base"/>
+  <link name="a"><inertial><mass value="2"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0"
+    iyz="0"/></inertial>
+    <collision><geometry><mesh filename="package://gone/a.stl"/></geometry></collision></link>
+  <link name="b"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0"
+    iyz="0"/></inertial>
+    <collision><origin xyz="0 0 .2"/><geometry><box size=".1 .1 .4"/></geometry></collision></link>
+  <joint name="j1" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" effort="50" velocity="2"/></joint>
+  <joint name="j2" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+    <origin xyz="0 0 .4"/><limit lower="-3" upper="3" effort="50" velocity="2"/></joint>
+</robot>"""
+
+
+def test_the_surface_of_a_urdf_is_that_of_its_shapes_and_a_capsule_where_there_are_none(tmp_path):
+    (tmp_path / "arm.urdf").write_text(URDF)
+    surface, sticks = arm_surface(tmp_path / "arm.urdf", ("j1", "j2"), points=200)
+    assert sticks == ("a",)
+    on_a, on_b = (surface.point[surface.link == k] for k in (0, 1))
+    assert len(on_a) == len(on_b) == 200
+    away = np.abs(on_b - [0, 0, 0.2]) - [0.05, 0.05, 0.2]
+    np.testing.assert_allclose(away.max(axis=1), 0, atol=1e-6)
+    along = np.clip(on_a[:, 2:], 0, 0.4) * [0, 0, 1]
+    np.testing.assert_allclose(np.linalg.norm(on_a - along, axis=1), 0.05, atol=1e-3)
+
+
+def test_joints_that_the_surface_is_not_of_are_named(tmp_path):
+    (tmp_path / "arm.urdf").write_text(URDF)
+    one, sticks = arm_surface(tmp_path / "arm.urdf", ("j2",), points=20)
+    assert set(one.link) == {0}
+    assert sticks == ()
+    (tmp_path / "bare.urdf").write_text(re.sub(r"<collision>.*?</collision>", "", URDF))
+    with pytest.raises(ValueError, match="no shape found of the last link, b"):
+        arm_surface(tmp_path / "bare.urdf", ("j1", "j2"))
+    with pytest.raises(ValueError, match="no joint 'j3'"):
+        arm_surface(tmp_path / "arm.urdf", ("j1", "j3"))
+    with pytest.raises(ValueError, match="base to tip, are j1, j2; expected j2, j1"):
+        arm_surface(tmp_path / "arm.urdf", ("j2", "j1"))

@@ -174,22 +174,32 @@ def plainly(
 def explained(
     detector: Any, trace: Trace, found: LogDetection, robot: Path
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """What each alarm was; its torques alone where the robot's file has no shapes."""
+    """What each alarm was; its torques alone where the robot's file gives no chain of links."""
     from tauguard.detectors import Diagnoser
     from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindows
     from tauguard.detectors.diagnosis.severity import ContactTorque
-    from tauguard.models import link_surface
+    from tauguard.models import arm_surface
 
     alarms = found.detection.alarms
+    if not alarms:
+        return [], ()
     try:
-        surface = link_surface(robot)
+        surface, sticks = arm_surface(robot, detector.arm.robot.joint_names)
     except ValueError as error:
         looked = PostAlarmWindows(detector.arm, detector.arm.noise_model, trace)
         contact_torque = [ContactTorque.of(looked.at(alarm.start)) for alarm in alarms]
         return [
             {"summary": one.text(trace.joint_names), **torques(one)} for one in contact_torque
         ], (f"{error}: links and forces are not looked for",)
-    return [cause(one) for one in Diagnoser.of(detector.arm, surface).diagnose(trace, alarms)], ()
+    notes: tuple[str, ...] = ()
+    if sticks:
+        notes = (
+            f"{robot.name}: no shape found of {', '.join(sticks)}, taken as capsules of 50 mm "
+            "radius for link and force; with its meshes in or above the file's folder they are "
+            "better",
+        )
+    found_causes = Diagnoser.of(detector.arm, surface).diagnose(trace, alarms)
+    return [cause(one) for one in found_causes], notes
 
 
 def torques(contact_torque: ContactTorque) -> dict[str, Any]:
