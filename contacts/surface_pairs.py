@@ -7,7 +7,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
 from tauguard.contacts.checker import Contacts, State, geom_kinds
@@ -70,6 +69,8 @@ class SurfacePairs:
         )
 
     def _motion(self, geom: int, before: State, after: State) -> Motion:
+        from scipy.spatial.transform import Rotation
+
         body = int(self._body[geom])
         start, end = (s.xmat[body].reshape(3, 3) for s in (before, after))
         pose = np.eye(4)

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import skops.io
 
 from tauguard.atomic_write import write_atomic
 from tauguard.detectors.alarms.alarm import CollisionAlarm
@@ -84,6 +83,8 @@ def write_model(path: str | os.PathLike[str], kind: str, value: object) -> None:
     Raises:
         ValueError: it cannot be in a file, or the folder cannot be written.
     """
+    import skops.io
+
     content, key = encode(value), key_of_user()
     own = checksum(content)
     container = {
@@ -128,6 +129,8 @@ def read_model(path: str | os.PathLike[str], kind: str) -> Any:
 
 def _container(path: Path) -> Mapping[str, Any]:
     """The outer dictionary of a file of ours."""
+    import skops.io
+
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -183,14 +183,36 @@ def test_no_files_of_detectors_import_each_other():
         waiting = {name: needs for name, needs in waiting.items() if name not in ready}
 
 
+def loaded_by(code: str, libraries: tuple[str, ...]) -> list[str]:
+    """Those of ``libraries`` that a fresh interpreter has loaded after ``code``."""
+    code += f"\nimport sys; print(*(m for m in {libraries!r} if m in sys.modules))"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return out.stdout.splitlines()[-1].split()
+
+
 @pytest.mark.parametrize("package", ["geometry", "cloth", "rigid", "traces", "report"])
 def test_light_packages_leave_heavy_libraries_unloaded(package):
+    heavy = ("mujoco", "pinocchio", "sklearn", "rerun", "mcap")
+    assert not loaded_by(f"import tauguard.{package}", heavy)
+
+
+#: What takes longer to import than all that an environment needs.
+HEAVY = ("sklearn", "skops", "pandas", "scipy", "matplotlib", "rerun", "pyarrow", "trimesh", "mcap")
+
+
+@pytest.mark.parametrize("detector", ["observer", None])
+def test_an_environment_leaves_heavy_libraries_unloaded(detector):
     code = (
-        f"import sys, tauguard.{package}; "
-        "print([m for m in ('mujoco', 'pinocchio', 'sklearn', 'rerun') if m in sys.modules])"
+        "import gymnasium\n"
+        f"env = gymnasium.make('tauguard:tauguard/Reach-v0', detector={detector!r})\n"
+        "env.reset(seed=1); env.step(env.action_space.sample())"
     )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert out.stdout.strip() == "[]"
+    assert loaded_by(code, ("tauguard.envs.gym.reach", *HEAVY)) == ["tauguard.envs.gym.reach"]
+
+
+def test_the_list_of_commands_leaves_heavy_libraries_unloaded():
+    code = "from tauguard.cli import main; main(['--help'])"
+    assert not loaded_by(code, (*HEAVY, "mujoco", "pinocchio", "tyro"))
 
 
 def test_nothing_generic_is_importable_by_itself(tmp_path):

@@ -1,9 +1,14 @@
 """The typed values that flow through tauguard, and their MCAP form."""
 
-from tauguard.traces.contacts import CheckedContacts
-from tauguard.traces.mcap import read_mcap, write_mcap
-from tauguard.traces.severity import STRATA, stratum
-from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
+from typing import TYPE_CHECKING
+
+from tauguard.lazy import on_demand
+
+if TYPE_CHECKING:
+    from tauguard.traces.contacts import CheckedContacts
+    from tauguard.traces.mcap import read_mcap, write_mcap
+    from tauguard.traces.severity import STRATA, stratum
+    from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
 
 __all__ = [
     "KINDS",
@@ -18,3 +23,5 @@ __all__ = [
     "stratum",
     "write_mcap",
 ]
+
+__getattr__ = on_demand(__name__)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
 from tauguard.contacts.checker import State
@@ -32,6 +31,8 @@ class Step:
     @classmethod
     def between(cls, model: Any, before: State, after: State) -> Step:
         """The step from ``before`` to ``after``."""
+        from scipy.spatial.transform import Rotation
+
         body = model.geom_bodyid
         start = before.xmat.reshape(-1, 3, 3)
         between = after.xmat.reshape(-1, 3, 3) @ start.transpose(0, 2, 1)
@@ -50,6 +51,8 @@ class Step:
 
     def poses(self, geoms: NDArray[Any], s: Array) -> tuple[Array, Array]:
         """Centres (K, 3) and rotations (K, 3, 3) of ``geoms`` (K,) at ``s`` (K,)."""
+        from scipy.spatial.transform import Rotation
+
         turn = Rotation.from_rotvec(s[:, None] * self.turn[geoms])
         center = self.origin[geoms] + s[:, None] * self.shift[geoms] + turn.apply(self.arm[geoms])
         return center, turn.as_matrix() @ self.xmat[geoms]

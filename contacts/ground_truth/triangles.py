@@ -7,7 +7,6 @@ from typing import Any
 import coal
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from tauguard.arrays import Array
 
@@ -78,6 +77,8 @@ class HullDistance:
 
     def __init__(self, model: Any, geom: int, kind: str) -> None:
         """Make coal's shape of ``geom``."""
+        from scipy.spatial import ConvexHull
+
         size = model.geom_size[geom]
         if kind == "box":
             self._shape = coal.Box(*(2 * size))

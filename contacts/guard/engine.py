@@ -14,7 +14,6 @@ from typing import Any
 
 import mujoco
 from mujoco.introspect import ast_nodes
-from mujoco.introspect.structs import STRUCTS
 
 from tauguard.models.mujoco_library import function_address
 
@@ -144,11 +143,18 @@ def _array(owner: Any, name: str) -> int:
     return int(getattr(owner, name).ctypes.data)
 
 
+def _structs() -> Any:
+    """MuJoCo's declarations by the name of the struct; their import takes long."""
+    from mujoco.introspect.structs import STRUCTS
+
+    return STRUCTS
+
+
 @functools.cache
 def _layout(struct: str, last: str | None = None) -> Any:
     """A struct of MuJoCo's, up to the field ``last`` if given."""
     fields = []
-    for field in STRUCTS[struct].fields:
+    for field in _structs()[struct].fields:
         if not hasattr(field, "type"):
             raise RuntimeError(f"MuJoCo {mujoco.__version__}: {struct} has a field without a type")
         fields.append((field.name, _ctype(field.type)))
@@ -168,4 +174,4 @@ def _ctype(kind: Any) -> Any:
     name = kind.name.removeprefix("struct ").rstrip("_")
     if name in _TYPES:
         return _TYPES[name]
-    return _layout(name) if name in STRUCTS else ctypes.c_int  # an enumeration
+    return _layout(name) if name in _structs() else ctypes.c_int  # an enumeration

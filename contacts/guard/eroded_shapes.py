@@ -6,8 +6,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
@@ -75,6 +73,9 @@ class _Hull:
     """The convex hull of points around a mesh's centre, and its faces pushed inwards."""
 
     def __init__(self, vertices: Array) -> None:
+        from scipy.optimize import linprog
+        from scipy.spatial import ConvexHull, QhullError
+
         self._vertices = np.ascontiguousarray(vertices)
         self._faces, self._middle, self.radius = None, vertices.mean(axis=0), 0.0
         try:
@@ -89,6 +90,8 @@ class _Hull:
 
     def core(self, layer: float) -> Array:
         """Its corners, less a layer."""
+        from scipy.spatial import HalfspaceIntersection, QhullError
+
         if layer <= 0 or self._faces is None:
             return self._vertices
         moved = self._faces + np.array([0, 0, 0, layer])

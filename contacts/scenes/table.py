@@ -6,7 +6,6 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from tauguard.arrays import Array
@@ -59,6 +58,8 @@ def bunny_table(mesh: str | Path | None = None, speed: float = 1.0) -> ContactSc
 
 
 def _load(path: Path) -> tuple[Array, NDArray[np.int32]]:
+    import trimesh
+
     if not path.is_file():
         raise FileNotFoundError(f"mesh {path}: no such file")
     with reading(path, "expected a triangle mesh"):
@@ -70,6 +71,8 @@ def _load(path: Path) -> tuple[Array, NDArray[np.int32]]:
 
 
 def _lumpy_ball() -> tuple[Array, NDArray[np.int32]]:
+    import trimesh
+
     ball = trimesh.creation.icosphere(subdivisions=3)
     points = np.asarray(ball.vertices, dtype=np.float64)
     waves = np.sin(3 * points[:, 0] + 1) + np.sin(4 * points[:, 1]) * np.cos(3 * points[:, 2])

@@ -16,7 +16,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
 
 from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
@@ -57,6 +56,8 @@ class Signs:
 
     def probabilities(self) -> dict[str, float]:
         """Of each of :data:`KINDS`; they sum to 1."""
+        from scipy.special import expit
+
         lasts = float(expit((self.lasting - LASTS) / LASTS_WIDTH))
         possible = self.reach <= REACH and abs(self.mass) <= HEAVIEST
         load = float(expit((self.load - LOAD) / LOAD_WIDTH)) if possible else 0.0

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import log_ndtr
 
 from tauguard.arrays import Array
 from tauguard.detectors.dynamics.robot import RobotNumbers
@@ -188,6 +187,8 @@ def _explain(torque: Array, y: Array, inward: Array, scales: Array) -> tuple[Arr
         inward: unit normals, shape (3, K).
         scales: shape (S,).
     """
+    from scipy.special import log_ndtr
+
     seen = np.tensordot(y, torque, 1)
     loose = 1 / scales[:, None] ** 2
     xx, yy, zz = ((torque[:, i] ** 2).sum(axis=0) + loose for i in range(3))

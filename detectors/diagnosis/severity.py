@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import log_ndtr, ndtr, ndtri
 
 from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.contact_force import (
@@ -78,6 +77,8 @@ def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) ->
         inward: unit normals, shape (K, 3).
         rng: of the draws.
     """
+    from scipy.special import log_ndtr, ndtr, ndtri
+
     seen, known = np.einsum("kni,n->ki", columns, y), np.einsum("kni,knj->kij", columns, columns)
     scales = np.array(SCALES)
     precision = known[:, None] + np.eye(3) / scales[:, None, None] ** 2  # (K, S, 3, 3)

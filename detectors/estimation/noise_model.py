@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import nnls
 
 from tauguard.arrays import Array
 
@@ -29,6 +28,8 @@ class NoiseModel:
             qd: [rad/s], shape (T, n).
             acceleration: [rad/s^2], shape (T, n).
         """
+        from scipy.optimize import nnls
+
         columns = cls._columns(qd, acceleration)
         weights = np.zeros((residual.shape[1], 4))
         for j in range(residual.shape[1]):

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from tauguard.arrays import Array
 from tauguard.traces.trace import Trace
@@ -81,6 +80,8 @@ class SensorNoise:
 @lru_cache(maxsize=1024)  # a Riccati equation, asked again at every reset of a detector
 def _joint_gains(position: float, velocity: float, dt: float, agility: float) -> tuple[float, ...]:
     """The six gains of a joint whose encoder and tachometer have this noise [rad], [rad/s]."""
+    from scipy.linalg import solve_discrete_are
+
     move = np.array([[1, dt, dt * dt / 2], [0, 1, dt], [0, 0, 1]])
     see = np.array([[1.0, 0, 0], [0, 1.0, 0]])
     push = agility * np.sqrt(dt) * np.array([dt * dt / 6, dt / 2, 1.0])

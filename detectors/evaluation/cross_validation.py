@@ -11,7 +11,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import binom
 
 from tauguard.arrays import Array
 from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
@@ -98,6 +97,8 @@ def cross_validate(
 
 def standing_out(logs: Sequence[CrossValidatedLog]) -> list[CrossValidatedLog]:
     """The logs with far more alarms for their length than the others, the least likely first."""
+    from scipy.stats import binom
+
     count = sum(len(log.alarms) for log in logs)
     seconds = sum(log.seconds for log in logs)
     if len(logs) < 2:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from tauguard.detectors.evaluation.matching import Matching
 from tauguard.report import rate as wilson
@@ -20,6 +19,8 @@ Rate = dict[str, Any]
 
 def poisson_rate(count: int, hours: float) -> Rate:
     """Events per hour with the exact (Garwood) Poisson 95 % interval; ``n`` is the count."""
+    from scipy import stats
+
     if count < 0 or not hours >= 0:
         raise ValueError(f"{count} events in {hours} h: expected 0 or more")
     if hours == 0:

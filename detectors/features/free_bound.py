@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
 
 from tauguard.arrays import Array
 from tauguard.detectors import _observer
@@ -53,6 +52,8 @@ def upper_quantile(
     Raises:
         ValueError: the programme has no solution: numbers that are not finite.
     """
+    from scipy.optimize import linprog
+
     k, stride = x.shape[1], max(1, -(-len(y) // rows))
     x, y = x[::stride], y[::stride]
     # max a (y - x prior) - m prior over a in [-(1 - quantile), quantile] stride and m >= 0 with

@@ -8,8 +8,6 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
-from scipy.signal import lfilter
 
 from tauguard.arrays import Array
 from tauguard.detectors.estimation.estimator import ArmModel
@@ -22,6 +20,8 @@ from tauguard.traces.trace import Trace
 
 def smoothed(x: Array, rate: float, dt: float) -> Array:
     """The low-pass of rate ``rate`` [1/s] along the rows of x, from the first row's value."""
+    from scipy.signal import lfilter
+
     keep = float(np.exp(-rate * dt))
     filtered: Array = lfilter([1 - keep], [1, -keep], x - x[:1], axis=0) + x[:1]
     return filtered
@@ -65,6 +65,8 @@ class CurrentThreshold:
         Raises:
             ValueError: traces that do not fit, or without collision-free motion.
         """
+        from scipy.optimize import nnls
+
         dt = common_interval(traces, arm.robot.joint_names)
         fast, levels = [], []
         for trace in traces:

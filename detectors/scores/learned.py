@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
-from sklearn.svm import OneClassSVM
 
 from tauguard.arrays import Array
 from tauguard.detectors.features.front_end import FrontEnd, FrontEndSettings, Scaling
@@ -132,6 +131,8 @@ class OneClass(Windowed):
 
     def learn(self, x: Array, y: Array) -> Remoteness:
         """The machine's decision function, but for its constant, as a remoteness."""
+        from sklearn.svm import OneClassSVM
+
         model = OneClassSVM(kernel="precomputed", nu=self.outside, cache_size=500)
         model.fit(srq_kernel(x, x, self.sigma))
         vectors = np.ascontiguousarray(x[model.support_])

@@ -10,9 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.ensemble import GradientBoostingRegressor
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.neural_network import MLPRegressor
 
 from tauguard.arrays import Array
 from tauguard.detectors import _ranking
@@ -48,6 +45,8 @@ class Forest:
             rate: what each counts.
             seed: of the half of the rows and the share of the columns that each tree sees.
         """
+        from sklearn.ensemble import GradientBoostingRegressor
+
         model = GradientBoostingRegressor(
             n_estimators=trees,
             max_depth=depth,
@@ -120,6 +119,9 @@ class Network(Frozen):
             epochs: at most.
             decay: weight of the squared weights.
         """
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.neural_network import MLPRegressor
+
         centre, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-9)
         outputs = y.reshape(len(y), -1)
         mean, spread = outputs.mean(axis=0), np.maximum(outputs.std(axis=0), 1e-9)

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
 
 from tauguard.arrays import Array
 from tauguard.detectors.thresholds.free_scores import FreeScores
@@ -90,6 +89,8 @@ class ExpectedRate:
 
         An upper one where ``confidence`` is above one half, else a lower one.
         """
+        from scipy import stats
+
         count = int(np.sum(self.highest > threshold)) + int(confidence > 0.5)
         return float(stats.chi2.ppf(confidence, 2 * count) / 2 / self.hours) if count else 0.0
 
@@ -104,6 +105,8 @@ class ExpectedRate:
         Raises:
             ValueError: a rate that is not above 0.
         """
+        from scipy import optimize
+
         if not per_hour > 0:
             raise ValueError(f"per_hour: {per_hour}, expected above 0")
 

@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from tauguard.detectors.thresholds.free_scores import FreeScores
 
@@ -109,6 +108,8 @@ def _too_few(
 
 def allowed_episodes(count: int, alpha: float, confidence: float) -> int:
     """The largest k with P(Binomial(count, alpha) <= k) <= 1 - confidence; -1 if there is none."""
+    from scipy import stats
+
     k = int(stats.binom.ppf(1 - confidence, count, alpha)) + 1
     while k >= 0 and stats.binom.cdf(k, count, alpha) > 1 - confidence:
         k -= 1

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import maximum_filter1d
-from sklearn.isotonic import IsotonicRegression
 
 from tauguard.arrays import Array
 
@@ -37,6 +35,8 @@ def recent_speed(qd: ArrayLike, dt: float, memory: float = MEMORY) -> Array:
         dt: sample interval [s].
         memory: [s].
     """
+    from scipy.ndimage import maximum_filter1d
+
     total = np.abs(np.asarray(qd, dtype=np.float64)).sum(axis=1)
     samples = memory_samples(dt, memory)
     found: Array = maximum_filter1d(
@@ -82,6 +82,8 @@ class SpeedNormalisation:
         Raises:
             ValueError: no blocks, shapes that differ, or numbers that are not finite.
         """
+        from sklearn.isotonic import IsotonicRegression
+
         value, speed = np.asarray(peaks, dtype=np.float64), np.asarray(speeds, dtype=np.float64)
         if value.shape != speed.shape or value.ndim != 1 or not len(value):
             raise ValueError(

@@ -13,7 +13,6 @@ import mujoco
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from tauguard.arrays import Array
 from tauguard.detectors import find_alarms
@@ -141,6 +140,8 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
     def _truth(
         self, t: Array, tau: Array, contact: NDArray[np.void], region: NDArray[np.void]
     ) -> Truth:
+        from scipy.spatial.transform import Rotation
+
         compiled = self._arm.compiled
         links = len(compiled.scene.link_bodies)
         wrenches = Wrenches.empty(len(t), links)

@@ -17,7 +17,6 @@ from tauguard.detectors import (
     MomentumObserver,
     RobotNumbers,
     Unknowns,
-    load_model,
 )
 from tauguard.detectors.alarms.monitor import Monitor
 from tauguard.detectors.estimation.observer import ENVIRONMENT_GAIN, PLAIN_GAIN
@@ -268,6 +267,8 @@ def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener]
 
         return observers
     if isinstance(wanted, str):
+        from tauguard.detectors import load_model  # with scikit-learn, which takes long to import
+
         try:
             wanted = load_model(wanted)
         except ValueError as error:
