@@ -51,8 +51,9 @@ class Task(Usual):
     options: ClassVar[dict[str, Any]] = {}
     #: Names of the terms of the reward; ``info`` has each as ``reward_NAME``.
     terms: ClassVar[tuple[str, ...]] = ()
-    #: ``info["reason"]`` where the task terminates an episode.
+    #: ``info["reason"]`` where the task terminates an episode, after a success and without one.
     ended: ClassVar[str] = ""
+    failed: ClassVar[str] = ""
 
     def __init__(self, batch: Batch, **options: Any) -> None:
         """Keep the batch."""
@@ -222,10 +223,9 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         batch.step(0, values, self.np_random)
         step = self._metrics()
         rewards, success, task.memory[0], over = task.score(step, task.memory.item(0))
+        why = (task.ended if success else task.failed) if over else ""
         diverged = step.diverged != 0
-        reason = (
-            divergence(self.compiled, step.diverged) if diverged else task.ended if over else ""
-        )
+        reason = divergence(self.compiled, step.diverged) if diverged else why
         info = self._info(step, rewards, success, reason)
         if success and not diverged:
             task.after(0, self.np_random)

@@ -4,19 +4,41 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv
-from tauguard.envs.gym.reach import Reach
+from tauguard.envs.gym.compiled import tool_position
+from tauguard.envs.gym.reach import CarefulReach, Reach
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import Cloth
 
 #: A sheet of 8 x 8 vertices that hangs across the workspace, held along its upper edge.
 SHEET = Cloth(count=8, size=0.5, mass=0.1, position=(0.55, 0.0, 0.55))
 
+#: A target of ClothReach-v1 is at least this far from the sheet [m].
+ASIDE = 0.12
+
 
 class ClothReach(Reach):
     """Reach across a hanging cloth and, where asked for, contact checkers that watch it."""
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "cloth": SHEET}
+
+
+class ClothBetween(CarefulReach):
+    """Targets on both sides of the sheet in turn, whose straight path goes through it."""
+
+    defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "cloth": SHEET}
+
+    def suits(self, i: int, arm: int, place: Array) -> bool:
+        """Beyond the sheet as seen from the tool, within its width."""
+        compiled = self.batch.compiled
+        sheet = compiled.scene.spec.cloth
+        if sheet is None:
+            return True
+        x, y, _ = sheet.position
+        tool = tool_position(compiled, self.batch.datas[i], arm)
+        beyond = (place[0] - x) * (tool[0] - x) < 0 and abs(place[0] - x) > ASIDE
+        return bool(beyond and abs(place[1] - y) < sheet.size / 2)
 
 
 class ClothReachEnv(ArmEnv):
@@ -42,6 +64,30 @@ class ClothReachEnv(ArmEnv):
     """
 
     task_type = ClothReach
+
+
+class ClothBetweenEnv(ArmEnv):
+    """Go round a hanging cloth to targets on its other side.
+
+    Actions, observations and keywords are those of ClothReach-v0. Each target lies beyond the sheet
+    as seen from the tool, so that the straight path to it goes through the cloth.
+
+    ## Reward
+
+    | term | value |
+    |---|---|
+    | progress | how much nearer the tool came [m] |
+    | target | 1 within 3 cm of the target; then comes the next |
+    | contact | -1 for each second at 100 N or more on a link, less force less |
+    """
+
+    task_type = ClothBetween
+
+
+class ClothBetweenVectorEnv(VectorArmEnv):
+    """Many ClothReach-v1 at once; see :class:`ClothBetweenEnv`."""
+
+    task_type = ClothBetween
 
 
 class ClothReachVectorEnv(VectorArmEnv):

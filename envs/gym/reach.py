@@ -16,6 +16,8 @@ from tauguard.envs.gym.vector import VectorArmEnv
 
 #: A target counts as reached this near [m], and is worth this much reward.
 TOLERANCE, BONUS = 0.03, 1.0
+#: A touch at this force [N], or more, costs as much in a second as a target is worth.
+CONTACT_FORCE = 100.0
 #: An episode starts this near to home [rad].
 START_SPREAD = 0.1
 #: Probability that the next target is the candidate whose straight path passes closest to the
@@ -64,7 +66,7 @@ class Reach(Task):
         batch.send_person(i, rng)
         batch.start(i)
         for arm in range(batch.compiled.arms):
-            batch.target[i, arm] = self.draw(rng, arm, None)
+            batch.target[i, arm] = self.draw(i, rng, arm, None)
         if batch.compiled.person is not None:
             self.aim_near_person(i, rng, None)
         batch.plants[i].refresh()
@@ -80,7 +82,7 @@ class Reach(Task):
                 at, moves, span, speed = crossing
                 qpos[at], qvel[moves] = side * place * span, -side * speed
 
-    def draw(self, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
+    def draw(self, i: int, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
         """A place [m] that the tool can reach, at least :data:`APART` from ``apart``."""
         compiled, scratch = self.batch.compiled, self._scratch
         (adr, low, high), (bx, by, _) = self._poses[arm], self._base
@@ -92,9 +94,13 @@ class Reach(Task):
             x, y, z = place.tolist()
             near = arm == 0 and math.hypot(x - bx, y - by) < NEAREST
             still = apart is not None and np.linalg.norm(place - apart) < APART
-            if z >= LOWEST and not near and not still:
+            if z >= LOWEST and not near and not still and self.suits(i, arm, place):
                 break
         return place
+
+    def suits(self, i: int, arm: int, place: Array) -> bool:
+        """Whether the task wants an arm's target at a place that its tool can reach."""
+        return True
 
     def aim_near_person(self, i: int, rng: np.random.Generator, apart: Array | None) -> None:
         """The first arm's target near the person, or the person's hand on the path to it."""
@@ -103,7 +109,7 @@ class Reach(Task):
         behind, reaches = rng.random(2) < NEAR_PERSON
         if behind:
             bodies = [r.body for r in batch.compiled.regions if r.mocap >= 0]
-            places = [self.draw(rng, 0, apart) for _ in range(CANDIDATES)]
+            places = [self.draw(i, rng, 0, apart) for _ in range(CANDIDATES)]
             nearest = [_clearance(tool, place, data.xpos[bodies]) for place in places]
             batch.target[i, 0] = places[int(np.argmin(nearest))]
         place = tool + rng.uniform(*HAND_FRACTION) * (batch.target[i, 0] - tool)
@@ -121,11 +127,24 @@ class Reach(Task):
         """The next target."""
         batch = self.batch
         for arm in range(batch.compiled.arms):
-            batch.target[i, arm] = self.draw(rng, arm, batch.target[i, arm].copy())
+            batch.target[i, arm] = self.draw(i, rng, arm, batch.target[i, arm].copy())
         if batch.compiled.person is not None:
             self.aim_near_person(i, rng, batch.target[i, 0].copy())
         batch.plants[i].refresh()
         self.memory[i] = batch.metrics["distance"][i]
+
+
+class CarefulReach(Reach):
+    """Reach in which a touch costs: the peak force of each action, by its duration."""
+
+    terms: ClassVar[tuple[str, ...]] = ("progress", "target", "contact")
+
+    def score(self, step: StepMetrics, memory: Any) -> Outcome:
+        """As :class:`Reach`, less the force over :data:`CONTACT_FORCE`, at most 1, a second."""
+        outcome = super().score(step, memory)
+        period = 1 / self.batch.compiled.settings.control_rate
+        outcome.rewards["contact"] = -period * np.minimum(step.force / CONTACT_FORCE, 1.0)
+        return outcome
 
 
 def _clearance(begin: Array, end: Array, points: Array) -> float:

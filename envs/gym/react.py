@@ -34,6 +34,10 @@ PATIENCE = 0.1
 REST_SPEED, REST_TIME = 0.02, 0.2
 #: Weights of the reward a second: force over its limit, speed over the largest; at the end.
 FORCE_PRICE, SPEED_PRICE, REST_PRIZE = 10.0, 1.0, 1.0
+#: The path of React-v1 is done this near to its end [m]; the terms of its reward.
+DONE, DONE_PRIZE, LIMIT_PRICE, IMPULSE_PRICE, TIME_PRICE = 0.03, 1.0, 1.0, 1.0, 0.1
+#: The region stands within this fraction of the run-up around the meeting point.
+WHERE = 0.5
 
 
 class React(Task):
@@ -163,6 +167,45 @@ class React(Task):
         return Outcome(rewards, success=over, memory=rested, terminated=over)
 
 
+class ReactOnward(React):
+    """Work goes on through the impact: bring the tool to the path's end within the limits."""
+
+    options: ClassVar[dict[str, Any]] = {"speed": 0.5}
+    terms: ClassVar[tuple[str, ...]] = ("progress", "done", "limit", "impulse", "time")
+    ended: ClassVar[str] = "the path's end is reached"
+    failed: ClassVar[str] = "a force limit is exceeded"
+    meets: ClassVar[bool] = False
+
+    def __init__(self, batch: Batch, **options: Any) -> None:
+        """Take ``speed``, by which the swing of :class:`React` was planned."""
+        super().__init__(batch, approach=False, **options)
+
+    def start(self, i: int, rng: np.random.Generator) -> None:
+        """At the beginning of the path; the region stands somewhere along it."""
+        super().start(i, rng)
+        batch, region = self.batch, self.batch.compiled.regions[0]
+        if region.joint >= 0:
+            address = int(batch.compiled.scene.model.jnt_qposadr[region.joint])
+            batch.datas[i].qpos[address] = rng.uniform(-WHERE, WHERE) * self._run_up
+            batch.start(i)
+        batch.plants[i].refresh()
+        self.memory[i] = batch.metrics["distance"][i]
+
+    def score(self, step: StepMetrics, memory: Any) -> Outcome:
+        """Progress, and what it costs. It remembers the last distance [m]."""
+        period = 1 / self.batch.compiled.settings.control_rate
+        hurt = step.limit_ratio > 1
+        done = (step.distance < DONE) & (step.limit_ratio <= 1)
+        rewards = {
+            "progress": memory - step.distance,
+            "done": DONE_PRIZE * done,
+            "limit": -LIMIT_PRICE * hurt,
+            "impulse": -IMPULSE_PRICE * period * step.limit_ratio,
+            "time": -TIME_PRICE * period + 0.0 * step.distance,
+        }
+        return Outcome(rewards, success=done, memory=step.distance, terminated=done | hurt)
+
+
 def home_swing(scene: Scene, own: bool) -> tuple[Array, Array]:
     """Where the tool is at home [m], and the direction of its swing, shapes (3,).
 
@@ -218,6 +261,36 @@ class ReactEnv(ArmEnv):
     """
 
     task_type = React
+
+
+class ReactOnwardEnv(ArmEnv):
+    """Bring the tool along a path on which somebody stands, without hurting them.
+
+    The tool begins at one end of a straight path of 0.5 m; a body region, the chest unless
+    ``obstacles`` says otherwise, stands on it and slides away when it is pushed. Standing still
+    reaches nothing, going fast exceeds the region's limit: the arm has to arrive gently, yield, and
+    go on.
+
+    Actions and observations are those of React-v0.
+
+    ## Reward and end
+
+    | term | value |
+    |---|---|
+    | progress | how much nearer the tool came to the path's end [m] |
+    | done | 1 within 3 cm of it; this ends the episode as a success |
+    | limit | -1 for a force above the region's limit; this ends the episode |
+    | impulse | -1 for each second at the limit, less force less |
+    | time | -0.1 a second |
+    """
+
+    task_type = ReactOnward
+
+
+class ReactOnwardVectorEnv(VectorArmEnv):
+    """Many React-v1 at once; see :class:`ReactOnwardEnv`."""
+
+    task_type = ReactOnward
 
 
 class ReactVectorEnv(VectorArmEnv):

@@ -6,15 +6,19 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.placing import Layout
-from tauguard.envs.gym.reach import Reach
+from tauguard.envs.gym.reach import CarefulReach, Reach
 from tauguard.envs.gym.second_arm import PLACE
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import Person, Scene, Table
 
 #: A person's distance from the line between the arms, in units of the reach.
 BESIDE = 0.75
+#: Targets of TwoArms-v1: the first this near to the middle between the arms, and the distance of
+#: the second from it [m].
+MIDDLE, GAP = 0.15, (0.15, 0.35)
 #: Between the arms, low enough to work above.
 BOARD = Table(position=(0.55, 0.0, 0.05), half_extents=(0.3, 0.6, 0.02))
 
@@ -30,6 +34,22 @@ class TwoArms(Reach):
         """Beside the table, looking at it."""
         x = layout.second_arm(PLACE)[0] / 2
         return Person(position=(x, -max(BESIDE * layout.reach, 0.6)), facing=np.pi / 2)
+
+
+class TwoArmsShared(CarefulReach):
+    """Both targets close to one another, in the part of the workspace that the arms share."""
+
+    arms: ClassVar[int] = 2
+    defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "table": BOARD}
+    person = TwoArms.person
+
+    def suits(self, i: int, arm: int, place: Array) -> bool:
+        """The first arm's in the middle, the second's near to it."""
+        layout = self.batch.compiled.layout
+        if arm == 0:
+            return bool(abs(place[0] - layout.second_arm(PLACE)[0] / 2) < MIDDLE * layout.scale)
+        gap = float(np.linalg.norm(place - self.batch.target[i, 0]))
+        return GAP[0] * layout.scale < gap < GAP[1] * layout.scale
 
 
 class TwoArmsEnv(ArmEnv):
@@ -63,6 +83,30 @@ class TwoArmsEnv(ArmEnv):
     """
 
     task_type = TwoArms
+
+
+class TwoArmsSharedEnv(ArmEnv):
+    """Bring two tools to two places 15 to 35 cm apart, without the arms touching.
+
+    Actions, observations and keywords are those of TwoArms-v0. Arms that go straight to their
+    targets meet.
+
+    ## Reward
+
+    | term | value |
+    |---|---|
+    | progress | how much less far the farther tool is from its target [m] |
+    | target | 1 when both are within 3 cm; then come the next targets |
+    | contact | -1 for each second at 100 N or more on a link, less force less |
+    """
+
+    task_type = TwoArmsShared
+
+
+class TwoArmsSharedVectorEnv(VectorArmEnv):
+    """Many TwoArms-v1 at once; see :class:`TwoArmsSharedEnv`."""
+
+    task_type = TwoArmsShared
 
 
 class TwoArmsVectorEnv(VectorArmEnv):

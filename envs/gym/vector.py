@@ -158,7 +158,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         for i in np.flatnonzero(~going):
             self._begin(int(i))
         infos = self._infos(terms, successes & going, np.ones_like(going))
-        infos["reason"][terminated] = task.ended
+        infos["reason"][terminated & successes] = task.ended
+        infos["reason"][terminated & ~successes] = task.failed
         for i in np.flatnonzero(successes & going & ~diverged):
             task.after(int(i), self._rngs[i])
         self._over = terminated | truncated

@@ -6,8 +6,11 @@ from __future__ import annotations
 ENVIRONMENTS = {
     "tauguard/Reach-v0": ("reach", "Reach", 1000),
     "tauguard/React-v0": ("react", "React", 200),
+    "tauguard/React-v1": ("react", "ReactOnward", 500),
     "tauguard/ClothReach-v0": ("cloth_reach", "ClothReach", 1000),
+    "tauguard/ClothReach-v1": ("cloth_reach", "ClothBetween", 1000),
     "tauguard/TwoArms-v0": ("two_arms", "TwoArms", 1000),
+    "tauguard/TwoArms-v1": ("two_arms", "TwoArmsShared", 1000),
 }
 
 

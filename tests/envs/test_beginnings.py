@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tauguard.environments import ENVIRONMENTS
 from tauguard.envs.gym.placing import StartsInContact
 from tauguard.envs.gym.trial import try_arm
 from tauguard.models import BodyProxy, Table
@@ -101,5 +102,5 @@ def test_the_trial_is_a_command():
     command = [sys.executable, "-m", "tauguard", "robot", "cura6", "--try", "--episodes", "1"]
     out = subprocess.run(command, capture_output=True, text=True)
     assert out.returncode == 0, out.stderr
-    assert out.stdout.count("tauguard/") == 4
+    assert out.stdout.count("tauguard/") == len(ENVIRONMENTS)
     assert "largest force against a skull" in out.stdout
