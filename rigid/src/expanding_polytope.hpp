@@ -2,12 +2,14 @@
 // polytope of van den Bergen 2001, without a simplex that holds the origin to start from. Where the
 // origin is inside, that is the least path on which the bodies come free of each other. Signs of
 // polynomials decide alone: with Dyadic every answer is right; with double it is a proposal that
-// the caller certifies, or rounded as for support shapes.
+// least_depth (depth_bound.hpp) certifies, or rounded as for support shapes.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <set>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -44,13 +46,23 @@ bool is_zero(const Vector<Number>& x) {
 inline bool negligible(double x, double scale) { return !(x > 1e-20 * scale); }
 inline bool negligible(const Dyadic& x, const Dyadic&) { return x.is_zero(); }
 
+// May rounding alone have put the centre on the inner side of a face, by what `spread` says that
+// the face's corners differ along its normal? depth_bound.hpp derives the share. Beyond the range
+// of the squares nothing is certain.
+inline bool side_is_rounding(double side, double spread, double square, double size) {
+  const double scale = square * (size * size), clear = std::fabs(side) - 4 * spread;
+  return !(scale > 1e-290 && clear > 0 && clear * clear > 0x1p-88 * scale);
+}
+
 // The differences b_j - a_i of two lists of points.
 template <class Number>
 class PointDifferences {
  public:
   using Source = std::array<std::size_t, 2>;  // rows of a and of b
 
-  PointDifferences(const Points<Number>& a, const Points<Number>& b) : a_(a), b_(b) {}
+  // `size`: the largest coordinate, which bounds the rounding of doubles.
+  PointDifferences(const Points<Number>& a, const Points<Number>& b, double size = 0)
+      : a_(a), b_(b), size_(size) {}
 
   Vector<Number> at(const Source& p) const { return minus(b_[p[1]], a_[p[0]]); }
   Source farthest(const Vector<Number>& n) const {
@@ -110,6 +122,16 @@ class PointDifferences {
     return !positive(excess) || !taken_.insert(farthest).second;
   }
   bool sees(const Number& excess, const Number&) const { return positive(excess); }
+  // Whether `side`, four times a height above a triangle, may be rounding alone.
+  bool unsure(const Number& side, const Vector<Number>& normal, const Number& square,
+              const std::array<const Vector<Number>*, 3>& y) const {
+    if constexpr (std::is_same_v<Number, double>) {
+      const double x = inner(normal, *y[0]), spread = std::max(std::fabs(inner(normal, *y[1]) - x),
+                                                               std::fabs(inner(normal, *y[2]) - x));
+      return side_is_rounding(side, spread, square, size_);
+    }
+    return false;
+  }
 
  private:
   static Vector<Number> across(const Vector<Number>& e) {
@@ -118,6 +140,7 @@ class PointDifferences {
   }
 
   const Points<Number>&a_, &b_;
+  const double size_;
   std::set<Source> taken_;
 };
 
@@ -175,6 +198,8 @@ class ExpandingPolytope {
     if (!positive(f.square)) broken_ = true;
     const Number side = inner(f.normal, inside4_) - Number(4.0) * f.offset;
     if (negligible(side * side, f.square * inner(inside4_, inside4_))) broken_ = true;
+    if (differences_.unsure(side, f.normal, f.square, {&points_[i], &points_[j], &points_[k]}))
+      broken_ = true;
     if (positive(side)) {
       for (int c = 0; c < 3; ++c) f.normal[c] = -f.normal[c];
       f.offset = -f.offset;

@@ -45,14 +45,17 @@ inline bool edges_of(const Bodies& bodies, std::size_t row, BodyEdges* out) {
 // unit n; and the largest height of all differences is a way out along n. A normal is computed to
 // an angle of 16 u / s, s the sine between its edges, so the facet's vertices are among those
 // within 128 u / s of the size from the top. The depth lies between the least of the former bounds
-// and the least of the latter.
+// and the least of the latter. The former holds only where the origin is inside: the point of the
+// nearest facet's plane that is nearest to the origin is then in the facet. It is inside where
+// every facet's true plane is above it, for which a top of more than 128 u / s of the size is
+// enough: the top changes by the angle times the farthest difference, 2 sqrt(3) of the size.
 class FacetDepth {
  public:
   FacetDepth(const Points<double>& a, const Points<double>& b, double size)
       : a_(a), b_(b), size_(size) {}
 
-  // False where rounding leaves the depth uncertain by more than `slack`, and where it is 0 or
-  // less.
+  // False where rounding leaves the depth uncertain by more than `slack`, or its sign; `apart`
+  // where the bodies are certainly apart.
   bool solve(const BodyEdges& ea, const BodyEdges& eb, double slack) {
     for (const BodyEdges* e : {&ea, &eb})
       for (int f = 0; f < e->faces; ++f)
@@ -65,20 +68,19 @@ class FacetDepth {
 
   double way = INFINITY;
   Vec normal{};  // unit, from a to b: b moved by `way` along it only touches
+  bool apart = false;
 
  private:
-  // Edges of two parallelepipeds that are parallel to 2^-48 span no facet after a change of that
-  // share of an edge.
+  // Edges of two parallelepipeds that are parallel to 2^-49 span no facet after a change of that
+  // share of an edge; the edges of one body add up to 3 of the size.
   bool consider(const Vec& x, const Vec& y, bool may_skip) {
     const Vec c = cross(x, y);
     const double length = norm(c), both = norm(x) * norm(y);
-    if (!(length > 0x1p-48 * both)) return may_skip;
+    if (!(length > 0x1p-49 * both)) return may_skip;
     const double slack = 0x1p-46 * (both / length) * size_;
     const Vec n = (1 / length) * c;
     const Range ra = range(a_, n), rb = range(b_, n);
-    bound(n, ra.high - rb.low, slack);
-    bound(-1.0 * n, rb.high - ra.low, slack);
-    return true;
+    return bound(n, ra.high - rb.low, slack) && bound(-1.0 * n, rb.high - ra.low, slack);
   }
 
   struct Range {
@@ -93,10 +95,15 @@ class FacetDepth {
     return r;
   }
 
-  void bound(const Vec& n, double top, double slack) {
+  bool bound(const Vec& n, double top, double slack) {
     if (top < way) way = top, normal = n;
-    if (top - 2 * slack >= std::min(low_, way)) return;
+    if (!(top > slack)) {
+      apart = top < -slack;
+      return false;
+    }
+    if (top - 2 * slack >= std::min(low_, way)) return true;
     low_ = std::min(low_, top - spread(a_, n, slack) - spread(b_, -1.0 * n, slack));
+    return true;
   }
 
   // How far below the top those lie that are within `slack` of it.

@@ -56,6 +56,8 @@ class ShapeDifferences {
   bool sees(double excess, double square) const {
     return excess > 0 && excess * excess > 1e-28 * size_ * size_ * square;
   }
+  // The answer is to rounding.
+  bool unsure(double, const Vec&, double, const std::array<const Vec*, 3>&) const { return false; }
 
  private:
   const SupportShape &a_, &b_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "convex_contact.hpp"
+#include "depth_bound.hpp"
 #include "exact_nearest.hpp"
 #include "facet_depth.hpp"
 #include "tauguard/rigid/distance.hpp"
@@ -12,6 +13,10 @@ namespace {
 
 // What a certified answer of double precision may be off, as a share of the size; closer to contact
 // than `near` of it the exact way is taken, so that the sign is never in question.
+// The error in all, in unit roundoffs of the size, of which 2^-45 has 256: 128 between the bound
+// from below and that from above, 18 for the corners' rounding, 21 for that of the bound from
+// above; then 18 for the bound from below of bodies apart, or 21 for FacetDepth's and 48 for the
+// facets that it leaves out, or 39 for least_depth.
 constexpr double certain = 0x1p-46, near = 1e-10;
 // Beyond these sizes products of four lengths leave the range of a double.
 constexpr double least_size = 1e-40, most_size = 1e40;
@@ -72,6 +77,7 @@ SignedDistance together(const Points<double>& a, const Points<double>& b, const 
 bool between_faces(const Points<double>& a, const Points<double>& b, const Nearest& ends,
                    double size, SignedDistance* out) {
   Vec w[3], at_a{}, at_b{};
+  double all = 0;
   for (int i = 0; i < 3; ++i) w[i] = b[ends.corner[i][1]] - a[ends.corner[i][0]];
   const Vec c = cross(w[1] - w[0], w[2] - w[0]);
   const double length = norm(c);
@@ -80,8 +86,13 @@ bool between_faces(const Points<double>& a, const Points<double>& b, const Neare
     const Vec part = cross(w[(i + 1) % 3] - foot, w[(i + 2) % 3] - foot);
     const double weight = dot(part, c) / (length * length);
     if (!(weight >= 0)) return false;
+    all += weight;
     at_a = at_a + weight * a[ends.corner[i][0]], at_b = at_b + weight * b[ends.corner[i][1]];
   }
+  // Points of the bodies, so that no bound from above is too low. In a thin triangle rounding may
+  // bring the sum far from one.
+  if (!(all > 0.5)) return false;
+  at_a = (1 / all) * at_a, at_b = (1 / all) * at_b;
   *out = {norm(at_b - at_a), at_a, at_b, n};
   return norm((at_b - at_a) - out->distance * n) <= 0x1p-44 * size;
 }
@@ -106,15 +117,15 @@ bool certified_depth(const Points<double>& a, const Points<double>& b, const Bod
       *way = facets.way, *n = facets.normal;
       return *way > near * size;
     }
+    if (facets.apart) return false;
   }
   using Polytope = ExpandingPolytope<double, PointDifferences<double>>;
-  Polytope polytope(PointDifferences<double>(a, b));
+  Polytope polytope(PointDifferences<double>(a, b, size));
   if (polytope.solve(2000) != Polytope::Answer::facet) return false;
-  const double length = norm(polytope.nearest.normal), depth = polytope.nearest.offset / length;
-  if (!(depth > near * size)) return false;
-  *n = (-1 / length) * polytope.nearest.normal;
+  *n = (-1 / norm(polytope.nearest.normal)) * polytope.nearest.normal;
   *way = top(a, *n) - bottom(b, *n);  // certainly enough to come free
-  return *way - depth <= certain * size;
+  const double depth = least_depth(polytope);
+  return depth > near * size && *way - depth <= certain * size;
 }
 
 // The largest binary exponent among the components; 0 for a zero vector.

@@ -1,0 +1,46 @@
+// How deep is the origin at least in a polytope of differences that was grown in doubles?
+//
+// Between bodies of very different sizes faces have edges that are almost parallel, and rounding
+// turns their normals by any angle. So nothing below asks how exact a normal is: a triangle lies in
+// the half-space n . x >= m for any n, with m the least n . y of its three corners y. Only the
+// rounding of these products counts. With u the unit roundoff and all coordinates of both bodies
+// at most s, |y| <= 2 sqrt(3) s, and a product is off by 3 u |n| |y| <= 11 u |n| s.
+//
+// The surface S of all faces is closed, convex or not: a step replaces faces by the cone over their
+// rim. Let c be the centre of the first tetrahedron.
+// 1. n . c < m for every face ever made. `side` is 4 (n . c - n . y) for one corner y, off by 142
+//    u |n| s at most (twice 42 by its products, 27 by their difference, 31 by the rounding of c);
+//    four times the largest |n . y - n . y'| of the corners is off by 112. More than 512 are asked
+//    for (unsure). So the centre is in no face of the first tetrahedron, that is in its inside.
+// 2. A corner w that replaces a face is further along n than y, but for 28 u |n| s of rounding,
+//    four times which the 512 cover too. So c is not in the tetrahedron of w and that face, and the
+//    number of times that S winds around c stays odd.
+// 3. Where 0 < m for all faces of the final S, no face meets the way from c to the origin, and S
+//    winds around the origin an odd number of times. No face is nearer to the origin than
+//    L = m / |n|, so the same holds around every point of the ball of radius L. Around a point
+//    outside the hull of its corners a closed surface winds no times: the ball is in the hull.
+// L is off by 23 u s. The stored corners are off by 16 u s (two coordinates, two differences and a
+// sum of that size); S keeps its winding where they move by less than L, so that costs 16 u s.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "expanding_polytope.hpp"
+
+namespace tauguard::rigid {
+
+// A lower bound of the depth to 39 u of the size; 0 or less: none.
+template <class Polytope>
+double least_depth(const Polytope& polytope) {
+  double least = INFINITY;
+  for (const auto& face : polytope.faces()) {
+    double low = INFINITY;
+    for (const int corner : face.corner)
+      low = std::min(low, inner(face.normal, polytope.point(corner)));
+    least = std::min(least, low / std::sqrt(face.square));
+  }
+  return least;
+}
+
+}  // namespace tauguard::rigid
