@@ -15,3 +15,8 @@ def test_tests_that_the_ledger_names_exist():
         tree = ast.parse((ROOT / path).read_text())
         there = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
         assert name in there, f"{path}::{name}"
+
+
+def test_test_files_that_the_ledger_names_exist():
+    for path in set(re.findall(r"`(tests/[\w/]+\.py)`", LEDGER.read_text())):
+        assert (ROOT / path).exists(), path
