@@ -140,10 +140,16 @@ def table(trace: Trace, number: int, residual: Array | None, like: pa.Schema) ->
             continue
         else:
             values = wide[signal][:, int(joint) - 1]
-        if field.type == pa.float32():
-            values = np.ascontiguousarray(values, np.float32)
-        columns.append(pa.array(values, field.type, from_pandas=field.name in POINT))
+        columns.append(_column(values, field.type, field.name in POINT))
     return pa.Table.from_arrays(columns, schema=like)
+
+
+def _column(values: Array, kind: pa.DataType, gaps: bool) -> pa.Array:
+    """A column, with nulls for NaN where ``gaps`` may be; ``pa.array`` would import pandas."""
+    values = np.ascontiguousarray(values, kind.to_pandas_dtype())
+    known = np.packbits(~np.isnan(values), bitorder="little") if gaps else None
+    buffers = [None if x is None else pa.py_buffer(x) for x in (known, values)]
+    return pa.Array.from_buffers(kind, len(values), buffers)
 
 
 def trace_of(rows: pa.Table, line: Mapping[str, Any], attachments: Mapping[str, str]) -> Trace:

@@ -11,11 +11,12 @@ import sys
 import time
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from tauguard.atomic_write import atomic_file
-from tauguard.datasets import inspection
+from tauguard.datasets import columns_of_shards, inspection
 from tauguard.datasets.configuration import load
 from tauguard.datasets.dataset_folder import HEAD, claimed, lines, read_head
 from tauguard.datasets.generation import generate_dataset
@@ -228,3 +229,29 @@ def test_a_damaged_arm_is_named_and_written_again(tiny, tiny_toml, tmp_path):
         list(read(folder))
     generate_dataset(load(tiny_toml), folder, workers=1)
     assert contents(folder) == contents(tiny)
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize("kind", [pa.float32(), pa.float64(), pa.int8(), pa.int32()])
+def test_a_column_is_what_pyarrow_makes_of_its_values(kind, gaps):
+    values = np.arange(21).astype(kind.to_pandas_dtype())
+    if pa.types.is_floating(kind):
+        values[[0, 7, 8, 20]] = np.nan
+    made = columns_of_shards._column(values[::-1], kind, gaps)
+    made.validate(full=True)
+    expected = pa.array(values[::-1].copy(), kind, from_pandas=gaps)
+    assert made.null_count == expected.null_count
+    assert made.is_null(nan_is_null=True).equals(expected.is_null(nan_is_null=True))
+    assert made.drop_null().to_numpy().tobytes() == expected.drop_null().to_numpy().tobytes()
+
+
+def test_generating_leaves_libraries_unloaded_that_cost_more_than_an_episode(tiny_toml, tmp_path):
+    code = (
+        "import sys; from pathlib import Path\n"
+        "from tauguard.datasets.configuration import load\n"
+        "from tauguard.datasets.generation import generate_dataset\n"
+        f"generate_dataset(load({str(tiny_toml)!r}), Path({str(tmp_path / 'made')!r}), workers=1)\n"
+        "print([m for m in ('sklearn', 'pandas', 'scipy', 'rerun') if m in sys.modules])"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.splitlines()[-1] == "[]"
