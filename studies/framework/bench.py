@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
@@ -117,7 +117,7 @@ def run_part(
     """Run one part: print its tables, draw its figure, write its JSON.
 
     Raises:
-        ValueError: bad input, or no folder to write the figure or the JSON into.
+        ValueError: bad input, or no folder to write into.
         Incomplete: some measurements failed; what the others found was printed and written.
         RuntimeError: the part failed by a defect.
     """
@@ -164,10 +164,9 @@ def _of_our_own(error: BaseException) -> bool:
     return not remote and module.partition(".")[0] in ("tauguard", "studies")
 
 
-def printed(module: ModuleType, rows: list[Row]) -> list[Row]:
+def printed(module: Any, rows: list[Row]) -> list[Row]:
     """What is printed of a part's rows."""
-    own: Callable[[list[Row]], list[Row]] = getattr(module, "table", list)
-    return own(rows)
+    return list(module.table(rows)) if hasattr(module, "table") else rows
 
 
 def chart(module: Any, rows: list[Row], kind: str = "png") -> bytes:

@@ -1,29 +1,34 @@
 """Jobs over processes, and the cache of their results: a run that was stopped goes on there.
 
-A result is text, numbers, arrays, lists, tuples, dictionaries and dataclasses of these. Its file
-holds arrays and JSON; nothing in it is code, and a class is built only if it is one of ours or of a
-module that the user has named.
+A file of the cache is a pickle that is read with data classes and arrays alone: it runs no code.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
-import importlib
-import json
 import multiprocessing
 import os
+import pickle
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tauguard.atomic_write import atomic_file
 from tauguard.report import versions
 
+#: Packages whose data classes results may hold, and what NumPy builds an array or a number with.
+OURS = ("tauguard", "studies")
+ARRAYS = {
+    ("numpy", "dtype"),
+    ("numpy", "ndarray"),
+    ("numpy._core.multiarray", "_reconstruct"),
+    ("numpy._core.multiarray", "scalar"),
+    ("numpy._core.numeric", "_frombuffer"),
+}
 Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
 
@@ -38,7 +43,7 @@ class Workers:
         self._count = count or os.cpu_count() or 1
         self._processes: Any = None
 
-    def __enter__(self) -> Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]:
+    def __enter__(self) -> Each:
         """Start the processes; the map takes a function of a module and its jobs."""
         if self._count == 1:
             return lambda call, jobs: map(call, jobs)
@@ -52,6 +57,13 @@ class Workers:
         """Stop the processes."""
         if self._processes is not None:
             self._processes.terminate()
+
+
+def build(*more: object) -> str:
+    """A hash of what decides a detector's answers: versions, sources, and ``more``."""
+    from tauguard.datasets.code_identity import detection_sources
+
+    return hashlib.sha256(repr((more, versions(), *detection_sources())).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
@@ -72,11 +84,7 @@ class JobCache:
         """
         if keep is None:
             return cls(None)
-        from tauguard.datasets.code_identity import detection_sources
-
-        build = (versions(), *detection_sources())
-        digest = hashlib.sha256(repr((size, build)).encode()).hexdigest()[:8]
-        folder = Path(keep) / f"{study}-seed{seed}-{digest}"
+        folder = Path(keep) / f"{study}-seed{seed}-{build(size)[:8]}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -92,13 +100,10 @@ class JobCache:
     ) -> Iterator[Any]:
         if self.folder is None:
             return each(call, jobs)
-        paths = [self.folder / f"{name}-{k:03d}.npz" for k in range(len(jobs))]
+        paths = [self.folder / f"{name}-{k:03d}.pickle" for k in range(len(jobs))]
         known = [path.exists() for path in paths]
-        missing = [
-            (call, job, path)
-            for job, path, done in zip(jobs, paths, known, strict=True)
-            if not done
-        ]
+        every = zip(jobs, paths, known, strict=True)
+        missing = [(call, job, path) for job, path, done in every if not done]
         return _InOrder(iter(zip(paths, known, strict=True)), each(_done, missing))
 
 
@@ -118,81 +123,38 @@ class _InOrder:
 
 
 def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
-    """Do a job and keep its result."""
+    """Do a job and keep its result, whole or not at all."""
     call, own, path = job
     result = call(own)
-    write(path, result)
+    with atomic_file(path) as stream:
+        pickle.dump(result, stream)
     return result
 
 
-def write(path: Path, value: object) -> None:
-    """Write a result, whole or not at all.
-
-    Raises:
-        ValueError: something in it cannot be kept; the message names its type.
-        OSError: the folder cannot be written.
-    """
-    arrays: list[np.ndarray] = []
-    text = json.dumps(_apart(value, arrays))
-    named = {f"array{k}": array for k, array in enumerate(arrays)}
-    with atomic_file(path) as stream:
-        np.savez_compressed(stream, json=np.array(text), **named)  # type: ignore[arg-type]
-
-
 def read(path: Path) -> Any:
-    """What :func:`write` wrote.
+    """A result that was kept.
 
     Raises:
         ValueError: a damaged file, or one of another build; it names what to delete.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            return _together(json.loads(str(file["json"])), file)
-    except Exception as error:  # whatever a damaged archive makes its readers raise
+        with path.open("rb") as stream:
+            return _Results(stream).load()
+    except Exception as error:  # whatever a damaged file makes its reader raise
         raise ValueError(f"{path}: damaged, or of another build: delete it ({error})") from error
 
 
-def _apart(value: Any, arrays: list[np.ndarray]) -> Any:
-    """``value`` as JSON; arrays are put on the list and named by their number."""
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
-        arrays.append(value)
-        return {"array": len(arrays) - 1}
-    if type(value) in (list, tuple):
-        return {type(value).__name__: [_apart(item, arrays) for item in value]}
-    if isinstance(value, dict):
-        return {"dict": [[_apart(k, arrays), _apart(v, arrays)] for k, v in value.items()]}
-    if is_dataclass(value) and not isinstance(value, type):
-        kind = type(value)
-        own = {field.name: _apart(getattr(value, field.name), arrays) for field in fields(kind)}
-        return {"class": f"{kind.__module__}:{kind.__qualname__}", "fields": own}
-    raise ValueError(f"a {type(value).__name__} cannot be kept")
+class _Results(pickle.Unpickler):
+    """Builds arrays, data classes of ours, and classes of a module that the user has named."""
 
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) not in ARRAYS and module.partition(".")[0] not in OURS:
+            from tauguard.detectors.registry import file_type
 
-def _together(content: Any, arrays: Any) -> Any:
-    if not isinstance(content, dict):
-        return content
-    if "class" in content:
-        own = {name: _together(item, arrays) for name, item in content["fields"].items()}
-        return _class(content["class"])(**own)
-    if "array" in content:
-        return arrays[f"array{content['array']}"]
-    if "dict" in content:
-        return {_together(k, arrays): _together(v, arrays) for k, v in content["dict"]}
-    ((kind, items),) = content.items()
-    return {"list": list, "tuple": tuple}[kind](_together(item, arrays) for item in items)
-
-
-def _class(name: str) -> Any:
-    module, _, own = name.partition(":")
-    if module.partition(".")[0] not in ("tauguard", "studies"):
-        from tauguard.detectors.registry import file_type
-
-        return file_type(name)
-    kind = getattr(importlib.import_module(module), own)
-    if not (isinstance(kind, type) and is_dataclass(kind)):
-        raise ValueError(f"{name} is no class of results")
-    return kind
+            return file_type(f"{module}:{name}")
+        found = super().find_class(module, name)
+        if module.partition(".")[0] in OURS and not (
+            isinstance(found, type) and is_dataclass(found)
+        ):
+            raise ValueError(f"{module}.{name} is no class of results")
+        return found

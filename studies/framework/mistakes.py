@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from html import escape
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from studies.framework.jobs import build
 from tauguard.replay.event_page import OFFLINE
 
 #: A collision that is found later than this is shown [s].
@@ -37,7 +37,7 @@ def mistakes(folder: Path, seed: int) -> str:
     found, why = _kept(kept, seed)
     if why:
         print(f"mistakes: {why}; training the detector of `tauguard demo`, minutes", flush=True)
-        found = {"seed": seed, "build": _build(), **judged(folder / "wrong", seed)}
+        found = {"seed": seed, "build": build(), **judged(folder / "wrong", seed)}
         write_json(kept, found)
     return _html(folder, found["counts"], found["rows"])
 
@@ -57,20 +57,11 @@ def _kept(path: Path, seed: int) -> tuple[dict[str, Any], str]:
         found["counts"] = str(found["counts"])
     except (ValueError, RecursionError, KeyError, TypeError, AttributeError):
         raise ValueError(f"{path}: no list of mistakes of this command; move it away") from None
-    if own != {"seed": seed, "build": _build()}:
+    if own != {"seed": seed, "build": build()}:
         return {}, "those recorded are of another seed or build"
     if not all((path.with_suffix("") / file.name).is_file() for file in files):
         return {}, "some recordings are gone"
     return found, ""
-
-
-def _build() -> str:
-    """A hash of what decides a detector's answers."""
-    from tauguard.datasets.code_identity import detection_sources
-    from tauguard.report import versions
-
-    decide = (versions(), *detection_sources())
-    return hashlib.sha256(repr(decide).encode()).hexdigest()[:16]
 
 
 def judged(folder: Path, seed: int) -> dict[str, object]:
@@ -120,8 +111,8 @@ def _pictures(folder: Path, rows: list[dict[str, Any]]) -> str:
     first: dict[str, Path] = {}
     for row in rows:
         first.setdefault(row["kind"], folder / Path(row["file"]).with_suffix(".png").name)
-    there = {kind: file for kind, file in first.items() if file.is_file()}
     return "".join(
         f"<figure>{picture(file.read_bytes(), 'png', f'{kind}: score and threshold')}</figure>"
-        for kind, file in there.items()
+        for kind, file in first.items()
+        if file.is_file()
     )

@@ -44,9 +44,9 @@ FIGURES = (
     "Circles are tauguard's, squares are peers of the same run.</p>"
 )
 RUNS = (
-    "<p>A quick run shows the form of the answers, a full run their size. Of all quick parts two "
-    "run at a time: their times are those of a busy machine. load: programs that wanted to run "
-    "when the part ended; above the number of cores its times are too long.</p>"
+    "A quick run shows the form of the answers, a full run their size; two quick parts run at a "
+    "time. load: programs that wanted to run when a part ended; above the number of cores its "
+    "times are too long."
 )
 CASES = (
     "<p>Named cases with exact answers, put to every library that is installed; "
@@ -122,15 +122,12 @@ class Missing:
         self.lines.append("".join(c if c.isprintable() else "?" for c in text)[:LENGTH])
 
     def attempt(self, what: str, make: Callable[[], T], instead: T) -> T:
-        """What ``make`` returns; ``instead``, and a line, where the rows are not as it expects.
-
-        A file may be of another build or of somebody else: any error is possible, and is named.
-        """
+        """What ``make`` returns; ``instead``, and a line, where the rows are not as it expects."""
         try:
             return make()
         except KeyError as error:
             self.add(what, f"no {error} in its rows")
-        except Exception as error:
+        except Exception as error:  # a file may be of another build, or of somebody else
             self.add(what, f"{type(error).__name__}: {error}")
         return instead
 
@@ -166,7 +163,6 @@ class Report:
             "Asked and not reached": self._not_reached(),
             "Hard cases": attempt("hard cases", lambda: _cases(cases), "") if cases else "",
             "Mistakes to look at": mistakes,
-            "What was measured": self._runs(),
             **bodies,
         }
         target = self.folder / "index.html"
@@ -177,13 +173,12 @@ class Report:
         """What a function of every study's package makes of the rows of all its parts."""
         found: list[Any] = []
         for study in STUDIES:
-            names = [name for name in self.found if name.startswith(f"{study}-")]
-            rows = [row for name in names for row in self.found[name]["rows"]]
+            own = [one for name, one in self.found.items() if name.startswith(f"{study}-")]
+            rows = [row for one in own for row in one["rows"]]
             make = getattr(package(study), function, None)
             if make and rows:
-                empty: list[Any] = []
-                listed = partial(lambda call, own: list(call(own)), make, rows)
-                found += self.missing.attempt(f"first page, {study}", listed, empty)
+                listed = partial(lambda call, given: found.extend(call(given)), make, rows)
+                self.missing.attempt(f"first page, {study}", listed, None)
         return found
 
     def _figures(self, points: Sequence[Point]) -> str:
@@ -196,12 +191,8 @@ class Report:
 
     def _not_reached(self) -> str:
         """Every line of a summary whose figure was not reached."""
-        judged = [
-            (name, row)
-            for name, one in self.found.items()
-            for row in one["rows"]
-            if "asked" in row and isinstance(row.get("met"), bool)
-        ]
+        rows = [(name, row) for name, one in self.found.items() for row in one["rows"]]
+        judged = [(n, r) for n, r in rows if "asked" in r and isinstance(r.get("met"), bool)]
         lost = [
             {
                 "part": name,
@@ -214,35 +205,6 @@ class Report:
         ]
         met = len(judged) - len(lost)
         return f"<p>{met} of {len(judged)} asked figures are met.</p>" + tables(lost, {})
-
-    def _runs(self) -> str:
-        runs = [
-            {
-                "part": name,
-                "question": self.parts[name].line,
-                "run": "quick" if one["quick"] else "full",
-                "seed": one["seed"],
-                "load": one["machine"].get("load"),
-            }
-            for name, one in self.found.items()
-        ]
-        absent = [
-            name + (f" ({self.failed[name]})" if name in self.failed else "")
-            for name in self.parts
-            if name not in self.found
-        ]
-        known = {f"{name}.json" for name in self.parts} | set(BESIDE)
-        others = sorted(p.name for p in self.folder.glob("*.json") if p.name not in known)
-        return (
-            RUNS
-            + tables(runs, {})
-            + (f"<p>Not in this report: {escape(', '.join(absent))}.</p>" if absent else "")
-            + (
-                f"<p>Files of no study, not read: {escape(', '.join(others))}.</p>"
-                if others
-                else ""
-            )
-        )
 
     def _part(self, name: str, part: Part) -> str:
         one, module = self.found[name], part.load()
@@ -259,7 +221,9 @@ class Report:
         text = self.missing.attempt(
             f"tables of {name}", lambda: tables(printed(module, rows), module.NOTES), empty
         )
-        run = f"{part.line} ({'quick' if one['quick'] else 'full'} run, seed {one['seed']})."
+        load = one["machine"].get("load")
+        kind = "quick" if one["quick"] else "full"
+        run = f"{part.line} ({kind} run, seed {one['seed']}, load {load})."
         return f"<p>{escape(run)}</p><figure>{figure}</figure>" + folded("Tables", text)
 
     def _lead(self) -> str:
@@ -270,12 +234,21 @@ class Report:
             with_what = ", ".join(f"{package} {v}" for package, v in one["versions"].items())
             text = f"{on['processor']}, {on['cores']} cores, {on['system']}: {with_what}"
             machines.setdefault(text, []).append(name)
-        lines = [f"{len(self.found)} of {len(self.parts)} parts of studies."]
+        lines = [f"{len(self.found)} of {len(self.parts)} parts of studies. {RUNS}"]
         for text, names in machines.items():
             lines.append(text + (f" ({', '.join(names)})." if len(machines) > 1 else "."))
+        absent = [
+            name + (f" ({self.failed[name]})" if name in self.failed else "")
+            for name in self.parts
+            if name not in self.found
+        ]
+        known = {f"{name}.json" for name in self.parts} | set(BESIDE)
+        others = sorted(p.name for p in self.folder.glob("*.json") if p.name not in known)
+        lines += [f"Not in this report: {', '.join(absent)}."] if absent else []
+        lines += [f"Files of no study, not read: {', '.join(others)}."] if others else []
         items = "".join(f"<li>{escape(line)}</li>" for line in self.missing.lines)
-        absent = f'<div class="no"><p>Not shown, or not whole:</p><ul>{items}</ul></div>'
-        return "".join(f"<p>{escape(line)}</p>" for line in lines) + (absent if items else "")
+        ending = f'<div class="no"><p>Not shown, or not whole:</p><ul>{items}</ul></div>'
+        return "".join(f"<p>{escape(line)}</p>" for line in lines) + (ending if items else "")
 
 
 def time_text(us: float) -> str:

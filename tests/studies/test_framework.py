@@ -201,7 +201,7 @@ def test_jobs_that_the_cache_holds_are_not_run_again(checkout):
     assert [row["us"] for row in rows(checkout.folder / "r.json")] == [10.0, 6.0, 8.0]
     assert checkout("bench", *flags, "--seed", "1").returncode == 0  # another seed, another folder
     assert len(log.read_text().split()) == len(first) + len(again) + 3
-    for path in checkout.folder.glob("kept/jobs-seed0-*/*.npz"):
+    for path in checkout.folder.glob("kept/jobs-seed0-*/*.pickle"):
         path.write_bytes(path.read_bytes()[:-40])
     done = checkout("bench", *flags)
     assert "damaged, or of another build: delete it" in done.stderr
