@@ -97,7 +97,10 @@ def run_trial(robot: str, episodes: int, pictures: Path | None) -> None:
         import matplotlib.pyplot as plt
         import numpy as np
 
-        shown = [picture(row.environment, robot) for row in rows if not row.refused]
+        try:
+            shown = [picture(row.environment, robot) for row in rows if not row.refused]
+        except RuntimeError as error:  # no OpenGL
+            raise ValueError(f"--pictures: {error}") from None
         if shown:
             plt.imsave(pictures, np.concatenate(shown, axis=1))
             print(f"wrote {pictures}")
