@@ -14,7 +14,7 @@ import numpy as np
 from tauguard.report import rate
 
 TASKS = ("Reach-v0", "React-v1", "ClothReach-v1", "TwoArms-v1")
-#: Share of the largest Cartesian speed at which a scripted tool goes to its target.
+#: Fraction of the largest Cartesian speed at which a scripted tool goes to its target.
 SPEEDS = {"straight, fast": 1.0, "straight, gentle": 0.35}
 
 
