@@ -63,7 +63,7 @@ def load_model(path: str | os.PathLike[str]) -> CollisionAlarm:
 
     Raises:
         ValueError: missing, damaged or of another kind or version (the message says what would
-            do), with numbers that no arm has, or a detector that no blow moves or that is never
+            do), with numbers that no arm has, or a detector that no impact moves or that is never
             silent.
     """
     alarm = read_model(path, ALARM)

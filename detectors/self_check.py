@@ -1,4 +1,4 @@
-"""Whether a detector from a file can be one: silent while an arm stands, loud when it is struck.
+"""Whether a detector from a file can be one: silent while an arm stands, loud when it is hit.
 
 Numbers that are each in their range can still make a detector that never raises an alarm, or always
 one. What is asked here is the least that every detector does; it says nothing of how well.
@@ -20,7 +20,7 @@ MOST_SAMPLES = 100_000
 #: Torque per ampere [N m/A], mass of a link [kg] and gravity [m/s^2] that an arm can have.
 GAINS, HEAVIEST, GRAVITY = (1e-4, 1e4), 1e4, 100.0
 #: Blows that one of has to be noticed: torques at all joints [N m], their length and pause [s].
-BLOWS, BLOW, PAUSE = (5.0, 20.0, 80.0, 320.0), 0.3, 0.5
+IMPACTS, IMPACT, PAUSE = (5.0, 20.0, 80.0, 320.0), 0.3, 0.5
 
 
 def check_ranges(alarm: CollisionAlarm) -> None:
@@ -50,36 +50,36 @@ def check_ranges(alarm: CollisionAlarm) -> None:
 
 
 def check_alarms(alarm: CollisionAlarm) -> None:
-    """Refuse a detector that no blow moves, or that calls an arm at rest struck all the time.
+    """Refuse a detector that no impact moves, or one that is never silent on an arm at rest.
 
     Raises:
         ValueError: says which, or that a score is not a number.
     """
-    trace, first = standing_and_struck(alarm.detector.arm, alarm.detector.dt, alarm.settle)
+    trace, first = standing_then_hit(alarm.detector.arm, alarm.detector.dt, alarm.settle)
     up = alarm.detect(trace).alarm
     if not up[first:].any():
-        raise ValueError(f"it raises no alarm at any blow up to {BLOWS[-1]:g} N m")
+        raise ValueError(f"it raises no alarm at any impact up to {IMPACTS[-1]:g} N m")
     standing = up[(trace.t > alarm.settle + PAUSE / 2) & (np.arange(len(up)) < first)]
     if len(standing) and standing.all() and up[first:].all():
-        raise ValueError("it calls an arm that stands still struck, all the time")
+        raise ValueError("it calls an arm that stands still in collision, all the time")
 
 
-def standing_and_struck(arm: ArmModel, dt: float, settle: float) -> tuple[Trace, int]:
-    """An arm that stands at zero as its model says, then is struck harder and harder.
+def standing_then_hit(arm: ArmModel, dt: float, settle: float) -> tuple[Trace, int]:
+    """An arm that stands at zero as its model says, then is hit harder and harder.
 
     Returns:
-        The trace, and the row of the first blow.
+        The trace, and the row of the first impact.
     """
-    seconds = settle + PAUSE + len(BLOWS) * (BLOW + PAUSE)
+    seconds = settle + PAUSE + len(IMPACTS) * (IMPACT + PAUSE)
     # Windows and confirmation need some samples even where these are rare.
     slow = max(1.0, dt / 0.01)
     t = np.arange(round(seconds * slow / dt), dtype=np.float64) * dt
-    begin, period = settle + PAUSE * slow, (BLOW + PAUSE) * slow
+    begin, period = settle + PAUSE * slow, (IMPACT + PAUSE) * slow
     number = np.floor((t - begin) / period).astype(int)
-    struck = (t >= begin) & ((t - begin) % period < BLOW * slow) & (number < len(BLOWS))
-    torque = np.where(struck, np.array(BLOWS)[np.clip(number, 0, len(BLOWS) - 1)], 0.0)
+    hit = (t >= begin) & ((t - begin) % period < IMPACT * slow) & (number < len(IMPACTS))
+    torque = np.where(hit, np.array(IMPACTS)[np.clip(number, 0, len(IMPACTS) - 1)], 0.0)
     n = arm.robot.joints
     rest = np.zeros((len(t), n))
     held = gravity_torque(arm.robot, np.zeros((1, n)))
     current = (held - torque[:, None]) / arm.drive_gain
-    return Trace(arm.robot.joint_names, t, rest, rest.copy(), current), int(struck.argmax())
+    return Trace(arm.robot.joint_names, t, rest, rest.copy(), current), int(hit.argmax())

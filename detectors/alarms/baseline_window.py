@@ -20,7 +20,7 @@ CONFIRMATION = 0.05  # [s]
 
 FACTOR = 1.5  # threshold over the largest residual of the quiet seconds
 
-STRANGE = 0.2  # share of a log in alarm that says that the log is another arm's
+STRANGE = 0.2  # fraction of a log in alarm that says that the log is another arm's
 
 BEFORE = 0.2  # [s] before an alarm from which residuals count as changed
 

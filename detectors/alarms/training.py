@@ -1,4 +1,4 @@
-"""From collision-free motion to a threshold: the one way, for the command line and all studies.
+"""From collision-free motion to a threshold: the one path, for the command line and all studies.
 
 Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
 (:mod:`.speed_normalisation`), and the threshold is where the tail of their peaks has the rate of
@@ -25,11 +25,13 @@ from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_thresh
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.traces.trace import Trace
 
-#: Share of the collision-free training traces that the threshold comes from.
+#: Fraction of the collision-free training traces that the threshold comes from.
 HELD_OUT = 0.34
 
 
-def held_out(traces: Sequence[Trace], share: float = HELD_OUT) -> tuple[list[Trace], list[Trace]]:
+def held_out(
+    traces: Sequence[Trace], fraction: float = HELD_OUT
+) -> tuple[list[Trace], list[Trace]]:
     """Traces to train on, and collision-free ones for the threshold.
 
     Returns:
@@ -37,7 +39,7 @@ def held_out(traces: Sequence[Trace], share: float = HELD_OUT) -> tuple[list[Tra
         threshold then comes from motion that the detector was trained on.
     """
     free = [i for i, t in enumerate(traces) if not (t.truth and t.truth.collisions)]
-    count = min(len(free) - 1, max(1, round(share * len(free)))) if len(free) > 1 else 0
+    count = min(len(free) - 1, max(1, round(fraction * len(free)))) if len(free) > 1 else 0
     if count == 0:
         return list(traces), list(traces)
     # Evenly through the list, which often goes through speeds and payloads in turn.

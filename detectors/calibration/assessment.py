@@ -18,17 +18,17 @@ from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknown
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.traces.trace import Trace
 
-#: Share of a joint's torque that a calibration may leave, and from which on a note says so. Right
-#: logs leave 5 % on a UR10e, 17 % on a UR5 and 23 to 31 % of a wrist joint on a UR3 whose friction
-#: warms up; two joints or two currents exchanged leave 14 to 25 % on the UR10e. Between the two
-#: only a note is possible.
+#: Fraction of a joint's torque that a calibration may leave, and from which on a note says so.
+#: Right logs leave 5 % on a UR10e, 17 % on a UR5 and 23 to 31 % of a wrist joint on a UR3 whose
+#: friction warms up; two joints or two currents exchanged leave 14 to 25 % on the UR10e. Between
+#: the two only a note is possible.
 UNEXPLAINED, DOUBTFUL = 0.35, 0.1
 #: A log held out whose residual is so many times the others' may have carried something: on a
 #: UR10e 4.3 and 4.6 with a load in one of seven, 2.4 with loads in two of eight, 1.2 without; 4.5
 #: where the others move single joints only. From the second on if much is unexplained as well.
 OUTLYING, OUTLYING_IN_DOUBT = 2.5, 1.5
-#: A given load is off by more than so many kg, and than this share of it, before it is refused: a
-#: UR10e's torques show 2.2 kg of 2.6 kg, and 0.05 kg of none.
+#: A given load is off by more than so many kg, and than this fraction of it, before it is refused:
+#: a UR10e's torques show 2.2 kg of 2.6 kg, and 0.05 kg of none.
 WRONG_LOAD = (0.8, 0.3)
 #: Slower joints are not judged [rad/s]: static friction explains itself.
 FAST_ENOUGH = 0.05
@@ -78,17 +78,18 @@ def explained(arm: ArmModel, traces: Sequence[Trace], rate: float = 20.0) -> tup
         moves = moving_span(trace)[:, None] & (np.abs(trace.qd) > FAST_ENOUGH)
         left += (np.where(moves, residual, 0.0) ** 2).sum(axis=0)
         torque += (np.where(moves, trace.current * arm.drive_gain, 0.0) ** 2).sum(axis=0)
-    share = np.sqrt(left / torque)
-    worst = int(np.argmax(share))
+    fraction = np.sqrt(left / torque)
+    worst = int(np.argmax(fraction))
     name = arm.robot.joint_names[worst]
     said = (
-        f"{100 * share[worst]:.0f} % of the torque of {name} in motion is not explained: friction "
-        "that changes with temperature, a load that was not named, contacts (nothing may touch the "
-        "arm in these logs), or wrong order, signs, units or gains of the currents or torques"
+        f"{100 * fraction[worst]:.0f} % of the torque of {name} in motion is not explained: "
+        "friction that changes with temperature, a load that was not named, contacts (nothing may "
+        "touch the arm in these logs), or wrong order, signs, units or gains of the currents or "
+        "torques"
     )
-    if share[worst] > UNEXPLAINED:
+    if fraction[worst] > UNEXPLAINED:
         raise ValueError(said)
-    return (said,) if share[worst] > DOUBTFUL else ()
+    return (said,) if fraction[worst] > DOUBTFUL else ()
 
 
 def outlier(held: Sequence[Array], least: float = OUTLYING) -> tuple[int, float] | None:

@@ -110,12 +110,12 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
     )
 
 
-#: Share of the torque left over that is refused, and from which on it is said. A UR10e with
+#: Fraction of the torque left over that is refused, and from which on it is said. A UR10e with
 #: published gains and friction leaves 0.1 to 0.2, with gains alone up to 0.53, with two joints
 #: exchanged 0.5 to 1.4, with another sign 1 to 1.9, in milliamperes 1.
 REFUSED, DOUBTED = 0.7, 0.4
 
-#: Torques are weighed against this share of what gravity can ask of the arm at least: in a pose
+#: Torques are weighed against this fraction of what gravity can ask of the arm at least: in a pose
 #: where it asks for nothing, friction is all there is.
 STRENGTH = 0.4
 
@@ -163,20 +163,20 @@ def check_torques(
     if most < 1e-6:
         return ()  # gravity asks for nothing: friction may be all there is
     sizes = [float(np.sqrt((x[rows] ** 2).sum(axis=1).mean())) for x in (residual, needed, given)]
-    share = sizes[0] / max(*sizes[1:], most)
+    fraction = sizes[0] / max(*sizes[1:], most)
     where = "contacts included" if touched else "where nothing touches the arm"
     said = (
-        f"{where}, {100 * share:.0f} % of the torque is not explained (the motion "
+        f"{where}, {100 * fraction:.0f} % of the torque is not explained (the motion "
         f"needs {sizes[1]:.3g} N m, the drives give {sizes[2]:.3g} N m, root mean square over all "
         "joints)"
     )
-    if share > REFUSED:
+    if fraction > REFUSED:
         raise ValueError(
             f"{said}: check the unit of the currents (milliamperes?), their signs, the order of "
             "the joints, the gains and the robot file"
         )
     return (
         (f"{said}: alarms mean little; a load, other gains, another order of the joints?",)
-        if share > DOUBTED
+        if fraction > DOUBTED
         else ()
     )

@@ -56,7 +56,7 @@ class Beliefs:
     gain: float = 0.5  #: relative, where gains are identified
     friction: float = 0.3
     """Of a friction weight, per median torque of the joint in the log that asks most of it, but for
-    the following: columns that are alike at the logged speeds share what they explain, and do not
+    the following: columns that are alike at the logged speeds split what they explain, and do not
     cancel each other beyond."""
     loaded: float = 0.3  #: of friction per load [1]
     saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
@@ -64,7 +64,7 @@ class Beliefs:
     moment: float = 0.5  #: of its first moment [kg m]
     spread: float = 0.2  #: of its inertia about the last link's origin [kg m^2]
     softness: float = 5.0  #: a sample counts 1/softness^2: model errors are not white
-    evenness: float = 0.15  #: a joint's level of error is at least this share of the largest
+    evenness: float = 0.15  #: a joint's level of error is at least this fraction of the largest
     rest: float = 0.5  #: a joint that has stood still for longer counts no more [s]
 
 

@@ -50,7 +50,7 @@ def moves(trace: Trace) -> bool:
 def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:
     """Rows from the first motion of any joint to the last one, shape (T,).
 
-    Before and after, static friction takes an unknown share of the torque.
+    Before and after, static friction takes an unknown fraction of the torque.
 
     Args:
         trace: the log.

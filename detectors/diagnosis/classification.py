@@ -4,7 +4,7 @@ Three questions, each with a measure that has a physical meaning:
 
 * Does it last? An impact is over while a clamping, a push and a payload are still there: what the
   residual keeps at the end of the look, in the direction of its peak.
-* Is it a load? An unknown payload pulls down at the flange: the share of the residual
+* Is it a load? An unknown payload pulls down at the flange: the fraction of the residual
   that one constant mass and first moment at the last link explain, over all joints and samples.
 * Does somebody mean it? A hand pushes more slowly than an arm runs into things (Golz et al. 2015,
   Kouris et al. 2018 use the spectrum), and a clamping always works against the arm's motion: the
@@ -22,23 +22,23 @@ from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 
 #: What there is; a payload change is no collision, a push is one that somebody intends.
 KINDS = ("impact", "clamp", "push", "payload")
-#: An event lasts where it keeps this share of its level, and how sharply that is decided.
+#: An event lasts where it keeps this fraction of its level, and how sharply that is decided.
 LASTS, LASTS_WIDTH = 0.5, 0.05
-#: A load explains this share of the residual, and how sharply that is decided.
+#: A load explains this fraction of the residual, and how sharply that is decided.
 LOAD, LOAD_WIDTH = 0.9, 0.01
 #: A payload is within this reach of the last joint [m] and no heavier than this [kg].
 REACH, HEAVIEST = 0.5, 7.0
 #: The end of the look that tells whether it lasts [s].
 END = 0.03
 #: Samples this soon after the alarm [s], and so many lags of the observer, are still in motion: the
-#: load's share looks at later ones.
+#: load's fraction looks at later ones.
 SETTLING, SETTLING_LAGS = 0.025, 3.0
 #: Log odds of an intended push: constant, per decade of N/s, per unit of the cosine. Fitted by
 #: logistic regression to simulated clampings and pushes, on arms and seeds that no study judges.
 INTENT = (4.2, -1.2, 3.6)
 #: No rise counts as shorter than this, or one sample of a faster trace [s].
 SHORTEST = 1e-3
-#: Levels between which the rise is measured, shares of the highest.
+#: Levels between which the rise is measured, fractions of the highest.
 RISE = (0.25, 0.75)
 
 
@@ -46,8 +46,8 @@ RISE = (0.25, 0.75)
 class Signs:
     """The measures that decide."""
 
-    lasting: float  #: residual at the end of the look along its peak, as a share of the peak
-    load: float  #: share of the residual that a constant payload explains, 0 to 1
+    lasting: float  #: residual at the end of the look along its peak, as a fraction of the peak
+    load: float  #: fraction of the residual that a constant payload explains, 0 to 1
     mass: float  #: that payload [kg]; negative: put down
     reach: float  #: its distance from the last joint [m]
     rise: float  #: rate of the force between a quarter and three quarters of its peak [N/s]
@@ -64,8 +64,8 @@ class Signs:
         odds = INTENT[0] + INTENT[1] * np.log10(max(self.rise, 1.0)) + INTENT[2] * self.along
         meant = float(expit(odds))
         pressing = lasts * (1 - load)
-        shares = (1 - lasts, pressing * (1 - meant), pressing * meant, lasts * load)
-        return dict(zip(KINDS, shares, strict=True))
+        fractions = (1 - lasts, pressing * (1 - meant), pressing * meant, lasts * load)
+        return dict(zip(KINDS, fractions, strict=True))
 
 
 def signs(after: PostAlarmWindow, force: Array, velocity: Array) -> Signs:
@@ -80,15 +80,15 @@ def signs(after: PostAlarmWindow, force: Array, velocity: Array) -> Signs:
     highest = float(level.max())
     scaled = after.residual / after.deviation
     same_way = scaled @ scaled[int(level.argmax())] / highest**2
-    share, mass, reach = load(after)
+    fraction, mass, reach = load(after)
     size, speed = float(np.linalg.norm(force)), float(np.linalg.norm(velocity))
     along = float(force @ velocity) / (size * speed) if size * speed > 0 else 0.0
-    first, second = (int(np.flatnonzero(level >= share * highest)[0]) for share in RISE)
+    first, second = (int(np.flatnonzero(level >= fraction * highest)[0]) for fraction in RISE)
     shortest = float(np.diff(after.t).min(initial=SHORTEST))
     rising = max(float(after.t[second] - after.t[first]), shortest)
     return Signs(
         float(same_way[after.t > after.t[-1] - END].mean()),
-        share,
+        fraction,
         mass,
         reach,
         (RISE[1] - RISE[0]) * size / rising,
@@ -98,9 +98,9 @@ def signs(after: PostAlarmWindow, force: Array, velocity: Array) -> Signs:
 
 
 def load(after: PostAlarmWindow) -> tuple[float, float, float]:
-    """Share of the residual that a constant payload explains, its mass [kg] and distance [m].
+    """Fraction of the residual that a constant payload explains, its mass [kg] and distance [m].
 
-    Weighted least squares for mass and first moment over the samples once the blow is over.
+    Weighted least squares for mass and first moment over the samples once the impact is over.
     """
     rows = after.t >= min(SETTLING + SETTLING_LAGS * after.lag, 0.5 * float(after.t[-1]))
     weight = 1 / after.deviation[rows]
@@ -109,6 +109,6 @@ def load(after: PostAlarmWindow) -> tuple[float, float, float]:
     found = np.linalg.lstsq(columns, y, rcond=None)[0]
     whole = float(y @ y)
     rest = y - columns @ found
-    share = 1 - float(rest @ rest) / whole if whole > 0 else 0.0
+    fraction = 1 - float(rest @ rest) / whole if whole > 0 else 0.0
     mass, moment = float(found[0]), float(np.linalg.norm(found[1:]))
-    return share, mass, moment / abs(mass) if mass else np.inf
+    return fraction, mass, moment / abs(mass) if mass else np.inf

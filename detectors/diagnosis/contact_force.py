@@ -106,8 +106,8 @@ class ContactBelief:
 
     def links(self, count: int) -> Array:
         """Probability of each link, shape (count,)."""
-        shares: Array = np.bincount(self.link, self.probability, minlength=count).astype(float)
-        return shares
+        fractions: Array = np.bincount(self.link, self.probability, minlength=count).astype(float)
+        return fractions
 
     def on(self, link: int) -> tuple[Array, Array]:
         """Expected force [N] and the surface point [m] nearest to the expected one, given a link.

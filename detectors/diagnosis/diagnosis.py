@@ -131,7 +131,7 @@ class Diagnoser:
         )
         force, point = at_peak.weighted(belief.probability).on(link)
         kinds = signs(after, force, self._velocity(link, point, after, peak))
-        shares = kinds.probabilities()
+        fractions = kinds.probabilities()
         return Diagnosis(
             alarm,
             link + 1,
@@ -140,8 +140,8 @@ class Diagnoser:
             alarm.start + float(after.t[peak]),
             force,
             point,
-            max(shares, key=lambda kind: shares[kind]),
-            shares,
+            max(fractions, key=lambda kind: fractions[kind]),
+            fractions,
             kinds,
             severity(robot, self.surface, after, belief, len(rows), self.trust),
             alarm.start + float(after.t[-1]),

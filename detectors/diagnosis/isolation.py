@@ -12,11 +12,11 @@ from tauguard.detectors.diagnosis.contact_force import ContactBelief, contact_be
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 
-#: The usual rule counts torques above this many deviations and this share of the largest torque:
+#: The usual rule counts torques above this many deviations and this fraction of the largest torque:
 #: its best values on simulated arms that no study judges.
 SIGNIFICANT, NOTICED = 6.0, 0.05
-#: Moments looked at besides the strongest one, and the share of its level that they need.
-MOMENTS, SHARE = 3, 0.4
+#: Moments looked at besides the strongest one, and the fraction of its level that they need.
+MOMENTS, FRACTION = 3, 0.4
 
 
 @dataclass(frozen=True)
@@ -78,21 +78,21 @@ def isolate(
     return replace(each[-1], probability=weight / weight.sum())
 
 
-def moments(level: Array, most: int = MOMENTS, share: float = SHARE) -> NDArray[np.int64]:
+def moments(level: Array, most: int = MOMENTS, fraction: float = FRACTION) -> NDArray[np.int64]:
     """Samples to look at: spread over those near the highest level, which comes last.
 
     Args:
         level: strength of the residual, shape (M,).
         most: how many samples before the highest one.
-        share: of the highest level that a sample needs.
+        fraction: of the highest level that a sample needs.
     """
-    strong = np.flatnonzero(level >= share * level.max())
+    strong = np.flatnonzero(level >= fraction * level.max())
     spread = strong[np.unique(np.linspace(0, len(strong) - 1, most).round().astype(np.int64))]
     return np.append(spread, int(level.argmax()))
 
 
 def last_joint(
-    residual: Array, deviation: Array, significant: float = SIGNIFICANT, share: float = NOTICED
+    residual: Array, deviation: Array, significant: float = SIGNIFICANT, fraction: float = NOTICED
 ) -> int:
     """The usual rule: the link of the last joint with a significant residual, 1-based; 0 if none.
 
@@ -102,8 +102,8 @@ def last_joint(
         residual: [N m], shape (n,).
         deviation: its standard deviation in free motion [N m], shape (n,).
         significant: deviations that count as torque.
-        share: of the largest residual that counts as torque besides.
+        fraction: of the largest residual that counts as torque besides.
     """
-    least = np.hypot(significant * deviation, share * np.abs(residual).max())
+    least = np.hypot(significant * deviation, fraction * np.abs(residual).max())
     found = np.flatnonzero(np.abs(residual) > least)
     return int(found[-1]) + 1 if len(found) else 0

@@ -19,7 +19,7 @@ from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, intervals, low_pass
 from tauguard.traces.trace import Trace
 
-#: Slower logs get an observer of this share of their rate.
+#: Slower logs get an observer of this fraction of their rate.
 PER_SAMPLE = 0.2
 
 #: What was known this long before the alarm is held [s].

@@ -104,14 +104,14 @@ def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) ->
     return drawn
 
 
-#: Share of the true values that the intervals are to hold.
+#: Fraction of the true values that the intervals are to hold.
 COVERAGE = 0.9
 
 #: The torque is averaged over so many lags to either side before its peak is taken.
 SMOOTHED = 0.3
 
-#: The contact lasts while the torque is above this share of its peak.
-CONTACT_SHARE = 0.15
+#: The contact lasts while the torque is above this fraction of its peak.
+CONTACT_FRACTION = 0.15
 
 #: Relative error besides noise and place (log): directions that turn, gains. Chosen on simulated
 #: arms and seeds that no study judges.
@@ -120,7 +120,7 @@ SPREAD = 0.2
 #: An interval whose ends differ by more than this factor says nothing of the size.
 IDENTIFIABLE = 6.0
 
-#: What the samples do not resolve is no more than this share of a contact's time.
+#: What the samples do not resolve is no more than this fraction of a contact's time.
 UNRESOLVED = 0.9
 
 
@@ -158,7 +158,7 @@ class ContactTorque:
     impulse: Array  #: integral of tau_ext [N m s], shape (n,)
     peak: Array  #: tau_ext at its peak [N m], shape (n,)
     shape: float  #: peak over mean
-    hidden: float  #: share of its time that the samples do not resolve
+    hidden: float  #: fraction of its time that the samples do not resolve
     goes_on: bool = False  #: it still touched when the look ended
 
     @property
@@ -260,7 +260,7 @@ def _without_lag(after: PostAlarmWindow) -> tuple[float, Array]:
 
 def _contact(along: Array, top: int) -> tuple[int, int]:
     """First and last row of the contact whose torque is highest at row ``top``."""
-    weak = along < CONTACT_SHARE * along[top]
+    weak = along < CONTACT_FRACTION * along[top]
     before, later = np.flatnonzero(weak[:top]), np.flatnonzero(weak[top:])
     first = int(before[-1]) if len(before) else 0
     last = top + int(later[0]) if len(later) else len(along) - 1

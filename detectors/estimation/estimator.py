@@ -45,9 +45,9 @@ class Unknowns:
     fast: float = 1.0  #: time constant of the offset [s]
     clip: float = 3.0
     """An innovation z above this many of its standard deviations c counts c^2/z. The deviation is
-    that of noise and beliefs, without ``lasting``."""
+    that of noise and beliefs, without ``noise_inflation``."""
     every: float = 0.01  #: time between two corrections [s]
-    lasting: float = 1.0
+    noise_inflation: float = 1.0
     """Corrections that an error of the model lasts for: the variance of a correction's noise is so
     many times ``noise^2``. With 1 the filter takes every correction for news."""
     transition: float = 0.0
@@ -59,7 +59,7 @@ class Unknowns:
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
-        for name, least in (("lasting", 1.0), ("transition", 0.0)):
+        for name, least in (("noise_inflation", 1.0), ("transition", 0.0)):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= least):
                 raise ValueError(f"{name} {value}: expected a number, {least:g} or more")
@@ -67,7 +67,7 @@ class Unknowns:
     @classmethod
     def for_detection(cls) -> Unknowns:
         """For detectors: model errors last some 0.2 s, and are a tenth of a change of friction."""
-        return cls(lasting=20.0, transition=0.1, weighted=True)
+        return cls(noise_inflation=20.0, transition=0.1, weighted=True)
 
     @classmethod
     def none(cls) -> Unknowns:
@@ -161,7 +161,7 @@ class Estimator:
             [float(s) for s in arm.noise],
             self.unknowns.clip,
             max(1, round(self.unknowns.every / self.dt)),
-            self.unknowns.lasting,
+            self.unknowns.noise_inflation,
             self.unknowns.transition,
             self.unknowns.weighted,
             arm.sensors.fusion_gains(self.dt) if arm.sensors else [],

@@ -1,6 +1,6 @@
 """The rate of the momentum observer [1/s], for every use of it.
 
-A faster observer follows a blow sooner and passes more noise; a rate far above a fifth of the
+A faster observer follows an impact sooner and passes more noise; a rate far above a fifth of the
 sampling rate brings no more. Whoever differs from another does so on purpose, and says why here.
 """
 

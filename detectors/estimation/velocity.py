@@ -17,7 +17,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.traces.trace import Trace
 
-#: How fast an acceleration may wander: (rad/s^2) per root second. Higher follows a blow sooner,
+#: How fast an acceleration may wander: (rad/s^2) per root second. Higher follows an impact sooner,
 #: lower passes less noise.
 AGILITY = 4.0
 #: Slower sampled velocities are taken as they are [s].
@@ -51,7 +51,7 @@ class SensorNoise:
 
         def level(name: str, floor: float) -> Array:
             squares = [np.diff(getattr(t, name), 3, axis=0) ** 2 for t in traces]
-            # Medians of a trace's pieces: blows and steps in some pieces do not count.
+            # Medians of a trace's pieces: impacts and steps in some pieces do not count.
             pieces = np.concatenate(
                 [
                     [p.mean(axis=0) for p in np.array_split(s, max(1, len(s) // 500))]

@@ -173,9 +173,9 @@ def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, 
 def _alarms_and_level(judged: Judged) -> tuple[tuple[Alarm, ...], float]:
     t, settled = judged.t, judged.t - judged.t[0] > SETTLE
     alarms = find_alarms(t, (judged.ratio.max(axis=1) > 1) & settled, SERIES)
-    share: Array = np.where(judged.rest, 0.0, np.abs(judged.residual) / judged.bound).max(axis=1)
+    fraction: Array = np.where(judged.rest, 0.0, np.abs(judged.residual) / judged.bound).max(axis=1)
     rows = settled & ~judged.rest.all(axis=1)
-    return alarms, float(np.median(share[rows])) if rows.any() else 0.0
+    return alarms, float(np.median(fraction[rows])) if rows.any() else 0.0
 
 
 def _motion(recordings: Sequence[Recording]) -> float:

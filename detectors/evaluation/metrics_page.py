@@ -139,10 +139,10 @@ def _draw_confusion(axes: Axes, confusion: Mapping[str, int], alarms: Mapping[st
     import numpy as np
 
     table = np.array([[confusion["tp"], confusion["fn"]], [confusion["fp"], confusion["tn"]]])
-    share = table / np.maximum(table.sum(axis=1, keepdims=True), 1)
-    axes.imshow(share, cmap="YlGnBu", vmin=0, vmax=1)
+    fraction = table / np.maximum(table.sum(axis=1, keepdims=True), 1)
+    axes.imshow(fraction, cmap="YlGnBu", vmin=0, vmax=1)
     for (i, j), number in np.ndenumerate(table):
-        color = "white" if share[i, j] > 0.6 else "black"
+        color = "white" if fraction[i, j] > 0.6 else "black"
         axes.text(j, i, f"{number}", ha="center", va="center", fontsize=15, color=color)
     axes.set_xticks([0, 1], ["alarm", "no alarm"])
     axes.set_yticks([0, 1], ["collision", "no collision\n(2 s cases)"])

@@ -18,8 +18,8 @@ from tauguard.traces.trace import Trace
 
 #: Time course of a contact over its duration, 0 to 1, by name.
 SHAPES: dict[str, Callable[[Array], Array]] = {
-    # A blow: half a sine.
-    "blow": lambda x: np.asarray(np.sin(np.pi * x)),
+    # An impact: half a sine.
+    "impact": lambda x: np.asarray(np.sin(np.pi * x)),
     # A hand's push: rises in a fifth of its time, holds, lets go in a fifth.
     "push": lambda x: np.asarray(np.clip(np.minimum(x, 1 - x) / 0.2, 0.0, 1.0)),
 }
@@ -32,7 +32,7 @@ class Added:
     start: float  #: [s]
     seconds: float  #: how long
     torque: tuple[float, ...]  #: at its peak, one a joint [N m]
-    shape: str = "blow"
+    shape: str = "impact"
 
 
 def add_contact(trace: Trace, drive_gain: Array, contact: Added) -> Trace:

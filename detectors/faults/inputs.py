@@ -24,11 +24,11 @@ Counts = NDArray[np.int64]
 FASTEST = 20.0
 #: Seconds over which velocities are summed to be held against the change of position.
 SPAN = 20e-3
-#: Share of a joint's travel that position and velocity may differ by: filters lag, time jitters.
-SHARE = 0.2
+#: Fraction of a joint's travel that position and velocity may differ by: filters lag, time jitters.
+FRACTION = 0.2
 #: The same over one sample: a time stamp may be half an interval late.
-STEP_SHARE = 0.5
-#: What is allowed beyond that share, over the most that training shows.
+STEP_FRACTION = 0.5
+#: What is allowed beyond that fraction, over the most that training shows.
 MARGIN = 3.0
 #: Resolution that any encoder is allowed [rad]: training at rest may show none.
 RESOLUTION = 2e-4
@@ -58,7 +58,7 @@ FAULTS: dict[int, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class UsualInput:
-    """What is usual of one arm's samples, from collision-free or struck motion alike."""
+    """What is usual of one arm's samples, from motion with and without collisions alike."""
 
     joint_names: tuple[str, ...]
     dt: float  #: sample interval [s]
@@ -67,7 +67,7 @@ class UsualInput:
     repeats: int  #: samples in a row in which no signal changes
     window: int  #: samples over which velocities are summed
     current: Array  #: largest believable ``|current|`` [A], shape (n,)
-    step: Array  #: ``|change of q less qd dt|`` over one sample beyond SHARE [rad], shape (n,)
+    step: Array  #: ``|change of q less qd dt|`` over one sample beyond FRACTION [rad], shape (n,)
     drift: Array  #: the same over ``window`` samples [rad], shape (n,)
     stuck: Counts  #: samples in a row with one joint's current unchanged, shape (n,)
     ratios: Array  #: of torque given to torque needed, see ``torques.torque_ratios``, shape (3, n)
@@ -121,7 +121,7 @@ def _believable(traces: Sequence[Trace], arm: ArmModel | None) -> Array:
 def _beyond(trace: Trace, window: int) -> Array:
     """Most that position and velocity differ by over ``window`` samples, beyond what is allowed.
 
-    Allowed are a share of the travel, and what a velocity or a time stamp that is late
+    Allowed are a fraction of the travel, and what a velocity or a time stamp that is late
     differs by.
     Shape (n,).
     """
@@ -129,8 +129,8 @@ def _beyond(trace: Trace, window: int) -> Array:
     error = np.diff(trace.q, axis=0) - travel
     late = np.minimum(np.abs(np.diff(trace.t) - trace.dt), trace.dt)[:, None]
     bend = trace.dt * np.abs(np.diff(trace.qd, axis=0)) + late * np.abs(trace.qd[1:])
-    share = STEP_SHARE if window == 1 else SHARE
-    left = np.abs(_sums(error, window)) - share * np.abs(_sums(travel, window))
+    fraction = STEP_FRACTION if window == 1 else FRACTION
+    left = np.abs(_sums(error, window)) - fraction * np.abs(_sums(travel, window))
     return np.asarray((left - _sums(bend, window)).max(axis=0).clip(0))
 
 
@@ -186,8 +186,8 @@ class FaultCheck:
             FASTEST,
             usual.repeats,
             usual.window,
-            SHARE,
-            STEP_SHARE,
+            FRACTION,
+            STEP_FRACTION,
             usual.current,
             usual.step,
             usual.drift,

@@ -13,9 +13,9 @@ from tauguard.traces.trace import Trace
 
 #: Rate of the observer whose residual is looked at [1/s].
 RATE = 20.0
-#: A joint counts as noisy as this share of the noisiest at least: a load can turn the torque of a
-#: wrist around, but not that of a shoulder.
-SHARE = 0.5
+#: A joint counts as noisy as this fraction of the noisiest at least: a load can turn the torque of
+#: a wrist around, but not that of a shoulder.
+FRACTION = 0.5
 #: A fast ratio below the first works against the motion; slow ones outside of the other two say
 #: another size. With loads and contacts in training, what those show beyond, and the margin.
 OPPOSED, LEAST, MOST, MARGIN = -0.4, 0.4, 1.7, 0.4
@@ -55,7 +55,7 @@ class TorqueCheck:
             np.maximum(MOST, seen[2] + MARGIN),
         )
         noise = np.asarray(arm.noise, dtype=np.float64)
-        floor = np.maximum(noise, SHARE * noise.max())
+        floor = np.maximum(noise, FRACTION * noise.max())
         self._names, self._dt = arm.robot.joint_names, dt
         self.observer = Estimator(arm, RATE, dt, Unknowns.none())
         gain = np.ascontiguousarray(arm.drive_gain, dtype=np.float64)

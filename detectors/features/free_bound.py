@@ -1,4 +1,4 @@
-"""How uncertain a carried load is, for the filter of slow errors (``src/slow_errors.hpp``)."""
+"""How uncertain a carried load is, for the bias filter (``src/bias_filter.hpp``)."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ class FrontEndSettings:
         """Identify the arm and its noise model from the collision-free rows.
 
         The last result for these settings is kept while its traces live: methods with equal
-        settings share it.
+        settings use the same.
 
         Raises:
             ValueError: traces that do not fit, or without collision-free motion, or joints that

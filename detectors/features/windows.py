@@ -93,7 +93,7 @@ class Prepared:
     signal: Array  #: scaled residual, shape (T, joints of the features)
     target: Array  #: what the regressor should say, shape (T,)
     free: Bools  #: rows that are surely collision-free, shape (T,)
-    struck: Bools  #: rows with a collision that can be felt, shape (T,)
+    collision: Bools  #: rows with a collision that can be felt, shape (T,)
 
 
 #: Torques of joints 1, 2, ... that count alike in the training target; the last is repeated. Only
@@ -116,7 +116,7 @@ def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float
     The torques are lagged as the observer is, and weighted by :data:`ALIKE`. The unit is such that
     the peaks of x of the collisions have the median :data:`MEDIAN_SEVERITY`: arms of all sizes have
     the same targets. Labels 0/1 do not grow with torque and fail as a ranking. x / (1 + x) keeps
-    the target within [0, 1), so that hard blows do not spend the regressor's bounded weights.
+    the target within [0, 1), so that hard impacts do not spend the regressor's bounded weights.
 
     Args:
         traces: without truth the target is 0.
@@ -141,8 +141,8 @@ def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float
 def severity(target: Array) -> Array:
     """x of a target x / (1 + x), no more than that of :data:`HIGHEST`.
 
-    A regressor's output cannot exceed 1 by much however hard the blow. Peaks of x have a tail that
-    can be extrapolated, and at any speed a blow can exceed what free motion leaves.
+    A regressor's output cannot exceed 1 by much however hard the impact. Peaks of x have a tail
+    that can be extrapolated, and at any speed an impact can exceed what free motion leaves.
     """
     bounded = np.minimum(target, HIGHEST)
     found: Array = bounded / (1 - bounded)
@@ -189,24 +189,24 @@ def draw_windows(
     count: int,
     positive: float = 0.2,
 ) -> tuple[Array, Array]:
-    """Random windows and targets, a share ``positive`` of them from collisions.
+    """Random windows and targets, a fraction ``positive`` of them from collisions.
 
     Raises:
         ValueError: no collision, or no free motion, in the traces.
     """
     x, y = [], []
-    for name, share in (("struck", positive), ("free", 1 - positive)):
+    for name, fraction in (("collision", positive), ("free", 1 - positive)):
         masks = [getattr(p, name) for p in prepared]
         total = sum(int(m.sum()) for m in masks)
         if total == 0:
-            what = "collision" if name == "struck" else "collision-free row"
+            what = "collision" if name == "collision" else "collision-free row"
             raise ValueError(f"the training traces hold no {what}: both kinds are needed")
-        picks = np.sort(rng.choice(total, min(total, round(count * share)), replace=False))
+        picks = np.sort(rng.choice(total, min(total, round(count * fraction)), replace=False))
         start = 0
         for p, mask in zip(prepared, masks, strict=True):
             rows = np.flatnonzero(mask)
             own = rows[picks[(picks >= start) & (picks < start + len(rows))] - start]
             x.append(shape.of(p.signal, own))
-            y.append(p.target[own] if name == "struck" else np.zeros(len(own)))
+            y.append(p.target[own] if name == "collision" else np.zeros(len(own)))
             start += len(rows)
     return np.concatenate(x), np.concatenate(y)

@@ -46,11 +46,11 @@ Fitted = TypeVar("Fitted", bound=FittedPerJoint)
 class PerJoint(ABC, Generic[Fitted]):
     """Settings of a method that compares each joint's residual with a limit.
 
-    A limit is what collision-free motion exceeds in a share 1 - ``share`` of its samples.
+    A limit is what collision-free motion exceeds in a fraction 1 - ``fraction`` of its samples.
     """
 
     front: FrontEndSettings = field(default_factory=FrontEndSettings)
-    share: float = 0.999
+    fraction: float = 0.999
     name: ClassVar[str] = "per-joint"
 
     @abstractmethod
@@ -71,7 +71,7 @@ class PerJoint(ABC, Generic[Fitted]):
         scaling = self.scaling(front)
         rows = undisturbed_rows(traces, front.settle)
         free = [np.abs(front.scaled(t, scaling)[r]) for t, r in zip(traces, rows, strict=True)]
-        limits = np.maximum(np.quantile(np.concatenate(free), self.share, axis=0), 1e-9)
+        limits = np.maximum(np.quantile(np.concatenate(free), self.fraction, axis=0), 1e-9)
         return self.fitted(front, scaling, limits)
 
 
@@ -163,7 +163,7 @@ class Cusum(PerJoint["FittedCusum"]):
     for.
     """
 
-    share: float = 0.99
+    fraction: float = 0.99
     name: ClassVar[str] = "cusum"
 
     def fitted(self, front: FrontEnd, scaling: Scaling, limits: Array) -> FittedCusum:

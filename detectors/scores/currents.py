@@ -88,7 +88,7 @@ class CurrentThreshold:
 def _parts(current: Array, slow: float, follow: float, dt: float) -> tuple[Array, Array]:
     """The fast part, and how large it was up to the sample before, shape (T, n) each."""
     fast = current - smoothed(current, slow, dt)
-    # One sample late: a blow must not raise the threshold that it is compared with.
+    # One sample late: an impact must not raise the threshold that it is compared with.
     size = np.abs(np.concatenate([fast[:1], fast[:-1]]))
     return fast, smoothed(size, follow, dt)
 
@@ -263,9 +263,9 @@ class CurrentNetwork:
         total = sum(float(weight.sum()) for weight in lively)
         drawn = []
         for rows, weight in zip(free, lively, strict=True):
-            share = min(len(rows), int(np.ceil(self.rows * weight.sum() / total)))
-            if share:
-                rows = rng.choice(rows, share, replace=False, p=weight / weight.sum())
+            fraction = min(len(rows), int(np.ceil(self.rows * weight.sum() / total)))
+            if fraction:
+                rows = rng.choice(rows, fraction, replace=False, p=weight / weight.sum())
             drawn.append(np.sort(rows))
         return drawn
 

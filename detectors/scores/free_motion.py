@@ -1,6 +1,6 @@
 """A detector that learns from collision-free motion alone.
 
-Momentum observer at 30/s, slow errors (load, friction) tracked while joints move, and each joint's
+Momentum observer at 30/s, biases (load, friction) tracked while joints move, and each joint's
 bound (:mod:`~tauguard.detectors.features.free_bound`). The score is the largest ratio of a joint's
 signal to its bound; 1 is the threshold.
 
@@ -74,7 +74,7 @@ class Judged:
     qdd: Array  #: [rad/s^2], shape (T, n)
     ratio: Array  #: of each joint's signal to its bound, at most 1 until confirmed, shape (T, n)
     bound: Array  #: [N m], shape (T, n)
-    residual: Array  #: without slow errors [N m], shape (T, n)
+    residual: Array  #: without biases [N m], shape (T, n)
     rest: Bools  #: which joints are at rest, shape (T, n)
 
 

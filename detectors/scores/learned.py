@@ -114,7 +114,7 @@ class OneClass(Windowed):
     mined: int = 1_000  #: of the rarest collision-free moments, added in each of two rounds
     sigma: float = 3.0  #: of the SRQ kernel
     graded: bool = False
-    outside: float = 0.05  #: share of the training windows that may lie outside
+    outside: float = 0.05  #: fraction of the training windows that may lie outside
     name: ClassVar[str] = "one-class"
 
     def draw(
@@ -125,8 +125,8 @@ class OneClass(Windowed):
         x = []
         for p in prepared:
             rows = np.flatnonzero(p.free)
-            share = min(len(rows), -(-self.windows * len(rows) // total))
-            x.append(shape.of(p.signal, rng.choice(rows, share, replace=False)))
+            fraction = min(len(rows), -(-self.windows * len(rows) // total))
+            x.append(shape.of(p.signal, rng.choice(rows, fraction, replace=False)))
         return np.concatenate(x), np.zeros(sum(map(len, x)))
 
     def learn(self, x: Array, y: Array) -> Remoteness:

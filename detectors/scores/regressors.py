@@ -43,7 +43,7 @@ class Forest:
             trees: how many.
             depth: of each.
             rate: what each counts.
-            seed: of the half of the rows and the share of the columns that each tree sees.
+            seed: of the half of the rows and the fraction of the columns that each tree sees.
         """
         from sklearn.ensemble import GradientBoostingRegressor
 

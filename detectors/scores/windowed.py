@@ -35,7 +35,7 @@ from tauguard.detectors.features.windows import (
 from tauguard.detectors.scores.kernel import KernelMachine
 from tauguard.traces.trace import Trace
 
-#: Share of the samples of collision-free motion that may be beyond what counts one.
+#: Fraction of the samples of collision-free motion that may be beyond what counts one.
 RARE = 1e-3
 
 #: Windows that are evaluated at once: memory stays small.
@@ -129,7 +129,7 @@ class Windowed(ABC):
     def prepared(
         traces: Sequence[Trace], targets: Sequence[Array], front: FrontEnd, scaling: Scaling
     ) -> list[Prepared]:
-        """Training traces with their targets, and the rows that are free or surely struck."""
+        """Training traces with their targets, and the rows that are free or surely in collision."""
         return [
             Prepared(
                 front.scaled(trace, scaling),
@@ -150,14 +150,14 @@ class Windowed(ABC):
         self, prepared: Sequence[Prepared], shape: WindowShape, regressor: Regressor, dt: float
     ) -> Array:
         """The collision-free moments with the highest output, as many from every trace."""
-        share = -(-self.mined // len(prepared))
+        fraction = -(-self.mined // len(prepared))
         thin = max(1, shape.lag // 2)
         gap = max(1, round(self.mining_gap / dt) // thin)
         found = []
         for p in prepared:
             rows = np.flatnonzero(p.free)[::thin]
             if len(rows):
-                worst = peaks(evaluated(regressor, p.signal, shape, rows), share, gap)
+                worst = peaks(evaluated(regressor, p.signal, shape, rows), fraction, gap)
                 found.append(shape.of(p.signal, rows[worst]))
         return np.concatenate(found)
 

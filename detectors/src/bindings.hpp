@@ -1,4 +1,4 @@
-// What the binding files share: array types, checks.
+// What the binding files fraction: array types, checks.
 #pragma once
 
 #include <nanobind/nanobind.h>

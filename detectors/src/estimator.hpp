@@ -11,14 +11,14 @@
 //
 // An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is,
 // the less it says about the model, and the sooner it is a collision. The deviation is that of one
-// innovation; `lasting` is no part of it, or a held contact would be learned as a payload.
+// innovation; `inflation` is no part of it, or a held contact would be learned as a payload.
 //
 // Errors of the model last longer than the time between two corrections, each of which would take
-// them for news: the noise of a correction has `lasting` times its variance, or the filter soon
+// them for news: the noise of a correction has `inflation` times its variance, or the filter soon
 // trusts a wrong payload, and friction errors many times their deviation, more than what it sees.
 //
 // Where friction has just changed (a joint breaks away, stops or turns) the model is wrong by a
-// share `transition` of the change: a variance that is added to the noise's.
+// fraction `transition` of the change: a variance that is added to the noise's.
 //
 // What the unknowns do not explain counts less where payload or friction is uncertain (`weighted`):
 // it is divided by the deviation of noise, payload and change of friction together, in units of the
@@ -51,7 +51,7 @@ struct EstimatorSettings {
   std::vector<double> noise;        // standard deviation of the residual [N m], n
   double clip = 3.0;
   int every = 10;              // samples between two corrections
-  double lasting = 1.0;        // corrections that an error of the model lasts for
+  double inflation = 1.0;      // corrections that an error of the model lasts for
   double transition = 0.0;     // relative error of friction that has just changed
   bool weighted = false;       // see above; false: all of the unexplained residual counts
   std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
@@ -240,7 +240,7 @@ class Estimator {
     std::fill(row_.begin(), row_.end(), 0.0);
     for (int a = 0; a < payload_numbers; ++a) row_[a] = load_[payload_numbers * j + a];
     for (int a = 0; a < per_joint; ++a) row_[first + a] = own_[per_joint * j + a];
-    double variance = set_.lasting * (set_.noise[j] * set_.noise[j] + changed(j));
+    double variance = set_.inflation * (set_.noise[j] * set_.noise[j] + changed(j));
     for (std::size_t b = 0; b < m_; ++b) {
       double sum = 0.0;
       for (int a = 0; a < payload_numbers; ++a) sum += covariance_[b * m_ + a] * row_[a];
@@ -250,7 +250,7 @@ class Estimator {
     double believed = 0.0;
     for (std::size_t b = 0; b < m_; ++b) believed += row_[b] * gathered_[b];
     double innovation = residual_[j] - expected(j);
-    const double limit = set_.clip * std::sqrt(variance / set_.lasting + believed);
+    const double limit = set_.clip * std::sqrt(variance / set_.inflation + believed);
     variance += believed;
     if (std::fabs(innovation) > limit) innovation = limit * limit / innovation;
     for (std::size_t a = 0; a < m_; ++a) {

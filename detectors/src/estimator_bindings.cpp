@@ -96,7 +96,7 @@ void bind_estimator(nb::module_& m) {
           [](Estimator* self, const Chain& chain, const FrictionBasis& basis,
              const Numbers& drive_gain, const Numbers& gain, const Numbers& weights,
              const Numbers& deviation, const Numbers& persistence, const Numbers& noise,
-             double clip, int every, double lasting, double transition, bool weighted,
+             double clip, int every, double inflation, double transition, bool weighted,
              const Numbers& fusion, double plain_gain) {
             const std::size_t n = chain.joints.size(), unknown = payload_numbers + per_joint * n;
             require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
@@ -106,10 +106,10 @@ void bind_estimator(nb::module_& m) {
                     "Estimator: array lengths differ");
             new (self) Estimator(chain, basis,
                                  {drive_gain, gain, weights, deviation, persistence, noise, clip,
-                                  every, lasting, transition, weighted, fusion, plain_gain});
+                                  every, inflation, transition, weighted, fusion, plain_gain});
           },
           "chain"_a, "basis"_a, "drive_gain"_a, "gain"_a, "weights"_a, "deviation"_a,
-          "persistence"_a, "noise"_a, "clip"_a, "every"_a, "lasting"_a, "transition"_a,
+          "persistence"_a, "noise"_a, "clip"_a, "every"_a, "inflation"_a, "transition"_a,
           "weighted"_a, "fusion"_a, "plain_gain"_a)
       .def_prop_ro("started", &Estimator::started)
       .def(

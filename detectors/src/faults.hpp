@@ -37,8 +37,8 @@ struct Usual {
   std::int64_t repeats = 0;         // samples in a row in which no signal changes
   std::int64_t window = 0;          // samples over which velocities are summed
   std::vector<double> current;      // largest |current| [A]
-  double share = 0;                 // of the travel that position and velocity may differ by
-  double step_share = 0;            // the same over one sample, whose time stamp may be late
+  double fraction = 0;              // of the travel that position and velocity may differ by
+  double step_fraction = 0;         // the same over one sample, whose time stamp may be late
   std::vector<double> step;         // |change of q less qd dt| beyond that, over one sample [rad]
   std::vector<double> drift;        // the same summed over `window` samples [rad]
   std::vector<std::int64_t> stuck;  // samples in a row with one joint's current unchanged
@@ -148,10 +148,10 @@ class FaultCheck {
       errors_[row + j] = error;
       travels_[row + j] = travel;
       bends_[row + j] = bend;
-      if (std::fabs(error) > usual_.step[j] + usual_.step_share * std::fabs(travel) + bend)
+      if (std::fabs(error) > usual_.step[j] + usual_.step_fraction * std::fabs(travel) + bend)
         say(Fault::position_against_velocity, joint, error);
       if (std::fabs(sums_[j]) >
-          usual_.drift[j] + usual_.share * std::fabs(travelled_[j]) + bent_[j])
+          usual_.drift[j] + usual_.fraction * std::fabs(travelled_[j]) + bent_[j])
         say(Fault::position_against_velocity, joint, sums_[j]);
       unchanged_[j] = current[j] == lc[j] ? unchanged_[j] + 1 : 0;
       if (unchanged_[j] > usual_.stuck[j]) say(Fault::current_stuck, joint, current[j]);

@@ -18,8 +18,8 @@ std::tuple<int, int, double> numbers(const Verdict& v) {
 }
 
 FaultCheck* make_check(double dt, double longest, std::int64_t odd, double speed,
-                       std::int64_t repeats, std::int64_t window, double share, double step_share,
-                       In1 current, In1 step, In1 drift, Ids stuck) {
+                       std::int64_t repeats, std::int64_t window, double fraction,
+                       double step_fraction, In1 current, In1 step, In1 drift, Ids stuck) {
   const std::size_t n = current.shape(0);
   require(dt > 0 && longest > 0 && window > 0 && repeats > 0,
           "dt, longest, window, repeats: expected above 0");
@@ -32,8 +32,8 @@ FaultCheck* make_check(double dt, double longest, std::int64_t odd, double speed
                          repeats,
                          window,
                          values(current),
-                         share,
-                         step_share,
+                         fraction,
+                         step_fraction,
                          values(step),
                          values(drift),
                          {stuck.data(), stuck.data() + n}});
@@ -57,7 +57,7 @@ TorqueCheck* make_torques(In1 gain, In1 noise, double rate, In1 opposed, In1 lea
 void bind_faults(nb::module_& m) {
   nb::class_<FaultCheck>(m, "FaultCheck")
       .def(nb::new_(&make_check), "dt"_a, "longest"_a, "odd"_a, "speed"_a, "repeats"_a, "window"_a,
-           "share"_a, "step_share"_a, "current"_a, "step"_a, "drift"_a, "stuck"_a)
+           "fraction"_a, "step_fraction"_a, "current"_a, "step"_a, "drift"_a, "stuck"_a)
       .def(
           "step",
           [](FaultCheck& check, double t, In1 q, In1 qd, In1 current) {

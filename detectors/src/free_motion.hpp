@@ -9,11 +9,11 @@
 #include <cmath>
 #include <vector>
 
+#include "bias_filter.hpp"
 #include "chain.hpp"
 #include "friction.hpp"
 #include "observer.hpp"
 #include "regimes.hpp"
-#include "slow_errors.hpp"
 
 namespace tauguard::detectors {
 
@@ -47,7 +47,7 @@ class FreeMotion {
                     &ratio_, &bound_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_, &design_})
-      v->resize(SlowErrors::load * n_);
+      v->resize(BiasFilter::load * n_);
     for (Sample& s : last_) s.values.resize(3 * n_);
     reset();
   }
@@ -56,7 +56,7 @@ class FreeMotion {
   bool started() const { return count_ > 0 || started_; }
   const std::vector<double>& ratio() const { return ratio_; }
   const std::vector<double>& bound() const { return bound_; }
-  const std::vector<double>& residual() const { return left_; }  // without slow errors
+  const std::vector<double>& residual() const { return left_; }  // without biases
   const std::vector<double>& qdd() const { return qdd_; }
   bool rest(std::size_t j) const { return regimes_.rest(j); }
 
@@ -163,7 +163,7 @@ class FreeMotion {
   std::size_t n_;
   Workspace work_;
   std::vector<double> memory_, column_;
-  SlowErrors slow_;
+  BiasFilter slow_;
   Regimes regimes_;
   std::vector<double> sum_;
   std::vector<double> p_, beta_, p_before_, beta_before_, tau_, tau_before_, friction_,

@@ -112,12 +112,12 @@ class Monitor {
     return missing;
   }
 
-  void interpolate(double share, const double* q, const double* qd, const double* current) {
+  void interpolate(double fraction, const double* q, const double* qd, const double* current) {
     const double* now[3] = {q, qd, current};
     for (std::size_t part = 0; part < 3; ++part)
       for (std::size_t j = 0; j < n_; ++j) {
         const double before = last_[part * n_ + j];
-        between_[part * n_ + j] = before + share * (now[part][j] - before);
+        between_[part * n_ + j] = before + fraction * (now[part][j] - before);
       }
     const double *a = between_.data(), *b = a + n_, *c = b + n_;
     alarm_.step(a, b, c, alarm_.dt());

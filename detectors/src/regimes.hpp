@@ -9,7 +9,7 @@
 // change away from what was before counts, so that letting go is no new push. Other joints go on as
 // before.
 //
-// In motion the residual without slow errors counts. The bound is linear in speed and
+// In motion the residual without biases counts. The bound is linear in speed and
 // accelerations; while a joint starts, its friction is between static and sliding, and more is
 // allowed.
 //
@@ -80,7 +80,7 @@ class Regimes {
   }
 
   // Ratios of what counts to its bound, at most 1 until confirmed, and the bounds [N m]. `residual`
-  // is the observer's, `left` it less slow errors, `spread` the deviation that they leave, all
+  // is the observer's, `left` it less biases, `spread` the deviation that they leave, all
   // [N m], n.
   void judge(const double* residual, const double* left, const double* spread, const double* qd,
              const double* qdd, double dt, double* ratio, double* bound) {

@@ -24,7 +24,7 @@ from tauguard.arrays import Array
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.tail_model import BEYOND_CHANCE, Tail, shape_error
 
-#: Share of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
+#: Fraction of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
 TAIL = 0.05
 #: Bounds of the tail's shape where the peaks do not show that it ends, and the lowest if they do.
 SHAPES, LOWEST = (0.0, 0.5), -0.5
@@ -72,9 +72,9 @@ class ExpectedRate:
         """The expected rate [1/h]."""
         return float(np.mean(self.rates(threshold)))
 
-    def quantile(self, threshold: float, share: float) -> float:
-        """The rate that this share of the draws does not exceed [1/h]."""
-        return float(np.quantile(self.rates(threshold), share))
+    def quantile(self, threshold: float, fraction: float) -> float:
+        """The rate that this fraction of the draws does not exceed [1/h]."""
+        return float(np.quantile(self.rates(threshold), fraction))
 
     def interval(self, threshold: float, confidence: float = 0.95) -> tuple[float, float]:
         """The lowest and the highest rate that the motion allows [1/h]."""
@@ -99,7 +99,7 @@ class ExpectedRate:
 
         Args:
             per_hour: false alarms to accept, above 0.
-            confidence: take the threshold that is enough for this share of the draws; ``None``:
+            confidence: take the threshold that is enough for this fraction of the draws; ``None``:
                 the one expected.
 
         Raises:

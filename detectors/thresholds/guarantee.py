@@ -22,8 +22,8 @@ import numpy as np
 from tauguard.detectors.thresholds.free_scores import FreeScores
 
 #: Alarms of an alarmed episode are counted at the threshold that so many episodes exceed, or this
-#: share of all if that is fewer.
-COUNTED, SHARE = 30, 0.25
+#: fraction of all if that is fewer.
+COUNTED, FRACTION = 30, 0.25
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def guaranteed_threshold(
     count = len(episodes)
     hours = sum(e.seconds for e in episodes) / 3600
     peaks = np.sort([e.peak for e in episodes])[::-1]
-    several, counted = 0.0, min(COUNTED, int(SHARE * count))
+    several, counted = 0.0, min(COUNTED, int(FRACTION * count))
     # Counted where at least as many episodes alarm as will: alarms an episode only grow from there.
     while (now := _alarms_an_episode(episodes, float(peaks[counted]))) > several:
         several = now

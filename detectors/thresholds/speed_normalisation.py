@@ -21,7 +21,7 @@ MEMORY = 0.5
 #: Speeds with levels of their own, and blocks that each of them needs at least.
 BINS, FEWEST = 10, 40
 
-#: Share of a speed's blocks whose peaks are its tail.
+#: Fraction of a speed's blocks whose peaks are its tail.
 TAIL = 0.1
 
 

@@ -99,7 +99,7 @@ def tail_level(peaks: Array, allowed: float, count: int) -> float:
     return Tail.of(peaks, count).level(allowed)
 
 
-#: Share of the blocks whose peaks the tail is fitted to.
+#: Fraction of the blocks whose peaks the tail is fitted to.
 TAIL = 0.05
 
 

@@ -96,7 +96,9 @@ def test_golden_scores(detector, unseen):
     score = detector.scores(first(unseen[0], 6_000))
     # Training runs through BLAS, whose last bits depend on the processor. Boosting's trees choose
     # other splits when the true torque moves by 3e-10 N m: its scores then differ by up to .0065.
-    relative = 2e-2 if detector.name == "boosting" else 1e-6
+    # The iterations that identify a real arm stop at 1e-7 of their cost: BLAS with one thread moves
+    # the scores of free motion by 4e-6.
+    relative = {"boosting": 2e-2, "free-motion": 1e-4}.get(detector.name, 1e-6)
     golden = GOLDEN["scores"][detector.name]
     np.testing.assert_allclose(score[GOLDEN["rows"]], golden, relative, 1e-9)
 

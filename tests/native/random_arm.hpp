@@ -75,7 +75,7 @@ inline EstimatorSettings settings_of(Random& random, std::size_t n, std::size_t 
   s.deviation = adapts ? uniforms(random, unknowns, 0, 1) : Numbers(unknowns, 0.0);
   s.persistence = uniforms(random, unknowns, 1, 60), s.noise = uniforms(random, n, 0.1, 1);
   s.every = 1 + static_cast<int>(random() % 10), s.weighted = random() % 2;
-  s.lasting = random() % 2 ? 20 : 1, s.transition = random() % 2 ? 0.1 : 0;
+  s.inflation = random() % 2 ? 20 : 1, s.transition = random() % 2 ? 0.1 : 0;
   if (adapts && random() % 2) s.fusion = uniforms(random, n * VelocityFusion::gain_numbers, 0, 0.5);
   return s;
 }

@@ -137,7 +137,7 @@ def test_the_usual_rule():
 
 def test_moments_end_with_the_strongest_and_leave_out_the_weak():
     level = np.array([0.0, 1, 5, 9, 10, 8, 3, 1])
-    rows = moments(level, most=3, share=0.4)
+    rows = moments(level, most=3, fraction=0.4)
     assert rows[-1] == 4
     assert set(rows.tolist()) <= {2, 3, 4, 5}
     assert moments(np.zeros(3))[-1] == 0

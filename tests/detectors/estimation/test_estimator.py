@@ -102,7 +102,7 @@ def test_an_error_that_lasts_is_not_taken_for_friction_that_changed(training, al
     current = trace.current + held * arm.noise / arm.drive_gain
     worst = {}
     for lasting in (1.0, 20.0):
-        estimator = Estimator(arm, unknowns=Unknowns(lasting=lasting))
+        estimator = Estimator(arm, unknowns=Unknowns(noise_inflation=lasting))
         clean, disturbed = (
             estimator.run(trace.t, trace.q, trace.qd, c, keep=True).unknowns
             for c in (trace.current, current)
@@ -130,7 +130,7 @@ def test_a_held_contact_is_not_learned(training, alarm, joint):
     assert seen[np.searchsorted(t, 4.6)].max() < 2
 
 
-@pytest.mark.parametrize("wrong", [{"lasting": 0.5}, {"transition": -1.0}])
+@pytest.mark.parametrize("wrong", [{"noise_inflation": 0.5}, {"transition": -1.0}])
 def test_what_unknowns_may_be(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):
         Unknowns(**wrong)

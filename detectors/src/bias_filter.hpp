@@ -3,7 +3,7 @@
 // A Kalman filter on the observer's residual. The unknowns are the load's mass and first moment in
 // the last link's frame, and of each joint a relative error of its friction and a torque offset;
 // all are forgotten towards the calibration. Only joints in motion correct them: static friction
-// may hold any torque, so a joint at rest says nothing of the load. A push is no slow error: an
+// may hold any torque, so a joint at rest says nothing of the load. A push is no bias: an
 // innovation z of more than `clip` standard deviations c counts as c^2 / z.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace tauguard::detectors {
 
-class SlowErrors {
+class BiasFilter {
  public:
   static constexpr std::size_t load = 4;  // mass [kg] and first moment [kg m]
   // Standard deviations of a joint's relative friction error, and of its offset per friction level.
@@ -28,7 +28,7 @@ class SlowErrors {
   static constexpr double started = 0.3;  // a joint counts so long after its start [s]
 
   // `level` of each joint's friction [N m]; deviations of the load [kg] and its moment [kg m].
-  SlowErrors(const std::vector<double>& level, double mass, double moment)
+  BiasFilter(const std::vector<double>& level, double mass, double moment)
       : n_(level.size()), m_(load + 2 * n_), deviation_(m_), noise_(n_), gain_(m_) {
     for (std::size_t a = 0; a < load; ++a) deviation_[a] = a ? moment : mass;
     for (std::size_t j = 0; j < n_; ++j) {
@@ -46,7 +46,7 @@ class SlowErrors {
     since_ = 0.0;
   }
 
-  // The residual less the slow errors, in `left`, and the deviation that they leave, in `spread`.
+  // The residual less the biases, in `left`, and the deviation that they leave, in `spread`.
   // `loads` is the residual's change per unit of the load, n x 4; `friction` per relative error of
   // each joint's friction; `moved` how long each joint has been in motion [s].
   void step(const double* residual, const double* loads, const double* friction,
