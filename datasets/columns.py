@@ -13,6 +13,8 @@ Column = str | int
 
 #: Fields of a map that name a column a joint.
 SIGNALS = ("q", "qd", "current", "torque", "q_des", "qd_des", "qdd_des")
+#: What :attr:`ColumnMap.repair` may name.
+REPAIRS = ("repeat", "tail", "nan", "state", "order")
 UR_JOINTS = (
     "shoulder_pan_joint",
     "shoulder_lift_joint",
@@ -41,13 +43,17 @@ class ColumnMap:
     degrees: bool = False  #: angles, their speeds and accelerations are in degrees
     time_scale: float = 1.0  #: seconds in one unit of the time column (1e-3: milliseconds)
     current_scale: float | tuple[float, ...] = 1.0  #: amperes in one unit, a number or one a joint
+    torque_scale: float | tuple[float, ...] = 1.0
+    """N m in one unit, a number or one a joint; -1 where the log's sign is not the robot file's."""
     separator: str = ","
     joint_names: tuple[str, ...] = ()  #: empty: not known
     width: int | None = None  #: number of columns of every row; None: not known
     headerless: bool = False  #: files have no header line; one with a header is refused
     repair: frozenset[str] = field(default_factory=frozenset)
-    """Faults whose rows may be dropped, of "repeat" (a row with the time of the one before), "tail"
-    (a last row that is cut off) and "nan" (a row with a number that is missing or not finite)."""
+    """Faults that may be mended, of "repeat" (a row with the time of the one before is dropped),
+    "tail" (a last row that is cut off), "nan" (a row with a number that is missing or not finite),
+    "state" (a row that repeats the whole state of the one before, as a recorder does that is faster
+    than its robot) and "order" (rows are sorted by time)."""
 
     def __post_init__(self) -> None:
         """Check that all joints have their columns.
@@ -62,13 +68,15 @@ class ColumnMap:
         for name, group in self.groups().items():
             if len(group) != joints:
                 raise ValueError(f"columns.{name}: {len(group)} columns for {joints} joints")
-        if not isinstance(self.current_scale, float | int) and len(self.current_scale) != joints:
-            raise ValueError(f"columns.current_scale: one number or {joints}")
+        for name in ("current_scale", "torque_scale"):
+            scale = getattr(self, name)
+            if not isinstance(scale, float | int) and len(scale) != joints:
+                raise ValueError(f"columns.{name}: one number or {joints}")
         if bool(self.current) == bool(self.torque):
             raise ValueError("columns: give either current [A] or torque [N m]")
-        unknown = self.repair - {"repeat", "tail", "nan"}
+        unknown = self.repair - set(REPAIRS)
         if unknown:
-            raise ValueError(f"columns.repair: {sorted(unknown)}; known: repeat, tail, nan")
+            raise ValueError(f"columns.repair: {sorted(unknown)}; known: {', '.join(REPAIRS)}")
 
     def _check_types(self) -> None:
         """Refuse wrong types: the text "false" would count as true."""
@@ -78,8 +86,10 @@ class ColumnMap:
                 raise ValueError(f"column {column!r}: expected a name or a number from 0")
         if not isinstance(self.degrees, bool):
             raise ValueError(f"columns.degrees: {self.degrees!r}, expected true or false")
-        one = self.current_scale
-        for scale in (self.time_scale, *(one if isinstance(one, tuple | list) else (one,))):
+        scales: list[object] = [self.time_scale]
+        for one in (self.current_scale, self.torque_scale):
+            scales += one if isinstance(one, tuple | list) else (one,)
+        for scale in scales:
             if isinstance(scale, bool) or not (isinstance(scale, float | int) and abs(scale) > 0):
                 raise ValueError(f"columns: {scale!r} as a scale, expected a number, not 0")
         if not (isinstance(self.separator, str) and len(self.separator) == 1):
@@ -135,6 +145,24 @@ PRESETS = {
         joint_names=UR_JOINTS,
         repair=frozenset({"repeat", "tail"}),
     ),
+    # Franka's arms by the names of libfranka's RobotState, with joint torque sensors [N m].
+    "franka": ColumnMap(
+        t="time",
+        q=numbered("q", 7),
+        qd=numbered("dq", 7),
+        torque=numbered("tau_J", 7),
+        repair=frozenset({"repeat", "tail", "state"}),
+    ),
+    # A KUKA LBR by sensor_msgs/JointState, with joint torque sensors [N m]. Its efforts are the
+    # torques that hold the arm with the other sign: gravity's share is -0.8 to -0.95 in a Med 7's.
+    "lbr": ColumnMap(
+        t="t",
+        q=numbered("q", 7, 1),
+        qd=numbered("qd", 7, 1),
+        torque=numbered("effort", 7, 1),
+        torque_scale=-1.0,
+        repair=frozenset({"repeat", "tail", "state"}),
+    ),
 }
 
 
@@ -160,7 +188,7 @@ def column_map(columns: str | None) -> ColumnMap | str | None:
         ValueError: no such file, or not the fields of a :class:`ColumnMap`.
     """
     if columns is None or not columns.endswith(".json"):
-        return columns
+        return columns  # "auto" is recognised from the file itself
     if not Path(columns).is_file():
         raise ValueError(f"{columns}: no such file; presets are {', '.join(PRESETS)}")
     fields = read_json(columns)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -15,8 +16,15 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.datasets.columns import PRESETS, Column, ColumnMap, presets_of, presets_of_width
 from tauguard.datasets.log_checks import checked
+from tauguard.datasets.recognition import described, recognised
 from tauguard.traces.trace import Trace
 from tauguard.untrusted_input import reading
+
+#: Rows at a file's beginning from which units are told.
+LOOKED_AT = 5000
+#: Rows that repeat the state are left out where they are this share, or more: a recorder that is
+#: faster than its robot. Below it, a standing arm repeats its numbers by chance.
+REPEATED = 0.2
 
 
 @dataclass(frozen=True)
@@ -38,8 +46,8 @@ def read_log(
         path: a ``.csv`` file, or an ``.mcap`` file: one written by tauguard, or one of a ROS 2
             system whose ``JointState`` messages hold the motor currents in ``effort``.
             If they are joint torques, set ``meta["effort"]`` of the trace to "torque".
-        columns: for CSV, a map or the name of a preset (see ``PRESETS``); without one the header
-            line must be that of a preset.
+        columns: for CSV, a map, the name of a preset (see ``PRESETS``), or "auto" for what names
+            and numbers suggest; without one the header line must be that of a preset.
         joint_names: what the joints are called, in the order of the columns (default: the map's
             names, the messages' names, or joint_1, joint_2, ...); for MCAP also which joints.
 
@@ -60,7 +68,7 @@ def read_log(
                 from tauguard.datasets.logs_mcap import read_joint_states
 
                 return read_joint_states(path, joint_names)
-            return read_csv(path, chosen(columns, path), joint_names)
+            return read_csv(path, chosen(columns, path), joint_names, columns == "auto")
         except UnicodeDecodeError as error:
             raise ValueError("not a text file; expected CSV or MCAP") from error
         except csv.Error as error:
@@ -71,20 +79,45 @@ def chosen(columns: ColumnMap | str | None, path: Path) -> ColumnMap:
     """The map itself, the preset of that name, or the preset that fits the header line."""
     if isinstance(columns, ColumnMap):
         return columns
-    if columns is not None:
+    if columns is not None and columns != "auto":
         if columns not in PRESETS:
-            raise ValueError(f"columns {columns!r}: presets are {', '.join(PRESETS)}")
+            raise ValueError(f"columns {columns!r}: presets are {', '.join(PRESETS)}, or auto")
         return PRESETS[columns]
     with open(path, newline="") as stream:
         first = next(csv.reader(stream), [])
     names = {cell.strip() for cell in first}
     for name in presets_of(names):
         return PRESETS[name]
-    raise ValueError(f"no column map: give one, or a preset: {', '.join(PRESETS)}")
+    found = recognised(*_beginning(path))
+    if found is not None and columns == "auto":
+        return found
+    known = f"give a column map, or a preset: {', '.join(PRESETS)}"
+    if found is None:
+        raise ValueError(
+            f"no column map, and no time, positions and efforts found among the columns: {known}"
+        )
+    raise ValueError(
+        f"no column map; it looks like {described(found)}: accept with --columns auto; or {known}"
+    )
 
 
-def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) -> Log:
-    """A CSV file as a trace; see :func:`read_log`."""
+def _beginning(path: Path) -> tuple[list[str], Array]:
+    """Names of the columns, and the numbers of the first rows, NaN for what is none."""
+    with open(path, newline="", encoding="utf-8-sig") as stream:
+        rows = list(islice((row for row in csv.reader(stream) if row), LOOKED_AT + 1))
+    header = [cell.strip() for cell in rows[0]] if rows else []
+    table = np.full((max(len(rows) - 1, 0), len(header)), np.nan)
+    for k, row in enumerate(rows[1:]):
+        for i, cell in enumerate(row[: len(header)]):
+            value = number(cell)
+            table[k, i] = np.nan if value is None else value
+    return header, table
+
+
+def read_csv(
+    path: Path, columns: ColumnMap, joint_names: Sequence[str] | None, auto: bool = False
+) -> Log:
+    """A CSV file as a trace; see :func:`read_log`. ``auto``: a note says what the columns are."""
     with open(path, newline="", encoding="utf-8-sig") as stream:
         rows = [
             (n, r) for n, r in enumerate(csv.reader(stream, delimiter=columns.separator), 1) if r
@@ -120,18 +153,29 @@ def read_csv(path: Path, columns: ColumnMap, joint_names: Sequence[str] | None) 
     ends = np.cumsum([len(group) for group in where.values()])[:-1]
     parts = dict(zip(where, np.split(table, ends, axis=1), strict=True))
     t = parts.pop("t")[:, 0] * columns.time_scale
+    if "order" in columns.repair and (np.diff(t) < 0).any():
+        order = np.argsort(t, kind="stable")
+        notes.append(f"{int((np.diff(t) < 0).sum())} times a row is earlier than the last: sorted")
+        t, lines = t[order], lines[order]
+        parts = {name: value[order] for name, value in parts.items()}
     keep = increasing(t, lines, columns, notes)
+    if "state" in columns.repair:
+        keep = fresh(t, np.column_stack(list(parts.values())), keep, notes)
     signals: dict[str, Any] = {
         name: np.ascontiguousarray(value[keep]) for name, value in parts.items()
     }
     meta = {"log": path.name}
     if preset := [name for name, known in PRESETS.items() if known == columns]:
         meta["columns"] = preset[0]
+    elif auto:
+        notes.insert(0, f"read as {described(columns)}")
     if columns.torque:
         meta["effort"] = "torque"
     else:
         signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
     efforts = signals.pop("torque", None)
+    if efforts is not None:
+        efforts = efforts * np.asarray(columns.torque_scale, float)
     if columns.degrees:
         signals |= {n: np.deg2rad(v) for n, v in signals.items() if n != "current"}
     if efforts is not None:
@@ -272,3 +316,32 @@ def increasing(
             f"{same.size} rows with a repeated time left out, first: line {lines[same[0] + 1]}"
         )
     return np.concatenate([[True], step > 0])
+
+
+def fresh(t: Array, state: Array, keep: NDArray[np.bool_], notes: list[str]) -> NDArray[np.bool_]:
+    """Rows to keep so that a recorder's copies of one state do not count as samples.
+
+    A difference quotient over copies is 0, and then twice the speed. A state that really stays is
+    kept at the usual interval of new ones.
+
+    Args:
+        t: times [s], shape (T,).
+        state: all signals, shape (T, columns).
+        keep: rows that count, shape (T,).
+        notes: gets a line.
+    """
+    rows = np.flatnonzero(keep)
+    new = np.concatenate([[True], (np.diff(state[rows], axis=0) != 0).any(axis=1)])
+    share = 1 - new.mean()
+    if share < REPEATED or new.sum() < 3:
+        return keep
+    usual = float(np.median(np.diff(t[rows][new])))
+    kept, last = np.zeros_like(keep), -np.inf
+    for row, is_new in zip(rows, new, strict=True):
+        if is_new or t[row] - last > 1.4 * usual:
+            kept[row], last = True, t[row]
+    notes.append(
+        f"{100 * share:.0f} % of the rows repeat the state before: left out, a state comes every "
+        f"{1e3 * usual:.3g} ms"
+    )
+    return kept

@@ -78,9 +78,10 @@ def command(
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
         robot: URDF or MJCF file of the arm alone.
-        columns: of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3) or a JSON file with the fields
-            of tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], "torque":
-            ["tau1", "tau2"]}; numbers instead of names count columns from 0.
+        columns: of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto for what the
+            names and numbers suggest, or a JSON file with the fields of
+            tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], "torque": ["tau1",
+            "tau2"]}; numbers instead of names count columns from 0.
         model: a detector that `tauguard train` wrote, for an arm and a rate like the log's.
         payload: what the arm carries, as KG or KG,X,Y,Z (centre in the last link's frame, m), for
             a model of `train --free`; 0 for nothing. Without it a load is found from the motion,

@@ -1,0 +1,129 @@
+"""Which columns of a CSV file are which: proposed from their names and numbers.
+
+Names come in groups that differ by a joint's number, such as ``q0`` to ``q6``, ``actual_q_0`` or
+``/joint_states/position[0]``. A group is told by its last word; groups of commands are not taken.
+What a name leaves open, numbers decide: angles beyond two turns are degrees, steps of time of more
+than half a second are milliseconds or less.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.datasets.columns import ColumnMap
+
+#: Last words of a group's name, by the field of the map.
+WORDS = {
+    "q": ("q", "position", "positions", "pos", "angle", "joint_position", "joint_positions"),
+    "qd": ("qd", "dq", "velocity", "velocities", "vel", "speed", "qdot", "joint_velocity"),
+    "torque": ("tau_j", "tau", "torque", "torques", "effort", "efforts", "joint_torque"),
+    "current": ("i", "current", "currents", "amps", "joint_current", "actual_current"),
+}
+TIMES = ("t", "time", "timestamp", "stamp", "seconds", "sec", "duration", "__time", "time_s")
+#: Positions beyond this are degrees [rad]; currents beyond this are milliamperes [A].
+TURNS, AMPERES = 4 * np.pi, 100.0
+#: Units of the time column, by the shortest usual step that they give.
+CLOCKS = ((5e4, 1e-9), (50.0, 1e-6), (0.5, 1e-3), (0.0, 1.0))
+#: A name with such a word is of a command, not of a measurement.
+_COMMANDED = re.compile(r"(^|_)(target|desired|des|command|cmd|goal|ref|reference|control)(_|$)")
+_NUMBER = re.compile(r"^(.*?)[\[_.(/ ]*?(\d{1,2})[\])]?$")
+#: Joints of an arm, at least and at most.
+FEWEST, MOST = 2, 16
+
+
+def grouped(header: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Columns that differ by their last number, which rises by one, by the name before it."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for name in header:
+        if match := _NUMBER.match(name):
+            found.setdefault(match.group(1), []).append((int(match.group(2)), name))
+    out = {}
+    for prefix, columns in found.items():
+        columns.sort()
+        first = columns[0][0]
+        if [n for n, _ in columns] == list(range(first, first + len(columns))):
+            out[prefix] = tuple(name for _, name in columns)
+    return out
+
+
+def _field(prefix: str) -> str | None:
+    plain = re.sub(r"[^a-z0-9]+", "_", prefix.lower()).strip("_")
+    if _COMMANDED.search(plain):
+        return None
+    for field, words in WORDS.items():
+        if plain in words or any(
+            plain.endswith("_" + word) for word in words if len(word) > 1 or word == "q"
+        ):
+            return field
+    return None
+
+
+def recognised(header: Sequence[str], table: Array) -> ColumnMap | None:
+    """The map that names and numbers suggest, None if positions, efforts or the time are not found.
+
+    Args:
+        header: names of all columns.
+        table: numbers of some rows, NaN where there is none, shape (rows, columns).
+    """
+    time = next((name for name in header if name.strip().lower() in TIMES), None)
+    groups: dict[str, tuple[str, ...]] = {}
+    for prefix, columns in grouped(header).items():
+        field = _field(prefix)
+        if field and FEWEST <= len(columns) <= MOST and field not in groups:
+            groups[field] = columns
+    effort = next((f for f in ("torque", "current") if f in groups), None)
+    if time is None or "q" not in groups or effort is None:
+        return None
+    joints = len(groups["q"])
+    if len(groups[effort]) != joints or len(groups.get("qd", groups["q"])) != joints:
+        return None
+
+    def numbers(columns: Sequence[str]) -> Array:
+        return table[:, [list(header).index(name) for name in columns]]
+
+    def largest(columns: Sequence[str]) -> float:
+        values = np.abs(numbers(columns))
+        return float(values[np.isfinite(values)].max(initial=0.0))
+
+    t = numbers([time])[:, 0]
+    steps = np.abs(np.diff(t[np.isfinite(t)]))
+    steps = steps[steps > 0]
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    repair = {"repeat", "tail", "state"} | ({"order"} if (np.diff(t) < 0).any() else set())
+    milli = effort == "current" and largest(groups["current"]) > AMPERES
+    return ColumnMap(
+        t=time,
+        q=groups["q"],
+        qd=groups.get("qd", ()),
+        current=groups["current"] if effort == "current" else (),
+        torque=groups["torque"] if effort == "torque" else (),
+        degrees=largest(groups["q"]) > TURNS,
+        time_scale=next(scale for least, scale in CLOCKS if usual >= least),
+        current_scale=1e-3 if milli else 1.0,
+        repair=frozenset(repair),
+    )
+
+
+def described(columns: ColumnMap) -> str:
+    """A map in one line, for the user to agree to."""
+    unit = {1.0: "s", 1e-3: "ms", 1e-6: "us", 1e-9: "ns"}[columns.time_scale]
+    angle = "deg" if columns.degrees else "rad"
+    ampere = "mA" if columns.current_scale == 1e-3 else "A"
+    parts = [f"time {columns.t} [{unit}]", f"positions {_span(columns.q)} [{angle}]"]
+    parts.append(f"velocities {_span(columns.qd)} [{angle}/s]" if columns.qd else "no velocities")
+    parts.append(
+        f"joint torques {_span(columns.torque)} [N m]"
+        if columns.torque
+        else f"currents {_span(columns.current)} [{ampere}]"
+    )
+    if "order" in columns.repair:
+        parts.append("rows sorted by time")
+    return ", ".join(parts)
+
+
+def _span(names: Sequence[object]) -> str:
+    return f"{names[0]} to {names[-1]}"

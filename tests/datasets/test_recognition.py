@@ -1,0 +1,163 @@
+"""What a log's columns are is told from names and numbers; copies of one state are no samples."""
+
+import numpy as np
+import pytest
+
+from tauguard.datasets.columns import ColumnMap, numbered
+from tauguard.datasets.logs import read_csv, read_log
+from tauguard.datasets.recognition import described, grouped, recognised
+
+
+def motion(rows=400, dt=0.01, joints=2):
+    t = dt * np.arange(rows)
+    phase = np.arange(joints)
+    q = 0.8 * np.sin(1.1 * t[:, None] + phase)
+    return t, q, 0.88 * np.cos(1.1 * t[:, None] + phase), 3 * np.cos(t[:, None] + phase)
+
+
+def written(path, names, *parts):
+    table = np.column_stack(parts)
+    np.savetxt(path, table, delimiter=",", fmt="%.10g", header=",".join(names), comments="")
+    return path
+
+
+def test_columns_are_grouped_by_their_last_number():
+    found = grouped(
+        ["time", "actual_q_0", "actual_q_1", "x1", "x3", "/j/effort[0]", "/j/effort[1]"]
+    )
+    assert found == {
+        "actual_q": ("actual_q_0", "actual_q_1"),
+        "/j/effort": ("/j/effort[0]", "/j/effort[1]"),
+    }
+
+
+def pairs(*names):
+    """Two columns of each signal."""
+    return [name.replace("#", str(k)) for name in names for k in range(2)]
+
+
+FRANKA = ("q", "q_d", "dq", "tau_J", "dtau_J", "tau_ext_hat_filtered")
+JOINT_STATE = ("position", "velocity", "effort")
+UR = ("actual_q_#", "target_current_#", "actual_current_#")
+
+
+@pytest.mark.parametrize(
+    ("names", "fields"),
+    [
+        (
+            ["duration", *pairs(*(f"state.{name}[#]" for name in FRANKA))],
+            {"q": "state.q[1]", "qd": "state.dq[1]", "torque": "state.tau_J[1]"},
+        ),
+        (
+            ["__time", *pairs(*(f"/joint_states/{name}[#]" for name in JOINT_STATE))],
+            {
+                "q": "/joint_states/position[1]",
+                "qd": "/joint_states/velocity[1]",
+                "torque": "/joint_states/effort[1]",
+            },
+        ),
+        (["timestamp", *pairs(*UR)], {"q": "actual_q_1", "current": "actual_current_1"}),
+    ],
+)
+def test_measured_signals_are_found_among_commanded_ones(names, fields):
+    table = np.random.default_rng(0).uniform(-1, 1, (50, len(names)))
+    table[:, 0] = 0.01 * np.arange(50)
+    found = recognised(names, table)
+    assert {name: group[1] for name, group in found.groups().items()} == fields
+
+
+def test_nothing_is_proposed_where_something_lacks():
+    table = np.zeros((5, 4))
+    assert recognised(["t", "q1", "q2", "x"], table) is None
+    assert recognised(["q1", "q2", "tau1", "tau2"], table) is None
+    assert recognised(["t", "q1", "q2", "tau1"], table) is None
+
+
+@pytest.mark.parametrize("accepted", [False, True])
+def test_units_and_order_are_proposed_and_read_when_accepted(tmp_path, accepted):
+    t, q, qd, current = motion()
+    order = np.arange(len(t))
+    order[[100, 101]] = order[[101, 100]]
+    names = ["stamp", "pos_1", "pos_2", "vel_1", "vel_2", "current_1", "current_2"]
+    parts = (1e3 * t, np.rad2deg(q), np.rad2deg(qd), 1e3 * current)
+    path = written(tmp_path / "log.csv", names, *(part[order] for part in parts))
+    if not accepted:
+        with pytest.raises(ValueError, match="accept with --columns auto") as error:
+            read_log(path)
+        assert "time stamp [ms], positions pos_1 to pos_2 [deg]" in str(error.value)
+        assert "currents current_1 to current_2 [mA], rows sorted by time" in str(error.value)
+        return
+    log = read_log(path, "auto")
+    np.testing.assert_allclose(log.trace.t, t, atol=1e-9)
+    np.testing.assert_allclose(log.trace.q, q, atol=1e-8)
+    np.testing.assert_allclose(log.trace.qd, qd, atol=1e-8)
+    np.testing.assert_allclose(log.trace.current, current, atol=1e-8)
+    assert log.notes[0].startswith("read as time stamp [ms]")
+    assert "1 times a row is earlier" in log.notes[1]
+
+
+def test_copies_of_a_state_are_left_out_and_a_standing_arm_keeps_its_samples(tmp_path):
+    t, q, qd, tau = motion(rows=600, dt=0.005)
+    rows = np.arange(600)
+    # A state every 10 ms, recorded every 5 ms; the arm stands still for half a second.
+    source = np.where(rows < 300, rows, np.maximum(300, rows - 100)) // 2 * 2
+    columns = ColumnMap(
+        "t",
+        numbered("q", 2),
+        numbered("v", 2),
+        torque=numbered("f", 2),
+        repair=frozenset({"state"}),
+    )
+    names = ["t", *columns.q, *columns.qd, *columns.torque]
+    speed = np.where((rows >= 300) & (rows < 400), 0.0, 1.0)[:, None] * qd[source]
+    path = written(tmp_path / "log.csv", names, t, q[source], speed, tau[source])
+    log = read_csv(path, columns, None)
+    # Every second row, but every third while it stands.
+    assert len(log.trace.t) == pytest.approx(275, abs=10)
+    assert np.diff(log.trace.t).max() <= 0.015 + 1e-9
+    moving = log.trace.t < 1.5
+    np.testing.assert_allclose(log.trace.t[moving], 0.01 * np.arange(moving.sum()), atol=1e-9)
+    assert "58 % of the rows repeat the state before" in log.notes[0]
+
+
+def test_a_fast_log_of_an_arm_that_rarely_repeats_keeps_all_rows(tmp_path):
+    t, q, qd, tau = motion()
+    source = np.arange(400)
+    source[50:60] = 50
+    names = ["time", "q0", "q1", "dq0", "dq1", "tau_J0", "tau_J1"]
+    path = written(tmp_path / "log.csv", names, t, q[source], qd[source], tau[source])
+    assert len(read_log(path, "auto").trace.t) == 400
+
+
+def test_torques_of_the_other_sign_are_turned(tmp_path):
+    t, q, qd, tau = motion()
+    names = ["t", "q0", "q1", "v0", "v1", "f0", "f1"]
+    path = written(tmp_path / "log.csv", names, t, q, qd, tau)
+    signals = {"q": ("q0", "q1"), "qd": ("v0", "v1"), "torque": ("f0", "f1")}
+    trace = read_log(path, ColumnMap("t", **signals, torque_scale=(-1.0, 1e-3))).trace
+    np.testing.assert_allclose(trace.current, tau * [-1.0, 1e-3], atol=1e-8)
+    for bad in (0.0, (1.0,), True):
+        with pytest.raises(ValueError, match=r"torque_scale|as a scale"):
+            ColumnMap("t", **signals, torque_scale=bad)
+
+
+def test_a_map_is_said_in_one_line():
+    columns = ColumnMap("t", ("a1", "a2"), torque=("b1", "b2"), time_scale=1e-9)
+    assert described(columns) == (
+        "time t [ns], positions a1 to a2 [rad], no velocities, joint torques b1 to b2 [N m]"
+    )
+
+
+@pytest.mark.data
+@pytest.mark.parametrize(
+    ("file", "preset", "share"),
+    [("panda_touch/a4.csv", "franka", "55 %"), ("kuka_med7/joint_states.csv", "lbr", "75 %")],
+)
+def test_real_logs_of_arms_with_torque_sensors_are_recognised(data_dir, file, preset, share):
+    if not (data_dir / file).is_file():
+        pytest.skip(f"no {file} in the real data")
+    log = read_log(data_dir / file)
+    assert log.trace.meta["columns"] == preset
+    assert log.trace.meta["effort"] == "torque"
+    assert any(f"{share} of the rows repeat the state before" in note for note in log.notes)
+    assert log.trace.dt == pytest.approx(0.01, rel=0.05)
