@@ -163,9 +163,10 @@ def judged(a: Solid, b: Solid, power: int) -> Judged:
     truth, size = exact_distance(a, b, 0), extent(a, b, 0)
     forms = [(a, b), swapped(a, b), scaled(power)(a, b), permuted(a, b)]
     got = np.array([distance(*form).distance[0] for form in forms])
+    # Before the scale is taken back: the least double above zero would be zero after it.
+    wrong = int((np.sign(got) != np.sign(truth)).sum())
     got[2] *= 2.0**-power
     error: NDArray[Any] = np.abs(got - truth)
-    wrong = int((np.sign(got) != np.sign(truth)).sum())
     share = float(error.max()) / size if size else float(np.inf if error.any() else 0.0)
     return Judged(share, wrong, len(forms))
 

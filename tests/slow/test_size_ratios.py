@@ -66,8 +66,15 @@ def test_times_of_impact(slow_seed, counts):
     missed, late, false = (
         sum(getattr(row, k) for row in found) for k in ("missed", "late", "false")
     )
-    early = max(row.early for row in found)
-    counts(hits=hits, missed=missed, late=late, false_hits=false, earliest=f"{early:.1e}")
+    early, apart = max(row.early for row in found), max(row.apart for row in found)
+    counts(
+        hits=hits,
+        missed=missed,
+        late=late,
+        false_hits=false,
+        earliest=f"{early:.1e}",
+        apart_at_a_false_hit=f"{apart:.1e}",
+    )
     assert hits >= MOVING // 2
     assert not missed
     assert not late
