@@ -17,7 +17,7 @@ import numpy as np
 
 from studies.detection.events import Event, payload_events, push_events, struck_events
 from studies.detection.motions import CALIBRATE, SPEEDS, TEST, Training, free_pool, stream
-from studies.framework import time_in_turn
+from studies.framework import groups, time_in_turn
 from tauguard.arrays import Array
 from tauguard.detectors import CollisionAlarm, Diagnoser, Diagnosis, make_detector, with_rate
 from tauguard.detectors.calibration.nominal import nominal_design
@@ -85,13 +85,8 @@ FULL = Size(3, SPEEDS, Training(slices=3), 0.3, 13, 3, 8)
 QUICK = Size(1, (10.0, 60.0), Training(slices=1, free=6, free_seconds=20.0), 0.02, 2, 1, 2)
 
 
-@dataclass(frozen=True)
-class Answer:
-    """What one method says of an event."""
-
-    link: int  #: 1-based, 0: none
-    force: Array  #: [N]
-    point: Array  #: [m]
+#: What a method says of an event: the link (1-based, 0: none), the force [N] and the point [m].
+Answer = tuple[int, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -161,16 +156,13 @@ def answered(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Jud
     exact = replace(after, residual=event.trace.truth.tau_ext[after.rows])
     informed = diagnoser.explain(event.alarm, exact)
     exposed = replace(diagnoser, surface=surface.only(EXPOSED)).explain(event.alarm, after)
-    answers = {
-        "surface": Answer(found.link, found.force, found.point),
-        "exposed": Answer(exposed.link, exposed.force, exposed.point),
-        "usual": usual(diagnoser, after, found),
-        "exact": Answer(informed.link, informed.force, informed.point),
-    }
+    own = {"surface": found, "exposed": exposed, "exact": informed}
+    answers = {name: (one.link, one.force, one.point) for name, one in own.items()}
+    answers["usual"] = usual(diagnoser, after, found)
     truth = contact_at(event.trace, event.collision, found.time)
-    errors = {n: ContactErrors.of(a.force, a.point, truth) for n, a in answers.items()}
+    errors = {n: ContactErrors.of(force, at, truth) for n, (_, force, at) in answers.items()}
     true = TrueSeverity.of(event.trace, event.collision, found.until)
-    return Judged(*known, found, {n: a.link for n, a in answers.items()}, errors, true)
+    return Judged(*known, found, {n: a[0] for n, a in answers.items()}, errors, true)
 
 
 def usual(diagnoser: Diagnoser, after: PostAlarmWindow, found: Diagnosis) -> Answer:
@@ -185,7 +177,7 @@ def usual(diagnoser: Diagnoser, after: PostAlarmWindow, found: Diagnosis) -> Ans
     columns = jacobian.T / after.deviation[row][:, None]
     damped = columns.T @ columns + np.eye(3) / EXPECTED**2
     force = np.linalg.solve(damped, columns.T @ (after.residual[row] / after.deviation[row]))
-    return Answer(found.last_joint, force, point)
+    return found.last_joint, force, point
 
 
 def by_group(contacts: Sequence[Judged]) -> list[tuple[str, list[Judged]]]:
@@ -214,31 +206,26 @@ def _link(judged: Judged) -> int:
 
 def link_rows(contacts: Sequence[Judged]) -> list[Row]:
     """How often the link is right, and how often it or a neighbour is."""
-    rows = []
+    rows: list[Row] = []
     for group, some in by_group(contacts):
         for method in METHODS:
             off = [abs(j.links[method] - _link(j)) for j in some]
-            rows.append(
-                {
-                    "study": "link",
-                    "group": group,
-                    "method": method,
-                    "link_right": rate(sum(o == 0 for o in off), len(off)),
-                    "link_or_neighbour": rate(sum(o <= 1 for o in off), len(off)),
-                }
-            )
+            row: Row = {"study": "link", "group": group, "method": method}
+            row["link_right"] = rate(sum(o == 0 for o in off), len(off))
+            row["link_or_neighbour"] = rate(sum(o <= 1 for o in off), len(off))
+            rows.append(row)
     return rows
 
 
 def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
     """Errors of force and point at the time of the estimated force: median and p95."""
     rows = []
+    names = ("true_force_n", "force_error_n", "direction_deg", "point_cm")
     for group, some in by_group(contacts):
         for method in METHODS:
             own = [j.errors[method] for j in some]
             errors = np.array([(e.true_force, e.force, e.direction, 100 * e.point) for e in own])
             row: Row = {"study": "contact", "group": group, "method": method, "n": len(some)}
-            names = ("true_force_n", "force_error_n", "direction_deg", "point_cm")
             for name, column in zip(names, errors.T, strict=True):
                 row[name] = float(np.median(column))
                 row[f"{name}_p95"] = float(np.percentile(column, 95))
@@ -248,13 +235,13 @@ def contact_rows(contacts: Sequence[Judged]) -> list[Row]:
 
 def severity_rows(contacts: Sequence[Judged]) -> list[Row]:
     """What the intervals of impulse and peak force are worth, by kind and by link."""
-    known = [j for j in contacts if j.diagnosis is not None and j.severity is not None]
-    named = sorted({j.kind for j in known}), sorted({_link(j) for j in known})
-    some = [(kind, [j for j in known if j.kind == kind]) for kind in named[0]]
-    some += [(f"link {link}", [j for j in known if _link(j) == link]) for link in named[1]]
+    by_kind = groups(sorted(contacts, key=lambda j: j.kind), lambda j: j.kind)
+    by_link = groups(sorted(contacts, key=_link), lambda j: f"link {_link(j)}")
     rows = []
-    for name, own in some:
+    for name, own in (by_kind | by_link).items():
         pairs = [(j.diagnosis, j.severity) for j in own if j.diagnosis and j.severity]
+        if not pairs:
+            continue
         found = severity_figures(pairs)
         row: Row = {"study": "severity", "group": name}
         for size in ("impulse", "peak"):
@@ -319,14 +306,12 @@ def draw(rows: list[Row], figure: Figure) -> None:
     axes = figure.subplots(1, 2)
     names = [f"{stratum(low)} N m" for low, _ in STRATA]
     for method in METHODS:
-        own = {r["group"]: r for r in rows if r["study"] == "link" and r["method"] == method}
-        own_errors = {
-            r["group"]: r for r in rows if r["study"] == "contact" and r["method"] == method
-        }
-        at = [i for i, name in enumerate(names) if name in own]
-        rates = (own[names[i]]["link_right"] for i in at)
-        errorbars(axes[0], at, rates, fmt="o-", label=method)
-        axes[1].plot(at, [own_errors[names[i]]["point_cm"] for i in at], "o-", label=method)
+        mine = [r for r in rows if r.get("method") == method and r["group"] in names]
+        links = [r for r in mine if r["study"] == "link"]
+        at = [names.index(r["group"]) for r in links]
+        errorbars(axes[0], at, (r["link_right"] for r in links), fmt="o-", label=method)
+        points = [r["point_cm"] for r in mine if r["study"] == "contact"]
+        axes[1].plot(at, points, "o-", label=method)
     for axis, label in ((axes[0], "link right"), (axes[1], "point error, median [cm]")):
         axis.set_xticks(range(len(names)), names)
         axis.set_ylabel(label)

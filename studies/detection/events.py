@@ -90,8 +90,7 @@ def payload_events(
         trace = simulate(_episode(rng, speed, arm, 0.0, picks=picks))
         alarms = trained[arm].detect(trace).alarms
         for time, mass in ((UP, grams / 1000), (DOWN, -grams / 1000)):
-            raised = [a for a in alarms if time <= a.start <= time + 0.5]
-            alarm = raised[0] if raised else None
+            alarm = next((a for a in alarms if time <= a.start <= time + 0.5), None)
             yield Event(arm, speed, "payload", trace, alarm, None, mass)
 
 
@@ -118,8 +117,7 @@ def _episode(
 def first_alarm(alarms: Sequence[Alarm], collision: Collision) -> Alarm | None:
     """The alarm that detects ``collision``, if any."""
     low, high = detection_window(collision)
-    inside = [a for a in alarms if low <= a.start <= high]
-    return inside[0] if inside else None
+    return next((a for a in alarms if low <= a.start <= high), None)
 
 
 def contact_kind(trace: Trace, collision: Collision, alarm: Alarm | None) -> str:

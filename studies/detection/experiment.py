@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from studies.detection import rows as report
 from studies.detection.motions import (
@@ -43,8 +42,8 @@ from tauguard.envs import PayloadPick, simulate
 from tauguard.report import Row
 from tauguard.traces import STRATA
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+#: How rows are printed, and their figure.
+table, draw = report.printed, report.draw
 
 _JUDGED = (
     "sensitivity: of the collisions from 16 N m up (achieved peak of the external torque, joints 1 "
@@ -189,7 +188,7 @@ def _fleets(
     jobs = [(seed, arm, detectors[arm], speed, hours) for arm in arms for speed in SPEEDS]
     free: dict[int, dict[float, Free]] = {arm: {} for arm in arms}
     for (_, arm, _, speed, _), found in zip(
-        jobs, cache.over(each, "free")(_calibrate, jobs), strict=True
+        jobs, cache.over(each, "free")(calibration, jobs), strict=True
     ):
         free[arm][speed] = found
     network = NETWORK if NETWORK in size.detectors else None
@@ -198,10 +197,6 @@ def _fleets(
 
 def _train(job: tuple[int, int, tuple[str, ...], Training]) -> dict[str, FittedDetector]:
     return trained(*job, Conditions())
-
-
-def _calibrate(job: tuple[int, int, dict[str, FittedDetector], float, float]) -> Free:
-    return calibration(*job)
 
 
 def _judge(job: tuple[tuple[Size, int, float, int], Mapping[int, Fleet]]) -> Tallies:
@@ -249,13 +244,3 @@ def _condition(job: tuple[str, int, Fleet, int]) -> list[Row]:
         for (detector, point), tally in merged(parts).items()
         if point == HOURLY
     ]
-
-
-def table(rows: list[Row]) -> list[Row]:
-    """Speeds as columns, the headline last."""
-    return report.printed(rows)
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """See :func:`studies.detection.rows.draw`."""
-    report.draw(rows, figure)

@@ -147,16 +147,8 @@ def struck_pool(
     first: int = 0,
 ) -> Iterator[Struck]:
     """Episodes until every stratum holds ``per_stratum`` collisions, or the rounds are used up.
-
-    Args:
-        seed: of the pool; the arm's seeds are apart from it.
-        speed: percent of the maximum.
-        arms: mismatch seeds, gone through in turn.
-        per_stratum: collisions wanted in each.
-        strata: [low, high) of the achieved peak |tau_ext| over joints 1-4 [N m].
-        forces: lowest and highest peak contact force [N].
-        conditions: payloads, temperature, mismatch.
-        first: number of the first episode, which arms and payloads are gone through by.
+    ``arms`` are mismatch seeds; episode ``first`` + k takes the next arm and payload in turn.
+    ``strata`` are [low, high) of the achieved peak |tau_ext| over joints 1-4 [N m].
     """
     under = conditions or Conditions()
     missing = Counter(wishes(per_stratum, strata))

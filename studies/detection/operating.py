@@ -6,7 +6,7 @@ reduced to alarms at the operating points, and forgotten.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,6 +23,7 @@ from tauguard.detectors import (
     match,
 )
 from tauguard.detectors.calibration.nominal import nominal_design
+from tauguard.detectors.evaluation.matching import Matching
 from tauguard.detectors.thresholds.free_scores import speed_normalisation
 from tauguard.detectors.thresholds.tail_model import tail_level, threshold_for_rate
 from tauguard.envs import simulate
@@ -84,10 +85,9 @@ def joined(parts: Sequence[Free]) -> Free:
     return {name: [one for part in parts for one in part[name]] for name in parts[0]}
 
 
-def calibration(
-    seed: int, arm: int, detectors: Mapping[str, FittedDetector], speed: float, hours: float
-) -> Free:
-    """Scores of the arm's collision-free motion with the training payloads."""
+def calibration(job: tuple[int, int, Mapping[str, FittedDetector], float, float]) -> Free:
+    """Scores of an arm's collision-free motion with the training payloads, at one speed [%]."""
+    seed, arm, detectors, speed, hours = job
     under = Conditions(payloads=tuple(sorted(map(float, set(TRAINING_PAYLOADS)))))
     pool = free_pool(stream(seed, CALIBRATE), speed, (arm,), hours, under)
     return joined([free_scores(detectors, simulate(episode)) for _, episode in pool])
@@ -118,12 +118,7 @@ def operated(
     network: rows then compare speed by speed. The third is for a rate over all speeds, which the
     normalised score spreads evenly. It bounds the other two, which ask for more alarms over all
     speeds; at a single one that can leave a detector less specific than the network.
-
-    Args:
-        detectors: trained, by name.
-        free: scores of collision-free motion of their arm, by speed [%], then by detector.
-        network: the name whose specificity is matched; ``None``: the third point alone.
-        per_hour: false alarms that the third point aims at.
+    ``free`` is by speed [%], then by detector; without a ``network`` the third point stands alone.
     """
     found = {}
     for name, detector in detectors.items():
@@ -179,33 +174,34 @@ Tallies = dict[tuple[str, str], Tally]
 
 def on_free(fleet: Fleet, trace: Trace) -> Tallies:
     """False alarms and false cases of every detector at every point over a free trace."""
-    span, found = (float(trace.t[0]) + BEGIN, float(trace.t[-1])), {}
-    for name, own in fleet.items():
-        levels = own.sustained(trace)
-        for point, threshold in own.thresholds.items():
-            m = match(find_alarms(trace.t, levels[point] > threshold), (), span)
-            counts = (m.cases, m.false_cases, len(m.false_alarms), m.free_seconds)
-            found[name, point] = Tally([], *counts)
-    return found
+    return {
+        key: Tally([], m.cases, m.false_cases, len(m.false_alarms), m.free_seconds)
+        for key, m in _matched(fleet, trace, ())
+    }
 
 
 def on_struck(fleet: Fleet, struck: Struck) -> Tallies:
     """Delays of the collisions that count; alarms elsewhere are judged on free motion alone."""
-    trace = struck.trace
-    assert trace.truth is not None
-    span, found = (float(trace.t[0]) + BEGIN, float(trace.t[-1])), {}
-    counted = {
-        collision.onset: kept
-        for collision, kept in zip(trace.truth.collisions, struck.kept, strict=True)
-    }
+    assert struck.trace.truth is not None
+    true = struck.trace.truth.collisions
+    counted = {one.onset: kept for one, kept in zip(true, struck.kept, strict=True)}
+    found = {}
+    for key, m in _matched(fleet, struck.trace, true):
+        pairs = zip(m.collisions, m.delays, strict=True)
+        found[key] = Tally([Outcome(c, d) for c, d in pairs if counted[c.onset]])
+    return found
+
+
+def _matched(
+    fleet: Fleet, trace: Trace, true: Sequence[Collision]
+) -> Iterator[tuple[tuple[str, str], Matching]]:
+    """Every detector's alarms at every point, matched with the collisions ``true``."""
+    span = float(trace.t[0]) + BEGIN, float(trace.t[-1])
     for name, own in fleet.items():
         levels = own.sustained(trace)
         for point, threshold in own.thresholds.items():
             alarms = find_alarms(trace.t, levels[point] > threshold)
-            m = match(alarms, trace.truth.collisions, span)
-            pairs = zip(m.collisions, m.delays, strict=True)
-            found[name, point] = Tally([Outcome(c, d) for c, d in pairs if counted[c.onset]])
-    return found
+            yield (name, point), match(alarms, true, span)
 
 
 def merged(parts: Iterable[Tallies]) -> Tallies:

@@ -47,12 +47,7 @@ QUICK = Size(1, NAMES[:3], (ASKED,), LITTLE, 0.1, 0.1, 1)
 
 
 def measure(quick: bool, seed: int, robot: str = ROBOTS, keep: str | None = None) -> list[Row]:
-    """Rows ``robot``: one a robot and detector.
-
-    Raises:
-        ValueError: a robot that cannot be used, or two of one name.
-        FileNotFoundError: no such robot.
-    """
+    """Rows ``robot``: one a robot and detector."""
     names = [name.strip() for name in robot.split(",")]
     stems = [Path(name).stem for name in names]
     twice = next((stem for stem in stems if stems.count(stem) > 1), None)
@@ -91,10 +86,6 @@ def conditions(name: str, folder: Path) -> Conditions:
     """Under which a robot is judged; a description with losses is written into ``folder``.
 
     The package's own arms and descriptions (TOML) are taken as they are.
-
-    Raises:
-        ValueError: a robot that cannot be used.
-        FileNotFoundError: no such robot.
     """
     facts = load_arm(name).facts
     source = name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -173,25 +173,18 @@ def headline(found: Sequence[Row]) -> list[Row]:
     }
     made = []
     for number, row in enumerate(by_name[best]):
-        reached = min(_values(row)) >= GOAL
-        made.append(
-            {
-                "study": "headline",
-                "threshold_a": row["threshold_a"],
-                "speed": row["speed"],
-                "best": best,
-                "best_rates": "{:.3f} / {:.3f}".format(*_values(row)),
-            }
-        )
+        rates = {"best_rates": _values(row)}
         for name in (name for name in ("srq-svr", "srq-svr-plain") if name in by_name):
-            made[-1][name] = "{:.3f} / {:.3f}".format(*_values(by_name[name][number]))
+            rates[name] = _values(by_name[name][number])
+        reached = min(rates["best_rates"]) >= GOAL
         cell = theirs.get((row["threshold_a"], row["speed"]))
         if cell:
-            its = [one["value"] for one in cell]
-            made[-1]["dissertation"] = "{:.3f} / {:.3f}".format(*its)
-            ours = _values(by_name["srq-svr"][number])
+            its = rates["dissertation"] = (cell[0]["value"], cell[1]["value"])
+            ours = rates["srq-svr"]
             reached &= ours[0] >= its[0] and ours[1] >= its[1]
-        made[-1]["met"] = bool(reached)
+        known = {"study": "headline", "threshold_a": row["threshold_a"], "speed": row["speed"]}
+        shown = {name: "{:.3f} / {:.3f}".format(*pair) for name, pair in rates.items()}
+        made.append({**known, "best": best, **shown, "met": bool(reached)})
     return made
 
 
@@ -200,16 +193,9 @@ def _values(row: Row) -> tuple[float, float]:
     return row["sensitivity"]["value"] or 0.0, row["specificity"]["value"] or 0.0
 
 
-# -- as printed ------------------------------------------------------------------------------------
-
-
 def printed(found: Sequence[Row]) -> list[Row]:
     """What is printed, in this order: speeds are columns, the headline comes last."""
-    compact: dict[str, Callable[[list[Row]], Row]] = {
-        "speed": _cells,
-        "hourly": _hourly,
-        "strata": _torques,
-    }
+    compact = {"speed": _cells, "hourly": _hourly, "strata": _torques}
     shown: list[Row] = []
     for name, make in compact.items():
         shown += [make(own) for own in groups(table_rows(found, name), _line).values()]

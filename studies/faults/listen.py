@@ -81,7 +81,6 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 def write_inputs(folder: Path, quick: bool, seed: int) -> None:
     """A log and a detector for each rate; the arm and its motions follow from the seed."""
-
     drawn = Mismatch(seed=2000 + seed)
     free = free_episodes(seed, EPISODES, SECONDS, SPEEDS, (0.0,), drawn)
     training = [simulate(episode) for episode in free]
@@ -94,13 +93,11 @@ def write_inputs(folder: Path, quick: bool, seed: int) -> None:
 
 def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
     """The detector and the log of a rate."""
-
     return load_model(folder / f"{rate:g}.skops"), read_log(folder / f"{rate:g}.mcap").trace
 
 
 def serve(folder: Path, rate: float, pipe: Connection) -> None:
     """Play the log: tell the port, and at the end how many packets were sent."""
-
     with UrServer(Packets.of(read_log(folder / f"{rate:g}.mcap").trace), 0) as server:
         pipe.send(server.port)
         server.wait()
@@ -124,11 +121,7 @@ def served(folder: Path, rate: float) -> Iterator[Connection]:
 
 
 def received(pipe: Connection) -> int:
-    """The next number from the serving process.
-
-    Raises:
-        RuntimeError: it ended, or sends nothing for ``ANSWERS`` seconds.
-    """
+    """The next number from the serving process; ``RuntimeError`` if it says nothing."""
     with contextlib.suppress(EOFError, OSError):
         if pipe.poll(ANSWERS):
             return int(pipe.recv())
@@ -137,7 +130,6 @@ def received(pipe: Connection) -> int:
 
 def heard(folder: Path, rate: float) -> Row:
     """Listen to the played log."""
-
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None
     truth = detect_with_faults(alarm, trace).detection.alarm
@@ -174,11 +166,8 @@ def heard(folder: Path, rate: float) -> Row:
 def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool]) -> dict[str, Any]:
     """Alarms of the file that begin at the same sample for the listener.
 
-    Args:
-        times: of the file's samples [s].
-        truth: whether its alarm is up, shape (T,).
-        said: the same of the listener by the time; alarms that begin beside a sample that was not
-            heard are not judged.
+    ``truth`` is whether the file's alarm is up at its ``times`` [s], shape (T,), ``said`` the same
+    of the listener by the time; alarms beside a sample that was not heard are not judged.
     """
     begins = [
         k
@@ -191,7 +180,6 @@ def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool])
 
 def stages(folder: Path, rate: float) -> list[Row]:
     """What a sample costs, stage by stage, on the log's beginning."""
-
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None
     usual, stream = alarm.inputs, alarm.stream()

@@ -14,6 +14,7 @@ drawn by the seed, and nothing was chosen on them but that a load of training is
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -169,8 +170,9 @@ def moments(tested: ArmLogs, rng: np.random.Generator, count: int) -> list[tuple
     for name, trace in tested.logs.items():
         since, whole = trace.t - trace.t[0], trace.t[-1] - trace.t[0]
         fits = (since > margin + 1.5) & (since < whole - margin - LASTS - AFTER)
-        if (fits & moving(trace)).any():
-            starts[name] = since[fits & moving(trace)]
+        moving = fits & (np.abs(trace.qd).max(axis=1) > 0.1)  # some joint [rad/s]
+        if moving.any():
+            starts[name] = since[moving]
         for alarm in tested.alarms[name]:
             begin = alarm - float(trace.t[0]) - 0.5 * LASTS
             struck += [(name, begin)] if fits[np.searchsorted(since, begin)] else []
@@ -180,11 +182,6 @@ def moments(tested: ArmLogs, rng: np.random.Generator, count: int) -> list[tuple
     drawn = [(name, float(rng.choice(starts[name]))) for name in names]
     chosen = rng.permutation(len(struck))[:count]
     return drawn + [struck[k] for k in chosen]
-
-
-def moving(trace: Trace) -> np.ndarray:
-    """Where some joint moves faster than 0.1 rad/s, shape (T,)."""
-    return np.asarray(np.abs(trace.qd).max(axis=1) > 0.1)
 
 
 def clean(tested: ArmLogs, name: str, trace: Trace) -> Row:
@@ -205,24 +202,15 @@ def clean(tested: ArmLogs, name: str, trace: Trace) -> Row:
 def others(known: Sequence[ArmLogs]) -> list[Row]:
     """One arm's samples to another's model, where the rates are alike to a quarter."""
     rows: list[Row] = []
-    for model in known:
-        for source in known:
-            if model is source or abs(source.alarm.detector.dt / model.alarm.detector.dt - 1) > 0.2:
-                continue
-            first = []
-            for trace in source.logs.values():
-                reasons = heard(model, Packets.of(trace)).reasons
-                first.append(reasons[0] if reasons else np.nan)
-            seen = [t for t in first if np.isfinite(t)]
-            rows.append(
-                {
-                    "study": "another arm",
-                    "model": model.name,
-                    "samples": source.name,
-                    "seen": rate(len(seen), len(first)),
-                    "median_s": float(np.median(seen)) if seen else None,
-                }
-            )
+    for model, source in itertools.permutations(known, 2):
+        if abs(source.alarm.detector.dt / model.alarm.detector.dt - 1) > 0.2:
+            continue
+        every = [heard(model, Packets.of(trace)).reasons for trace in source.logs.values()]
+        seen = [reasons[0] for reasons in every if reasons]
+        row: Row = {"study": "another arm", "model": model.name, "samples": source.name}
+        row["seen"] = rate(len(seen), len(every))
+        row["median_s"] = float(np.median(seen)) if seen else None
+        rows.append(row)
     return rows
 
 

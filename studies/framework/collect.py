@@ -25,13 +25,9 @@ MACHINE = ("processor", "cores", "system")
 def collect(folder: Path, names: Iterable[str], *, quick: bool, seed: int) -> dict[str, str]:
     """Run the parts ``names`` that ``folder`` does not hold with these settings and versions.
 
-    Each leaves ``NAME.json``, ``NAME.png`` and ``NAME.log``. A part that fails does not stop the
-    others. A file of that name which no part wrote is left as it is. Quick parts run
-    :data:`TOGETHER` at a time, full ones alone, since others would disturb their times.
-
-    Returns:
-        Why, for each part that failed: the last line that it printed, or what is wrong with the
-        file that is there.
+    Each leaves ``NAME.json``, ``NAME.png`` and ``NAME.log``; a file that no part wrote is left as
+    it is. Full parts run alone, since others would disturb their times. Returns why each part
+    failed that did: its last line, or what is wrong with the file that is there.
     """
     folder.mkdir(parents=True, exist_ok=True)
     failed: dict[str, str] = {}
@@ -85,12 +81,7 @@ def _run(folder: Path, name: str, quick: bool, seed: int) -> str | None:
 
 
 def read_rows(path: Path, name: str) -> dict[str, Any]:
-    """The file that the part ``name`` wrote, checked.
-
-    Raises:
-        ValueError: no file of that part; the message says what is wrong with it.
-        OSError: it cannot be read.
-    """
+    """The file that the part ``name`` wrote; ``ValueError`` says what is wrong with another."""
     try:
         found = json.loads(path.read_text())
     except (ValueError, RecursionError) as error:

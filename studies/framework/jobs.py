@@ -76,11 +76,7 @@ class JobCache:
     def of(cls, keep: str | None, study: str, seed: int, size: object) -> JobCache:
         """One folder a seed, size and build.
 
-        A build is the versions of the libraries and the sources of simulation and detectors. A
-        change of native code or of the study itself is not seen: take another folder then.
-
-        Raises:
-            ValueError: the folder cannot be made.
+        A change of native code or of the study itself is not seen: take another folder then.
         """
         if keep is None:
             return cls(None)
@@ -132,11 +128,7 @@ def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
 
 
 def read(path: Path) -> Any:
-    """A result that was kept.
-
-    Raises:
-        ValueError: a damaged file, or one of another build; it names what to delete.
-    """
+    """A result that was kept; ``ValueError`` names a damaged file."""
     try:
         with path.open("rb") as stream:
             return _Results(stream).load()

@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 from studies.framework.jobs import build
 from tauguard.replay.event_page import OFFLINE
+from tauguard.report import write_json
 
 #: A collision that is found later than this is shown [s].
 LATE = 0.05
@@ -23,16 +24,7 @@ def mistakes(folder: Path, seed: int) -> str:
     The detector and the motions are those of `tauguard demo`. The recordings lie in
     ``folder/wrong`` and their list in ``folder/wrong.json``; both are made where they are not of
     this seed and build, which is said before it begins.
-
-    Args:
-        folder: of the report.
-        seed: of the arm and the motions.
-
-    Raises:
-        ValueError: ``wrong.json`` or the folder is something else.
     """
-    from tauguard.report import write_json
-
     kept = folder / "wrong.json"
     found, why = _kept(kept, seed)
     if why:
@@ -43,11 +35,7 @@ def mistakes(folder: Path, seed: int) -> str:
 
 
 def _kept(path: Path, seed: int) -> tuple[dict[str, Any], str]:
-    """What is there, and why it has to be made again (nothing if it has not).
-
-    Raises:
-        ValueError: the file is no list of mistakes.
-    """
+    """What is there, and why it has to be made again (nothing if it has not)."""
     if not path.exists():
         return {}, "none are recorded yet"
     try:

@@ -43,6 +43,8 @@ Alarms = Callable[[Trace], NDArray[np.bool_]]
 
 #: An alarm so long before the start of a push still finds it [s].
 EARLY = 0.15
+#: Random shifts of a log's alarms, for ``by chance``.
+SHIFTS = 200
 #: Seconds from which the plain observer learns.
 QUIET = 4.0
 #: Confirmation of the fixed thresholds [s].
@@ -135,55 +137,34 @@ def count(tally: Tally, how: str, alarms: Alarms, trace: Trace) -> None:
 
 
 def find(
-    tally: Tally,
-    alarms: Alarms,
-    trace: Trace,
-    known: tuple[Push, ...],
-    rng: np.random.Generator,
-    shifts: int = 200,
+    tally: Tally, alarms: Alarms, trace: Trace, known: tuple[Push, ...], rng: np.random.Generator
 ) -> None:
     """Adds the pushes of a log: each one's delay, inf where it is missed."""
     t = trace.t - trace.t[0]
     starts = np.array([alarm.start for alarm in find_alarms(t, alarms(trace), SERIES)])
-    shifted = (starts + rng.uniform(0, t[-1], (shifts, 1))) % t[-1]
+    shifted = (starts + rng.uniform(0, t[-1], (SHIFTS, 1))) % t[-1]
     for push in known:
-
-        def within(x: Array, push: Push = push) -> NDArray[np.bool_]:
-            return np.asarray((x >= push.start - EARLY) & (x <= push.peak))
-
-        hits = starts[within(starts)]
+        begin = push.start - EARLY
+        hits = starts[(starts >= begin) & (starts <= push.peak)]
         tally.delays[push.moving].append(float(hits[0] - push.start) if len(hits) else np.inf)
-        tally.chance[push.moving] += float(within(shifted).any(axis=1).mean())
+        lucky = ((shifted >= begin) & (shifted <= push.peak)).any(axis=1)
+        tally.chance[push.moving] += float(lucky.mean())
 
 
 def _rows(arm: str, how: str, tally: Tally) -> list[Row]:
     per_hour = poisson_rate(tally.alarms, tally.seconds / 3600)
-    rows: list[Row] = [
-        {
-            "study": "false alarms",
-            "arm": arm,
-            "detector": how,
-            "minutes": tally.seconds / 60,
-            "alarms": tally.alarms,
-            "per hour": per_hour["value"],
-            "at least": per_hour["low"],
-            "at most": per_hour["high"],
-        }
-    ]
+    row: Row = {"study": "false alarms", "arm": arm, "detector": how}
+    row |= {"minutes": tally.seconds / 60, "alarms": tally.alarms, "per hour": per_hour["value"]}
+    rows = [row | {"at least": per_hour["low"], "at most": per_hour["high"]}]
     for moving, delays in tally.delays.items():
         found = [delay for delay in delays if np.isfinite(delay)]
         if delays:
-            rows.append(
-                {
-                    "study": "pushes",
-                    "arm": arm,
-                    "state": "moving" if moving else "standing",
-                    "detector": how,
-                    "found": rate(len(found), len(delays)),
-                    "by chance": tally.chance[moving] / len(delays),
-                    "median delay ms": 1e3 * float(np.median(found)) if found else None,
-                }
-            )
+            state = "moving" if moving else "standing"
+            row = {"study": "pushes", "arm": arm, "state": state, "detector": how}
+            row["found"] = rate(len(found), len(delays))
+            row["by chance"] = tally.chance[moving] / len(delays)
+            row["median delay ms"] = 1e3 * float(np.median(found)) if found else None
+            rows.append(row)
     return rows
 
 

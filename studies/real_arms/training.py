@@ -76,16 +76,10 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def _row(
-    name: str,
-    start: ArmModel,
-    logs: Mapping[str, Recording],
-    seconds: float,
-    turns: int,
-    seed: int,
+    name: str, start: ArmModel, logs: Mapping[str, Recording], seconds: float, turns: int, seed: int
 ) -> Row:
-    row: Row = {"study": "trained with", "arm": name, "seconds": seconds}
-    if not np.isfinite(seconds):
-        row["seconds"] = "all"
+    length = seconds if np.isfinite(seconds) else "all"
+    row: Row = {"study": "trained with", "arm": name, "seconds": length}
     alarms, judged, standing, moving = 0, 0.0, [], []
     rng = np.random.default_rng([seed, 7])
     for turn in range(turns):
@@ -98,7 +92,8 @@ def _row(
             continue
         for log in held:
             recording = logs[log]
-            trace, known = recording.trace, _loaded(fitted, recording)
+            trace, load = recording.trace, recording.load
+            known = fitted if load is None else fitted.carrying(load)
             up = CollisionAlarm(known, 1.0, CONFIRMATION).detect(trace).alarm
             alarms += len(find_alarms(trace.t, up, SERIES))
             judged += float(trace.t[-1] - trace.t[0])
@@ -115,10 +110,6 @@ def _row(
         "moving N": float(np.median(moving)) if moving else None,
         "pushes": len(standing) + len(moving),
     }
-
-
-def _loaded(fitted: FittedFreeMotion, recording: Recording) -> FittedFreeMotion:
-    return fitted if recording.load is None else fitted.carrying(recording.load)
 
 
 def first_seconds(
@@ -145,10 +136,8 @@ def drawn_arm(seed: int, count: int) -> tuple[ArmModel, dict[str, Recording]]:
     """What the user of a drawn arm believes, and collision-free logs of it by name.
 
     The file is up to 30 % wrong in masses, 3 cm in centres, 8 % in the gains.
-
-    Args:
-        seed: of everything; successive ones take the sizes and the sample rates in turn.
-        count: of logs of :data:`LENGTH` each.
+    Successive seeds take the sizes and the sample rates in turn; each log is as long as
+    :data:`LENGTH`.
     """
     rng = np.random.default_rng([seed, 2])
     name = cura6.NAMES[seed % len(cura6.NAMES)]
@@ -179,13 +168,6 @@ def smallest_pushes(
 
     ``inf``: even the strongest is missed. Moments at which the detector alarms by itself, and
     directions that hardly turn any joint, are passed over.
-
-    Args:
-        fitted: with the load.
-        trace: collision-free, not trained on.
-        moving: while the arm moves, or stands.
-        count: of moments.
-        rng: draws moments and directions.
     """
     alarm = CollisionAlarm(fitted, 1.0, CONFIRMATION)
     found = []
