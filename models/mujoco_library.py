@@ -29,3 +29,9 @@ def function_address(name: str) -> int:
     address = ctypes.cast(getattr(library(), name), ctypes.c_void_p).value
     assert address is not None
     return address
+
+
+@functools.cache
+def variable_address(name: str) -> int:
+    """Where one of its global variables lies."""
+    return ctypes.addressof(ctypes.c_void_p.in_dll(library(), name))

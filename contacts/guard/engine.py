@@ -14,8 +14,9 @@ from typing import Any
 
 import mujoco
 from mujoco.introspect import ast_nodes
+from mujoco.introspect.enums import ENUMS
 
-from tauguard.models.mujoco_library import function_address
+from tauguard.models.mujoco_library import function_address, variable_address
 
 FUNCTIONS = (
     "mj_step",
@@ -35,7 +36,15 @@ FUNCTIONS = (
     "mj_mulJacVec",
     "mj_jacBodyCom",
     "mj_integratePos",
+    "_mjPRIVATE_setTlsLogHandler",  # the way of the Python binding: errors become exceptions
+    "_mjPRIVATE_getGlobalLogHandler",
 )
+#: Flags of features whose state or distances a guarded step cannot take back.
+REFUSED = {
+    "ipc": mujoco.mjtEnableBit.mjENBL_IPC,
+    "speculative": mujoco.mjtEnableBit.mjENBL_SPECULATIVE,
+    "sleep": mujoco.mjtEnableBit.mjENBL_SLEEP,
+}
 #: Parts of the state that kinematics follow from.
 POSE = int(
     mujoco.mjtState.mjSTATE_QPOS
@@ -61,7 +70,13 @@ _MOVING = (
     *("ncon", "nefc", "contact", "efc_aref", "efc_margin", "efc_vel", "efc_pos", "efc_force"),
     *("efc_type", "efc_id"),
 )
+OPTIONS = (
+    *("timestep", "disableflags", "enableflags", "integrator", "cone", "solver", "iterations"),
+    *("o_margin", "o_solref"),
+)
 _NUMBERS = ("nq", "nv", "nbody", "nmocap", "ngeom", "nflex", "nflexvert", "ntendon")
+#: mjLOG_ERROR of mjtLogLevel.
+_LOG_ERROR = ENUMS["mjtLogLevel"].values["mjLOG_ERROR"]
 _TYPES = {
     "int": ctypes.c_int,
     "mjtNum": ctypes.c_double,
@@ -101,8 +116,7 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
     names = ("dist", "dim", "geom", "flex", "efc_address", "pos", "frame")
     out |= {f"at_{name}": int(getattr(contact, name).offset) for name in names}
     option = model._address + int(_layout("mjModel", "opt").opt.offset)
-    options = ("timestep", "disableflags", "integrator", "cone", "solver", "iterations")
-    out |= {name: option + int(getattr(_layout("mjOption"), name).offset) for name in options}
+    out |= {name: option + int(getattr(_layout("mjOption"), name).offset) for name in OPTIONS}
     _compare(model, data, out, base + int(fields.qpos.offset))
     return out | {
         "model": model._address,
@@ -116,6 +130,14 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
         "sig_pose": POSE,
         "discrete": int(mujoco.mjtIntegrator.mjINT_DISCRETE),
         "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
+        "runge_kutta": int(mujoco.mjtIntegrator.mjINT_RK4),
+        "override": int(mujoco.mjtEnableBit.mjENBL_OVERRIDE),
+        "refused": sum(int(bit) for bit in REFUSED.values()),
+        "mjcb_contactfilter": variable_address("mjcb_contactfilter"),
+        "at_pstack": int(fields.pstack.offset),
+        "at_pbase": int(fields.pbase.offset),
+        "log_error": int(_LOG_ERROR),
+        "at_subject": int(_layout("mjLogMessage").subject.offset),
         "newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
         "equality": int(mujoco.mjtConstraint.mjCNSTR_EQUALITY),
         "refsafe": int(mujoco.mjtDisableBit.mjDSBL_REFSAFE),

@@ -56,9 +56,7 @@ class ErodedShapes:
             size = np.maximum(size - layer, 0)
         elif kind == "mesh":
             vertices = self._hull(geom).core(layer)
-        mat = np.zeros(9)
-        mujoco.mju_quat2Mat(mat, model.geom_quat[geom])
-        place = np.ascontiguousarray(model.geom_pos[geom], dtype=np.float64)
+        place, mat = frame_on_body(model, geom)
         body = int(model.geom_bodyid[geom])
         return self._guard.add(CONVEX.index(kind), size, radius, body, place, mat, vertices)
 
@@ -67,6 +65,28 @@ class ErodedShapes:
         if mesh not in self._hulls:
             self._hulls[mesh] = _Hull(hull_vertices(self._model, geom))
         return self._hulls[mesh]
+
+
+def frame_on_body(model: Any, geom: int) -> tuple[Array, Array]:
+    """Where MuJoCo's kinematics put a geom on its body: position (3,) [m] and rotation (9,).
+
+    A geom that had the frame of its body or of the body's inertia when the model was compiled
+    keeps it, whatever ``geom_pos`` and ``geom_quat`` say (``geom_sameframe``).
+    """
+    kinds, own = mujoco.mjtSameFrame, int(model.geom_sameframe[geom])
+    body = int(model.geom_bodyid[geom])
+    place, quat = model.geom_pos[geom], model.geom_quat[geom]
+    if own == kinds.mjSAMEFRAME_BODY:
+        place = np.zeros(3)
+    elif own == kinds.mjSAMEFRAME_INERTIA:
+        place = model.body_ipos[body]
+    if own in (kinds.mjSAMEFRAME_BODY, kinds.mjSAMEFRAME_BODYROT):
+        quat = np.array([1.0, 0, 0, 0])
+    elif own in (kinds.mjSAMEFRAME_INERTIA, kinds.mjSAMEFRAME_INERTIAROT):
+        quat = model.body_iquat[body]
+    mat = np.zeros(9)
+    mujoco.mju_quat2Mat(mat, quat)
+    return np.ascontiguousarray(place, dtype=np.float64), mat
 
 
 class _Hull:

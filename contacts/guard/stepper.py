@@ -15,11 +15,12 @@ from tauguard.arrays import Array
 from tauguard.contacts._contacts import Guard
 from tauguard.contacts.guard.covered import Covered, names
 from tauguard.contacts.guard.energy_budget import EnergyBalance, EnergyMeter, sheets_of
-from tauguard.contacts.guard.engine import INTEGRATION, addresses
+from tauguard.contacts.guard.engine import INTEGRATION, REFUSED, addresses
 from tauguard.contacts.guard.impact_zone import Hit, impact_zone
 from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
 from tauguard.contacts.guard.tunnelling import TunnellingEvents, elements
+from tauguard.contacts.guard.watched_fields import refuse_shapes, watched_fields
 
 #: What the native part goes by.
 SETTINGS = {
@@ -39,6 +40,11 @@ SETTINGS = {
 class GuardedStepper:
     """``mj_step`` that lets no pair pass through itself.
 
+    Between two steps everything in ``model`` and ``data`` may be changed: the next step goes by it,
+    or refuses it by name. Geoms that an edit moves do not sweep the way in between. An error of
+    MuJoCo's or an exception in ``each`` leaves the state of before the step. Copies, deep copies
+    and unpickled guards continue with the same bits; a plain copy shares model and data.
+
     A plain step is tried first. It is accepted, with the bits of ``mj_step``, unless the verdict
     finds a pair that becomes too deep or that touches and parts unseen. Otherwise the state is
     rolled back, the pair made stiff until it parts, and the step taken in sub-steps: one up to the
@@ -57,8 +63,7 @@ class GuardedStepper:
         most: calls of ``mj_step`` that one step may cost before partners are stopped.
 
     Raises:
-        ValueError: another name, a model with ``ipc``, ``speculative`` or ``sleep`` (their state or
-            distances cannot be taken back), the integrator RK4, or ``most`` below 2.
+        ValueError: another name, ``most`` below 2, or what :meth:`step` refuses.
     """
 
     def __init__(
@@ -70,17 +75,32 @@ class GuardedStepper:
         most: int = 40,
     ) -> None:
         """Copy the shapes and make room for one saved state."""
-        _refuse(model)
         if most < 2:
             raise ValueError(f"most {most}: expected 2 or more steps")
-        rigid, cloth = names(checkers)
-        self.model, self.data, self.most = model, data, most
+        self._rigid, self._cloth = names(checkers)
+        self._model, self._data, self._stiff, self._most = model, data, stiff, most
+        self._start()
+
+    def _start(self) -> None:
+        """Make the native guard."""
+        model = self._model
+        _refuse(model, self._data)
         end = mujoco.MjData(model)
-        settings = {**SETTINGS, "stiff": float(stiff), "most": float(most)}
+        settings = {**SETTINGS, "stiff": float(self._stiff), "most": float(self._most)}
         other = mujoco.MjData(model) if model.nmocap else end
-        held = (model, data, end, other)
-        self._guard = Guard(addresses(*held), settings, held)
-        covered = Covered(model, self._guard, rigid, cloth)
+        held = (model, self._data, end, other)
+        found = addresses(*held)
+        self._options = [(found[name], 4) for name in ("disableflags",)]
+        self._guard = Guard(found, settings, held)
+        self._quiet: dict[int, StepReport] = {}  # by the number of contacts
+        self._cover()
+
+    def _cover(self) -> None:
+        """Tell the native guard the pairs and shapes that the model has now."""
+        model = self._model
+        refuse_shapes(model)
+        self._guard.clear()
+        covered = Covered(model, self._guard, self._rigid, self._cloth)
         self._pairs, self._uncovered = tuple(covered.pairs), tuple(covered.uncovered)
         for sheet in sheets_of(model):
             self._guard.sheet(*sheet.rows())
@@ -91,9 +111,43 @@ class GuardedStepper:
         if covered.sheets:
             first = len(covered.pairs) - len(covered.sheets)
             self._tunnelling = TunnellingEvents(model, covered.sheets, first)
-        self._guard.start(self._tunnelling is not None)
         self._meter: EnergyMeter | None = None
-        self._quiet: dict[int, StepReport] = {}  # by the number of contacts
+        self._guard.start(self._tunnelling is not None)
+        self._guard.watch(watched_fields(model, self._options))
+
+    def _follow(self) -> None:
+        """Go by what was changed since the last step, or refuse it."""
+        _refuse(self._model, self._data)
+        if self._guard.changed():
+            self._cover()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Model, data and what is known of earlier steps."""
+        self._follow()
+        names = ("_model", "_data", "_rigid", "_cloth", "_stiff", "_most")
+        return {name: getattr(self, name) for name in names} | {"saved": self._guard.saved()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Continue from there."""
+        saved = state.pop("saved")
+        self.__dict__.update(state)
+        self._start()
+        self._guard.restore(saved)
+
+    @property
+    def model(self) -> Any:
+        """The scene's; another one, recompiled for instance, needs a guard of its own."""
+        return self._model
+
+    @property
+    def data(self) -> Any:
+        """What is stepped."""
+        return self._data
+
+    @property
+    def most(self) -> int:
+        """Calls of ``mj_step`` that one step may cost before partners are stopped."""
+        return self._most
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -129,6 +183,13 @@ class GuardedStepper:
         Args:
             each: called at the end of every sub-step of a step that was cut, ``data`` being there;
                 a step that stands whole does not call it.
+
+        Raises:
+            ValueError: a timestep that is not finite or not above 0; the flags ``ipc``,
+                ``speculative`` or ``sleep`` (their state or distances cannot be taken back); the
+                integrator RK4; a contact filter (``mjcb_contactfilter``); a mocap pose that is not
+                finite; a shape that is none. Nothing was stepped.
+            mujoco.FatalError: an error of MuJoCo's; the state is that of before.
         """
         contacts = self._guard.step(self, each)
         if contacts < 0:
@@ -231,14 +292,18 @@ def _turning(model: Any) -> NDArray[np.int32]:
     return np.array(out, dtype=np.int32)
 
 
-def _refuse(model: Any) -> None:
-    flags = mujoco.mjtEnableBit
-    for name, bit in (
-        ("ipc", flags.mjENBL_IPC),
-        ("speculative", flags.mjENBL_SPECULATIVE),
-        ("sleep", flags.mjENBL_SLEEP),
-    ):
+def _refuse(model: Any, data: Any) -> None:
+    step = model.opt.timestep
+    if not 0 < step < np.inf:
+        raise ValueError(f"timestep {step}: expected a finite number above 0")
+    for name, bit in REFUSED.items():
         if model.opt.enableflags & bit:
             raise ValueError(f"option flag {name}: a guarded step cannot take it back; disable it")
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise ValueError("integrator RK4: expected Euler, implicit, implicitfast or discrete")
+    if mujoco.get_mjcb_contactfilter() is not None:
+        raise ValueError("mjcb_contactfilter: a guard cannot know the pairs it leaves; remove it")
+    for name in ("mocap_pos", "mocap_quat"):
+        rows = getattr(data, name)
+        for row in np.flatnonzero(~np.isfinite(rows).all(axis=1)).tolist():
+            raise ValueError(f"{name}: row {row} is {rows[row].tolist()}, not finite")

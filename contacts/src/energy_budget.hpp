@@ -40,6 +40,11 @@ class EnergyBudget {
     return change.gain > 0 && gained_ + change.gain > allowed_;
   }
   void record(const EnergyChange& change) { gained_ += change.gain; }
+  void set_sheets(std::vector<Sheet> sheets) { sheets_ = std::move(sheets); }
+  template <class Archive>
+  void archive(Archive& a) {
+    a(gained_), a(allowed_);
+  }
 
  private:
   double kinetic(const void* data, const double* velocity);

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "caught.hpp"
+
 namespace tauguard::contacts {
 
 // Parts of a state that are saved, restored and copied: MuJoCo's mjtState.
@@ -27,14 +29,15 @@ struct Engine {
   void *data, *end;  // what is stepped; the kinematics of a step's end
   void* other;       // with mocap bodies: those of the same joints with other mocap poses
 
-  Step step, step1, step2, kinematics, com_pos, com_vel, flex, tendon, make_m, energy_pos;
-  void (*get_state)(const void*, const void*, double*, int);
-  void (*set_state)(const void*, void*, const double*, int);
-  void (*copy_state)(const void*, const void*, void*, int);
-  void (*mul_m)(const void*, const void*, double*, const double*);
-  void (*mul_jac)(const void*, const void*, double*, const double*);
-  void (*jac_com)(const void*, const void*, double*, double*, int);
-  void (*integrate)(const void*, double*, const double*, double);
+  Logging logging;
+  Call<const void*, void*> step, step1, step2, kinematics, com_pos, com_vel, flex, tendon, make_m,
+      energy_pos;
+  Call<const void*, const void*, double*, int> get_state;
+  Call<const void*, void*, const double*, int> set_state;
+  Call<const void*, const void*, void*, int> copy_state;
+  Call<const void*, const void*, double*, const double*> mul_m, mul_jac;
+  Call<const void*, const void*, double*, double*, int> jac_com;
+  Call<const void*, double*, const double*, double> integrate;
 
   int nq, nv, nbody, nmocap, ngeom, nflex, nflexvert, ntendon;
   Signatures signature;
@@ -43,7 +46,8 @@ struct Engine {
 
   // Of the model; timestep, flags, margins and parameters are changed within a step.
   double* timestep;
-  int *disableflags, *integrator, *cone, *solver, *iterations;
+  int *disableflags, *enableflags, *integrator, *cone, *solver, *iterations;
+  double *o_margin, *o_solref;                // of all contacts, where the flag `override` is set
   double *margin[3], *solref[3], *solimp[3];  // by place: an explicit pair, a geom, a flex
   double* friction[3];
   int* priority[3];
@@ -70,7 +74,10 @@ struct Engine {
   double *other_energy, *other_mocap_pos, *other_mocap_quat;
   const double *other_xpos, *other_xmat, *other_flexvert;
 
-  int discrete, pyramidal, refsafe, newton, equality;  // values of MuJoCo's enumerations
+  // Values of MuJoCo's enumerations; flags that are refused.
+  int discrete, runge_kutta, pyramidal, refsafe, newton, equality, override_flag, refused;
+  void* const* contact_filter;      // MuJoCo's global callback
+  std::size_t at_stack, at_frames;  // mjData's pointers into its stack
 
   Contact contact(int k) const {
     const char* p = *contacts + static_cast<std::size_t>(k) * contact_size;

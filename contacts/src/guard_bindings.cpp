@@ -1,13 +1,17 @@
 // The guarded stepper: what of a model it covers, and its steps.
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/vector.h>
 
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "arrays.hpp"
+#include "saved_state.hpp"
 #include "stepper.hpp"
 #include "tauguard/geometry/rounding.hpp"
+#include "watched_fields.hpp"
 
 namespace tauguard::contacts {
 namespace {
@@ -21,6 +25,8 @@ class Addresses {
   void set(const char* name, T* field) const {
     if constexpr (std::is_pointer_v<T>)
       *field = reinterpret_cast<T>(static_cast<std::uintptr_t>(number(name)));
+    else if constexpr (std::is_class_v<T>)
+      *field = reinterpret_cast<typename T::Function>(static_cast<std::uintptr_t>(number(name)));
     else
       *field = static_cast<T>(number(name));
   }
@@ -38,11 +44,18 @@ void set_functions(const Addresses& a, Engine* e) {
   a.set("mj_copyState", &e->copy_state), a.set("mj_mulM", &e->mul_m);
   a.set("mj_mulJacVec", &e->mul_jac);
   a.set("mj_jacBodyCom", &e->jac_com), a.set("mj_integratePos", &e->integrate);
+  a.set("_mjPRIVATE_setTlsLogHandler", &e->logging.set);
+  a.set("_mjPRIVATE_getGlobalLogHandler", &e->logging.global);
+  a.set("log_error", &e->logging.error), a.set("at_subject", &e->logging.at_subject);
 }
 
 void set_model(const Addresses& a, Engine* e) {
   a.set("model", &e->model), a.set("timestep", &e->timestep);
   a.set("disableflags", &e->disableflags), a.set("integrator", &e->integrator);
+  a.set("enableflags", &e->enableflags), a.set("o_margin", &e->o_margin);
+  a.set("o_solref", &e->o_solref), a.set("mjcb_contactfilter", &e->contact_filter);
+  a.set("runge_kutta", &e->runge_kutta), a.set("override", &e->override_flag);
+  a.set("refused", &e->refused), a.set("at_pstack", &e->at_stack), a.set("at_pbase", &e->at_frames);
   a.set("cone", &e->cone), a.set("solver", &e->solver), a.set("iterations", &e->iterations);
   const char* kinds[3] = {"pair", "geom", "flex"};
   for (int k = 0; k < 3; ++k) {
@@ -151,12 +164,30 @@ class Guard {
   void spins(Ints dofs) { spins_ = list<int>(dofs); }
   void pulled(Bytes equalities) { pulled_ = list<char>(equalities); }
 
+  // Bytes of the model that all this was made from, as they are now.
+  void watch(const std::vector<std::pair<std::uintptr_t, std::size_t>>& fields) {
+    watched_.clear();
+    for (const auto& [from, size] : fields) watched_.add(reinterpret_cast<const char*>(from), size);
+  }
+  // Whether the model's fields differ from then.
+  bool changed() const { return watched_.changed(); }
+  // Takes back what was added since the last start.
+  void clear() {
+    verdict_ = Verdict{}, pairs_.clear(), last_.clear(), sheets_.clear(), spins_.clear();
+    pulled_.clear();
+  }
+
   // All was added. Whether flexes are covered against flexes: the owner's `_tunnelling_events`
   // finds them.
   void start(bool sheets) {
-    stepper_ = std::make_unique<Stepper>(engine_, std::move(verdict_), std::move(pairs_),
-                                         std::move(last_), std::move(sheets_), std::move(spins_),
-                                         std::move(pulled_), s_, allowed_);
+    if (stepper_)
+      stepper_->follow(std::move(verdict_), std::move(pairs_), std::move(last_), std::move(sheets_),
+                       std::move(spins_), std::move(pulled_));
+    else
+      stepper_ = std::make_unique<Stepper>(engine_, std::move(verdict_), std::move(pairs_),
+                                           std::move(last_), std::move(sheets_), std::move(spins_),
+                                           std::move(pulled_), s_, allowed_);
+    clear();
     Stepper::TunnellingEvents find;
     if (sheets) find = [this](std::vector<PairHit>* hits) { add_tunnelling(hits); };
     stepper_->set_callbacks(find, [this](const std::vector<PairHit>& hits, const double* qpos,
@@ -167,6 +198,7 @@ class Guard {
   // call: it holds this.
   int step(nb::handle owner, nb::object each) {
     owner_ = owner;
+    if (watched_.changed() || !stepper_->acceptable()) owner.attr("_follow")();
     std::function<void()> call;
     if (!each.is_none())
       call = [&each] {
@@ -174,12 +206,33 @@ class Guard {
         each();
       };
     bool quiet;
-    {
+    const Stacks stacks(engine_);
+    try {
       const nb::gil_scoped_release release;
       const tauguard::geometry::RoundToNearest guard;
+      const Catching catching(engine_.logging);
       quiet = stepper_->step(call);
+    } catch (const MujocoError& error) {
+      undo(stacks);
+      // An exception in one of MuJoCo's Python callbacks comes as an error of MuJoCo's.
+      if (!PyErr_Occurred())
+        PyErr_SetString(nb::module_::import_("mujoco").attr("FatalError").ptr(), error.what());
+      throw nb::python_error();
+    } catch (...) {
+      undo(stacks);
+      throw;
     }
     return quiet ? stepper_->report().contacts : -1;
+  }
+
+  nb::bytes saved() const {
+    Writer writer;
+    stepper_->archive(writer);
+    return nb::bytes(writer.bytes().data(), writer.bytes().size());
+  }
+  void restore(nb::bytes state) {
+    Reader reader(state.c_str(), state.size());
+    stepper_->archive(reader), reader.end();
   }
 
   // Steps, contacts, cuts (time, pair, stiffened), pairs restored, passed and in impact zones,
@@ -217,6 +270,31 @@ class Guard {
   void reset() { stepper_->reset(); }
 
  private:
+  // MuJoCo's stacks, which an error leaves as they were when it came.
+  struct Stacks {
+    explicit Stacks(const Engine& engine) : e(engine) {
+      for (int k = 0; k < 3; ++k)
+        std::memcpy(&stack[k], at(k, e.at_stack), sizeof stack[k]),
+            std::memcpy(&frames[k], at(k, e.at_frames), sizeof frames[k]);
+    }
+    void put_back() const {
+      for (int k = 0; k < 3; ++k)
+        std::memcpy(at(k, e.at_stack), &stack[k], sizeof stack[k]),
+            std::memcpy(at(k, e.at_frames), &frames[k], sizeof frames[k]);
+    }
+    char* at(int k, std::size_t offset) const {
+      void* const all[3] = {e.data, e.end, e.other};
+      return static_cast<char*>(all[k]) + offset;
+    }
+    const Engine& e;
+    std::size_t stack[3], frames[3];
+  };
+
+  void undo(const Stacks& stacks) {
+    stacks.put_back();
+    stepper_->abandon();
+  }
+
   // Rows (pair, vertices, way) of owner._tunnelling_events(x_t1).
   void add_tunnelling(std::vector<PairHit>* hits) {
     const nb::gil_scoped_acquire acquire;
@@ -239,6 +317,7 @@ class Guard {
   }
 
   Engine engine_;
+  WatchedFields watched_;
   nb::object held_;   // what the addresses point into
   nb::handle owner_;  // of the step that is being made
   Settings s_{};
@@ -271,6 +350,11 @@ void bind_guard(nb::module_& m) {
       .def("report", &Guard::report)
       .def("passing", &Guard::passing)
       .def("stiffened", &Guard::stiffened)
+      .def("watch", &Guard::watch, "fields"_a)
+      .def("changed", &Guard::changed)
+      .def("clear", &Guard::clear)
+      .def("saved", &Guard::saved)
+      .def("restore", &Guard::restore, "state"_a)
       .def("close", &Guard::close)
       .def("reset", &Guard::reset);
 }

@@ -81,6 +81,13 @@ void Mocap::stand(const Poses& poses) {
   if (e_.nflex) e_.flex(e_.model, e_.other);
 }
 
+bool Mocap::finite() const {
+  double sum = 0;
+  for (int i = 0; i < 3 * e_.nmocap; ++i) sum += e_.mocap_pos[i] - e_.mocap_pos[i];
+  for (int i = 0; i < 4 * e_.nmocap; ++i) sum += e_.mocap_quat[i] - e_.mocap_quat[i];
+  return sum == 0;
+}
+
 void Mocap::remember() {
   read(&start_);
   time_ = *e_.time;

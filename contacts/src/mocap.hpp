@@ -18,6 +18,14 @@ class Mocap {
   // `pulled`: by equality, whether something that mocap carries takes part in it.
   Mocap(const Engine& engine, std::vector<char> pulled);
 
+  void set_pulled(std::vector<char> pulled) { pulled_ = std::move(pulled); }
+  // Whether every number of the poses is finite.
+  bool finite() const;
+  template <class Archive>
+  void archive(Archive& a) {
+    a(start_), a(time_);
+  }
+
   // The present poses begin the way of the next step.
   void remember();
   // A step begins at the present state; false if something else set it since the last one ended.

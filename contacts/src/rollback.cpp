@@ -60,7 +60,7 @@ double Stepper::sub_step(double length, const std::function<void()>& each) {
     mocap_.sub_step(share, length < rest_ * (1 - 1e-9) ? share + length / whole_ : 1);
     rows_.step(length, held(length), push_);
     ++report_.steps;
-    if (*e_.time != begin + length) {
+    if (*e_.time != begin + length || !finite()) {
       note_reset();
       break;
     }

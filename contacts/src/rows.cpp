@@ -64,6 +64,11 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
     else
       geoms_[e_.pair_geom1[at.number]] = geoms_[e_.pair_geom2[at.number]] = 1;
   }
+  if (*e_.enableflags & e_.override_flag) {  // the parameters of all contacts instead
+    for (const Held& h : held) borrowed.set(e_.o_margin, std::max(*e_.o_margin, h.margin));
+    if (discrete && !held.empty())
+      borrowed.set(e_.o_solref, rigid), borrowed.set(e_.o_solref + 1, 1.0);
+  }
   if (discrete) *e_.disableflags |= e_.refsafe;
   e_.step1(e_.model, e_.data);
   aim(length, push);

@@ -1,6 +1,7 @@
 #include "stepper.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace tauguard::contacts {
 namespace {
@@ -61,13 +62,69 @@ Stepper::Stepper(const Engine& engine, Verdict verdict, std::vector<Partners> pa
       guarded_(pairs_.size(), 0),
       passed_(pairs_.size(), 0),
       in_zone_(pairs_.size(), 0) {
+  number_pairs();
+}
+
+void Stepper::number_pairs() {
+  number_.clear();
   for (std::size_t i = 0; i < pairs_.size(); ++i)
     number_[key(pairs_[i].first, pairs_[i].second)] = static_cast<int>(i);
 }
 
+void Stepper::follow(Verdict verdict, std::vector<Partners> pairs, std::vector<int> last_level,
+                     std::vector<Sheet> sheets, std::vector<int> spins, std::vector<char> pulled) {
+  struct Before {
+    std::vector<char> known;
+    bool guarded, stiff;
+  };
+  std::unordered_map<std::uint64_t, Before> before;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const int pair = static_cast<int>(i);
+    before[key(pairs_[i].first, pairs_[i].second)] = {verdict_.known(i), guarded_[i] != 0,
+                                                      stiffening_.is_stiff(pair)};
+  }
+  stiffening_.follow();
+  close();
+  const int watched = watched_;
+  verdict_ = std::move(verdict), pairs_ = std::move(pairs), last_level_ = std::move(last_level);
+  budget_.set_sheets(std::move(sheets)), mocap_.set_pulled(std::move(pulled));
+  spins_ = std::move(spins), watched_ = watched;
+  stiffening_.resize(), number_pairs();
+  for (std::vector<char>* marks : {&guarded_, &passed_, &in_zone_}) marks->assign(pairs_.size(), 0);
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const auto found = before.find(key(pairs_[i].first, pairs_[i].second));
+    if (found == before.end()) continue;
+    verdict_.set_known(i, found->second.known);
+    guarded_[i] = found->second.guarded, guarded_count_ += guarded_[i];
+    if (found->second.stiff) stiffening_.stiffen(static_cast<int>(i));
+  }
+}
+
+bool Stepper::acceptable() const {
+  const double h = *e_.timestep;
+  return h > 0 && h <= std::numeric_limits<double>::max() && !(*e_.enableflags & e_.refused) &&
+         *e_.integrator != e_.runge_kutta && !(e_.contact_filter && *e_.contact_filter) &&
+         mocap_.finite();
+}
+
+void Stepper::abandon() {
+  if (!stepping_) return;
+  stepping_ = false;
+  e_.set_state(e_.model, e_.data, first_.data(), e_.signature.integration);
+}
+
+bool Stepper::finite() const {
+  double sum = 0;
+  for (int i = 0; i < e_.nq; ++i) sum += e_.qpos[i] - e_.qpos[i];
+  for (int i = 0; i < e_.nv; ++i) sum += e_.qvel[i] - e_.qvel[i];
+  return sum == 0;
+}
+
 bool Stepper::step(const std::function<void()>& each) {
+  stiffening_.follow();
   if (!mocap_.begin()) verdict_.forget();
   e_.get_state(e_.model, e_.data, first_.data(), e_.signature.integration);
+  stepping_ = true;
   const bool watched = watched_ > 0;
   if (watched) std::copy_n(e_.qvel, e_.nv, velocity_.begin());
   whole_ = *e_.timestep;
@@ -75,7 +132,7 @@ bool Stepper::step(const std::function<void()>& each) {
   e_.step(e_.model, e_.data);
   std::vector<PairHit> hits = judge();
   std::fill(passed_.begin(), passed_.end(), 0);
-  bool lost = *e_.time != after;
+  bool lost = *e_.time != after || !finite();
   if (lost) note_reset();
   if (!hits.empty()) {
     for (const PairHit& hit : hits) lost = lost || hit.lost;
@@ -88,6 +145,7 @@ bool Stepper::step(const std::function<void()>& each) {
     const bool released = stands();
     if (lost) report_.passed = marked(passed_);
     mocap_.remember();
+    stepping_ = false;
     return !released && !lost;
   }
   watched_ = s_.watched;
@@ -96,6 +154,7 @@ bool Stepper::step(const std::function<void()>& each) {
     roll_back(std::move(hits), !watched, each);
   }
   mocap_.remember();
+  stepping_ = false;
   return false;
 }
 

@@ -83,10 +83,25 @@ class Stepper {
   void close();
   // The state was set from outside: forgets the steps before.
   void reset();
+  // Another cover, as the constructor takes it; what is known of pairs that are in both is kept.
+  void follow(Verdict verdict, std::vector<Partners> pairs, std::vector<int> last_level,
+              std::vector<Sheet> sheets, std::vector<int> spins, std::vector<char> pulled);
+  // Whether the model and the data can be stepped at all.
+  bool acceptable() const;
+  // A step ended in an exception: the state is that of its start.
+  void abandon();
+  // All that is known of earlier steps, written or read.
+  template <class Archive>
+  void archive(Archive& a) {
+    verdict_.archive(a), mocap_.archive(a), budget_.archive(a), stiffening_.archive(a);
+    a(guarded_), a(guarded_count_), a(watched_), a(since_), a(contacts_), a(stops_);
+  }
   std::vector<int> stiffened() const;
 
  private:
   bool stands();
+  bool finite() const;
+  void number_pairs();
   void roll_back(std::vector<PairHit> hits, bool fresh, const std::function<void()>& each);
   double sub_step(double length, const std::function<void()>& each);
   EnergyChange last_resort(double length, const std::vector<PairHit>& hits, EnergyChange change);
@@ -118,6 +133,7 @@ class Stepper {
   std::unordered_map<std::uint64_t, int> number_;  // of a pair, by its partners
   std::vector<int> spins_;                         // degrees of freedom that turn something
 
+  bool stepping_ = false;  // the state of the start is in first_
   std::vector<double> first_, saved_, velocity_, qpos_, x_t1_, turn_;
   std::vector<char> guarded_;
   int guarded_count_ = 0, watched_ = 0, since_ = 0, contacts_ = 0;

@@ -26,8 +26,22 @@ bool Stiffening::stiffen(int pair) {
   if (own_priority) {
     const Place& other = p.first == at ? p.second : p.first;
     *own_priority = std::max(*own_priority, e_.priority[other.kind][other.number] + 1);
+    saved.raised = *own_priority;
   }
   return true;
+}
+
+void Stiffening::follow() {
+  const auto one = [](auto* now, auto stiff, auto* saved) {
+    if (*now != stiff) *saved = *now, *now = stiff;
+  };
+  for (auto& [at, saved] : saved_) {
+    for (int k = 0; k < 2; ++k)
+      one(e_.solref[at.kind] + 2 * at.number + k, solref[k], &saved.solref[k]);
+    for (int k = 0; k < 5; ++k)
+      one(e_.solimp[at.kind] + 5 * at.number + k, solimp[k], &saved.solimp[k]);
+    if (e_.priority[at.kind]) one(e_.priority[at.kind] + at.number, saved.raised, &saved.priority);
+  }
 }
 
 bool Stiffening::restore(int pair) {

@@ -38,13 +38,36 @@ class Stiffening {
   // Undo that, once no other pair needs it; false if it was not stiff.
   bool restore(int pair);
   bool is_stiff(int pair) const { return stiff_[pair]; }
+  // What somebody else wrote since counts as the pair's own from now on.
+  void follow();
+  // Another list of pairs, none of them stiff.
+  void resize() { stiff_.assign(pairs_.size(), 0), saved_.clear(); }
+  template <class Archive>
+  void archive(Archive& a) {
+    a(stiff_);
+    std::vector<Entry> entries(saved_.begin(), saved_.end());
+    archive_entries(a, &entries);
+    saved_ = {entries.begin(), entries.end()};
+  }
 
  private:
   struct Saved {
     std::array<double, 2> solref;
     std::array<double, 5> solimp;
     int priority, users;
+    int raised;  // the priority that was written
   };
+  using Entry = std::pair<Place, Saved>;
+  template <class Archive>
+  static void archive_entries(Archive& a, std::vector<Entry>* entries) {
+    std::size_t count = entries->size();
+    a(count);
+    entries->resize(count, {Place{Place::geom, 0}, Saved{}});
+    for (Entry& e : *entries) {
+      a(e.first), a(e.second.solref), a(e.second.solimp);
+      a(e.second.priority), a(e.second.users), a(e.second.raised);
+    }
+  }
   const Engine& e_;
   const std::vector<Partners>& pairs_;
   std::vector<char> stiff_;

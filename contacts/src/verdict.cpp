@@ -203,6 +203,20 @@ void Verdict::judge_flex(std::size_t number, const double* x_t0, const double* x
   }
 }
 
+std::vector<char> Verdict::known(std::size_t pair) const {
+  if (pair < pairs_.size()) return {pairs_[pair].known};
+  pair -= pairs_.size();
+  return pair < flex_pairs_.size() ? flex_pairs_[pair].known : std::vector<char>{};
+}
+
+void Verdict::set_known(std::size_t pair, const std::vector<char>& known) {
+  if (known.size() != this->known(pair).size() || known.empty()) return;
+  if (pair < pairs_.size())
+    pairs_[pair].known = known[0];
+  else
+    flex_pairs_[pair - pairs_.size()].known = known;
+}
+
 void Verdict::forget() {
   for (Pair& pair : pairs_) pair.known = unknown;
   for (FlexPair& pair : flex_pairs_) std::fill(pair.known.begin(), pair.known.end(), unknown);

@@ -36,6 +36,17 @@ class Verdict {
   void forget();
   void judge(const Poses& poses, const double* x_t0, const double* x_t1, std::vector<Hit>* hits);
 
+  std::size_t rigid_pairs() const { return pairs_.size(); }
+  // What is known of a pair from the steps before: one entry, or one a simplex.
+  std::vector<char> known(std::size_t pair) const;
+  // Sets that, unless the number of entries differs.
+  void set_known(std::size_t pair, const std::vector<char>& known);
+  template <class Archive>
+  void archive(Archive& a) {
+    for (Pair& pair : pairs_) a(pair.known);
+    for (FlexPair& pair : flex_pairs_) a(pair.known);
+  }
+
  private:
   struct Entry {
     Shape shape;
