@@ -14,7 +14,6 @@ from typing import Any
 
 import mujoco
 from mujoco.introspect import ast_nodes
-from mujoco.introspect.enums import ENUMS
 
 from tauguard.models.mujoco_library import function_address, variable_address
 
@@ -75,8 +74,8 @@ OPTIONS = (
     *("o_margin", "o_solref"),
 )
 _NUMBERS = ("nq", "nv", "nbody", "nmocap", "ngeom", "nflex", "nflexvert", "ntendon")
-#: mjLOG_ERROR of mjtLogLevel.
-_LOG_ERROR = ENUMS["mjtLogLevel"].values["mjLOG_ERROR"]
+#: mjLOG_ERROR of mjtLogLevel, which the Python binding does not show.
+_LOG_ERROR = 3
 _TYPES = {
     "int": ctypes.c_int,
     "mjtNum": ctypes.c_double,
@@ -136,7 +135,7 @@ def addresses(model: Any, data: Any, end: Any, other: Any) -> dict[str, int]:
         "mjcb_contactfilter": variable_address("mjcb_contactfilter"),
         "at_pstack": int(fields.pstack.offset),
         "at_pbase": int(fields.pbase.offset),
-        "log_error": int(_LOG_ERROR),
+        "log_error": _LOG_ERROR,
         "at_subject": int(_layout("mjLogMessage").subject.offset),
         "newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
         "equality": int(mujoco.mjtConstraint.mjCNSTR_EQUALITY),

@@ -16,11 +16,12 @@ from tauguard.contacts._contacts import Guard
 from tauguard.contacts.guard.covered import Covered, names
 from tauguard.contacts.guard.energy_budget import EnergyBalance, EnergyMeter, sheets_of
 from tauguard.contacts.guard.engine import INTEGRATION, REFUSED, addresses
+from tauguard.contacts.guard.followed_fields import followed_fields, refuse_shapes
 from tauguard.contacts.guard.impact_zone import Hit, impact_zone
 from tauguard.contacts.guard.mocap import pulled
 from tauguard.contacts.guard.report import Cut, Pair, StepReport, partner_name
 from tauguard.contacts.guard.tunnelling import TunnellingEvents, elements
-from tauguard.contacts.guard.watched_fields import refuse_shapes, watched_fields
+from tauguard.models.mujoco_defects import warn_of_sparse_newton
 
 #: What the native part goes by.
 SETTINGS = {
@@ -79,6 +80,7 @@ class GuardedStepper:
             raise ValueError(f"most {most}: expected 2 or more steps")
         self._rigid, self._cloth = names(checkers)
         self._model, self._data, self._stiff, self._most = model, data, stiff, most
+        warn_of_sparse_newton(model)
         self._start()
 
     def _start(self) -> None:
@@ -113,7 +115,7 @@ class GuardedStepper:
             self._tunnelling = TunnellingEvents(model, covered.sheets, first)
         self._meter: EnergyMeter | None = None
         self._guard.start(self._tunnelling is not None)
-        self._guard.watch(watched_fields(model, self._options))
+        self._guard.follow(followed_fields(model, self._options))
 
     def _follow(self) -> None:
         """Go by what was changed since the last step, or refuse it."""

@@ -8,10 +8,10 @@
 #include <string>
 
 #include "arrays.hpp"
+#include "followed_fields.hpp"
 #include "saved_state.hpp"
 #include "stepper.hpp"
 #include "tauguard/geometry/rounding.hpp"
-#include "watched_fields.hpp"
 
 namespace tauguard::contacts {
 namespace {
@@ -165,12 +165,12 @@ class Guard {
   void pulled(Bytes equalities) { pulled_ = list<char>(equalities); }
 
   // Bytes of the model that all this was made from, as they are now.
-  void watch(const std::vector<std::pair<std::uintptr_t, std::size_t>>& fields) {
-    watched_.clear();
-    for (const auto& [from, size] : fields) watched_.add(reinterpret_cast<const char*>(from), size);
+  void follow(const std::vector<std::pair<std::uintptr_t, std::size_t>>& fields) {
+    fields_.clear();
+    for (const auto& [from, size] : fields) fields_.add(reinterpret_cast<const char*>(from), size);
   }
   // Whether the model's fields differ from then.
-  bool changed() const { return watched_.changed(); }
+  bool changed() const { return fields_.changed(); }
   // Takes back what was added since the last start.
   void clear() {
     verdict_ = Verdict{}, pairs_.clear(), last_.clear(), sheets_.clear(), spins_.clear();
@@ -198,7 +198,7 @@ class Guard {
   // call: it holds this.
   int step(nb::handle owner, nb::object each) {
     owner_ = owner;
-    if (watched_.changed() || !stepper_->acceptable()) owner.attr("_follow")();
+    if (fields_.changed() || !stepper_->acceptable()) owner.attr("_follow")();
     std::function<void()> call;
     if (!each.is_none())
       call = [&each] {
@@ -317,7 +317,7 @@ class Guard {
   }
 
   Engine engine_;
-  WatchedFields watched_;
+  FollowedFields fields_;
   nb::object held_;   // what the addresses point into
   nb::handle owner_;  // of the step that is being made
   Settings s_{};
@@ -350,7 +350,7 @@ void bind_guard(nb::module_& m) {
       .def("report", &Guard::report)
       .def("passing", &Guard::passing)
       .def("stiffened", &Guard::stiffened)
-      .def("watch", &Guard::watch, "fields"_a)
+      .def("follow", &Guard::follow, "fields"_a)
       .def("changed", &Guard::changed)
       .def("clear", &Guard::clear)
       .def("saved", &Guard::saved)

@@ -35,7 +35,7 @@ _UNIT = 1e-6
 Regions = list[tuple[int, int]]
 
 
-def watched_fields(model: Any, options: Regions) -> Regions:
+def followed_fields(model: Any, options: Regions) -> Regions:
     """Addresses and sizes in bytes of all that a guard of this model goes by.
 
     Args:

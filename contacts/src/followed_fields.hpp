@@ -7,7 +7,7 @@
 
 namespace tauguard::contacts {
 
-class WatchedFields {
+class FollowedFields {
  public:
   void clear() { fields_.clear(), copy_.clear(); }
   // So many bytes from here on, as they are now.

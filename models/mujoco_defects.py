@@ -1,0 +1,36 @@
+"""Known defects of MuJoCo versions that change results, and which models they hit."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import mujoco
+
+#: Versions whose Newton solver factors a wrong Hessian where the Jacobian is sparse: it may stop at
+#: its limit of iterations, with wrong accelerations. Mended in 4.0.1.
+WRONG_SPARSE_NEWTON = ("4.0.0",)
+
+
+def hit_by_sparse_newton(model: Any) -> bool:
+    """Whether this version's Newton solver may give wrong accelerations of this model.
+
+    Args:
+        model: MjModel.
+    """
+    return (
+        mujoco.__version__ in WRONG_SPARSE_NEWTON
+        and int(model.opt.solver) == mujoco.mjtSolver.mjSOL_NEWTON
+        and bool(mujoco.mj_isSparse(model))
+    )
+
+
+def warn_of_sparse_newton(model: Any) -> None:
+    """One ``UserWarning`` that says what to do, where :func:`hit_by_sparse_newton` is true."""
+    if hit_by_sparse_newton(model):
+        warnings.warn(
+            f"MuJoCo {mujoco.__version__}: its Newton solver can give wrong accelerations with a "
+            f"sparse Jacobian, which this model has ({model.nv} degrees of freedom); set "
+            "model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE, or use MuJoCo 4.0.1 or later",
+            stacklevel=3,
+        )
