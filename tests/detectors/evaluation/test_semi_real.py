@@ -26,7 +26,7 @@ def test_the_current_changes_by_the_torque_over_the_gain():
     [
         ({"seconds": 0.0}, "more than 0 s"),
         ({"torque": (1.0,)}, "3 torques"),
-        ({"shape": "kick"}, "blow or push"),
+        ({"shape": "kick"}, "impact or push"),
     ],
 )
 def test_what_is_no_contact_is_refused(wrong, words):
