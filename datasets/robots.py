@@ -56,7 +56,7 @@ def find_robot(asked: str, folder: Path) -> RobotSource:
 
 
 def nominal_texts(name: str, robots: Sequence[RobotSource]) -> dict[str, str]:
-    """The nominal arm, whose numbers an observer may use; see ``Scene.nominal_texts``."""
+    """Names and texts that describe the nominal arm; see ``Scene.nominal_texts``."""
     for robot in robots:
         if robot.name == name:
             return _scene(robot.source).nominal_texts
@@ -67,7 +67,7 @@ def check_unchanged(name: str, robots: Sequence[RobotSource]) -> None:
     """Check that an arm's file has not changed since the dataset was described.
 
     Raises:
-        ValueError: its file is another, or is not there.
+        ValueError: the file has changed or does not exist.
     """
     for robot in robots:
         if robot.name != name:

@@ -119,14 +119,14 @@ def free_rows(trace: Trace, settle: float = 1.0, recover: float = RECOVER) -> Bo
 def undisturbed_rows(traces: Sequence[Trace], settle: float) -> list[Bools]:
     """Collision-free rows to learn free motion from, shape (T,) a trace.
 
-    A collision leaves an estimator that tracks the payload with wrong beliefs. What follows within
-    the time that it needs to settle is no free motion: one such second of a recording can be 80
-    times what all others leave. Where every row is so close to a collision, all count that are
-    outside of them.
+    After a collision, an estimator that tracks the payload holds a wrong payload and needs the
+    time ``settle`` to correct it. Rows within that time are left out: in one such second of a
+    recording the residual can be 80 times that of all other rows. If every row is that close to a
+    collision, all rows outside the collisions are used.
 
     Args:
-        traces: without truth all of a trace counts as free.
-        settle: of the estimator [s].
+        traces: recordings; every row of a trace without truth counts as collision-free.
+        settle: time that the estimator needs to settle [s].
     """
     found = [free_rows(trace, settle, max(settle, RECOVER)) for trace in traces]
     if any(rows.any() for rows in found):

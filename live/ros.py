@@ -75,7 +75,7 @@ class RosStream(Closing):
         threading.Thread(target=self._executor.spin, daemon=True).start()
 
     def _heard(self, message: Any) -> None:
-        """One message, in the executor's thread."""
+        """Queue the sample of a message; the executor calls this in its own thread."""
         try:
             found: Sample | ValueError = sample_of(message, self.joint_names, time.monotonic_ns())
         except ValueError as error:

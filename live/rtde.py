@@ -63,21 +63,22 @@ def packet(kind: int, payload: bytes = b"") -> bytes:
 
 
 class PacketReader:
-    """Packets out of a stream of bytes that comes in pieces of any size."""
+    """Splits a stream of bytes, which arrives in pieces of any size, into packets."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
+        """Create a reader that has received no bytes yet."""
         self._bytes = bytearray()
 
     def feed(self, data: bytes) -> None:
-        """Take in what came from the socket."""
+        """Append the bytes that the socket received."""
         self._bytes += data
 
     def next(self) -> Packet | None:
-        """The next whole packet, None while there is none.
+        """The next complete packet, or None if it has not arrived completely.
 
         Raises:
-            ValueError: a size smaller than the header: the other side does not speak RTDE.
+            ValueError: the packet states a size below that of its header, so the other side does
+                not speak RTDE.
         """
         if len(self._bytes) < HEADER.size:
             return None

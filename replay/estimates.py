@@ -1,4 +1,4 @@
-"""What was said after the alarms, for a viewer: an arrow for each contact believed in."""
+"""Arrows that show a viewer the contact estimated after each alarm."""
 
 from __future__ import annotations
 
@@ -10,38 +10,38 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.traces.trace import Alarm
 
-#: An estimate is shown from its alarm on for at least so long [s].
+#: Least time for which an estimate is shown, from its alarm on [s].
 SHOWN = 0.5
 
 
 class Explained(Protocol):
-    """What one alarm was; ``tauguard.detectors.Diagnosis`` is one."""
+    """The explanation of one alarm, such as ``tauguard.detectors.Diagnosis``."""
 
     @property
     def alarm(self) -> Alarm:
-        """When."""
+        """The alarm that is explained."""
 
     @property
     def kind(self) -> str:
-        """A word; "payload" is no contact."""
+        """One word for the cause of the alarm; "payload" means that there was no contact."""
 
     @property
     def summary(self) -> str:
-        """All of it in a few words."""
+        """The explanation in one line of text."""
 
     @property
     def force(self) -> Array:
-        """On the arm, world frame [N], shape (3,)."""
+        """Estimated force on the arm, in the world frame [N], shape (3,)."""
 
     @property
     def point(self) -> Array:
-        """World frame [m], shape (3,)."""
+        """Estimated point of contact, in the world frame [m], shape (3,)."""
 
 
 def during(explained: Sequence[Explained], frames: Array) -> list[Explained | None]:
-    """The contact believed in at each frame time [s], the latest where several are; None for none.
+    """The estimated contact at each frame time [s], or None where there is none.
 
-    A payload change is no contact.
+    Where several contacts overlap in time, the latest one counts. A payload change is no contact.
     """
     found: list[Explained | None] = [None] * len(frames)
     for one in sorted(explained, key=lambda e: e.alarm.start):

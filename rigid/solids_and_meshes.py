@@ -71,11 +71,12 @@ def distance(a: Solid, b: MeshTree, threads: int = 1) -> MeshDistances: ...
 def distance(a: Solid | MeshTree, b: Solid | MeshTree, threads: int = 1) -> Distances:
     """Signed distance, nearest points and normal of the convex bodies ``a[i]`` and ``b[i]``.
 
-    The sign is never wrong, degenerate bodies included: it is that of :func:`overlap`, and 0
-    exactly where the bodies touch. The length is off by at most 3e-14 of the pair's extent and
-    distance. Gilbert, Johnson and Keerthi's descent (1988) and the expanding polytope (van den
-    Bergen 2001) in floating point, each answer with its certificate; where that fails, and within
-    1e-10 of contact, both in exact arithmetic (about a millisecond a pair).
+    The sign is never wrong, even for degenerate bodies: it agrees with :func:`overlap`, and the
+    distance is 0 exactly where the bodies touch. The error of the length is at most 3e-14 of the
+    pair's extent and distance. The method is Gilbert, Johnson and Keerthi's descent (1988) with
+    the expanding polytope (van den Bergen 2001) in floating point; a certificate checks each
+    answer. If the certificate fails, or the bodies are within 1e-10 of contact, both algorithms
+    run in exact arithmetic, which takes about a millisecond a pair.
 
     Args:
         a: N bodies of one kind, rounded or not, or one; or a mesh, whose surface counts (not its

@@ -1,4 +1,4 @@
-// The pairs of features of two overlapping leaves that must be asked about.
+// The pairs of features of two overlapping leaves that the narrow phase must test.
 #pragma once
 
 #include <cstdint>
@@ -9,21 +9,23 @@
 
 namespace tauguard::cloth {
 
-// Candidates in the form the narrow phase takes: `rows` holds 4 vertices a query (vertex and face,
-// or edge and edge), `pairs` the numbers of the two features.
+// Candidates in the form that the narrow phase takes. `rows` holds the 4 vertices of each query (of
+// a vertex and a face, or of two edges). `pairs` holds the numbers of the two features.
 struct CandidateBlock {
-  // Where a block is handed on, and the room that the leaf pair before that may still need.
+  // A block is passed on once it holds `full` candidates. `capacity` leaves room for those of one
+  // more pair of leaves.
   static constexpr std::size_t full = 2048, capacity = full + lanes * lanes;
   std::vector<std::int32_t> rows = std::vector<std::int32_t>(4 * capacity);
   std::vector<std::int32_t> pairs = std::vector<std::int32_t>(2 * capacity);
   std::size_t size = 0;
-  std::uint64_t adjacent = 0,
-                kept_apart = 0;  // left out: sharing a vertex; of groups that do not meet
+  // Numbers of pairs left out because they share a vertex (`adjacent`) or because their groups
+  // never touch (`kept_apart`).
+  std::uint64_t adjacent = 0, kept_apart = 0;
 };
 
-// Isolated edges and vertices stand behind the triangles (topology.hpp): `first` is the number of
-// the first of them, `point` marks the isolated vertices. Only isolated vertices are tested with
-// them, and each pair of isolated vertices once.
+// Isolated edges and isolated vertices are numbered after the triangles (topology.hpp). `first` is
+// the lowest of these numbers; `point` marks the isolated vertices. Only isolated vertices are
+// tested against isolated features, and each pair of isolated vertices is tested once.
 struct Isolated {
   std::int32_t first;
   const std::uint8_t* point;
@@ -32,9 +34,9 @@ struct Isolated {
   }
 };
 
-// Appends the candidates of one leaf pair: features whose own volumes overlap, share no vertex and
-// may meet. Edges come smaller number first; vertices and faces come vertex first. `out` must not
-// be full.
+// Appends the candidates of one pair of leaves to `out`, which must not be full. The two features
+// of a candidate share no vertex, their bounding volumes overlap, and their groups may touch. Of
+// two edges the one with the smaller number comes first; a vertex comes before a face.
 void leaf_candidates(const FeatureTree& a, const FeatureTree& b, NodePair leaves,
                      const Groups& groups, const Isolated& isolated, CandidateBlock& out);
 

@@ -1,8 +1,8 @@
-// Queries are answered in batches. Most have a coplanarity cubic without a root. The time of the
-// others is split into pieces of one root each (Descartes' rule in Bernstein form, which is
-// Vincent's), and at each root, earliest first, the features touch or not, beyond rounding and
-// beyond what the root's own error can change. What that leaves open goes through intervals.hpp,
-// and what those leave open through exact.hpp.
+// Queries are answered in batches. For most queries the coplanarity cubic has no root. For the
+// others the step is split into intervals with one root each, by Descartes' rule in Bernstein form
+// (Vincent's theorem). At each root, earliest first, a test decides whether the features touch; it
+// allows for rounding and for the error of the root. Queries that it cannot decide go to
+// intervals.hpp, and queries that intervals.hpp cannot decide go to exact.hpp.
 #include "narrow_phase.hpp"
 
 #include <algorithm>
@@ -24,20 +24,19 @@
 namespace tauguard::cloth {
 namespace {
 
-constexpr int batch = 128,
-              block =
-                  512;  // queries at a time, after and before those apart on an axis are left out
+// Queries at a time: `block` before and `batch` after queries that an axis separates are left out.
+constexpr int batch = 128, block = 512;
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Exactly one root: the ends have different signs and the coefficients between them one variation.
+// Whether the cubic has exactly one root: its Bernstein coefficients change their sign once.
 bool one_root(const double* b, double error) {
   const double s = b[0] > 0 ? 1 : -1;
   return s * b[0] > error && s * b[3] < -error && (s * b[1] > error || s * b[2] < -error);
 }
 
-// Where to cut a cubic for pieces of one root: ends on one side, at the extremum towards the other
-// (where the derivative turns to their side); else at the inflection, on either side of which there
-// are two at most.
+// Where to cut a cubic into pieces with fewer roots. If both ends have one sign, the cut is at the
+// extremum in the direction of the other sign. Otherwise it is at the inflection point, because at
+// most two roots lie on either side of it.
 double cut_of(const double* b) {
   const double s = b[0] > 0 ? 1 : -1, d0 = s * (b[1] - b[0]), d1 = s * (b[2] - b[1]),
                d2 = s * (b[3] - b[2]);
@@ -50,8 +49,9 @@ double cut_of(const double* b) {
   return cut > 0x1p-20 && cut < 1 - 0x1p-20 ? cut : 0.5;
 }
 
-// Pieces with one root each that hold every root of the cubic, in order; -1 where rounding leaves
-// that open. At most three cuts in a row, which the error allows for.
+// Writes pieces that hold one root each, in order, and together all roots of the cubic. Returns
+// their number, or -1 if rounding prevents a decision. The error bound allows for the limit of
+// three cuts in a row.
 int split(const double* b, double error, std::int32_t query, Piece* pieces) {
   struct Part {
     double start, length;
@@ -88,7 +88,7 @@ double exactly(const Ends& x, const std::int32_t* row, Stats& stats) {
   return exact_contact(vf, x, row);
 }
 
-// The rest, one by one: by intervals, then exactly.
+// Answers one query that the batch left open: by intervals and, if they fail, exactly.
 template <bool vf>
 double resolve(const Ends& x, const std::int32_t* row, double distance, Stats& stats) {
   ++stats.resolved;
@@ -106,8 +106,8 @@ struct Batch {
   int count = 0, left = 0;  // pieces; queries that stay open
 };
 
-// Pieces of all queries that may have contact, those of one piece first; returns how many these
-// are.
+// Writes the pieces of all queries that may have contact. Queries with a single piece come first;
+// returns their number.
 int make_pieces(Batch& b, int n, Stats& stats) {
   std::uint8_t rest[batch / width];
   const int groups = (n + width - 1) / width;
@@ -142,7 +142,7 @@ int make_pieces(Batch& b, int n, Stats& stats) {
   return single;
 }
 
-// Is the cubic zero at the start, as far as rounding lets that be seen?
+// Whether the cubic may be zero at the start, given its rounding error.
 bool may_touch_at_start(const Batch& b, std::int32_t query) {
   const Group& group = b.groups[query / width];
   const int lane = query % width;
@@ -150,8 +150,9 @@ bool may_touch_at_start(const Batch& b, std::int32_t query) {
          !(std::fabs(group.value[Group::cubic][lane]) > group.value[Group::error][lane]);
 }
 
-// Of a query that is apart at the start. A cubic that is zero there may be zero throughout: what
-// slides on a plane across an axis is then decided in two dimensions.
+// Time of contact of a query whose features are apart at the start. A cubic that is zero at the
+// start may be zero throughout the step: features that slide on a common plane perpendicular to an
+// axis are decided in two dimensions.
 template <bool vf>
 double later(const Batch& b, std::int32_t query, const Ends& x, const std::int32_t* row,
              Stats& stats) {

@@ -1,4 +1,4 @@
-// One query in differences, and its coplanarity cubic: what every method starts from.
+// One query as differences of positions, and its coplanarity cubic. Every method starts from these.
 #pragma once
 
 #include <algorithm>
@@ -21,17 +21,20 @@ using geometry::operator+;
 using geometry::operator-;
 using geometry::operator*;
 
-// Differences of positions at both ends: the cubic is p . (q x r); `gap` holds those that a
-// separating direction must see on one side. `big` is the largest magnitude among them.
+// Differences of positions at both ends of the step. The cubic is p . (q x r). A direction
+// separates the features if all differences in `gap` have one sign along it. `big` is the largest
+// magnitude of all differences.
 struct Query {
   Vec3 p[2], q[2], r[2];
   Vec3 gap[2][4];
   int gaps;
   double big, distance;
-  // Of a Bernstein coefficient, with M = big^3: each of up to three triple products of 6 terms
-  // carries 3 differences, 2 products and 3 sums, 8 u of 6 M each, 144 u M and 40 for their own
-  // sum; every cut adds 3 interpolations of 3 roundings on values up to 6 M, 54 u M, and there are
-  // at most 70 in a row: (184 + 70 * 54) u M < 2^12 u M. The scale keeps underflow far below that.
+  // Bound on the error of a Bernstein coefficient, with M = big^3. A coefficient sums up to three
+  // triple products of 6 terms, at most 6 M each. The 3 differences, 2 products and 3 sums of a
+  // triple product add 8 u of 6 M, for three of them 144 u M; their sum adds 40 u M. Every cut adds
+  // 3 interpolations of 3 roundings on values up to 6 M, which is 54 u M, and there are at most 70
+  // cuts in a row. The total is (184 + 70 * 54) u M < 2^12 u M. The scale of make() keeps underflow
+  // far below this bound.
   double cubic_error() const { return 0x1p-41 * big * big * big; }
 };
 
@@ -62,7 +65,7 @@ Query make(const Ends& x, const std::int32_t* row, double distance) {
     for (int i = 0; i < k.gaps; ++i) k.big = std::max(k.big, largest(k.gap[e][i]));
     k.big = std::max({k.big, largest(k.q[e]), largest(k.r[e])});
   }
-  // By a power of two to about 1, so that no product over- or underflows.
+  // Scales the query by a power of two to about 1, so that no product overflows or underflows.
   if (k.big > 0x1p-20 && k.big < 0x1p20) return k;
   const double s = k.big > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(k.big), -1000, 1000)) : 1;
   for (int e = 0; e < 2; ++e) {
@@ -90,7 +93,7 @@ inline int one_sign(const Cubic& c, double error) {
   if (c.b[0] < -error && c.b[1] < -error && c.b[2] < -error && c.b[3] < -error) return -1;
   return 0;
 }
-// de Casteljau: the parts before and after s.
+// Splits the cubic at s by de Casteljau's algorithm.
 inline void halve(const Cubic& c, double s, Cubic& left, Cubic& right) {
   const auto l = [s](double a, double b) { return a + s * (b - a); };
   const double d0 = l(c.b[0], c.b[1]), d1 = l(c.b[1], c.b[2]), d2 = l(c.b[2], c.b[3]);
@@ -99,7 +102,7 @@ inline void halve(const Cubic& c, double s, Cubic& left, Cubic& right) {
   right = {{f, e1, d2, c.b[3]}};
 }
 
-// The root of a cubic with ends of different sign, in (0, 1): Newton's steps kept within the
+// A root in (0, 1) of a cubic whose ends have different signs, by Newton's method kept within a
 // bracket.
 inline double root(const double* b) {
   double lo = 0, hi = 1, x = b[0] / (b[0] - b[3]);

@@ -173,7 +173,7 @@ def _structs() -> Any:
 
 @functools.cache
 def _layout(struct: str, last: str | None = None) -> Any:
-    """A struct of MuJoCo's, up to the field ``last`` if given."""
+    """The ctypes layout of a MuJoCo struct; ``last`` names the last field to include."""
     fields = []
     for field in _structs()[struct].fields:
         if not hasattr(field, "type"):

@@ -50,7 +50,7 @@ double EnergyBudget::stretch(const double* x) const {
   return sum;
 }
 
-// Power of forces applied to bodies.
+// Power of the forces that are applied to bodies [W].
 double EnergyBudget::pushed(const double* velocity) {
   double power = 0;
   std::vector<double> jacobian;

@@ -5,8 +5,9 @@
 
 namespace tauguard::contacts {
 
-// An elastic flex of triangles: the ends of its edges, their squares at rest, and the stiffness,
-// element by element. Its energy is e K e / 4, e the change of the squares.
+// An elastic flex of triangles. For each element it holds the vertices at the ends of the edges,
+// the squared edge lengths at rest, and the stiffness matrix K. With e the change of the squared
+// lengths, the energy of an element is e K e / 4.
 struct Sheet {
   std::vector<std::int32_t> ends;       // 6 an element
   std::vector<double> rest, stiffness;  // 3 and 9 an element
@@ -14,13 +15,13 @@ struct Sheet {
 };
 
 struct EnergyChange {
-  double
-      gain;  // of all energy in a sub-step, less the work of drives, mocap and applied forces [J]
-  double kinetic;  // at its end [J]
+  // Change of the total energy minus the work of drives, mocap and applied forces [J].
+  double gain;
+  double kinetic;  // kinetic energy at the end of the sub-step [J]
 };
 
-// Counts kinetic energy, gravity, springs and the stretch of flexes. Losses in joints and materials
-// count as taken by contacts.
+// Limits the energy that contacts add. The total energy is kinetic energy, gravity, springs and the
+// stretch of flexes. Losses in joints and materials are attributed to contacts.
 class EnergyBudget {
  public:
   EnergyBudget(const Engine& engine, Mocap& mocap, std::vector<Sheet> sheets, double share)
@@ -30,11 +31,13 @@ class EnergyBudget {
         fraction_(share),
         momentum_(engine.nv) {}
 
-  // Starts a new budget from this velocity (nv), at the start of the step that was just made.
+  // Starts a new budget: a share of the kinetic energy at `velocity` (nv), the velocity at the
+  // start of the step that was just made.
   void open(const double* velocity) {
     gained_ = 0, allowed_ = fraction_ * kinetic(e_.data, velocity);
   }
-  // Of the last sub-step, which began at `velocity` (nv) and ended at the vertices `x_t1`.
+  // Energy change of the last sub-step. `velocity` (nv) is the velocity at its start, `length` its
+  // duration [s], `x_t1` the flex vertices at its end.
   EnergyChange change(const double* velocity, double length, const double* x_t1);
   bool exceeded(const EnergyChange& change) const {
     return change.gain > 0 && gained_ + change.gain > allowed_;

@@ -1,1 +1,1 @@
-"""From scores to alarms: online and in batch, with faults of the samples."""
+"""Turns scores into alarms, online or in batch, and reports faults of the samples."""

@@ -145,10 +145,11 @@ def left_out(
     rate: float = 20.0,
     stop: float = 0.0,
 ) -> list[Array]:
-    """Residual RMS of each recording under the calibration from all the others [N m], (n,) each.
+    """Residual RMS of each recording under a calibration from the other recordings [N m].
 
-    With gains that are identified, the gains of all recordings are used for all, so that the
-    figures are in the same newton metres. ``stop``: as in :func:`residual_rms`.
+    Each array has the shape (n,). If gains are identified, they come from all recordings. One set
+    of gains makes the figures of the recordings comparable. :func:`residual_rms` describes
+    ``stop``.
 
     Raises:
         ValueError: fewer than two recordings, or what :func:`identify` raises.

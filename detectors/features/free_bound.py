@@ -1,4 +1,4 @@
-"""How uncertain a carried load is, for the bias filter (``src/bias_filter.hpp``)."""
+"""``Bound``, the bound of the residual in free motion, and the quantile fit that learns it."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ LOADED = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """Numbers of one arm."""
+    """Bound of one arm's residual in collision-free motion, at rest and while joints move."""
 
     friction: Array  #: level of each joint's friction [N m], shape (n,)
     noise: Array  #: deviation of the residual of a joint at rest [N m], shape (n,)
@@ -105,7 +105,7 @@ class Bound:
 
     @classmethod
     def prior(cls, friction: Array) -> Bound:
-        """Before any log was looked at."""
+        """The bound to start from, before it is fitted to recordings."""
         return cls(friction, 0.02 * friction, friction[:, None] * PRIOR)
 
     @property

@@ -1,4 +1,4 @@
-"""What the methods with one learned number a joint share."""
+"""Baselines that learn one number for each joint: thresholds of the residual and CUSUM."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Support vector regression with the SRQ kernel on windows of the residual, in two forms."""
+"""Learned methods that score windows of the residual.
+
+Support vector regression with the SRQ kernel, a one-class method, boosting and a neural network.
+"""
 
 from __future__ import annotations
 

@@ -1,10 +1,12 @@
-// What a calibrated model gets wrong slowly: a load that is not known, warmer or colder friction.
+// Estimates errors of a calibrated model that change slowly: an unknown load, and friction that
+// changes with temperature.
 //
-// A Kalman filter on the observer's residual. The unknowns are the load's mass and first moment in
-// the last link's frame, and of each joint a relative error of its friction and a torque offset;
-// all are forgotten towards the calibration. Only joints in motion correct them: static friction
-// may hold any torque, so a joint at rest says nothing of the load. A push is no bias: an
-// innovation z of more than `clip` standard deviations c counts as c^2 / z.
+// The estimator is a Kalman filter on the observer's residual. Its state holds the load's mass and
+// first moment in the last link's frame and, for each joint, a relative error of the friction and a
+// torque offset. The state decays to zero, which stands for the calibrated model. Only joints in
+// motion correct the state: static friction may hold any torque, so the residual of a joint at rest
+// does not depend on the load. A collision must not change the state: an innovation of z > c
+// standard deviations, with c = `clip`, is reduced to c^2 / z standard deviations.
 #pragma once
 
 #include <algorithm>
@@ -16,18 +18,20 @@ namespace tauguard::detectors {
 class BiasFilter {
  public:
   static constexpr std::size_t load = 4;  // mass [kg] and first moment [kg m]
-  // Standard deviations of a joint's relative friction error, and of its offset per friction level.
+  // Standard deviations: of the relative friction error, and of the offset per friction level.
   static constexpr double friction_error = 0.3, offset = 0.1;
-  // Time constant with which all is forgotten [s]: gears warm up within minutes.
+  // Time constant of the decay [s]; gears warm up within minutes.
   static constexpr double forget = 300.0;
   static constexpr double every = 0.05;  // time between two corrections [s]
-  // Variance of one correction per squared friction level: model errors of 0.3 that last some six
-  // corrections.
+  // Measurement variance of one correction, per squared friction level. Model errors of 0.3
+  // friction levels last for about six corrections, so six corrections together count as one
+  // measurement.
   static constexpr double variance = 0.3 * 0.3 * 6;
   static constexpr double clip = 3.0;
-  static constexpr double started = 0.3;  // a joint counts so long after its start [s]
+  static constexpr double started = 0.3;  // motion of a joint before its first correction [s]
 
-  // `level` of each joint's friction [N m]; deviations of the load [kg] and its moment [kg m].
+  // `level` is each joint's friction level [N m]; `mass` [kg] and `moment` [kg m] are the standard
+  // deviations of the load's mass and first moment.
   BiasFilter(const std::vector<double>& level, double mass, double moment)
       : n_(level.size()), m_(load + 2 * n_), deviation_(m_), noise_(n_), gain_(m_) {
     for (std::size_t a = 0; a < load; ++a) deviation_[a] = a ? moment : mass;
@@ -46,9 +50,10 @@ class BiasFilter {
     since_ = 0.0;
   }
 
-  // The residual less the biases, in `left`, and the deviation that they leave, in `spread`.
-  // `loads` is the residual's change per unit of the load, n x 4; `friction` per relative error of
-  // each joint's friction; `moved` how long each joint has been in motion [s].
+  // Writes the residual minus the estimated biases to `left`, and the standard deviation of
+  // this estimate to `spread`. `loads` (n x 4) is the derivative of the residual by the load;
+  // `friction` is its derivative by the relative friction error of each joint; `moved` is the time
+  // for which each joint has been in motion [s].
   void step(const double* residual, const double* loads, const double* friction,
             const double* moved, double dt, double* left, double* spread) {
     for (std::size_t j = 0; j < n_; ++j) {
@@ -65,7 +70,8 @@ class BiasFilter {
   }
 
  private:
-  // The six entries of a joint's row that are not zero; what the state says of the residual.
+  // Sets the six entries of a joint's row of the measurement matrix that are not zero. Returns the
+  // residual that the state predicts.
   double row(std::size_t j, const double* loads, const double* friction) {
     double sum = 0.0;
     for (std::size_t a = 0; a < load; ++a) {
@@ -80,7 +86,7 @@ class BiasFilter {
     return sum;
   }
 
-  // Covariance times the row, in gain_; the variance of what the row predicts.
+  // Writes covariance times row to gain_. Returns the variance of the predicted residual.
   double gather() {
     for (std::size_t b = 0; b < m_; ++b) {
       double sum = 0.0;

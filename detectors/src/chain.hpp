@@ -9,8 +9,9 @@
 //   dT/dq_i  = H_i . (V_i x S_i)                              (= (C(q, qd)^T qd)_i)
 //   g_i      = dU/dq_i = -S_i . (first moment x gravity, mass gravity)  of the subtree
 //
-// The second line: turning joint i by d changes its link's velocity by V_i x S_i d (x: motion cross
-// product), which the whole subtree then carries along, and the kinetic energy by H_i times that.
+// Reason for the second line: if joint i turns by d, the velocity of its link and of the whole
+// subtree changes by V_i x S_i d (x: motion cross product). The kinetic energy then changes by
+// H_i . (V_i x S_i) d.
 #pragma once
 
 #include <cstddef>
@@ -75,16 +76,17 @@ class Chain {
   // each.
   void momentum(const double* q, const double* qd, double* p, double* beta, Workspace& work) const;
 
-  // The same, per unit of every inertial parameter of every link: p and beta are n x (10 n),
+  // Derivatives of p and beta by every inertial parameter of every link: both are n x (10 n),
   // row-major.
   void regressor(const double* q, const double* qd, double* p, double* beta, Workspace& work) const;
 
-  // The same for the inertial parameters of link `link` alone, the first `count` of them: n x
-  // count.
+  // Derivatives of p and beta by the first `count` inertial parameters of link `link`; both are
+  // n x count.
   void link_regressor(int link, int count, const double* q, const double* qd, double* p,
                       double* beta, Workspace& work) const;
-  // The same for mass and first moment of link `link`, n x 4, at the state that `work` holds from
-  // the call before: each joint's motion and what it does to the velocities, seen from the link.
+  // Derivatives of p and beta by the mass and first moment of link `link`; both are n x 4. The
+  // state is the one that the previous call left in `work`. The motion of each joint and its effect
+  // on the velocities are expressed in the link's frame.
   void load_columns(int link, double* p, double* beta, const Workspace& work) const;
 
   // Inverse dynamics: tau = M qdd + C qd + g.

@@ -164,7 +164,7 @@ class Batch:
             self._become(i, draw(known, self.compiled, rng, stated))
 
     def _become(self, i: int, drawn: dict[str, Array]) -> None:
-        """Make copy ``i`` what was drawn."""
+        """Apply the drawn values to copy ``i``, which gets a model and a plant of its own."""
         if not drawn:
             return
         model = self.model(i) if self._variants[i] else own_model(self.compiled)
@@ -175,7 +175,7 @@ class Batch:
             self.sensing[i].sensors = variant.drive.sensors
 
     def place(self, i: int, q: Array) -> None:
-        """Put copy ``i`` at rest at ``q`` [rad], shape (n,), everything else where it began."""
+        """Reset copy ``i`` and put its arm at rest at ``q`` [rad], shape (n,)."""
         data = self.datas[i]
         mujoco.mj_resetData(self.model(i), data)
         data.qpos[self.compiled.scene.qpos_adr] = q

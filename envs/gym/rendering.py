@@ -144,7 +144,7 @@ class Stage:
 
 
 class Camera(Stage):
-    """An off-screen camera on one copy of a compiled."""
+    """An off-screen camera that draws one copy of a compiled scene."""
 
     def __init__(
         self, compiled: CompiledScene, data: mujoco.MjData, height: int = HEIGHT, width: int = WIDTH
@@ -152,7 +152,7 @@ class Camera(Stage):
         """Open it.
 
         Raises:
-            RuntimeError: there is nothing to draw with; the message says what would help.
+            RuntimeError: OpenGL cannot start; the message suggests what to change.
         """
         super().__init__(compiled, data)
         size = self.model.vis.global_
@@ -165,12 +165,16 @@ class Camera(Stage):
             self._renderer = mujoco.Renderer(self.model, height, width)
 
     def colours(self, targets: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """The state and a ball at each target, shape (arms, 3): a picture (height, width, 3)."""
+        """Draw the state and a ball at each target, shape (arms, 3).
+
+        Returns:
+            RGB image, shape (height, width, 3).
+        """
         pixels: NDArray[np.uint8] = self._render(targets)
         return pixels
 
     def depths(self, targets: NDArray[np.float64]) -> NDArray[np.float32]:
-        """How far everything is along the optical axis [m], shape (height, width)."""
+        """Distance of each pixel along the optical axis [m], shape (height, width)."""
         self._renderer.enable_depth_rendering()
         try:
             depth: NDArray[np.float32] = self._render(targets)
@@ -190,13 +194,13 @@ class Camera(Stage):
 
 
 class Window(Stage):
-    """A window on one copy of a compiled."""
+    """A window that shows one copy of a compiled scene."""
 
     def __init__(self, compiled: CompiledScene, data: mujoco.MjData) -> None:
         """Open it.
 
         Raises:
-            RuntimeError: there is nothing to draw with; the message says what would help.
+            RuntimeError: OpenGL cannot start; the message suggests what to change.
         """
         super().__init__(compiled, data)
         _need_display()
@@ -223,13 +227,13 @@ class Window(Stage):
 
 
 class Picture:
-    """What ``render`` shows: a picture, or a window that follows."""
+    """The view behind ``render``: an image for each call, or a window that is updated."""
 
     def __init__(self, compiled: CompiledScene, data: mujoco.MjData, mode: str) -> None:
         """Open it.
 
         Raises:
-            RuntimeError: there is nothing to draw with; the message says what would help.
+            RuntimeError: OpenGL cannot start; the message suggests what to change.
         """
         self._view = Window(compiled, data) if mode == "human" else Camera(compiled, data)
 
@@ -247,7 +251,7 @@ class Picture:
 
 @contextmanager
 def _no_picture() -> Iterator[None]:
-    """Whatever keeps OpenGL from starting becomes one line that says what would help."""
+    """Turn an error of OpenGL's start into one line that suggests what to change."""
     try:
         yield
     except Exception as error:

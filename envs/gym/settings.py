@@ -138,12 +138,12 @@ def _objects(value: Any) -> tuple[SceneObject, ...]:
 
 
 def one_of(name: str, value: object, known: tuple[str, ...]) -> None:
-    """``value`` is one of ``known``, or ``ValueError`` that lists them."""
+    """Raise a ``ValueError`` that lists ``known`` if ``value`` is not among them."""
     if value not in known:
         raise ValueError(f"{name} {value!r}: expected one of {', '.join(known)}")
 
 
 def positive(name: str, value: float) -> None:
-    """``value`` is finite and above 0, or ``ValueError``."""
+    """Raise a ``ValueError`` unless ``value`` is finite and above 0."""
     if not (np.isfinite(value) and value > 0):
         raise ValueError(f"{name} {value}: expected a finite number above 0")

@@ -48,7 +48,7 @@ class Plant {
   int substeps = 1;
   std::vector<Carried> carried;
 
-  // Makes it an environment's: where results go and what surrounds the arm.
+  // Prepares the plant for an environment: sets the surroundings of the arm and the output rows.
   void surround(Surroundings around, Rows rows) {
     around_ = std::move(around);
     around_.arms.physics = &physics_;
@@ -58,7 +58,7 @@ class Plant {
 
   std::size_t joints() const { return drives_.size(); }
 
-  // After the data was reset: no current, bristles relaxed, nothing has touched yet.
+  // Call after a reset of the data. Clears the currents, friction bristles and contact records.
   void relax() {
     drives_.relax();
     contact_ = Contact{};
@@ -70,8 +70,8 @@ class Plant {
     carry();
   }
 
-  // The same for an environment, after the data was forwarded too: the reference is where the arm
-  // is.
+  // Call at the start of an episode, after a reset and mj_forward. Calls relax() and makes the
+  // present joint positions the reference.
   void reset() {
     relax();
     row_ = 0;

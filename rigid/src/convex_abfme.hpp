@@ -1,27 +1,28 @@
 // Overlap of two convex bodies by eliminating the separating plane.
 //
-// A plane f separates A (f >= 0) from B (f < 0). Its unknowns are the weights of A's facet
-// functions, f = sum_i p_i F_i with p_i >= 0, one row for each vertex b_j: sum_i p_i F_i(b_j) < 0
-// (a generator of B enters by its absolute value). Facet functions are scaled by determinants,
-// never divided.
-//   * a column all negative: p_i alone separates (a facet of A);
-//   * a row all positive: the vertex b_j is in A, no plane can exist;
-//   * eliminating p_k from a pair of columns combines the rows of opposite sign and leaves an
-//   interval
-//     for the ratio p_i / p_k: not empty, and a plane through that edge of A separates. Pairs of
-//     facets that share no edge are redundant (their zero sets meet in less than two bits) and are
-//     left out, and so are rows that the same rule drops;
-//   * the last elimination, of three unknowns, leaves planes through a facet of B, which are the
-//   columns
-//     of the transposed table.
-// Nothing else can separate bodies of full dimension, so where every step is certified to fail they
-// share an interior point.
+// A plane f separates A (f >= 0) from B (f < 0). The unknowns are weights p_i >= 0 of A's facet
+// functions F_i, with f = sum_i p_i F_i. Each vertex b_j of B gives one row of a table:
+// sum_i p_i F_i(b_j) < 0. A generator of B enters by its absolute value. Facet functions are scaled
+// by determinants and never divided.
 //
-// Every entry has an error bound E (derived at its place, u = 2^-53; the sum of the stated terms is
-// rounded up to a power of two, which also covers the rounding of E itself). Entries lowered by E
-// that still do not separate, or raised by E that still do, are certain: raising an entry can only
-// hurt a separation. What is certain in neither way is `undecided`. Sizes outside [1e-30, 1e30] are
-// left undecided, so products up to degree nine neither overflow nor lose their relative accuracy.
+// If a column is all negative, p_i alone separates the bodies (a facet of A). If a row is all
+// positive, the vertex b_j lies in A and no plane can separate them.
+//
+// Eliminating p_k from a pair of columns combines the rows of opposite sign and leaves an interval
+// for the ratio p_i / p_k. If the interval is not empty, a plane through that edge of A separates
+// the bodies. Pairs of facets that share no edge are redundant and left out, because their zero
+// sets meet in less than two bits. Rows that are redundant by this rule are left out, too.
+//
+// The last elimination, of three unknowns, leaves planes through a facet of B. These planes are the
+// columns of the transposed table. No other plane is needed for bodies of full dimension, so if
+// every step is certified to fail, the bodies share an interior point.
+//
+// Every entry has an error bound E, which is derived where the entry is computed (u = 2^-53). The
+// sum of its terms is rounded up to a power of two, which also covers the rounding of E itself.
+// Raising an entry can only prevent a separation. Therefore a separation found with entries raised
+// by E is certain, and so is a failure with entries lowered by E. Any other result is `undecided`.
+// Sizes outside [1e-30, 1e30] are `undecided`, too, so that products up to degree nine neither
+// overflow nor lose their relative accuracy.
 #pragma once
 
 #include <algorithm>
@@ -48,11 +49,11 @@ TAUGUARD_INLINE double dot(const double* x, const double* y) {
   return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
 }
 
-// Components of four points from `origin`, one point a lane.
+// Loads four points relative to `origin`: x[k] holds component k, one point in each lane.
 TAUGUARD_INLINE void load_points(const double* v, const double* origin, Double4* x) {
   for (int k = 0; k < 3; ++k) x[k] = Double4{v[k], v[3 + k], v[6 + k], v[9 + k]} - origin[k];
 }
-// The same as rows; returns their largest 1-norm.
+// Writes four points relative to `origin` to the rows of p. Returns the largest 1-norm of a row.
 TAUGUARD_INLINE double offsets_from(const double* v, const double* origin, double (*p)[3]) {
   double reach = 0.0;
   for (int j = 0; j < 4; ++j) {
@@ -62,8 +63,8 @@ TAUGUARD_INLINE double offsets_from(const double* v, const double* origin, doubl
   return reach;
 }
 
-// Lanes whose columns x, y leave an interval of ratios r > 0 with x_j + r y_j < 0.
-// A rounding of r moves a row by u |y| r, which the callers' E covers with its slack.
+// Marks the lanes in which some interval of ratios r > 0 gives x_j + r y_j < 0 for all rows j. The
+// rounding of r changes a row by u |y| r; the slack in the callers' bound E covers this error.
 template <int Rows = 4>
 TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
   Double4 low = splat(0.0), high = splat(HUGE_VAL);
@@ -77,9 +78,10 @@ TAUGUARD_INLINE Mask4 leaves_interval(const Double4* x, const Double4* y) {
   return low < high;
 }
 
-// The facet functions of a tetrahedron, lane i the one that vanishes on the facet opposite vertex i
-// and is positive at it: F = n . p - c, negated where the determinant is negative, with points p
-// taken from vertex 0. (The sign comes last, so that no entry waits for the determinant.)
+// The facet functions F = n . p - c of a tetrahedron, with points p relative to vertex 0. The
+// function in lane i vanishes on the facet opposite vertex i and is positive at vertex i: it is
+// negated where the determinant is negative. (The sign is applied last, so that no entry waits for
+// the determinant.)
 struct TetrahedronFacets {
   Double4 n[3], c, determinant;
   Mask4 turned;  // the sign bit, in lanes whose normal points outwards
@@ -108,12 +110,16 @@ struct TetrahedronFacets {
   }
 };
 
-// E of a tetrahedron's table at points p - a0 of 1-norm at most `reach`, a = the largest 1-norm of
-// a vertex from a0. An edge (at most 2 a) is off by 4 u a, a component of a normal (at most 4 a^2)
-// by 24 u a^2, n . p by (24 + 4 + 12) u a^2 reach and c by as much with a for reach, their
-// difference by 4 u a^2 (a + reach) more; the determinant, whose sign may be wrong, by 88 u a^3.
-// With the slack of 8 u of an entry for the ratio of an interval that is at most 164 u a^2 (a +
-// reach).
+// The bound E for a tetrahedron's table at points p - a0 whose 1-norm is at most `reach`. The
+// largest 1-norm of a vertex relative to a0 is a. The errors are at most
+//   4 u a                        in an edge (at most 2 a),
+//   24 u a^2                     in a component of a normal (at most 4 a^2),
+//   (24 + 4 + 12) u a^2 reach    in n . p,
+//   (24 + 4 + 12) u a^3          in c,
+//   4 u a^2 (a + reach)          in the difference of n . p and c,
+//   88 u a^3                     in the determinant, whose sign may be wrong.
+// The ratio of an interval needs a slack of 8 u of an entry. The sum of all errors is at most
+// 164 u a^2 (a + reach).
 TAUGUARD_INLINE double tetrahedron_error(double a, double reach) {
   return 256 * unit * a * a * (a + reach);
 }
@@ -154,8 +160,8 @@ TAUGUARD_INLINE Verdict abfme_tetrahedra(const double* a, const double* b) {
   return certain ? common : undecided;
 }
 
-// Slabs of a zonotope with three generators: |n_i . (p - centre)| <= determinant, lane i < 3 (lane
-// 3 is zero); n_i is the cross product of the other two generators.
+// The slabs |n_i . (p - centre)| <= determinant of a zonotope with three generators. The normal n_i
+// is the cross product of the other two generators. Slab i is in lane i < 3; lane 3 is zero.
 struct Slabs {
   Double4 n[3];
   double determinant, size;
@@ -171,12 +177,15 @@ struct Slabs {
   }
 };
 
-// Zonotope A against tetrahedron B. E of A's table at points p_j = (b_j - origin) - shift, `reach`
-// the 1-norm of b_j - origin plus 3 a: a point is off by 3 u reach, a normal by 4 u a^2, an entry
-// by (4 + 3 + 1 + 2) u a^2 reach, the determinant by 8 u a^3 (a <= reach / 3), their sum by one
-// rounding more: 14 u and the slack of 8 u, 32 u a^2 reach. B's planes at A's centre: as
-// tetrahedron_error, with 20 u b^2 for each of the three generators, covered by counting 6 a into
-// the reach.
+// Zonotope A against tetrahedron B. A's table is computed at the points p_j = (b_j - origin) -
+// shift; `reach` is the 1-norm of b_j - origin plus 3 a, so a <= reach / 3. The errors are at most
+//   3 u reach                      in a point,
+//   4 u a^2                        in a normal,
+//   (4 + 3 + 1 + 2) u a^2 reach    in an entry,
+//   8 u a^3                        in the determinant,
+// and one rounding of their sum. Together they are 14 u a^2 reach. With the slack of 8 u, E is
+// rounded up to 32 u a^2 reach. B's planes at A's centre have the error of tetrahedron_error() and
+// 20 u b^2 for each of the three generators; adding 6 a to the reach covers the generators.
 TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const double* b) {
   const Slabs sa(a);
   Double4 p[3];  // one vertex of B a lane
@@ -184,7 +193,7 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
   const Double4 reach = abs(p[0]) + abs(p[1]) + abs(p[2]) + 3 * sa.size;
   for (int k = 0; k < 3; ++k) p[k] -= a.shift[k];
   if (!in_range(sa.size) || !all((reach >= 1e-30) & (reach <= 1e30))) return undecided;
-  const Double4 ea = 32 * unit * sa.size * sa.size * reach;  // of every vertex's entries
+  const Double4 ea = 32 * unit * sa.size * sa.size * reach;  // for the entries of each vertex
   const double wall = sa.determinant;
   Double4 row[3];  // slab i at the vertices
   for (int i = 0; i < 3; ++i) row[i] = sa.n[0][i] * p[0] + sa.n[1][i] * p[1] + sa.n[2][i] * p[2];
@@ -227,12 +236,15 @@ TAUGUARD_INLINE Verdict abfme_zonotope_tetrahedron(const Zonotope& a, const doub
   return certain ? common : undecided;
 }
 
-// Two zonotopes: A's slabs with B's generators C_k = n_i . g_k (lane i) and the offset m of the
-// centres. w = |origin_b - origin_a|_1 + 3 (a + b) bounds every length; the offset is off by 4 u w.
-// Facets: m by 11 u a^2 w, the determinant by 8 u a^3, three entries by 8 u a^2 b each, four sums
-// by 8 u a^2 w: 32 u a^2 w. Edges: products of two such entries, |C| <= a^2 b: 42 u for the
-// offset's minor, 12 u for the determinant's terms, 24 u for the generators' minors, 20 u for the
-// sums, of a^4 b w. Twice the facets' bound and 128 u a^4 b w are used.
+// Two zonotopes. A's slabs are evaluated at B's generators, C_k = n_i . g_k (lane i), and at the
+// offset of the centres, which gives m. The length w = |origin_b - origin_a|_1 + 3 (a + b) bounds
+// every length. The error of the offset is at most 4 u w.
+//
+// For facets the errors are at most 11 u a^2 w in m, 8 u a^3 in the determinant, 8 u a^2 b in each
+// of three entries, and 8 u a^2 w in four sums. Together they are at most 32 u a^2 w; E is twice
+// this bound. For edges two such entries are multiplied, with |C| <= a^2 b. The errors, in units of
+// u a^4 b w, are 42 in the offset's minor, 12 in the determinant's terms, 24 in the generators'
+// minors and 20 in the sums; E is 128 u a^4 b w.
 TAUGUARD_INLINE Verdict abfme_zonotopes(const Zonotope& a, const Zonotope& b) {
   const Slabs sa(a), sb(b);
   double d[3], w = 0.0;

@@ -1,5 +1,6 @@
-// First contact of shapes given by support functions. Three rates of turning are tried, none and
-// those of either partner; the longest certified step is taken.
+// First contact of shapes given by support functions. Each step tries a separating plane that turns
+// with the first body, one that turns with the second, and one that does not turn. The longest
+// certified step is taken.
 #include <algorithm>
 
 #include "advancement.hpp"
@@ -8,7 +9,7 @@
 namespace tauguard::rigid {
 namespace {
 
-// A guard against creeping along a resting pair: the time reached is still never late.
+// Limits the number of tiny steps for a resting pair. The time reached is never late.
 constexpr int most_steps = 500;
 
 double longest_step(const SupportShape& a, const SupportShape& b, const Distance& d, double offset,
@@ -58,9 +59,9 @@ Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double s
   double t, seen = -1;  // `d` is of time `seen`
   Vec n{};
   Distance d;
-  // With curved cores the bound may lag behind the distance: what the segment says is then not a
-  // contact yet, but no step is certified either. It is reported, early by at most what the bound
-  // lags.
+  // For curved cores the lower bound may be smaller than the true distance. Close to contact such a
+  // pair gets no certified step although it does not touch yet. It is then reported as a contact,
+  // too early by at most the difference between bound and distance.
   const auto near = [&](double now) {
     seen = now;
     d = distance_of(a, b, n, close);

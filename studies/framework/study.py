@@ -60,10 +60,13 @@ def all_parts() -> dict[str, Part]:
 
 
 def find(name: str, part: str | None = None) -> dict[str, Part]:
-    """The parts of a study, one of them, or the part with this full name or alias.
+    """Find parts by the name of a study, by a full name, or by an alias.
+
+    The name of a study gives all its parts, or only the one that ``part`` names.
 
     Raises:
-        ValueError: there is none; the message names the nearest, or all.
+        ValueError: no study or part has that name. The message suggests the nearest name or lists
+            all names.
     """
     parts = all_parts()
     if name in STUDIES:

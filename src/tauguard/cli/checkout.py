@@ -1,4 +1,4 @@
-"""``tauguard bench`` and ``tauguard report``: run by ``studies``, which only a checkout has."""
+"""``tauguard bench`` and ``tauguard report`` run ``studies``, which only a checkout has."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def run_studies(name: str, args: Sequence[str]) -> int:
             "the studies are in the source distribution, not in an installed package: "
             "unpack `pip download --no-binary tauguard --no-deps tauguard` and run this there"
         )
-    # Last on the path would be better, as the checkout's folders have generic names; -m needs it.
+    # The checkout's generic folder names may hide packages, but -m needs it on the path.
     path = os.pathsep.join(
         [str(root), str(root / "tests"), *filter(None, [os.environ.get("PYTHONPATH")])]
     )
@@ -35,7 +35,7 @@ def run_studies(name: str, args: Sequence[str]) -> int:
 
 
 def checkout() -> Path | None:
-    """The folder that holds ``studies``: of this package's sources, or the working folder."""
+    """Find the folder that holds ``studies``: the package's source tree or the working folder."""
     for root in (Path(tauguard.__file__).resolve().parents[2], Path.cwd()):
         if (root / "studies" / "__main__.py").is_file():
             return root

@@ -34,23 +34,26 @@ def command(
     A second run with the same flags continues where the first stopped.
 
     Args:
-        out: folder of the recordings (made if it does not exist).
-        episodes: how many.
-        collisions: injected into each episode; 0 gives collision-free ones.
-        free: collision-free episodes beside them, for thresholds.
-        seconds: length of a collision-free episode (struck ones are as long as they need).
-        speeds: percent of the maximum joint speed, cycled.
-        payloads_g: grams at the flange that the observer does not know, cycled
-            (default: 0, 1016 and 4039, less on an arm whose torque limits are below 64 N m).
-        seed: of everything that is drawn.
-        mismatch_seed: which arm: how its masses, gains and friction differ from the nominal ones;
-            None simulates the nominal arm.
-        checkers: contact checkers (mujoco, cloth, rigid) that watch every step; their contacts go
-            into the recordings and the replay.
-        robot: which arm, by name or file: see `tauguard robot`.
-        objects: TOML file of things around the arm, see the page "Build a scene of your own".
-        workers: processes (default: all processors).
-        json: write what was simulated here as JSON.
+        out: folder for the recordings; it is created if it does not exist.
+        episodes: number of episodes.
+        collisions: number of collisions in each episode; 0 makes every episode collision-free.
+        free: number of additional collision-free episodes, from which thresholds can be set.
+        seconds: length of a collision-free episode [s]; an episode with collisions is as long
+            as its collisions require.
+        speeds: joint speeds in percent of the maximum; the episodes take them in turn.
+        payloads_g: payloads at the flange [g] that the observer does not know; the episodes take
+            them in turn. The default is 0, 1016 and 4039, scaled down for an arm whose torque
+            limits are below 64 N m.
+        seed: seed of the random motions and collisions.
+        mismatch_seed: seed of the differences between the simulated arm and its nominal model in
+            masses, gains and friction; None simulates the nominal arm.
+        checkers: contact checkers (mujoco, cloth, rigid) to run at every step; the recordings and
+            the replay show the contacts that they report.
+        robot: name or file of the arm; see `tauguard robot`.
+        objects: TOML file that describes the objects around the arm; the page "Build a scene of
+            your own" explains its format.
+        workers: number of processes; the default is one for each processor.
+        json: file for a summary of the simulated episodes, in JSON.
     """
     from tauguard.datasets import free_episodes, struck_episodes, write_dataset
     from tauguard.datasets.plans import torque_scale

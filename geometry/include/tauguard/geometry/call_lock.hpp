@@ -1,8 +1,8 @@
-// One call at a time on an object that keeps state between calls.
+// A lock for an object that keeps state between calls and allows one call at a time.
 //
-// Waiting ends with Ctrl-C. A thread that holds the lock already (a signal's handler that calls
-// again) and a child process of which no thread can ever release it get an error in place of a
-// wait without end.
+// Ctrl-C ends the wait for the lock. Two cases would wait forever and raise an error instead: a
+// thread that already holds the lock calls again, for example in a signal handler; or a process was
+// forked during a call, so that no thread of the child can release the lock.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ class CallLock {
   }
 
  private:
-  std::atomic<long> process_{0};  // of the call that holds it; 0: none
+  std::atomic<long> process_{0};  // process that holds the lock; 0 means that it is free
   std::atomic<std::thread::id> thread_{};
 };
 
