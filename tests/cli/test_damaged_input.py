@@ -53,7 +53,9 @@ def intact(tmp_path_factory):
     struck = ("--out", "mcap", "--episodes", "3", "--collisions", "1", "--workers", "1")
     for command, flags in (("train", free), ("simulate", struck), ("train", traces)):
         assert run(command, folder, *flags) == 0
-    trace, detection = read_mcap(folder / "mcap" / "episode-00000.mcap")
+    for number, path in enumerate(sorted((folder / "mcap").glob("*.mcap"))):
+        path.rename(path.with_name(f"{number}.mcap"))
+    trace, detection = read_mcap(folder / "mcap" / "0.mcap")
     short = folder / "short.mcap"
     write_mcap(short, trace, detection)
     write_rrd(folder / "short.rrd", trace, detection)
@@ -63,7 +65,7 @@ def intact(tmp_path_factory):
 #: Files and folders that commands make.
 MADE = {"new", "new.skops", "new.xml", "mcap", "free.skops", "model.skops"}
 #: Without these a folder is another one, or not complete yet: no error.
-OPTIONAL = ("mcap/episode-00001.mcap", "dataset/SHA256SUMS", "dataset/manifest/train-000000.jsonl")
+OPTIONAL = ("mcap/1.mcap", "dataset/SHA256SUMS", "dataset/manifest/train-000000.jsonl")
 
 
 def run(command, folder, *flags):
@@ -88,12 +90,12 @@ COMMANDS = [
     ("train", ("--free", "log0.csv", "log1.csv", *FREE, *GAINS, "--model", "new.skops"),
      ("log0.csv", "arm.xml", "columns.json")),
     ("train", ("--traces", "mcap", "--detector", "residual-thresholds", "--model", "new.skops"),
-     ("mcap/episode-00001.mcap",)),
+     ("mcap/1.mcap",)),
     ("train", ("--traces", "dataset", "--detector", "residual-thresholds", "--model", "new.skops"),
      ("dataset/dataset.json", "dataset/data/train-000001.parquet",
       "dataset/manifest/train-000001.jsonl", "dataset/arms/cura6.xml")),
     ("evaluate", ("--traces", "mcap", "--model", "model.skops"),
-     ("mcap/episode-00001.mcap", "model.skops")),
+     ("mcap/1.mcap", "model.skops")),
     ("evaluate", ("--data", "dataset", "--model", "model.skops"),
      ("dataset/dataset.json", "dataset/data/test-000000.parquet", "model.skops")),
     ("generate", ("tiny.toml", "--out", "new", "--quick", "--workers", "1"), ("tiny.toml",)),

@@ -352,6 +352,7 @@ import gymnasium, numpy, tauguard, warnings
 from gymnasium.utils.env_checker import check_env
 from tauguard.environments import ENVIRONMENTS
 warnings.simplefilter("error")
+warnings.filterwarnings("ignore", message=".*out of date")  # earlier versions stay usable
 for name in ENVIRONMENTS:
     env = gymnasium.make(name, render_mode="rgb_array")
     env.reset(seed=0)
