@@ -115,6 +115,7 @@ class Batch:
         n, steps = len(compiled.scene.joint_names), compiled.settings.substeps
         self.observation = np.zeros((rows, len(self.observations)))
         self.metrics = np.zeros(rows, METRICS)
+        self._cost = self.metrics["cost"]
         self.tau_ext, self.residual = np.zeros((rows, n)), np.zeros((rows, n))
         self.alarm = np.zeros(rows, dtype=np.bool_)
         self.target = np.zeros((rows, compiled.arms, 3))
@@ -245,7 +246,7 @@ class Batch:
             self._checked_step(i, action)
         else:
             self.plants[i].step(action)
-        self.cost_sum[i] += self.metrics["cost"][i]
+        self.cost_sum[i] += self._cost[i]
         if self.sensing is not None:
             self._sense(i, rng)
 
@@ -258,7 +259,7 @@ class Batch:
                 self._checked_step(int(i), actions[i])
         else:
             _plant.step_all(self.plants, actions, mask, threads)
-        self.cost_sum[mask] += self.metrics["cost"][mask]
+        self.cost_sum[mask] += self._cost[mask]
         if self.sensing is not None:
             for i in np.flatnonzero(mask):
                 self._sense(int(i), rngs[i])

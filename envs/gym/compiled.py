@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -102,6 +103,11 @@ class CompiledScene:
     def arms(self) -> int:
         """How many arms there are."""
         return len(self.tools)
+
+    @functools.cached_property
+    def least_pressure(self) -> Array:
+        """Of a touch of each region by a flat surface [N/cm^2], see :func:`region_pressure`."""
+        return np.array([r.stiffness / (np.pi * r.radius) for r in self.regions]) / 1e4
 
     def shown(self) -> mujoco.MjModel:
         """The scene with the shapes that only show; bodies, joints and flexes have the same ids."""
@@ -341,8 +347,7 @@ def region_pressure(compiled: CompiledScene, force: Array) -> Array:
     """
     if compiled.settings.contact_area is not None:
         return force / compiled.settings.contact_area
-    least = np.array([r.stiffness / (np.pi * r.radius) for r in compiled.regions]) / 1e4
-    return np.where(force > 0, least, 0.0)
+    return np.where(force > 0, compiled.least_pressure, 0.0)
 
 
 def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:
