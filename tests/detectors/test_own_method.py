@@ -11,7 +11,7 @@ from tauguard.cli import main
 from tauguard.datasets import free_episodes, struck_episodes, write_dataset
 from tauguard.detectors import load_model, make_detector, with_rate
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "detection.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own_detector.md"
 
 
 @pytest.fixture
