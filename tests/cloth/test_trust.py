@@ -28,9 +28,9 @@ def pairs(frame):
 
 @pytest.fixture
 def ctrl_c():
-    """SIGINT as in a terminal (a job in the background ignores it), sent once after 0.4 s."""
+    """SIGINT as in a terminal (a job in the background ignores it), sent once after 0.1 s."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    killer = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT))
+    killer = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT))
     yield killer.start
     killer.join()
     signal.signal(signal.SIGINT, before)
@@ -213,7 +213,7 @@ os._exit(0)
 
 @pytest.mark.parametrize("method", ["ab2pf", "exact"])
 def test_ctrl_c_ends_a_find_of_identical_vertices(method, ctrl_c):
-    n = 1500
+    n = 2400  # a fast machine needs well over the 0.1 s
     faces, x = np.arange(n).reshape(-1, 3), np.zeros((n, 3))
     ccd = MeshCCD(faces, method=method, threads=2)
     ctrl_c()
