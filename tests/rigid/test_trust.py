@@ -217,7 +217,7 @@ rim = np.c_[np.cos(angle), np.sin(angle), np.zeros(4000)]
 k = np.arange(4000)
 ring = MeshTree(np.r_[rim, 1.1 * rim], np.c_[k, (k + 1) % 4000, k + 4000])
 needle = MeshTree([[0, 0, -2], [0, 0.01, 0], [0, 0, 2]], [[0, 1, 2]])
-many = Tetrahedra(rng.normal(size=(300_000, 4, 3)))
+many = Tetrahedra(rng.normal(size=(900_000, 4, 3)))
 print("ready", flush=True)
 try:
     CALL
@@ -234,7 +234,7 @@ def test_ctrl_c_ends_a_long_call(name, threads):
     code = SCRIPT.replace("CALL", LONG_CALLS[name].format(threads=threads))
     run = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     assert run.stdout.readline() == "ready\n"
-    time.sleep(0.5)
+    time.sleep(0.2)
     start = time.monotonic()
     run.send_signal(signal.SIGINT)
     try:
