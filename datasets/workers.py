@@ -90,8 +90,7 @@ def in_processes(
             task = next(waiting, None)
             if task is None:
                 break
-            pipe, process = _hire(work)
-            crew[pipe] = process
+            pipe = _hire(work, crew)
             pipe.send(task)
         busy = set(crew)
         ready: deque[Any] = deque()
@@ -108,25 +107,26 @@ def in_processes(
                 yield result
 
 
-def _hire(work: Callable[[Any], Any]) -> tuple[Connection, BaseProcess]:
+def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Connection:
+    """Start a worker and note it in ``crew``; a signal to stop waits until both are done."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
-    resource_tracker.ensure_running()  # start() would begin it and unblock Ctrl-C
-    with (
-        _ctrl_c_blocked()
-    ):  # inherited, so Ctrl-C reaches this process only, which ends the workers
+    resource_tracker.ensure_running()  # start() would begin it and unblock the signals
+    with _stop_signals_blocked():
         process.start()
+        crew[ours] = process
     theirs.close()
-    return ours, process
+    return ours
 
 
 @contextlib.contextmanager
-def _ctrl_c_blocked() -> Iterator[None]:
+def _stop_signals_blocked() -> Iterator[None]:
+    """A process started here inherits the mask: Ctrl-C reaches this process, which ends it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:
@@ -135,6 +135,8 @@ def _ctrl_c_blocked() -> Iterator[None]:
 
 def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
     """Do tasks until the pipe is closed."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # SIGINT stays blocked
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
         try:
