@@ -112,8 +112,8 @@ def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Co
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
-    resource_tracker.ensure_running()  # start() would begin it and unblock the signals
-    with _stop_signals_blocked():
+    resource_tracker.ensure_running()  # start() would begin it and unblock Ctrl-C
+    with _stop_signals_deferred(), _ctrl_c_blocked():
         process.start()
         crew[ours] = process
     theirs.close()
@@ -121,12 +121,35 @@ def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Co
 
 
 @contextlib.contextmanager
-def _stop_signals_blocked() -> Iterator[None]:
-    """A process started here inherits the mask: Ctrl-C reaches this process, which ends it."""
+def _stop_signals_deferred() -> Iterator[None]:
+    """Signals to stop are handled after the block.
+
+    A mask of this thread would not do: the signal then reaches another thread of the process.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    caught: list[int] = []
+    before = {
+        number: signal.signal(number, lambda number, frame: caught.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    for caught_number in caught:
+        signal.raise_signal(caught_number)
+
+
+@contextlib.contextmanager
+def _ctrl_c_blocked() -> Iterator[None]:
+    """A process started here inherits the mask: Ctrl-C reaches its parent only, which ends it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
@@ -135,8 +158,6 @@ def _stop_signals_blocked() -> Iterator[None]:
 
 def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
     """Do tasks until the pipe is closed."""
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # SIGINT stays blocked
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
         try:
