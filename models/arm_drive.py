@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from tauguard.arrays import Array, Bools
 from tauguard.models import cura6
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
-from tauguard.models.robot import RobotDrive
+from tauguard.models.robot import RobotDrive, RobotRipple, RobotSensors, per_joint
 
 #: Presliding of joints whose friction is known by its level alone [rad].
 PRESLIDING = 1.5e-3
@@ -36,28 +37,63 @@ def stated_drive(stated: RobotDrive, limit: Array, sources: dict[str, str]) -> D
     """What a robot's description says of its drives; ``sources`` gets a note of what is assumed."""
     n = len(limit)
     gear, constant = stated.row("gear", n), stated.row("torque_constant", n)
-    current = stated.row("current_limit", n)
+    current, gain = stated.row("current_limit", n), stated.row("gain", n)
     ratio = np.full(n, _GEAR) if gear is None else gear
-    gain = np.full(n, _GAIN) if constant is None else ratio * constant
-    coulomb, viscous = stated.row("coulomb", n), stated.row("viscous", n)
-    friction = None
-    if coulomb is not None or viscous is not None:
-        zero = np.zeros(n)
-        friction = level_friction(
-            zero if coulomb is None else coulomb, zero if viscous is None else viscous
-        )
-    named = [
-        k for k in ("gear", "torque_constant", "coulomb", "viscous") if stated.row(k, n) is not None
-    ]
-    rest = "no losses, no ripple, no lag" if friction is None else "no ripple, no lag"
-    given = sources.get("drive", "given" if named else "")
-    assumed = [] if constant is not None else [f"{_GAIN:g} N m/A"]
+    if gain is None:
+        gain = np.full(n, _GAIN) if constant is None else ratio * constant
+        assumed = [] if constant is not None else [f"{_GAIN:g} N m/A"]
+    else:
+        assumed = []
+    friction = _stated_friction(stated, n)
+    named = ("gear", "gain", "torque_constant", "coulomb", "viscous")
+    given = "given" if any(stated.row(name, n) is not None for name in named) else ""
+    ripple, sensors = _stated_ripple(stated.ripple), _stated_sensors(stated.sensors, n)
+    parts = {"losses": friction, "ripple": ripple, "lag": None}
+    rest = ", ".join(f"no {part}" for part, known in parts.items() if known is None)
     if stated.like is not None:
         rest = (
             "ripple, lag, noise and missing friction: the CURA6-like arm's, as fractions of limits"
         )
-    sources["drive"] = "; ".join(x for x in (given, *assumed, rest) if x)
-    return Drive(gain, ratio, limit / gain if current is None else current, None, friction)
+    sources["drive"] = "; ".join(x for x in (sources.get("drive", given), *assumed, rest) if x)
+    limits = limit / np.abs(gain) if current is None else current
+    return Drive(gain, ratio, limits, None, friction, ripple, sensors)
+
+
+def _stated_friction(stated: RobotDrive, n: int) -> Friction | None:
+    coulomb, viscous = stated.row("coulomb", n), stated.row("viscous", n)
+    if coulomb is None and viscous is None:
+        return None
+    zero = np.zeros(n)
+    coulomb = zero if coulomb is None else coulomb
+    friction = level_friction(coulomb, zero if viscous is None else viscous)
+    known: dict[str, Any] = {
+        name: row
+        for name in ("static", "stribeck_velocity", "load")
+        if (row := stated.row(name, n)) is not None
+    }
+    length = stated.row("presliding", n)
+    if length is not None:
+        known["bristle_stiffness"] = coulomb / length
+    return replace(friction, **known)
+
+
+def _stated_ripple(stated: RobotRipple | None) -> Ripple | None:
+    if stated is None:
+        return None
+    return Ripple(np.array(stated.cycles), np.array(stated.amplitude), np.array(stated.phase))
+
+
+def _stated_sensors(stated: RobotSensors | None, n: int) -> Sensors | None:
+    if stated is None:
+        return None
+    return Sensors(
+        current_noise=per_joint(stated.current_noise, n, "drive.sensors.current_noise"),
+        current_quantum=per_joint(stated.current_quantum, n, "drive.sensors.current_quantum"),
+        position_quantum=stated.position_quantum,
+        velocity_noise=stated.velocity_noise,
+        velocity_quantum=stated.velocity_quantum,
+        directional=_stated_ripple(stated.directional),
+    )
 
 
 def with_speeds(drive: Drive, speed: Array, lightest: Array) -> Drive:

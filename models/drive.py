@@ -77,6 +77,16 @@ class Ripple:
             if not np.isfinite(getattr(self, name)).all():
                 raise ValueError(f"Ripple.{name}: not finite")
 
+    def at(self, angle: Array) -> Array:
+        """The series [A] at angles of what turns (a motor, a joint) [rad], shape (..., n) both."""
+        turns = np.asarray(angle)[..., None] * self.cycles
+        series: Array = (self.amplitude * np.sin(turns + self.phase)).sum(axis=-1)
+        return series
+
+
+#: An error that changes sign with the velocity does so over this speed [rad/s].
+DIRECTION_SPEED = 0.02
+
 
 @dataclass(frozen=True)
 class Sensors:
@@ -87,11 +97,21 @@ class Sensors:
     position_quantum: float = 2e-6  #: [rad]
     velocity_noise: float = 5e-4  #: standard deviation [rad/s]
     velocity_quantum: float = 0.0  #: [rad/s]
+    directional: Ripple | None = None
+    """Error of the current that changes sign with the velocity: added to what is reported, without
+    an effect on the motion. Its cycles are those of a joint's revolution."""
 
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
         shaped(self, (len(self.current_noise),), "one a joint", "current_quantum")
-        not_negative(self, *(f.name for f in fields(self)))
+        not_negative(self, *(f.name for f in fields(self) if f.name != "directional"))
+        if self.directional is not None:
+            shaped(
+                self.directional,
+                (len(self.current_noise), len(self.directional.cycles)),
+                "joints, harmonics",
+                "amplitude",
+            )
 
     def measure(
         self, rng: np.random.Generator, q: Array, qd: Array, current: Array
@@ -107,6 +127,8 @@ class Sensors:
                 f"expected (T, {len(self.current_noise)}) each"
             )
         amperes = current + rng.normal(size=current.shape) * self.current_noise
+        if self.directional is not None:
+            amperes += self.directional.at(q) * np.tanh(qd / DIRECTION_SPEED)
         speed = qd + rng.normal(size=qd.shape) * self.velocity_noise
         return (
             _rounded(q, self.position_quantum),

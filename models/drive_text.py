@@ -17,7 +17,10 @@ _PARTS = {"friction": Friction, "ripple": Ripple, "sensors": Sensors}
 
 def drive_text(drive: Drive) -> str:
     """``drive`` as JSON, every digit; :func:`drive_of` makes an equal one."""
-    return json.dumps({"version": VERSION, **asdict(drive)}, sort_keys=True, default=_plain)
+    values = {"version": VERSION, **asdict(drive)}
+    if drive.sensors is not None and drive.sensors.directional is None:
+        del values["sensors"]["directional"]
+    return json.dumps(values, sort_keys=True, default=_plain)
 
 
 def drive_of(text: str) -> Drive:
@@ -31,6 +34,9 @@ def drive_of(text: str) -> Drive:
         version = values.pop("version")
         if version != VERSION:
             raise ValueError(f"drive: of version {version}; this tauguard reads {VERSION}")
+        sensors = values["sensors"]
+        if sensors is not None and "directional" in sensors:
+            sensors["directional"] = Ripple(**_arrays(sensors["directional"]))
         for name, kind in _PARTS.items():
             if values[name] is not None:
                 values[name] = kind(**_arrays(values[name]))

@@ -14,18 +14,64 @@ from tauguard.arrays import Array
 from tauguard.untrusted_input import read_text, reading
 
 Numbers = tuple[float, ...]
+#: A number a joint and harmonic.
+Rows = tuple[Numbers, ...]
 
 #: What becomes of the joints below the flange.
 GRIPPERS = ("weld", "passive")
 
 
 @dataclass(frozen=True)
-class RobotDrive:
-    """Drives as a data sheet states them; a number is that of every joint.
+class RobotRipple:
+    """A Fourier series of each joint's current, as :class:`tauguard.models.Ripple`."""
 
-    ``gear`` and ``torque_constant`` give the gain, ``rotor_inertia`` is the motor's own (the joint
-    feels gear^2 times it). Coulomb and viscous friction are those at the joint.
+    cycles: Numbers  #: per motor revolution, shape (h,)
+    amplitude: Rows  #: [A], shape (n, h)
+    phase: Rows  #: [rad], shape (n, h)
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the field."""
+        for name in ("cycles", "amplitude", "phase"):
+            rows = tuple(getattr(self, name))
+            if name != "cycles":
+                rows = tuple(tuple(np.atleast_1d(_numbers(row, name)).tolist()) for row in rows)
+                if any(len(row) != len(self.cycles) for row in rows):
+                    raise ValueError(f"{name}: expected {len(self.cycles)} numbers a joint")
+            else:
+                rows = tuple(np.atleast_1d(_numbers(rows, name)).tolist())
+            object.__setattr__(self, name, rows)
+
+
+@dataclass(frozen=True)
+class RobotSensors:
+    """What the arm reports of its signals; a number is that of every joint."""
+
+    current_noise: float | Numbers = 0.0  #: standard deviation [A]
+    current_quantum: float | Numbers = 0.0  #: [A]
+    position_quantum: float = 0.0  #: [rad]
+    velocity_noise: float = 0.0  #: standard deviation [rad/s]
+    velocity_quantum: float = 0.0  #: [rad/s]
+    directional: RobotRipple | None = None  #: error that changes sign with the velocity [A]
+
+    def __post_init__(self) -> None:
+        """Check the values: ``ValueError`` names the field."""
+        for name in [field.name for field in fields(self) if field.name != "directional"]:
+            value = _numbers(getattr(self, name), f"drive.sensors.{name}")
+            object.__setattr__(self, name, value)
+            if not np.all(np.asarray(value) >= 0):
+                raise ValueError(f"drive.sensors.{name} {value}: expected 0 or more")
+
+
+@dataclass(frozen=True)
+class RobotDrive:
+    """Drives as a data sheet or an identification states them; a number is that of every joint.
+
+    ``gear`` and ``torque_constant`` give the gain, or ``gain`` does; ``rotor_inertia`` is the
+    motor's own (the joint feels gear^2 times it). Friction is that at the joint, in the terms of
+    :class:`tauguard.models.Friction`.
     """
+
+    gain: float | Numbers | None = None  #: at the joint [N m/A]; not beside torque_constant
 
     gear: float | Numbers | None = None
     torque_constant: float | Numbers | None = None  #: of the motor [N m/A]
@@ -33,6 +79,12 @@ class RobotDrive:
     current_limit: float | Numbers | None = None  #: [A]
     coulomb: float | Numbers | None = None  #: [N m]
     viscous: float | Numbers | None = None  #: [N m s/rad]
+    static: float | Numbers | None = None  #: breakaway, at least Coulomb friction [N m]
+    stribeck_velocity: float | Numbers | None = None  #: [rad/s]
+    presliding: float | Numbers | None = None  #: Coulomb friction over bristle stiffness [rad]
+    load: float | Numbers | None = None  #: rise of the level per transmitted torque [1/(N m)]
+    ripple: RobotRipple | None = None
+    sensors: RobotSensors | None = None
     like: str | None = None
     """``"cura6"``: joints of which neither this nor the file states friction get that arm's losses
     (:mod:`tauguard.models.arm_drive`), all joints its ripple, lag and sensor noise."""
@@ -41,15 +93,18 @@ class RobotDrive:
         """Check the values: ``ValueError`` names the field."""
         if self.like not in (None, "cura6"):
             raise ValueError(f'drive.like {self.like!r}: expected "cura6"')
+        if self.gain is not None and self.torque_constant is not None:
+            raise ValueError("drive.gain: not beside drive.torque_constant, which gives it too")
         for field in fields(self):
-            if field.name == "like":
+            if field.name in ("like", "ripple", "sensors"):
                 continue
             value = getattr(self, field.name)
             if value is None:
                 continue
             value = _numbers(value, f"drive.{field.name}")
             object.__setattr__(self, field.name, value)
-            low = 0 if field.name in ("rotor_inertia", "coulomb", "viscous") else None
+            zero = "rotor_inertia", "coulomb", "viscous", "static", "load"
+            low = 0 if field.name in zero else None
             bad = [x for x in np.atleast_1d(value) if not (x >= 0 if low == 0 else x > 0)]
             if bad:
                 raise ValueError(f"drive.{field.name} {value}: expected above 0")
@@ -84,6 +139,7 @@ class Robot:
     bandwidth: float | Numbers | None = None  #: of the servo [rad/s]
     friction_compensation: float = 1.0  #: fraction of the known friction that the servo compensates
     drive: RobotDrive = RobotDrive()  #: noqa: RUF009
+    source: str | None = None  #: what the drive was identified from, in words
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the field and what would work."""
@@ -131,9 +187,31 @@ class Robot:
         _check_keys(parts, known, "robot")
         drive = parts.pop("drive", {})
         if not isinstance(drive, RobotDrive):
-            _check_keys(drive, [field.name for field in fields(RobotDrive)], "drive")
-            drive = RobotDrive(**drive)
+            drive = _drive(drive)
         return cls(**parts, drive=drive)
+
+
+def _drive(values: Mapping[str, Any]) -> RobotDrive:
+    """From the keys of the TOML table ``drive`` and its own tables."""
+    parts = dict(values)
+    _check_keys(parts, [field.name for field in fields(RobotDrive)], "drive")
+    if "ripple" in parts:
+        parts["ripple"] = _part(RobotRipple, parts["ripple"], "drive.ripple")
+    if "sensors" in parts:
+        sensors = dict(parts["sensors"])
+        if "directional" in sensors:
+            where = "drive.sensors.directional"
+            sensors["directional"] = _part(RobotRipple, sensors["directional"], where)
+        parts["sensors"] = _part(RobotSensors, sensors, "drive.sensors")
+    return RobotDrive(**parts)
+
+
+def _part(kind: type, values: Mapping[str, Any], where: str) -> Any:
+    _check_keys(values, [field.name for field in fields(kind)], where)
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise ValueError(f"{where}: {str(error).partition('() ')[2]}") from None
 
 
 def _check_keys(found: Mapping[str, Any], known: list[str], where: str) -> None:

@@ -1,5 +1,7 @@
 """A robot described once: what is stated is used, what is not is derived and says so."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from tauguard.models import (
     load_arm,
     pin_model,
 )
+from tauguard.models.drive_text import drive_of, drive_text
 from tests.models.arms import random_arm
 
 
@@ -183,3 +186,63 @@ def test_losses_like_the_cura6s_are_shares_of_the_limits(arm):
     assert load_arm(stated).facts.drive.friction.coulomb == pytest.approx(0.5)
     with pytest.raises(ValueError, match=r'drive\.like .*expected "cura6"'):
         RobotDrive(like="ur5")
+
+
+def test_an_identified_drive_has_friction_ripple_and_sensors_of_its_own(tmp_path, arm):
+    path, n = tmp_path / "r.toml", len(load_arm(str(arm(4))).joints)
+    path.write_text(f"""
+file = "{arm(4)}"
+source = "identified from a.csv"
+[drive]
+gain = {[12.0] * n}
+coulomb = 2.0
+static = 2.5
+stribeck_velocity = 0.1
+load = {[0.01] * n}
+presliding = 1e-3
+[drive.ripple]
+cycles = [2.0]
+amplitude = {[[0.2]] * n}
+phase = {[[0.0]] * n}
+[drive.sensors]
+current_noise = 0.01
+[drive.sensors.directional]
+cycles = [1.0]
+amplitude = {[[0.3]] * n}
+phase = {[[np.pi / 2]] * n}
+""")
+    facts = load_arm(str(path)).facts
+    drive = facts.drive
+    assert facts.sources["drive"] == "identified from a.csv; no lag"
+    np.testing.assert_array_equal(drive.gain, 12.0)
+    np.testing.assert_allclose(drive.friction.bristle_stiffness, 2000.0)
+    np.testing.assert_array_equal(drive.friction.static, 2.5)
+    # Two cycles a turn are at their first peak after an eighth of it: sin(2 pi / 4) = 1.
+    np.testing.assert_allclose(drive.ripple.at(np.full((1, n), np.pi / 4)), 0.2)
+    still, quick = np.zeros((1, n)), np.full((1, n), -1.0)
+    quiet = replace(drive.sensors, current_noise=np.zeros(n), velocity_noise=0.0)
+    rng = np.random.default_rng(0)
+    np.testing.assert_allclose(quiet.measure(rng, still, still, still)[2], 0.0)
+    np.testing.assert_allclose(quiet.measure(rng, still, quick, still)[2], -0.3)
+    again = drive_of(drive_text(drive))
+    np.testing.assert_array_equal(again.sensors.directional.amplitude, np.full((n, 1), 0.3))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("gain = 1.0\ntorque_constant = 0.1", "not beside drive.torque_constant"),
+        ("[drive.ripple]\ncycles = [1.0]", "drive.ripple: missing"),
+        ("[drive.sensors]\nlag = 1.0", "drive.sensors: no key 'lag'"),
+        ("[drive.sensors]\ncurrent_noise = -1.0", "expected 0 or more"),
+        (
+            "[drive.ripple]\ncycles = [1.0]\namplitude = [[1.0, 2.0]]\nphase = [[0.0]]",
+            "amplitude: expected 1 numbers a joint",
+        ),
+    ],
+)
+def test_an_identified_drive_that_cannot_be_is_refused(tmp_path, text, says):
+    path = tmp_path / "r.toml"
+    path.write_text(f'file = "a.xml"\n[drive]\n{text}\n')
+    with pytest.raises(ValueError, match=says):
+        Robot.from_toml(path)
