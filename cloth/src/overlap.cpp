@@ -84,38 +84,41 @@ void pair_portable(const LeafLanes& a, const LeafLanes& b, int axes, int times, 
 }
 
 #if defined(__x86_64__)
-TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const float* b,
-                                            int times) {
-  const __m256 below = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
-  const __m256 above =
-      _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
-  if (times == 1) return _mm256_or_ps(below, above);
-  row += s.end;
-  b += 2 * lanes;
-  const __m256 below1 = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
-  const __m256 above1 =
-      _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
-  return _mm256_or_ps(_mm256_and_ps(below, below1), _mm256_and_ps(above, above1));
+// Eight lanes on one axis.
+template <int times>
+TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const float* b) {
+  __m256 below[times], above[times];
+  for (int t = 0; t < times; ++t, row += s.end, b += 2 * lanes) {
+    below[t] = _mm256_cmp_ps(_mm256_set1_ps(row[s.side]), _mm256_loadu_ps(b), _CMP_LT_OQ);
+    above[t] = _mm256_cmp_ps(_mm256_loadu_ps(b + lanes), _mm256_set1_ps(row[0]), _CMP_LT_OQ);
+  }
+  if constexpr (times == 1) return _mm256_or_ps(below[0], above[0]);
+  return _mm256_or_ps(_mm256_and_ps(below[0], below[times - 1]),
+                      _mm256_and_ps(above[0], above[times - 1]));
 }
 
+// Every axis is looked at, whatever the others say: no branch to mispredict.
+template <int times>
 TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, const float* b,
-                                                int axes, int times, Mask wanted) {
-  for (int k = 0; k < axes && wanted; ++k, row += s.axis, b += 2 * lanes * times) {
-    const Mask left = _mm256_movemask_ps(apart8(row, s, b, times));
-    const Mask right = _mm256_movemask_ps(apart8(row, s, b + 8, times));
-    wanted &= ~(left | right << 8);
+                                                int axes, Mask wanted) {
+  __m256 left = _mm256_setzero_ps(), right = left;
+  for (int k = 0; k < axes; ++k, row += s.axis, b += 2 * lanes * times) {
+    left = _mm256_or_ps(left, apart8<times>(row, s, b));
+    right = _mm256_or_ps(right, apart8<times>(row, s, b + 8));
   }
-  return wanted;
+  return wanted & ~Mask(_mm256_movemask_ps(left) | _mm256_movemask_ps(right) << 8);
 }
 
 TAUGUARD_AVX2 Mask node_avx2(const float* node, int slots, const float* block, int axes, int times,
                              Mask wanted) {
-  return overlap_avx2(node, in_node(slots), block, axes, times, wanted);
+  return times == 1 ? overlap_avx2<1>(node, in_node(slots), block, axes, wanted)
+                    : overlap_avx2<2>(node, in_node(slots), block, axes, wanted);
 }
-TAUGUARD_AVX2 Mask sharing_avx2(const LeafLanes& a, int row, const LeafLanes& b) {
+template <int arity_a, int arity_b>
+TAUGUARD_AVX2 TAUGUARD_INLINE Mask sharing_avx2(const LeafLanes& a, int row, const LeafLanes& b) {
   __m256i left = _mm256_setzero_si256(), right = left;
-  for (int j = 0; j < a.arity; ++j)
-    for (int k = 0; k < b.arity; ++k) {
+  for (int j = 0; j < arity_a; ++j)
+    for (int k = 0; k < arity_b; ++k) {
       const auto* at = reinterpret_cast<const __m256i*>(b.vertices + k * lanes);
       const __m256i v = _mm256_set1_epi32(a.vertices[j * lanes + row]);
       left = _mm256_or_si256(left, _mm256_cmpeq_epi32(v, _mm256_loadu_si256(at)));
@@ -124,21 +127,26 @@ TAUGUARD_AVX2 Mask sharing_avx2(const LeafLanes& a, int row, const LeafLanes& b)
   return Mask(_mm256_movemask_ps(_mm256_castsi256_ps(left))) |
          Mask(_mm256_movemask_ps(_mm256_castsi256_ps(right))) << 8;
 }
-// On x, y and z for all rows; for those with lanes left that share no vertex, on the other axes:
-// few branches to mispredict.
-TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
-                             Overlaps& out) {
-  const RowStride s = in_block(times);
-  Remaining rest;
+template <int times, int arity_a, int arity_b>
+TAUGUARD_AVX2 TAUGUARD_INLINE void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes,
+                                             bool same, Overlaps& out) {
   for (Mask rows = a.occupied; rows; rows &= rows - 1) {
     const int row = __builtin_ctz(rows);
-    const Mask near = overlap_avx2(a.block + row, s, b.block, 3, times, lanes_after(same, row, b));
-    rest.add(row, near, sharing_avx2(a, row, b), out);
+    const Mask near = overlap_avx2<times>(a.block + row, in_block(times), b.block, axes,
+                                          lanes_after(same, row, b));
+    const Mask shared = near & sharing_avx2<arity_a, arity_b>(a, row, b);
+    out.adjacent += count_of(shared);
+    out.set(row, near & ~shared);
   }
-  for (int i = 0; i < rest.count; ++i) {
-    const int row = rest.rows[i];
-    out.set(row, overlap_avx2(a.block + row + 3 * s.axis, s, b.block + 3 * s.axis, axes - 3, times,
-                              out.lanes_of[row]));
+}
+TAUGUARD_AVX2 void pair_avx2(const LeafLanes& a, const LeafLanes& b, int axes, int times, bool same,
+                             Overlaps& out) {
+  if (a.arity == 1) {
+    times == 1 ? pair_avx2<1, 1, 3>(a, b, axes, same, out)
+               : pair_avx2<2, 1, 3>(a, b, axes, same, out);
+  } else {
+    times == 1 ? pair_avx2<1, 2, 2>(a, b, axes, same, out)
+               : pair_avx2<2, 2, 2>(a, b, axes, same, out);
   }
 }
 
