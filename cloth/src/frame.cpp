@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <vector>
 
+#include "apart.hpp"
+#include "tauguard/geometry/interrupt.hpp"
 #include "tauguard/geometry/rounding.hpp"
 #include "tauguard/geometry/scratch.hpp"
 #include "too_many.hpp"
@@ -17,10 +20,10 @@ double seconds(Instant from, Instant to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-// One collision, and those of one chunk of candidates.
+// One collision before it is described, and those of one chunk of candidates.
 struct Row {
-  std::int32_t pair[2];
-  double toi, point[3], normal[3], weights[4];
+  std::int32_t pair[2], vertices[4];
+  double toi;
 };
 struct Part {
   std::vector<Row> rows;
@@ -34,16 +37,14 @@ struct Place {
   const Row* row;
 };
 
-// By key, a digit at a time from the last (radix sort); digits that are zero in all keys are passed
-// over.
+// By key, a digit at a time from the last (radix sort).
 void sort(std::vector<Place>& places) {
   constexpr int digit = 11;
   std::vector<Place> other(places.size());
   std::uint64_t used = 0;
   for (const auto& at : places) used |= at.key;
-  for (int shift = 0; shift < 64; shift += digit) {
+  for (int shift = 0; shift < 64 && used >> shift != 0; shift += digit) {
     const auto value = [shift](std::uint64_t key) { return key >> shift & ((1u << digit) - 1); };
-    if (value(used) == 0) continue;
     std::size_t start[(1 << digit) + 1] = {};
     for (const auto& at : places) ++start[value(at.key) + 1];
     for (int i = 0; i < 1 << digit; ++i) start[i + 1] += start[i];
@@ -54,38 +55,65 @@ void sort(std::vector<Place>& places) {
 
 // What the narrow phase writes for a block of candidates.
 struct Answers {
-  static constexpr std::size_t n = CandidateBlock::capacity;
-  std::vector<std::uint8_t> hit = std::vector<std::uint8_t>(n);
-  std::vector<double> toi = std::vector<double>(n), point = std::vector<double>(3 * n),
-                      normal = std::vector<double>(3 * n), weights = std::vector<double>(4 * n);
+  std::uint8_t hit[CandidateBlock::capacity];
+  double toi[CandidateBlock::capacity];
 };
 
-// One list in the order of the pairs. A pair occurs once, so that the order is unique.
-Collisions sorted(const std::vector<Part>& parts) {
-  Collisions all;
-  std::vector<Place> places;
+// In the order of the pairs. A pair occurs once, so that the order is unique.
+std::vector<Place> in_order(const std::vector<Part>& parts) {
+  std::size_t n = 0;
+  std::uint32_t largest = 0;
   for (const auto& part : parts) {
+    n += part.rows.size();
+    for (const auto& row : part.rows) largest = std::max(largest, std::uint32_t(row.pair[1]));
+  }
+  // The second number takes no more bits than it needs: fewer digits to sort by.
+  const int bits = largest == 0 ? 0 : 32 - __builtin_clz(largest);
+  std::vector<Place> places;
+  places.reserve(n);
+  for (const auto& part : parts)
     for (const auto& row : part.rows)
       places.push_back(
-          {std::uint64_t(std::uint32_t(row.pair[0])) << 32 | std::uint32_t(row.pair[1]), &row});
+          {std::uint64_t(std::uint32_t(row.pair[0])) << bits | std::uint32_t(row.pair[1]), &row});
+  sort(places);
+  return places;
+}
+
+// Where, along which normal and with which weights: written straight to where it stays.
+template <bool vf>
+void describe_all(const Ends& x, const std::vector<Place>& places, int threads, Collisions& out) {
+  constexpr std::size_t grain = 2048;
+  const ImpactArrays impacts{out.toi.data(), out.point.data(), out.normal.data(),
+                             out.weights.data()};
+  geometry::interruptible_for(places.size(), threads, grain, [&](auto begin, auto end, auto) {
+    for (auto i = begin; i < end; ++i) {
+      // Rows lie anywhere in memory, and so do their vertices: both are asked for before their use.
+      const auto next = [&](int steps) { return places[std::min(i + steps * ahead, end - 1)].row; };
+      __builtin_prefetch(next(2));
+      prefetch<true>(x, next(1)->vertices);
+      const Row& row = *places[i].row;
+      std::copy_n(row.pair, 2, &out.pairs[2 * i]);
+      out.toi[i] = row.toi;
+      describe<vf>(x, row.vertices, row.toi, impacts, i);
+    }
+  });
+}
+
+Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, const std::vector<Part>& parts) {
+  Collisions all;
+  for (const auto& part : parts) {
     all.stats += part.stats;
     all.narrow_s += part.narrow_s;
   }
-  sort(places);
+  const auto places = in_order(parts);
   const std::size_t n = places.size();
   all.pairs.resize(2 * n);
   all.toi.resize(n);
   all.point.resize(3 * n);
   all.normal.resize(3 * n);
   all.weights.resize(4 * n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Row& row = *places[i].row;
-    std::copy_n(row.pair, 2, &all.pairs[2 * i]);
-    all.toi[i] = row.toi;
-    std::copy_n(row.point, 3, &all.point[3 * i]);
-    std::copy_n(row.normal, 3, &all.normal[3 * i]);
-    std::copy_n(row.weights, 4, &all.weights[4 * i]);
-  }
+  (kind == MeshCcd::Kind::vf ? describe_all<true> : describe_all<false>)(ccd.ends(), places,
+                                                                         ccd.threads(), all);
   return all;
 }
 
@@ -114,25 +142,22 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& 
     geometry::Scratch<Answers> scratch;
     Answers& answers = *scratch;
     Part& part = parts[chunk];
-    const std::size_t before = part.rows.size();
     const auto begin = std::chrono::steady_clock::now();
-    narrow_phase(
-        ccd.ends(), block.rows.data(), block.size, answers.hit.data(),
-        {answers.toi.data(), answers.point.data(), answers.normal.data(), answers.weights.data()},
-        part.stats);
+    narrow_phase(ccd.ends(), block.rows.data(), block.size, answers.hit,
+                 {answers.toi, nullptr, nullptr, nullptr}, part.stats);
+    const std::size_t hits = std::count(answers.hit, answers.hit + block.size, 1);
+    if ((found += hits) > limit) throw TooMany("collisions of a kind", limit);
+    part.rows.reserve(part.rows.size() + hits);
     for (std::size_t i = 0; i < block.size; ++i) {
       if (!answers.hit[i]) continue;
       Row& row = part.rows.emplace_back();
       std::copy_n(&block.pairs[2 * i], 2, row.pair);
+      std::copy_n(&block.rows[4 * i], 4, row.vertices);
       row.toi = answers.toi[i];
-      std::copy_n(&answers.point[3 * i], 3, row.point);
-      std::copy_n(&answers.normal[3 * i], 3, row.normal);
-      std::copy_n(&answers.weights[4 * i], 4, row.weights);
     }
-    if ((found += part.rows.size() - before) > limit) throw TooMany("collisions of a kind", limit);
     part.narrow_s += seconds(begin, std::chrono::steady_clock::now());
   });
-  Collisions all = sorted(parts);
+  Collisions all = described(ccd, kind, parts);
   all.total_s = seconds(start, std::chrono::steady_clock::now());
   return all;
 }

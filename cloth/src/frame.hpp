@@ -20,8 +20,8 @@ struct Collisions {
   std::size_t size() const { return toi.size(); }
 };
 
-// Decides a block of candidates, rows (n, 4) of vertices, as solve_vf does. Called from several
-// threads.
+// Decides a block of candidates, rows (n, 4) of vertices, as solve_vf does; of the impacts only the
+// times are asked for. Called from several threads.
 using NarrowPhase = std::function<void(const Ends& x, const std::int32_t* rows, std::size_t n,
                                        std::uint8_t* hit, ImpactArrays impacts, Stats& stats)>;
 

@@ -12,7 +12,8 @@
 namespace tauguard::cloth {
 
 // Row i is written where query i is a hit. Weights are those of the four vertices of the row: (1, w
-// of the face's vertices), or (1 - s, s, 1 - t, t) of the two edges.
+// of the face's vertices), or (1 - s, s, 1 - t, t) of the two edges. Null but for `toi` where only
+// times are asked for.
 struct ImpactArrays {
   double *toi, *point, *normal, *weights;  // (n), (n, 3), (n, 3), (n, 4)
 };

@@ -263,7 +263,7 @@ void solve(const Ends& x, const std::int32_t* rows, std::size_t n, Method method
       hit[first + i] = toi[i] <= 1;
       if (!hit[first + i]) continue;
       out.toi[first + i] = toi[i];
-      describe<vf>(x, part + 4 * i, toi[i], out, first + i);
+      if (out.point) describe<vf>(x, part + 4 * i, toi[i], out, first + i);
     }
   }
 }
