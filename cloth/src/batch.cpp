@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "apart.hpp"
+#include "cuts.hpp"
 
 namespace tauguard::cloth {
 namespace {
@@ -50,14 +51,10 @@ TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, G
   const Double4 b0 = dot(p0, c00), b1 = (1.0 / 3) * (dot(p1, c00) + dot(p0, mixed)),
                 b2 = (1.0 / 3) * (dot(p0, c11) + dot(p1, mixed)), b3 = dot(p1, c11);
   const Double4 error = 0x1p-43 * ((s * sizes[0]) * (s * sizes[1]) * (s * sizes[2])) + 0x1p-1000;
-  const Double4 least = min(min(b0, b1), min(b2, b3)), most = max(max(b0, b1), max(b2, b3));
-  // One variation: the ends have different signs, and not both coefficients between them the other
-  // end's.
-  const Mask4 falls = (b0 > error) & (b3 < -error) & ((b1 > error) | (b2 < -error));
-  const Mask4 rises = (b0 < -error) & (b3 > error) & ((b1 < -error) | (b2 > error));
+  const Cubics cubic{{b0, b1, b2, b3}};
   g.odd = static_cast<std::uint8_t>(bits(~fair));
-  g.no_root = static_cast<std::uint8_t>(bits(fair & ((least > error) | (most < -error))));
-  g.one_root = static_cast<std::uint8_t>(bits(fair & (falls | rises)));
+  g.no_root = static_cast<std::uint8_t>(bits(fair & one_sign(cubic, error)));
+  g.one_root = static_cast<std::uint8_t>(bits(fair & one_root(cubic, error)));
   store4(g.value[Group::cubic], b0);
   store4(g.value[Group::cubic + 1], b1);
   store4(g.value[Group::cubic + 2], b2);
@@ -104,6 +101,43 @@ TAUGUARD_INLINE void gather(const Ends& x, const std::int32_t* rows, int n, Grou
     }
     finish(p, q, r, *groups);
   }
+}
+
+TAUGUARD_INLINE Cut cut(const Group* groups, std::int32_t* queries, int n, Piece* pieces) {
+  Cut found;
+  for (int first = 0; first < n; first += width) {
+    alignas(64) double value[5][width];
+    for (int i = 0; i < width; ++i) {
+      const std::int32_t query = queries[std::min(first + i, n - 1)];
+      for (int j = 0; j < 5; ++j)
+        value[j][i] = groups[query / width].value[Group::cubic + j][query % width];
+    }
+    const Cubics whole{{load4(value[0]), load4(value[1]), load4(value[2]), load4(value[3])}};
+    const Double4 error = load4(value[4]), at = cut_of(whole);
+    Cubics part[2];
+    halve(whole, at, part[0], part[1]);
+    Mask4 decided = (abs(whole.b[0]) > error) & (abs(whole.b[3]) > error);
+    unsigned roots[2];
+    for (int k = 0; k < 2; ++k) {
+      const Mask4 root = one_root(part[k], error);
+      decided &= root | one_sign(part[k], error);
+      roots[k] = bits(root);
+    }
+    const unsigned sure = bits(decided);
+    for (int i = 0; i < width && first + i < n; ++i) {
+      const std::int32_t query = queries[first + i];
+      queries[found.left] = query;
+      found.left += !(sure >> i & 1);
+      found.clear += (sure & ~roots[0] & ~roots[1]) >> i & 1;
+      for (int k = 0; k < 2; ++k) {
+        if (!((sure & roots[k]) >> i & 1)) continue;
+        Piece& piece = pieces[found.pieces++];
+        piece = {k ? at[i] : 0, k ? 1 - at[i] : at[i], {}, query};
+        for (int j = 0; j < 4; ++j) piece.cubic[j] = part[k].b[j][i];
+      }
+    }
+  }
+  return found;
 }
 
 // Pieces, transposed, with the differences of their queries.
@@ -242,6 +276,9 @@ TAUGUARD_INLINE void gather(bool vf, const Ends& x, const std::int32_t* rows, in
                                 Group* groups) {                                                   \
     x.in_lines() ? gather<true>(vf, x, rows, n, groups) : gather<false>(vf, x, rows, n, groups);   \
   }                                                                                                \
+  attributes Cut cut_##name(const Group* groups, std::int32_t* queries, int n, Piece* pieces) {    \
+    return cut(groups, queries, n, pieces);                                                        \
+  }                                                                                                \
   attributes void at_roots_##name(bool vf, const Group* groups, const Piece* pieces, int n,        \
                                   Outcome* outcome, double* toi) {                                 \
     vf ? at_roots<true>(groups, pieces, n, outcome, toi)                                           \
@@ -257,7 +294,7 @@ TAUGUARD_INLINE void gather(bool vf, const Ends& x, const std::int32_t* rows, in
               : not_apart_on_seven<false>(points, rows, n, left);                                  \
   }                                                                                                \
   constexpr BatchKernels name{not_apart_##name, not_apart_on_seven_##name, gather_##name,          \
-                              at_roots_##name};
+                              cut_##name, at_roots_##name};
 
 TAUGUARD_VARIANT(portable, )
 #if defined(__x86_64__)

@@ -36,6 +36,13 @@ struct Piece {
 // itself.
 enum class Outcome : std::uint8_t { clear, contact, edge, unknown };
 
+// What became of queries whose cubics were cut once.
+struct Cut {
+  int pieces = 0;  // written: each query's in a row, in order of time
+  int clear = 0;   // queries without a piece
+  int left = 0;    // queries for which one cut does not suffice
+};
+
 struct BatchKernels {
   // The queries of n that no axis (x, y or z) keeps apart, on the same side at both ends of the
   // step and so in between: their numbers go to `left`. Comparisons of coordinates only, and so
@@ -47,6 +54,9 @@ struct BatchKernels {
   // (n + width - 1) / width groups of n queries; the last is filled up with copies of the last
   // query.
   void (*gather)(bool vf, const Ends& x, const std::int32_t* rows, int n, Group* groups);
+  // Cuts the cubics of n queries (numbers into the groups) once; those left take the first places
+  // of `queries`.
+  Cut (*cut)(const Group* groups, std::int32_t* queries, int n, Piece* pieces);
   // Per piece: is there contact at its root, and from when on can that be (at most 2^-32 before
   // it).
   void (*at_roots)(bool vf, const Group* groups, const Piece* pieces, int n, Outcome* outcome,

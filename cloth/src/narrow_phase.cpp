@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "batch.hpp"
+#include "cuts.hpp"
 #include "exact.hpp"
 #include "impact.hpp"
 #include "integer_contact.hpp"
@@ -28,26 +29,8 @@ namespace {
 constexpr int batch = 128, block = 512;
 constexpr double never = std::numeric_limits<double>::infinity();
 
-// Whether the cubic has exactly one root: its Bernstein coefficients change their sign once.
-bool one_root(const double* b, double error) {
-  const double s = b[0] > 0 ? 1 : -1;
-  return s * b[0] > error && s * b[3] < -error && (s * b[1] > error || s * b[2] < -error);
-}
-
-// Where to cut a cubic into pieces with fewer roots. If both ends have one sign, the cut is at the
-// extremum in the direction of the other sign. Otherwise it is at the inflection point, because at
-// most two roots lie on either side of it.
-double cut_of(const double* b) {
-  const double s = b[0] > 0 ? 1 : -1, d0 = s * (b[1] - b[0]), d1 = s * (b[2] - b[1]),
-               d2 = s * (b[3] - b[2]);
-  const double a = d0 - 2 * d1 + d2, h = d1 - d0;
-  double cut = -h / a;
-  if (s * b[3] > 0) {
-    const double root = std::sqrt(std::max(0.0, h * h - a * d0));
-    cut = h > 0 ? -d0 / (h + root) : (root - h) / a;
-  }
-  return cut > 0x1p-20 && cut < 1 - 0x1p-20 ? cut : 0.5;
-}
+// Four times the same.
+Cubics cubics_of(const double* b) { return {{splat(b[0]), splat(b[1]), splat(b[2]), splat(b[3])}}; }
 
 // Writes pieces that hold one root each, in order, and together all roots of the cubic. Returns
 // their number, or -1 if rounding prevents a decision. The error bound allows for the limit of
@@ -64,12 +47,12 @@ int split(const double* b, double error, std::int32_t query, Piece* pieces) {
     const Part part = stack[--top];
     const double* c = part.c.b;
     if (one_sign(part.c, error) != 0) continue;
-    if (one_root(c, error)) {
+    if (one_root(cubics_of(c), splat(error))[0]) {
       pieces[count++] = {part.start, part.length, {c[0], c[1], c[2], c[3]}, query};
       continue;
     }
     if (part.cuts == 3 || !(std::fabs(c[0]) > error && std::fabs(c[3]) > error)) return -1;
-    const double cut = cut_of(c), middle = part.start + cut * part.length;
+    const double cut = cut_of(cubics_of(c))[0], middle = part.start + cut * part.length;
     Part &right = stack[top++], &left = stack[top++];
     left = {part.start, middle - part.start, {}, part.cuts + 1};
     right = {middle, part.start + part.length - middle, {}, part.cuts + 1};
@@ -126,19 +109,27 @@ int make_pieces(Batch& b, int n, Stats& stats) {
     }
   }
   const int single = b.count;
+  std::int32_t several[batch];
+  int count = 0;
   for (int g = 0; g < groups; ++g)
     for (unsigned lanes = rest[g]; lanes; lanes &= lanes - 1) {
-      const Group& group = b.groups[g];
-      const int lane = __builtin_ctz(lanes), query = g * width + lane;
-      double c[4];
-      for (int j = 0; j < 4; ++j) c[j] = group.value[Group::cubic + j][lane];
-      const bool odd = group.odd >> lane & 1;
-      const int found =
-          odd ? -1 : split(c, group.value[Group::error][lane], query, b.pieces + b.count);
-      if (found < 0) b.open[b.left++] = query;
-      if (found == 0) ++stats.cubic_sign;
-      b.count += std::max(found, 0);
+      const int lane = __builtin_ctz(lanes);
+      const bool odd = b.groups[g].odd >> lane & 1;
+      (odd ? b.open[b.left++] : several[count++]) = g * width + lane;
     }
+  const Cut cut = batch_kernels().cut(b.groups, several, count, b.pieces + b.count);
+  b.count += cut.pieces;
+  stats.cubic_sign += cut.clear;
+  for (int i = 0; i < cut.left; ++i) {
+    const Group& group = b.groups[several[i] / width];
+    const int lane = several[i] % width;
+    double c[4];
+    for (int j = 0; j < 4; ++j) c[j] = group.value[Group::cubic + j][lane];
+    const int found = split(c, group.value[Group::error][lane], several[i], b.pieces + b.count);
+    if (found < 0) b.open[b.left++] = several[i];
+    if (found == 0) ++stats.cubic_sign;
+    b.count += std::max(found, 0);
+  }
   return single;
 }
 
