@@ -29,7 +29,7 @@ class Friction:
     """
 
     coulomb: Array  #: Fc [N m], shape (n,)
-    static: Array  #: Fs, breakaway level, at least Fc [N m], shape (n,)
+    static: Array  #: Fs, level at rest [N m], shape (n,); below Fc it rises with speed
     stribeck_velocity: Array  #: vs [rad/s], shape (n,)
     viscous: Array  #: [N m s/rad], shape (n,)
     bristle_stiffness: Array  #: k [N m/rad], shape (n,)
@@ -50,8 +50,8 @@ class Friction:
                 f"Friction.bristle_stiffness {self.bristle_stiffness}: expected above 0 where "
                 "there is Coulomb friction"
             )
-        if not (self.static >= self.coulomb).all():
-            raise ValueError("Friction.static: below coulomb; the breakaway level is at least it")
+        if not ((self.static > 0) | ((self.coulomb == 0) & (self.static == 0))).all():
+            raise ValueError("Friction.static: expected above 0 where there is Coulomb friction")
         warm = self.temperature - self.reference_temperature
         for name in ("coulomb_per_kelvin", "viscous_per_kelvin"):
             if not 1 + getattr(self, name) * warm > 0:

@@ -22,6 +22,7 @@ PRODUCT = {
     "datasets",
     "replay",
     "live",
+    "twin",
 }
 ALLOWED = {
     "geometry": set(),
@@ -35,6 +36,7 @@ ALLOWED = {
     "datasets": {"envs", "contacts", "traces", "models", "detectors"},
     "replay": {"traces", "models", "detectors", "report"},
     "live": {"detectors", "traces"},
+    "twin": {"detectors", "models", "traces"},
     "report": set(),
     "hard_cases": PRODUCT,
     "cli": PRODUCT | {"report", "hard_cases"},

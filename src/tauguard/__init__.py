@@ -3,7 +3,7 @@
 Import the sub-package that you need (``tauguard.cloth`` pulls in
 neither MuJoCo nor Pinocchio): ``models``, ``traces``, ``geometry``, ``cloth``, ``rigid``,
 ``detectors``, ``contacts``, ``envs``, ``datasets``, ``live``, ``replay``,
-``report``, ``hard_cases``.
+``report``, ``hard_cases``, ``twin``.
 
 ``tauguard.residual(trace)`` and ``tauguard.plot(trace)`` look at a recording by hand.
 
@@ -29,6 +29,7 @@ register_environments()
 _PACKAGES = (
     "cloth", "contacts", "datasets", "detectors", "envs", "geometry", "hard_cases", "live",
     "models", "replay", "report", "rigid", "traces",
+    "twin",
 )  # fmt: skip
 _FUNCTIONS = {"plot": "tauguard.replay.plot", "residual": "tauguard.detectors.calibration.nominal"}
 

@@ -33,7 +33,7 @@ def test_bad_drives_are_named(change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"static": 0.5 * SIX}, "breakaway level"),
+        ({"static": 0 * SIX}, "static: expected above 0"),
         ({"bristle_stiffness": 0 * SIX}, "Friction.bristle_stiffness .* expected above 0"),
         ({"viscous": -SIX}, "Friction.viscous .* expected 0 or more"),
         ({"load": np.full(6, np.nan)}, "Friction.load .* expected 0 or more"),

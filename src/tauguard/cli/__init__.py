@@ -19,6 +19,7 @@ from tauguard.cli.checkout import STUDY_COMMANDS, run_studies
 COMMANDS = {
     "demo": "simulate, strike, train, detect, and leave a recording to look at",
     "calibrate": "friction, inertia and drive gains of a real arm from collision-free logs",
+    "twin": "a simulated arm that is like a real one, from collision-free logs",
     "detect": "look for collisions in the log of a real arm",
     "generate": "a labelled dataset from its description, on all cores or a Ray cluster",
     "inspect": "the content of a generated dataset, and whether it is intact",

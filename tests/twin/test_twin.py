@@ -1,0 +1,107 @@
+"""A twin of an arm whose friction is known finds that friction, and is like its arm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tauguard.detectors import ArmModel, FrictionModel
+from tauguard.detectors.dynamics.robot import RobotNumbers
+from tauguard.models import Friction, load_arm
+from tauguard.twin import compare, identify_twin
+from tauguard.twin.description import write_twin
+from tauguard.twin.play import friction_torque
+from tauguard.twin.signals import quantum, white_noise
+from tests.detectors.synthetic_arm import (
+    COULOMB,
+    GAIN,
+    VISCOUS,
+    XML,
+    held_joint,
+    record,
+    true_model,
+)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    friction = FrictionModel.coulomb_viscous(COULOMB, VISCOUS)
+    robot = RobotNumbers.from_pin(true_model())
+    return ArmModel(robot, GAIN, friction, np.full(3, 0.1))
+
+
+@pytest.fixture(scope="module")
+def logs():
+    return [record(seed) for seed in (1, 2, 3)]
+
+
+@pytest.fixture(scope="module")
+def twin(arm, logs):
+    return identify_twin(arm, logs[:2], np.full(3, 30.0))
+
+
+def test_friction_of_a_known_arm_is_found(twin):
+    # At .3 rad/s, in the middle of the logged speeds: parts that are alike there may be exchanged.
+    speed = 0.3
+    f = twin.drive.friction
+    slip = np.exp(-((speed / f.stribeck_velocity) ** 2))
+    level = f.coulomb + (f.static - f.coulomb) * slip + f.viscous * speed
+    np.testing.assert_allclose(level, COULOMB + VISCOUS * speed, rtol=0.1)
+    assert twin.rate == pytest.approx(100)
+    assert twin.notes == ()
+
+
+def test_the_twin_is_more_like_its_arm_than_one_without_friction(arm, logs, twin):
+    found = compare(arm, twin.drive, logs[2:])
+    assert found.moving_auc < 0.9
+    # Without friction the estimator is left with all of it.
+    wrong = compare(arm, replace(twin.drive, friction=None), logs[2:])
+    assert (wrong.rms > 4 * found.rms).all()
+    assert wrong.moving_auc > 0.95
+
+
+def test_a_joint_that_never_moves_keeps_a_prior_and_is_named(arm):
+    found = identify_twin(arm, [held_joint(1), held_joint(2)], np.full(3, 30.0))
+    assert found.fits[2] is None
+    assert found.notes[0].startswith("c: hardly moves")
+    assert found.drive.friction.coulomb[2] > 0
+
+
+def test_logs_without_motion_are_refused(arm, logs):
+    still = replace(logs[0], qd=0 * logs[0].qd)
+    with pytest.raises(ValueError, match="no joint moves"):
+        identify_twin(arm, [still], np.full(3, 30.0))
+
+
+def test_the_description_is_the_robot_that_is_simulated(twin, tmp_path):
+    robot = tmp_path / "arm.xml"
+    robot.write_text(XML)
+    write_twin(twin, robot, tmp_path / "twin.toml", ["a.csv"], "gains")
+    drive = load_arm(str(tmp_path / "twin.toml")).facts.drive
+    for name in ("coulomb", "static", "viscous", "load"):
+        got, given = (getattr(d.friction, name) for d in (drive, twin.drive))
+        np.testing.assert_allclose(got, given, rtol=1e-5)
+    np.testing.assert_allclose(drive.ripple.amplitude, twin.drive.ripple.amplitude, rtol=1e-5)
+    np.testing.assert_allclose(
+        drive.sensors.current_noise, twin.drive.sensors.current_noise, rtol=1e-5
+    )
+    with pytest.raises(ValueError, match=r"ends in \.toml"):
+        write_twin(twin, robot, tmp_path / "twin.xml", ["a.csv"], "gains")
+
+
+def test_friction_settles_at_its_level_and_stays_when_the_joint_stops():
+    one = np.ones(1)
+    friction = Friction(2 * one, 2 * one, 0.1 * one, 3 * one, 2000 * one, 0 * one)
+    qd = np.where(np.arange(400) < 200, 0.5, 0.0)[:, None]
+    torque = friction_torque(friction, qd, 0 * qd, np.full(400, 0.01))
+    assert torque[199, 0] == pytest.approx(2 + 3 * 0.5)
+    assert torque[-1, 0] == pytest.approx(2)
+
+
+def test_quantum_and_noise_of_a_signal():
+    rng = np.random.default_rng(0)
+    smooth = np.sin(np.linspace(0, 20, 5000))
+    noisy = smooth + rng.normal(size=5000) * 0.01
+    assert quantum(np.rint(noisy / 0.002) * 0.002) == pytest.approx(0.002)
+    assert quantum(noisy) == 0
+    assert white_noise(noisy, 0.0) == pytest.approx(0.01, rel=0.1)

@@ -1,0 +1,67 @@
+"""The currents that a drive would report along a motion that is given."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.detectors import ArmModel, Estimator, Unknowns
+from tauguard.models import Drive, Friction
+from tauguard.traces import Trace
+from tauguard.twin.signals import motion_of
+
+#: Rate of the observer whose residuals are compared [1/s].
+OBSERVER = 30.0
+_TRACKED = Unknowns.for_detection()
+
+
+def played(arm: ArmModel, drive: Drive, trace: Trace, seed: int = 0) -> Array:
+    """Currents of the twin along a log's own motion [A], shape (T, n).
+
+    Args:
+        arm: its bodies.
+        drive: what is simulated: friction, ripple, sensors.
+        trace: the motion; its currents are not used.
+        seed: of the sensors' noise.
+    """
+    motion = motion_of(arm, trace)
+    torque = motion.bodies.copy()
+    if drive.friction is not None:
+        steps = np.diff(trace.t, prepend=trace.t[0])
+        torque += friction_torque(drive.friction, motion.qd, motion.bodies, steps)
+    current = torque / drive.gain
+    if drive.ripple is not None:
+        current += drive.ripple.at(trace.q * drive.gear)
+    if drive.sensors is None:
+        return current
+    rng = np.random.default_rng(seed)
+    return drive.sensors.measure(rng, trace.q, motion.qd, current)[2]
+
+
+def residual_of(arm: ArmModel, trace: Trace) -> Array:
+    """What a detector's estimator does not explain of a log [N m], shape (T, n)."""
+    estimator = Estimator(arm, OBSERVER, float(np.median(np.diff(trace.t))), _TRACKED)
+    return estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
+
+
+def friction_torque(friction: Friction, qd: Array, torque: Array, steps: Array) -> Array:
+    """Friction along a motion [N m], by the recursion of :class:`tauguard.models.Friction`.
+
+    Args:
+        friction: its numbers; the temperature is that of reference.
+        qd: velocities [rad/s], shape (T, n).
+        torque: that the joints transmit [N m], shape (T, n).
+        steps: time before each sample [s], shape (T,).
+    """
+    slip = np.exp(-((qd / friction.stribeck_velocity) ** 2))
+    level = friction.coulomb + (friction.static - friction.coulomb) * slip
+    level = np.maximum(level * (1 + friction.load * np.abs(torque)), 1e-9)
+    z = np.zeros(qd.shape[1])
+    out = np.empty_like(qd)
+    stiffness = friction.bristle_stiffness
+    limit = np.sign(qd) * level / np.maximum(stiffness, 1e-9)
+    fade = np.exp(-stiffness * np.abs(qd) / level * steps[:, None])
+    for k in range(len(qd)):
+        z = limit[k] + (z - limit[k]) * fade[k]
+        out[k] = stiffness * z
+    return out + friction.viscous * qd
