@@ -9,15 +9,6 @@
 namespace tauguard::cloth {
 namespace {
 
-TAUGUARD_INLINE Vec3x4 field(const Group& g, int f) {
-  return {load4(g.value[f]), load4(g.value[f + 1]), load4(g.value[f + 2])};
-}
-TAUGUARD_INLINE void set(Group& g, int f, Vec3x4 v) {
-  store4(g.value[f], v.x);
-  store4(g.value[f + 1], v.y);
-  store4(g.value[f + 2], v.z);
-}
-
 // 2^-e for 2^e <= x < 2^(e + 1), of normal x below 2^1023.
 TAUGUARD_INLINE Double4 inverse_power(Double4 x) {
   const Mask4 exponent = (Mask4)x & (std::int64_t{0x7ff} << 52);
@@ -40,11 +31,6 @@ TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, G
   const Double4 big = max(max(sizes[0], sizes[1]), sizes[2]);
   const Mask4 fair = (big > 0x1p-900) & (big < 0x1p900);
   const Double4 s = inverse_power(big);
-  for (int e = 0; e < 2; ++e) {
-    set(g, Group::p + 3 * e, s * p[e]);
-    set(g, Group::q + 3 * e, s * q[e]);
-    set(g, Group::r + 3 * e, s * r[e]);
-  }
   const Vec3x4 p0 = s * p[0], p1 = s * p[1], q0 = s * q[0], q1 = s * q[1], r0 = s * r[0],
                r1 = s * r[1];
   const Vec3x4 c00 = cross(q0, r0), c11 = cross(q1, r1), mixed = cross(q0, r1) + cross(q1, r0);
@@ -61,6 +47,7 @@ TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, G
   store4(g.value[Group::cubic + 3], b3);
   store4(g.value[Group::error], error);
   store4(g.value[Group::big], s * big);
+  store4(g.value[Group::scale], s);
 }
 
 // Of one query, at one end of the step.
@@ -91,13 +78,16 @@ TAUGUARD_INLINE void gather(const Ends& x, const std::int32_t* rows, int n, Grou
     for (int i = 0; i < width; ++i) prefetch<packed>(x, row(i + ahead));
     Vec3x4 p[2], q[2], r[2];
     for (int e = 0; e < 2; ++e) {
-      const Differences a = differences<vf, packed>(x, e, row(0)),
-                        b = differences<vf, packed>(x, e, row(1)),
-                        c = differences<vf, packed>(x, e, row(2)),
-                        d = differences<vf, packed>(x, e, row(3));
-      p[e] = transposed(a.p, b.p, c.p, d.p);
-      q[e] = transposed(a.q, b.q, c.q, d.q);
-      r[e] = transposed(a.r, b.r, c.r, d.r);
+      Differences d[width];
+      for (int i = 0; i < width; ++i) {
+        d[i] = differences<vf, packed>(x, e, row(i));
+        store4(groups->of[i][e][Group::p], d[i].p);
+        store4(groups->of[i][e][Group::q], d[i].q);
+        store4(groups->of[i][e][Group::r], d[i].r);
+      }
+      p[e] = transposed(d[0].p, d[1].p, d[2].p, d[3].p);
+      q[e] = transposed(d[0].q, d[1].q, d[2].q, d[3].q);
+      r[e] = transposed(d[0].r, d[1].r, d[2].r, d[3].r);
     }
     finish(p, q, r, *groups);
   }
@@ -147,31 +137,37 @@ struct Pieces {
 };
 TAUGUARD_INLINE void transpose(const Group* groups, const Piece* pieces, const double* roots, int n,
                                Pieces& out) {
-  alignas(64) double value[Group::fields][width], own[7][width];
+  alignas(64) double own[10][width];
+  const double (*of[width])[Group::differences][4];
   for (int i = 0; i < width; ++i) {
     const Piece& piece = pieces[std::min(i, n - 1)];
     const Group& g = groups[piece.query / width];
     const int lane = piece.query % width;
-    for (int f = 0; f < Group::fields; ++f) value[f][i] = g.value[f][lane];
+    of[i] = g.of[lane];
     own[0][i] = piece.start;
     own[1][i] = piece.length;
     for (int j = 0; j < 4; ++j) own[2 + j][i] = piece.cubic[j];
     own[6][i] = roots[std::min(i, n - 1)];
+    own[7][i] = g.value[Group::error][lane];
+    own[8][i] = g.value[Group::big][lane];
+    own[9][i] = g.value[Group::scale][lane];
   }
+  const Double4 scale = load4(own[9]);
   for (int e = 0; e < 2; ++e) {
-    const auto vector = [&](int f) {
-      return Vec3x4{load4(value[f]), load4(value[f + 1]), load4(value[f + 2])};
+    const auto vector = [&](Group::Difference f) {
+      return scale * transposed(load4(of[0][e][f]), load4(of[1][e][f]), load4(of[2][e][f]),
+                                load4(of[3][e][f]));
     };
-    out.p[e] = vector(Group::p + 3 * e);
-    out.q[e] = vector(Group::q + 3 * e);
-    out.r[e] = vector(Group::r + 3 * e);
+    out.p[e] = vector(Group::p);
+    out.q[e] = vector(Group::q);
+    out.r[e] = vector(Group::r);
   }
   out.start = load4(own[0]);
   out.length = load4(own[1]);
   for (int j = 0; j < 4; ++j) out.cubic[j] = load4(own[2 + j]);
   out.root = load4(own[6]);
-  out.error = load4(value[Group::error]);
-  out.big = load4(value[Group::big]);
+  out.error = load4(own[7]);
+  out.big = load4(own[8]);
 }
 
 // In Bernstein form.

@@ -14,11 +14,15 @@ using namespace geometry;  // lanes.hpp: vector types have no namespace to be fo
 
 inline constexpr int width = 4;
 
-// `width` queries in differences (query.hpp), scaled by powers of two so that the largest is in [1,
-// 2).
+// `width` queries. Their differences (query.hpp) stay query by query: most have no root, and those
+// that have are looked at by pieces.
 struct Group {
-  enum Field { p = 0, q = 6, r = 12, cubic = 18, error = 22, big = 23, fields = 24 };
-  alignas(64) double value[fields][width];  // p, q, r: x, y, z at the start, then at the end
+  enum Field { cubic = 0, error = 4, big = 5, scale = 6, fields = 7 };
+  enum Difference { p, q, r, differences };
+  alignas(64) double of[width][2][differences][4];  // x, y, z and a spare, at both ends
+  // big: the largest difference times `scale`, a power of two that brings it into [1, 2). The cubic
+  // and its error are of the scaled query.
+  alignas(64) double value[fields][width];
   // A bit per query, beyond rounding: the Bernstein coefficients of its cubic have one sign, so
   // that it has no root; or one variation, so that it has one. Both 0 where the query's size keeps
   // it out of this.

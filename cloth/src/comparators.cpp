@@ -107,14 +107,16 @@ double first_root_inside(const Query& k, const Cubic& c, Comparator comparator, 
 }
 
 Query query_of(const Group& g, int lane) {
-  const auto vector = [&](int f) {
-    return Vec3{g.value[f][lane], g.value[f + 1][lane], g.value[f + 2][lane]};
+  const double scale = g.value[Group::scale][lane];
+  const auto vector = [&](int e, Group::Difference f) {
+    const double* x = g.of[lane][e][f];
+    return scale * Vec3{x[0], x[1], x[2]};
   };
   Query k{};
   for (int e = 0; e < 2; ++e) {
-    k.p[e] = vector(Group::p + 3 * e);
-    k.q[e] = vector(Group::q + 3 * e);
-    k.r[e] = vector(Group::r + 3 * e);
+    k.p[e] = vector(e, Group::p);
+    k.q[e] = vector(e, Group::q);
+    k.r[e] = vector(e, Group::r);
   }
   return k;
 }
