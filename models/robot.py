@@ -214,6 +214,21 @@ def _part(kind: type, values: Mapping[str, Any], where: str) -> Any:
         raise ValueError(f"{where}: {str(error).partition('() ')[2]}") from None
 
 
+def bodies_file(path: Path) -> Path:
+    """The URDF or MJCF file behind a robot file: that of a TOML description, else ``path``.
+
+    Raises:
+        ValueError: a TOML file that describes no robot, or one whose ``file`` is not there.
+        FileNotFoundError: no such file.
+    """
+    if path.suffix.lower() != ".toml":
+        return path
+    bodies = Path(Robot.from_toml(path).file)
+    if not bodies.is_file():
+        raise ValueError(f"{path}: file {str(bodies)!r}: no such file")
+    return bodies
+
+
 def _check_keys(found: Mapping[str, Any], known: list[str], where: str) -> None:
     for key in found:
         if key not in known:

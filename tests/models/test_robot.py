@@ -17,6 +17,7 @@ from tauguard.models import (
     pin_model,
 )
 from tauguard.models.drive_text import drive_of, drive_text
+from tauguard.models.robot import bodies_file
 from tests.models.arms import random_arm
 
 
@@ -186,6 +187,16 @@ def test_losses_like_the_cura6s_are_shares_of_the_limits(arm):
     assert load_arm(stated).facts.drive.friction.coulomb == pytest.approx(0.5)
     with pytest.raises(ValueError, match=r'drive\.like .*expected "cura6"'):
         RobotDrive(like="ur5")
+
+
+def test_the_bodies_of_a_description_are_its_file(tmp_path, arm):
+    bodies, path = arm(4), tmp_path / "r.toml"
+    path.write_text(f'file = "{bodies.name}"\n')
+    assert bodies_file(path) == bodies
+    assert bodies_file(bodies) == bodies
+    path.write_text('file = "gone.xml"\n')
+    with pytest.raises(ValueError, match=r"gone\.xml.*no such file"):
+        bodies_file(path)
 
 
 def test_an_identified_drive_has_friction_ripple_and_sensors_of_its_own(tmp_path, arm):

@@ -77,7 +77,7 @@ def command(
 
     Args:
         log: CSV file, or MCAP file with sensor_msgs/JointState (currents in effort).
-        robot: URDF or MJCF file of the arm alone.
+        robot: URDF or MJCF file of the arm alone, or the TOML file of `tauguard twin`.
         columns: of a CSV file: a preset (ur10e, ur_rtde, ur5, ur3, franka, lbr), auto for what the
             names and numbers suggest, or a JSON file with the fields of
             tauguard.datasets.ColumnMap, such as {"t": "time", "q": ["q1", "q2"], "torque": ["tau1",
@@ -93,6 +93,7 @@ def command(
     """
     from tauguard.cli.help_text import print_notes
     from tauguard.datasets.arm_logs import read_one
+    from tauguard.models.robot import bodies_file
     from tauguard.report import write_json
 
     if out is not None and out.exists() and not out.is_dir():
@@ -102,6 +103,7 @@ def command(
     if model is None and payload is not None:
         raise ValueError("--payload goes with --model only")
     causes: Sequence[dict[str, Any]] = ()
+    robot = bodies_file(robot)
     read = read_one(log, columns, torque)
     print_notes(read.notes)
     trace = read.trace

@@ -53,7 +53,8 @@ def command(
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder. A contact in them would raise
             the bounds; a log that stands out by its alarms is named and left out.
-        robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains.
+        robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains,
+            and so does the TOML file of `tauguard twin`.
         columns: of CSV files, see `tauguard detect`.
         gains: N m per ampere, one a joint (known for calibrated robot files and for ur10e).
         payload: what the logs carried, see `tauguard calibrate`.
@@ -85,12 +86,15 @@ def command(
         sure = 0.95 if confidence is None else confidence
         labelled_motion(traces, target, detector, calibration, rate, sure, arm)
         return
+    from tauguard.models.robot import bodies_file
+
     if robot is None:
         raise ValueError("--free needs --robot")
     if false_alarms_per_hour is not None:
         raise ValueError(
             "--false-alarms-per-hour: with --traces only; the card of --free says how many"
         )
+    robot = bodies_file(robot)
     free_motion(free, robot, target, columns, gains, payload, torque, card, accept)
 
 

@@ -1,0 +1,67 @@
+"""``tauguard twin`` from logs to a file that simulation and detection take."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tauguard.cli import main
+from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
+
+COLUMNS = {
+    "t": "t",
+    "q": ["q0", "q1", "q2"],
+    "qd": ["v0", "v1", "v2"],
+    "current": ["i0", "i1", "i2"],
+}
+HEAD = ",".join(["t", *COLUMNS["q"], *COLUMNS["qd"], *COLUMNS["current"]])
+
+
+def write(path, trace):
+    table = np.column_stack([trace.t, trace.q, trace.qd, trace.current])
+    np.savetxt(path, table, delimiter=",", fmt="%.9g", header=HEAD, comments="")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("twin")
+    (folder / "arm.xml").write_text(XML)
+    (folder / "columns.json").write_text(json.dumps(COLUMNS))
+    (folder / "free").mkdir()
+    for seed in range(3):
+        write(folder / "free" / f"log{seed}.csv", record(seed))
+    return folder
+
+
+def run(folder, command, *flags):
+    gains = ["--gains", *map(str, GAIN)]
+    common = ["--columns", str(folder / "columns.json")]
+    main([command, *map(str, flags), *common, *(gains if command == "twin" else [])])
+
+
+def test_from_logs_to_detection(folder, capsys):
+    free, out, figures = folder / "free", folder / "twin.toml", folder / "twin.json"
+    page = folder / "twin.png"
+    bodies = ("--robot", folder / "arm.xml")
+    run(folder, "twin", free, *bodies, "--out", out, "--json", figures, "--figure", page)
+    assert "judged on log2.csv" in capsys.readouterr().out
+    found = json.loads(figures.read_text())
+    assert found["judged_on"] == ["log2.csv"]
+    assert found["rows"][-1]["residual"] == "area under the curve"
+    assert page.stat().st_size > 1000
+    main(["robot", str(out)])
+    said = capsys.readouterr().out
+    assert "identified from log0.csv, log1.csv, log2.csv" in said
+    run(folder, "detect", free / "log0.csv", "--robot", out)
+    assert "the calibration in twin.bodies.xml" in capsys.readouterr().out
+
+
+def test_what_the_logs_do_not_show_is_named(folder, tmp_path, capsys):
+    for seed in (1, 2):
+        write(tmp_path / f"held{seed}.csv", held_joint(seed))
+    logs = tmp_path / "held1.csv", tmp_path / "held2.csv"
+    run(folder, "twin", *logs, "--robot", folder / "arm.xml", "--out", tmp_path / "t.toml")
+    said = capsys.readouterr().out
+    assert "c: hardly moves; its friction is a prior" in said
+    assert "not judged: give three logs or more" in said
+    assert "# c: hardly moves" in (tmp_path / "t.toml").read_text()
