@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tauguard.arrays import Array
 from tauguard.detectors import ArmModel
@@ -50,7 +51,8 @@ def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) 
     n = arm.robot.joints
     motions = [motion_of(arm, trace) for trace in traces]
     torques = [trace.current * arm.drive_gain for trace in traces]
-    fits = tuple(fit_joint(j, motions, torques, GEAR) for j in range(n))
+    with threadpool_limits(1, "blas"):  # small products: threads cost more than they save
+        fits = tuple(fit_joint(j, motions, torques, GEAR) for j in range(n))
     known = [j for j in range(n) if fits[j] is not None]
     if not known:
         raise ValueError("no joint moves for two stretches of half a second: give longer logs")
