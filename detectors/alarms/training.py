@@ -2,7 +2,7 @@
 
 Scores are reduced to the peaks of pieces (:mod:`.free_scores`), normalised over the speed
 (:mod:`.speed_normalisation`), and the threshold is where the tail of their peaks has the rate of
-false alarms that is accepted (:mod:`.rates`), or the one that a calibration set guarantees
+false alarms that is accepted (:mod:`.tail_model`), or the one that a calibration set guarantees
 (:mod:`.guarantee`). What else the motion allows: :mod:`.expected_rate`.
 """
 
@@ -48,31 +48,58 @@ def held_out(
 
 
 def train(
-    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float
+    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float, folds: int = 1
 ) -> CollisionAlarm:
-    """Fit a detector on a part of the traces and choose its threshold by the rest.
+    """Fit a detector and choose its threshold by motion that it was not trained on.
 
     Args:
         detector: settings of a method.
         traces: with truth, of one arm at one sample rate.
         arm: the model before training.
         per_hour: false alarms to accept in an hour of motion like the training's.
+        folds: 1 keeps a third of the collision-free traces for the threshold. With more, the
+            detector is trained on all traces, and the threshold comes from all collision-free
+            ones: each is scored by a detector that was trained without its fold. That takes
+            ``folds`` more fits; the threshold knows more motions and loads.
 
     Raises:
-        ValueError: traces that do not fit or lack what the method needs.
+        ValueError: traces that do not fit or lack what the method needs, or too few for the folds.
     """
-    return train_and_score(detector, traces, arm, per_hour)[0]
+    return train_and_score(detector, traces, arm, per_hour, folds)[0]
 
 
 def train_and_score(
-    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float
+    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float, folds: int = 1
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """As :func:`train`, with the normalised scores that the threshold comes from."""
     if not per_hour > 0:
         raise ValueError(f"per_hour: {per_hour}, expected above 0")
-    own, rest = held_out(traces)
-    alarm, scores = _with_rate(detector.fit(own, arm), rest, per_hour, CONFIRMATION)
+    if folds == 1:
+        own, rest = held_out(traces)
+        fitted = detector.fit(own, arm)
+        found = _free_scores(fitted, rest, CONFIRMATION)
+    else:
+        found = _cross_fitted(detector, traces, arm, folds)
+        fitted = detector.fit(traces, arm)
+    alarm, scores = _with_rate(fitted, found, per_hour, CONFIRMATION)
     return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm)), scores
+
+
+def _cross_fitted(
+    detector: Detector, traces: Sequence[Trace], arm: ArmModel, folds: int
+) -> list[FreeScores]:
+    """Scores of every collision-free trace, by detectors that were trained without it."""
+    free = [i for i, t in enumerate(traces) if not (t.truth and t.truth.collisions)]
+    if not 1 < folds <= len(free):
+        raise ValueError(
+            f"folds: {folds}, expected 1, or 2 to the number of collision-free traces, {len(free)}"
+        )
+    found: list[FreeScores] = []
+    for k in range(folds):
+        fold = set(free[k::folds])
+        fitted = detector.fit([t for i, t in enumerate(traces) if i not in fold], arm)
+        found += _free_scores(fitted, [traces[i] for i in sorted(fold)], CONFIRMATION)
+    return found
 
 
 def with_rate(
@@ -92,19 +119,26 @@ def with_rate(
     Raises:
         ValueError: no collision-free motion, or a rate that is not above 0.
     """
-    return _with_rate(detector, traces, per_hour, confirmation)[0]
+    found = _free_scores(detector, traces, confirmation)
+    return _with_rate(detector, found, per_hour, confirmation)[0]
+
+
+def _free_scores(
+    detector: FittedDetector, traces: Sequence[Trace], confirmation: float
+) -> list[FreeScores]:
+    """Scores of the collision-free rows, not yet normalised."""
+    plain = CollisionAlarm(detector, np.inf, confirmation)
+    return [plain.free_scores(trace) for trace in long_enough(plain, traces)]
 
 
 def _with_rate(
-    detector: FittedDetector, traces: Sequence[Trace], per_hour: float, confirmation: float
+    detector: FittedDetector, found: Sequence[FreeScores], per_hour: float, confirmation: float
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
-    plain = CollisionAlarm(detector, np.inf, confirmation)
-    found = [plain.free_scores(trace) for trace in long_enough(plain, traces)]
+    """Normalise the scores and choose the threshold from them."""
     normalisation = speed_normalisation(found)
     scores = [one.over(normalisation) for one in found]
-    return replace(
-        plain, normalisation=normalisation, threshold=threshold_for_rate(scores, per_hour)
-    ), scores
+    threshold = threshold_for_rate(scores, per_hour)
+    return CollisionAlarm(detector, threshold, confirmation, normalisation), scores
 
 
 def with_guarantee(

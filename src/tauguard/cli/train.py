@@ -31,12 +31,14 @@ def command(
     card: Path | None = None,
     accept: tuple[str, ...] = (),
     arm: str | None = None,
+    folds: int = 3,
 ) -> None:
     """Train a detector and write its model file.
 
-    With --traces: on labelled recordings, some with collisions; a third of the collision-free ones
-    is kept for the threshold. With --calibration the threshold is guaranteed instead: no more than
-    the false alarms per hour that you name, on motion like that.
+    With --traces: on labelled recordings, some with collisions; the threshold comes from the
+    collision-free ones, each scored by a detector that was trained without it. With --calibration
+    the threshold is guaranteed instead: no more than the false alarms per hour that you name, on
+    motion like that.
     With --free and --robot: a detector of a real arm from logs in which nothing touched it; 20 s of
     motion are the least, two minutes are good. A card says what it can find, and which regimes the
     logs do not show.
@@ -62,7 +64,11 @@ def command(
         card: with --free, draw the card here (PNG).
         accept: with --free, logs to learn from even if they stand out.
         arm: of a dataset with several arms, the one that the detector is for.
+        folds: with --traces, parts of the collision-free recordings that are left out in turn, and
+            so many more fits; 1 is quicker and keeps a third of them for the threshold.
     """
+    if folds < 1:
+        raise ValueError(f"--folds {folds}: expected 1 or more")
     if (traces is None) == (not free):
         raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
     target = _target(model)
@@ -84,7 +90,7 @@ def command(
             raise ValueError(f"{', '.join(given)}: with --free only, not with --traces")
         rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
         sure = 0.95 if confidence is None else confidence
-        labelled_motion(traces, target, detector, calibration, rate, sure, arm)
+        labelled_motion(traces, target, detector, calibration, rate, sure, arm, folds)
         return
     from tauguard.models.robot import bodies_file
 
@@ -116,6 +122,7 @@ def labelled_motion(
     rate: float,
     confidence: float,
     arm: str | None = None,
+    folds: int = 1,
 ) -> None:
     """Train on labelled recordings."""
     from tauguard.datasets.recordings import labelled
@@ -133,7 +140,9 @@ def labelled_motion(
     if free:
         check_guarantee([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
     recordings = labelled(traces, arm)
-    alarm, scores = train_and_score(method, recordings, nominal_arm(recordings), rate)
+    motion = sum(not (t.truth and t.truth.collisions) for t in recordings)
+    parts = 1 if free else max(1, min(folds, motion))  # --calibration replaces the threshold
+    alarm, scores = train_and_score(method, recordings, nominal_arm(recordings), rate, parts)
     guarantee = None
     if free:
         alarm, guarantee = with_guarantee(alarm, free, rate, confidence)

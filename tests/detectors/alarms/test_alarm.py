@@ -13,7 +13,9 @@ from tauguard.detectors import (
     match_detection,
     train,
 )
+from tauguard.detectors.alarms.training import train_and_score
 from tauguard.detectors.features.front_end import FrontEndSettings
+from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 
 
 def test_it_finds_collisions_on_unseen_motions_with_unknown_payloads(alarm, unseen):
@@ -80,6 +82,26 @@ def test_held_out_traces_are_collision_free_and_not_trained_on(training):
     assert not {id(t) for t in own} & {id(t) for t in rest}
     struck = [t for t in training if t.truth.collisions]
     assert held_out(struck) == (struck, struck)
+
+
+def test_folds_score_every_free_trace_by_a_detector_that_has_not_seen_it(training, arm):
+    free = [t for t in training if not t.truth.collisions]
+    seen: list[set[int]] = []
+
+    class Noted(SrqSvr):
+        def fit(self, traces, arm):
+            seen.append({id(t) for t in traces})
+            return super().fit(traces, arm)
+
+    alarm, scores = train_and_score(Noted(windows=300, mined=0), training, arm, 10.0, folds=2)
+    assert len(scores) == len(free)
+    assert seen[-1] == {id(t) for t in training}
+    left_out = [{id(t) for t in training} - one for one in seen[:-1]]
+    assert sorted(i for one in left_out for i in one) == sorted(id(t) for t in free)
+    assert alarm.threshold == threshold_for_rate(scores, 10.0)
+    for folds in (0, len(free) + 1):
+        with pytest.raises(ValueError, match="number of collision-free traces"):
+            train_and_score(SrqSvr(), training, arm, 10.0, folds=folds)
 
 
 def test_bad_input(alarm, training, robot, arm, unseen):
