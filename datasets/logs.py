@@ -124,24 +124,8 @@ def read_csv(
         ]
     if not rows:
         raise ValueError("empty file")
-    header = header_of(rows[0][1])
-    if header and columns.headerless:
-        fitting = presets_of(header)
-        raise ValueError(
-            f"the first line names columns ({listed(header, 60)}), files of these columns have no "
-            "such line: "
-            + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
-        )
+    header, where = _located(rows[0][1], columns)
     rows = rows[1:] if header else rows
-    try:
-        where = {
-            name: [position(column, header, columns) for column in group]
-            for name, group in {"t": (columns.t,), **columns.groups()}.items()
-        }
-    except ValueError as error:
-        better = presets_of(header) if header else presets_of_width(len(rows[0][1]))
-        hint = f"; these are the columns of the preset {' or '.join(better)}" if better else ""
-        raise ValueError(f"{error}{hint}") from None
     if not rows:
         raise ValueError("a header line without rows of numbers")
     width = columns.width or len(header) or len(rows[0][1])
@@ -161,9 +145,8 @@ def read_csv(
     keep = increasing(t, lines, columns, notes)
     if "state" in columns.repair:
         keep = fresh(t, np.column_stack(list(parts.values())), keep, notes)
-    signals: dict[str, Any] = {
-        name: np.ascontiguousarray(value[keep]) for name, value in parts.items()
-    }
+    kept_parts = {name: np.ascontiguousarray(value[keep]) for name, value in parts.items()}
+    signals: dict[str, Any] = _in_si_units(kept_parts, columns)
     meta = {"log": path.name}
     if preset := [name for name, known in PRESETS.items() if known == columns]:
         meta["columns"] = preset[0]
@@ -171,15 +154,6 @@ def read_csv(
         notes.insert(0, f"read as {described(columns)}")
     if columns.torque:
         meta["effort"] = "torque"
-    else:
-        signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
-    efforts = signals.pop("torque", None)
-    if efforts is not None:
-        efforts = efforts * np.asarray(columns.torque_scale, float)
-    if columns.degrees:
-        signals |= {n: np.deg2rad(v) for n, v in signals.items() if n != "current"}
-    if efforts is not None:
-        signals["current"] = efforts
     if "qd" not in signals:
         signals["qd"] = differentiated(t[keep], signals["q"])
         notes.append(DIFFERENTIATED)
@@ -187,6 +161,44 @@ def read_csv(
     trace = Trace(joint_names=names, t=t[keep], meta=meta, **signals)
     kept = lines[keep]
     return Log(trace, (*notes, *checked(trace, lambda row: f"line {kept[row]}")))
+
+
+def _located(first: Sequence[str], columns: ColumnMap) -> tuple[list[str], dict[str, list[int]]]:
+    """The header, empty if the first line is numbers, and the column numbers of each signal.
+
+    Raises:
+        ValueError: columns that this file does not have; the presets that fit it are named.
+    """
+    header = header_of(first)
+    if header and columns.headerless:
+        fitting = presets_of(header)
+        raise ValueError(
+            f"the first line names columns ({listed(header, 60)}), files of these columns have no "
+            "such line: "
+            + (f"use {' or '.join(fitting)}" if fitting else "give the columns by their names")
+        )
+    try:
+        return header, {
+            name: [position(column, header, columns) for column in group]
+            for name, group in {"t": (columns.t,), **columns.groups()}.items()
+        }
+    except ValueError as error:
+        better = presets_of(header) if header else presets_of_width(len(first))
+        hint = f"; these are the columns of the preset {' or '.join(better)}" if better else ""
+        raise ValueError(f"{error}{hint}") from None
+
+
+def _in_si_units(parts: dict[str, Array], columns: ColumnMap) -> dict[str, Array]:
+    """Signals in rad, rad/s and A, or N m; joint torques stand in the place of currents."""
+    signals = dict(parts)
+    if not columns.torque:
+        signals["current"] = signals["current"] * np.asarray(columns.current_scale, float)
+    efforts = signals.pop("torque", None)
+    if columns.degrees:
+        signals |= {n: np.deg2rad(v) for n, v in signals.items() if n != "current"}
+    if efforts is not None:
+        signals["current"] = efforts * np.asarray(columns.torque_scale, float)
+    return signals
 
 
 #: Note on a log without velocities.
