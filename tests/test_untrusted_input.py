@@ -210,7 +210,7 @@ def test_simulate_with_workers_ends_at_once_and_a_rerun_gives_the_same_bytes(tmp
     command = [sys.executable, "-m", "tauguard", "simulate", "--out", str(folder), *flags]
     run = subprocess.Popen([*command, "--workers", "2"], stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 120
-    while not list(folder.glob("episode-*")) and time.monotonic() < until:
+    while not list(folder.glob("*.mcap")) and time.monotonic() < until:
         time.sleep(0.01)
     start = time.monotonic()
     run.send_signal(signal.SIGTERM)
