@@ -42,7 +42,7 @@ class Split:
     collisions: int  #: planned in each of those
     kinds: tuple[str, ...]  #: of collisions; a kind listed twice occurs twice as often
     links: tuple[int, ...]  #: that collisions act on, 1-based
-    severities: tuple[tuple[float, float], ...]  #: wanted peak |tau_ext| of joints 1-4 [N m]
+    severities: tuple[tuple[float, float], ...]  #: wanted peak ``|tau_ext|`` of joints 1-4 [N m]
     temperature: tuple[float, float]  #: of the gears, drawn between these [degC]
     picks: float  #: fraction of collision-free episodes with a payload picked up
     unseen: tuple[str, ...]  #: properties without a value of the first split: "arm", ...

@@ -21,9 +21,9 @@ class FrictionModel:
     """Friction torque of n joints: per joint a weighted sum of the same columns.
 
     Columns: 1; qd; a Dahl bristle b for each settling length; a stop operator for each width;
-    b exp(-(qd/w)^2) for each Stribeck velocity; tanh(qd/w) for each slope; |load| b;
-    |load| tanh(qd/w) for each loaded slope; cos(c q) and sin(c q) for each ripple frequency c of
-    the joint; tau |tau| where ``saturation`` says so.
+    b exp(-(qd/w)^2) for each Stribeck velocity; tanh(qd/w) for each slope; ``|load| b``;
+    ``|load| tanh(qd/w)`` for each loaded slope; cos(c q) and sin(c q) for each ripple frequency c
+    of the joint; ``tau |tau|`` where ``saturation`` says so.
     """
 
     bristles: tuple[float, ...] = (1.5e-3, 3e-3)  #: settling lengths [rad]

@@ -58,7 +58,7 @@ class KernelMachine(Frozen):
 
 
 def srq_kernel(a: ArrayLike, b: ArrayLike, sigma: float = 3.0, *, threads: int = 0) -> Array:
-    """K_ij = 1 / (1 + |a_i - b_j|^2 / sigma^2)^2.
+    """``K_ij = 1 / (1 + |a_i - b_j|^2 / sigma^2)^2``.
 
     Args:
         a: shape (N, d).

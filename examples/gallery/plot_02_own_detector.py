@@ -1,0 +1,64 @@
+"""
+A detector of your own
+======================
+
+A detector has a name and ``fit``; what it returns gives a score for each sample. Thresholds, alarms
+and metrics are the same for all detectors, so yours stands beside the built-in ones.
+"""
+
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import tauguard
+from tauguard.datasets import free_episodes, struck_episodes
+from tauguard.detectors import detection_metrics, make_detector, match_detection, train
+from tauguard.detectors.calibration.nominal import nominal_arm
+from tauguard.envs import simulate
+
+
+@dataclass(frozen=True)
+class ResidualChange:
+    """The largest change of the residual within 20 ms."""
+
+    name: str = "residual-change"
+
+    def fit(self, traces, arm):
+        return Fitted(self.name, arm, traces[0].dt)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    name: str
+    arm: object
+    dt: float
+    settle: float = 0.1  # seconds until the scores count
+
+    def scores(self, trace):
+        residual, span = tauguard.residual(trace), round(0.02 / trace.dt)
+        before = np.concatenate([np.repeat(residual[:1], span, axis=0), residual[:-span]])
+        return np.abs(residual - before).max(axis=1)
+
+    def stream(self):
+        raise NotImplementedError("batch only")
+
+
+speeds = (30.0,)
+motion = [simulate(e) for e in struck_episodes(1, 1, 5, speeds) + free_episodes(1, 4, 12.0, speeds)]
+fresh = [simulate(e) for e in struck_episodes(2, 1, 8, speeds)]
+for detector in (ResidualChange(), make_detector("moving-thresholds")):
+    alarm = train(detector, motion, nominal_arm(motion), per_hour=10)
+    found = [alarm.detect(trace) for trace in fresh]
+    pairs = zip(found, fresh, strict=True)
+    metrics = detection_metrics(match_detection(f, t, alarm.settle) for f, t in pairs)
+    print(f"{detector.name:<18}", metrics["sensitivity"], metrics["delay_ms"])
+    plt.plot(fresh[0].t, found[0].score / found[0].threshold, linewidth=0.7, label=detector.name)
+for hit in fresh[0].truth.collisions:
+    plt.axvspan(hit.onset, hit.end, color="tab:red", alpha=0.4)
+plt.axhline(1.0, color="black", linewidth=0.8)
+plt.ylim(0, 8)
+plt.xlim(3, 12)
+plt.xlabel("time [s]")
+plt.ylabel("score over threshold")
+plt.legend()

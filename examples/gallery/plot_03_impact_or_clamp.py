@@ -1,0 +1,36 @@
+"""
+Tell a clamp from an impact
+===========================
+
+An alarm says that something touched the arm. The diagnosis says which link, how hard, and what kind
+of contact it was: an impact is over when the arm moves on, a clamped person needs the arm to open.
+"""
+
+import matplotlib.pyplot as plt
+
+from tauguard.datasets import free_episodes, struck_episodes
+from tauguard.detectors import diagnose, make_detector, train
+from tauguard.detectors.calibration.nominal import nominal_arm
+from tauguard.envs import CollisionPlan, Episode, simulate
+
+speeds = (30.0,)
+motion = [simulate(e) for e in struck_episodes(3, 1, 5, speeds) + free_episodes(3, 4, 12.0, speeds)]
+alarm = train(make_detector("moving-thresholds"), motion, nominal_arm(motion), per_hour=10)
+
+# %%
+# Two new recordings, one of each kind.
+
+plans = {
+    "impact": CollisionPlan("strike", time=5.0, link=3),
+    "clamp": CollisionPlan("clamp", time=5.0, link=3, duration=0.8),
+}
+figure, panels = plt.subplots(1, 2, figsize=(9, 3.2), sharey=True, layout="constrained")
+for panel, (name, plan) in zip(panels, plans.items(), strict=True):
+    trace = simulate(Episode(seed=13, seconds=8, collisions=(plan,)))
+    found = alarm.detect(trace)
+    panel.plot(trace.t, trace.truth.contact_force, color="tab:red")
+    for cause in diagnose(alarm, trace):
+        print(f"{name}: {cause.summary}")
+        panel.axvline(cause.alarm.start, color="black", linestyle="--")
+    panel.set(title=name, xlabel="time [s]", xlim=(4.5, 7.0))
+panels[0].set_ylabel("contact force [N]")

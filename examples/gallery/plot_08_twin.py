@@ -1,0 +1,36 @@
+"""
+A twin from a log
+=================
+
+Some minutes of free motion show an arm's friction, ripple and noise. Identified from them, a
+simulated arm reports currents like the real one's. Here a second simulated arm, whose numbers are
+hidden, plays the real one.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from tauguard.datasets import free_episodes
+from tauguard.detectors.calibration.nominal import nominal_arm
+from tauguard.envs import simulate
+from tauguard.models import Mismatch
+from tauguard.twin import identify_twin, played
+
+hidden = Mismatch(seed=12)
+logs = [simulate(e) for e in free_episodes(4, 6, 20.0, (30.0,), (0.0,), hidden)]
+twin = identify_twin(nominal_arm(logs), logs[:5], np.full(6, 30.0))
+print("Coulomb friction [N m]:", twin.drive.friction.coulomb.round(2))
+print(*twin.notes, sep="\n")
+
+# %%
+# The last log was not used. The twin plays along its motion.
+
+log = logs[5]
+current = played(twin.arm, twin.drive, log)
+figure, panels = plt.subplots(2, 1, figsize=(8, 4.5), sharex=True, layout="constrained")
+for panel, joint in zip(panels, (1, 3), strict=True):
+    panel.plot(log.t, log.current[:, joint], linewidth=0.8, label="arm")
+    panel.plot(log.t, current[:, joint], linewidth=0.8, label="twin")
+    panel.set_ylabel(f"current, joint {joint + 1} [A]")
+panels[0].legend()
+panels[1].set(xlabel="time [s]", xlim=(5, 15))
