@@ -24,6 +24,7 @@ FORMER = {
     "kills": _SLOW.format("'interrupted or generate'"),
     "endurance": _SLOW.format("endurance"),
     "detection_ladder": _NOTE.format("from-the-dissertation"),
+    "arms": _NOTE.format("arms") + "; `tauguard robot NAME --try` tries an arm",
     "detection_parts": _NOTE.format("thresholds"),
     "detection_conformal": "is a row of false_alarms now: `tauguard bench false_alarms`",
 }

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from oracles.recorded_collisions import KINDS, QUERY_SETS, load_frame, load_queries
 from studies.cloth import shared
 from studies.cloth.shared import Step, narrow_phases
-from studies.framework import answer, groups, number, table_rows, time_in_turn, timed
+from studies.framework import answer, groups, table_rows, time_in_turn, timed
 from tauguard.cloth import MeshCCD
 from tauguard.cloth.comparators import METHODS, solve
 from tauguard.cloth.scenes import SCENES
@@ -282,18 +282,3 @@ def judge(rows: Sequence[Row]) -> list[Row]:
         what = f"a clear query of {row['set']}, {row['kind']}: {row['peer']} over ab2pf"
         out.append(answer(what, f"{asked}", text, timed(ratio >= asked, quick)))
     return out
-
-
-def draw(rows: Sequence[Row], figure: Any) -> None:
-    """Time of a query by method, and of a labelled query, hatched where some answer is wrong."""
-    left, right = figure.subplots(1, 2)
-    mixed = [row for row in table_rows(rows, "query") if "ns" in row]
-    for axes, part, key in ((left, mixed, "ns"), (right, table_rows(rows, "hard query"), "us")):
-        for i, (method, own) in enumerate(groups(part, lambda row: str(row["method"])).items()):
-            time = float(np.mean([number(row[key]) for row in own]))
-            errs = any(number(row["misses"]) or number(row["false_hits"]) for row in own)
-            axes.barh(i, time, color="C0", hatch="////" if errs else None, edgecolor="white")
-            axes.text(time, i, f" {method}", va="center", fontsize="x-small")
-        axes.set(yticks=[], xlabel=f"{key} a query", xscale="log")
-    left.set(title="Candidates of a frame (hatched: errs)")
-    right.set(title="Queries with public labels, mean of the sets")

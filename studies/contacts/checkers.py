@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -170,31 +169,3 @@ def judge(rows: Sequence[Row]) -> list[Row]:
         met = timed(row["share_with_state"] < 0.25, row["run"] == "quick")
         out.append(answer(what, "below 0.25", text, met))
     return out
-
-
-def draw(rows: Sequence[Row], figure: Any) -> None:
-    """Error against cost in every scene, and the ball's contacts against its speed."""
-    axes = figure.subplot_mosaic([["cost", "generates"], ["cost", "holds"]])
-    left, seen = axes["cost"], [r for r in table_rows(rows, "scenes") if r["recall"]["n"]]
-    by_checker = groups(seen, lambda row: str(row["checker"]))
-    for color, (name, mine) in zip(("C7", "C0", "C1"), by_checker.items(), strict=False):
-        left.plot([], [], "o", color=color, label=name)
-        for row in mine:
-            missed = row["recall"]["value"] < 1
-            error = row["timestep_ms"] if missed else max(abs(row["delay_ms"] or 0.0), 1e-9)
-            left.plot(row["share"], error, "x" if missed else "o", color=color)
-    left.plot([], [], "x", color="black", label="misses contacts (at its time step)")
-    left.set(xscale="log", yscale="log", xlabel="cost: fraction of mj_step")
-    left.set(ylabel="error: onset to first report [ms]")
-    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    curves = groups(
-        table_rows(rows, "crossing"), lambda row: f"{row['mode']}, {row['timestep_ms']:g} ms"
-    )
-    for kind in ("generates", "holds"):
-        for label, mine in curves.items():
-            values = [row[f"mujoco_{kind}"]["value"] for row in mine]
-            style = "-" if label.startswith("plain") else ":"
-            axes[kind].plot([row["speed"] for row in mine], values, style, label=label)
-        axes[kind].set(xscale="log", ylabel=f"fraction that MuJoCo {kind}", ylim=(-0.05, 1.05))
-    axes["generates"].legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
-    axes["holds"].set(xlabel="ball's speed [m/s]")

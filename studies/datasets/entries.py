@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,9 +32,6 @@ from tauguard.detectors import (
 )
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.report import Row
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: The dataset, and the rate that thresholds aim at.
 NAME, PER_HOUR = "tauguard-collisions-v1", 10.0
@@ -128,21 +125,3 @@ def rows_of(name: str, entries: Sequence[Entry]) -> list[Row]:
             }
         )
     return rows
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """False alarms an hour against collisions missed from 16 N m up, a point a detector."""
-    own = [row for row in rows if row["study"] == "entries"]
-    splits = list(dict.fromkeys(row["split"] for row in own))
-    plots = np.atleast_1d(figure.subplots(1, len(splits)))
-    for axes, split in zip(plots, splits, strict=True):
-        for k, row in enumerate(r for r in own if r["split"] == split):
-            missed, alarms = 1 - row["from_16"]["value"], row["false_per_hour"]["value"]
-            axes.plot(alarms, missed, "os^Dv<>"[k % 7], label=row["detector"], alpha=0.8)
-        axes.set(xlabel="false alarms per hour", ylabel="missed from 16 N m up", title=split)
-        axes.set_xscale("symlog", linthresh=1)
-        axes.set_xlim(left=0)
-        axes.set_ylim(bottom=0)
-        axes.margins(x=0.2)
-        axes.grid(alpha=0.3)
-    figure.legend(*plots[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)

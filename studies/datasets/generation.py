@@ -10,7 +10,7 @@ import tempfile
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow.parquet as pq
 
@@ -27,9 +27,6 @@ from tauguard.envs import Simulation
 from tauguard.envs.plant import untimed
 from tauguard.models import pin_model
 from tauguard.report import Row
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NAME = "tauguard-collisions-v1"
 #: Parts of the work, in their order; rows a second whose bytes are measured.
@@ -162,7 +159,7 @@ def memory_row(count: int, seed: int) -> Row:
     return {"study": "memory", "episodes": count, "command [MiB]": own, "worker [MiB]": worker}
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """Where the time of a sample goes, and bytes an hour."""
     left, right = figure.subplots(1, 2)
     timed = [row for row in table_rows(rows, "rate") if f"{PARTS[0]} [us]" in row]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -35,10 +35,6 @@ from tauguard.models import LinkSurface, cura6, link_surface
 from tauguard.report import Row, rate
 from tauguard.report.charts import errorbars
 from tauguard.traces import STRATA, Collision, stratum
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 #: The detector whose alarms are explained, and its false alarms per hour.
 DETECTOR, PER_HOUR = "moving-thresholds", 5.0
@@ -301,7 +297,7 @@ def cost_row(event: Event, trained: CollisionAlarm, surface: LinkSurface) -> Row
     return {"study": "cost", "surface_points": len(surface.link), **scaled}
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """Link accuracy and point error by severity."""
     axes = figure.subplots(1, 2)
     names = [f"{stratum(low)} N m" for low, _ in STRATA]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,8 +19,6 @@ from tauguard.arrays import Array
 from tauguard.report import Row
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tauguard.detectors import CollisionAlarm
     from tauguard.detectors.scores.kernel import KernelMachine, SrqRegressor
     from tauguard.traces import Trace
@@ -243,7 +241,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
     return rows + kernel_rows(full[-1], windows, extent.single, seed)
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """Microseconds and error over the number of support vectors."""
     own = [r for r in rows if r["study"] == "kernel"]
     count = [r["support_vectors"] for r in own]

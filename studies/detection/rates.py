@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 from studies.detection.motions import (
     CALIBRATE,
@@ -43,9 +43,6 @@ from tauguard.envs import simulate
 from tauguard.report import Row, rate
 from tauguard.report.charts import errorbars
 from tauguard.traces import STRATA
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: How a threshold is chosen: expected to give a rate, or guaranteed not to exceed it.
 AIMED, GUARANTEED = "aimed at", "guaranteed"
@@ -171,7 +168,7 @@ def _judged(size: Size, seed: int, arm: int, fleet: dict[str, Operated]) -> Iter
             yield from (on_struck(fleet, one) for one in pool)
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """Rate found, with its interval, over the rate asked for."""
     axes = figure.add_subplot()
     asked = sorted({row["asked"] for row in rows})

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import Any
 
 from studies.detection.motions import Conditions, Training
 from studies.detection.rates import AIMED, Size, arm_tallies, collisions, point
@@ -23,9 +23,6 @@ from tauguard.models import cura6_drive, load_arm
 from tauguard.models.arm import NAMED
 from tauguard.report import Row
 from tauguard.report.charts import errorbars
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: The shipped detector, and others of which the first two read the same residual.
 NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds", "boosting")
@@ -100,7 +97,7 @@ def conditions(name: str, folder: Path) -> Conditions:
     return Conditions(robot=source, joints=len(facts.joints), share=share)
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """Found and false alarms by robot, with their intervals."""
     left, right = figure.subplots(1, 2)
     robots = list(dict.fromkeys(row["robot"] for row in rows))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from studies.framework import groups, table_rows
 from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics, poisson_rate
 from tauguard.report import Row, rate
 from tauguard.traces import stratum
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: The dissertation's confusion matrices (TP, FN, FP, TN; 65 collisions) by speed [%]:
 #: SVR at 1.6 A, network of [25] at 1.6 A, SVR at 2.0 A, network at 2.0 A. Kowalczuk & Czubenko.
@@ -250,7 +247,7 @@ def _together(own: Sequence[Row]) -> str:
     return f"{hits}/{sum(one['n'] for one in rates)}"
 
 
-def draw(found: list[Row], figure: Figure) -> None:
+def draw(found: list[Row], figure: Any) -> None:
     """Sensitivity over the torque, tau98, delay, and the cells beside the dissertation's."""
     (torque, least), (delay, cells) = figure.subplots(2, 2)
     hourly = groups(table_rows(found, "hourly"), lambda row: str(row["detector"]))

@@ -37,8 +37,6 @@ from tauguard.report import rate as share
 from tauguard.traces import write_mcap
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tauguard.detectors import CollisionAlarm
     from tauguard.detectors.alarms.monitor import Answer
     from tauguard.live import Sample
@@ -221,7 +219,7 @@ def timed(call: Callable[[int], object], count: int) -> Row:
     return {"p50 [us]": float(median), "p99.9 [us]": float(tail)}
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """Latency of each rate beside its period."""
     axes = figure.subplots()
     for k, row in enumerate(row for row in rows if row["study"] == "listen"):

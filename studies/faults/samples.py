@@ -17,7 +17,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -28,10 +28,6 @@ from tauguard.live.lateness import Lateness
 from tauguard.live.packets import FAULTS, Fault, Packets
 from tauguard.report import Row, rate
 from tauguard.traces.trace import Trace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 #: Moments of each fault, an arm, drawn at random and again at collisions: full run, quick one.
 MOMENTS = (8, 3)
@@ -214,7 +210,7 @@ def others(known: Sequence[ArmLogs]) -> list[Row]:
     return rows
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """Delay of every fault, an arm a colour."""
     own = [row for row in rows if row["study"] == "faults"]
     names, axes = list(FAULTS), figure.add_subplot()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Annotated, Any
 import tyro
 
 from studies import STUDIES
+from studies.framework.pareto import draw_points
 from studies.framework.rows import Incomplete
 from studies.framework.study import Part, all_parts, find, package
 from tauguard.atomic_write import atomic_file
@@ -179,7 +181,10 @@ def chart(module: Any, rows: list[Row], kind: str = "png") -> bytes:
     out = io.BytesIO()
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=getattr(module, "SIZE", None), layout="constrained")
-        module.draw(rows, figure)
+        if hasattr(module, "draw"):
+            module.draw(rows, figure)
+        else:
+            draw_points(importlib.import_module(module.__package__).points(rows), figure)
         figure.savefig(out, format=kind)
         plt.close(figure)
     return out.getvalue()

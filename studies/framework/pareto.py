@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-from studies.framework.rows import Point
+from studies.framework.rows import Point, groups
 from tauguard.report.charts import COLOURS
 
 #: Colours of our points and of the peers'.
@@ -29,19 +30,32 @@ def svg(points: Sequence[Point]) -> str:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    labels = list(dict.fromkeys(p.method for p in sorted(points, key=lambda p: p.cost)))
     with plt.rc_context({"font.size": 10, "svg.hashsalt": points[0].question}):
-        height = 3.4 + 0.19 * ((len(labels) + 1) // 2)
-        figure, axes = plt.subplots(figsize=(5.6, height), layout="constrained")
-        _draw(points, labels, figure, axes)
+        height = 3.4 + 0.19 * ((len({p.method for p in points}) + 1) // 2)
+        figure = plt.figure(figsize=(5.6, height), layout="constrained")
+        _draw(points, figure)
         out = io.StringIO()
         figure.savefig(out, format="svg", metadata={"Date": None})
         plt.close(figure)
     return out.getvalue()
 
 
-def _draw(points: Sequence[Point], labels: list[str], figure: Any, axes: Any) -> None:
+def draw_points(points: Iterable[Point], figure: Any) -> None:
+    """A panel for each question whose points have an error."""
+    shown = groups([p for p in points if not math.isnan(p.error)], lambda p: p.question)
+    if not shown:
+        figure.text(0.5, 0.5, "times and errors are in the tables", ha="center")
+        return
+    figure.set_size_inches(6.0 * len(shown), 5.8)
+    panels = figure.subfigures(1, len(shown), squeeze=False)[0]
+    for own, panel in zip(shown.values(), panels, strict=True):
+        _draw(own, panel)
+
+
+def _draw(points: Sequence[Point], figure: Any) -> None:
     """Points numbered by label; the numbers are explained below the axes."""
+    axes = figure.subplots()
+    labels = list(dict.fromkeys(p.method for p in sorted(points, key=lambda p: p.cost)))
     for number, label in enumerate(labels, 1):
         own = [point for point in points if point.method == label]
         colour, marker = (PEER, "s") if own[0].role == "peer" else (OURS, "o")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar
 
 from studies import STUDIES
@@ -30,6 +31,7 @@ UNITS = (("s", 1e6), ("ms", 1e3), ("µs", 1.0), ("ns", 1e-3))
 LENGTH = 300
 
 #: What the page says above its sections.
+EMPTY = "<p>Not shown: see the top of this page.</p>"
 NONE = "<p>None of these studies is in this report.</p>"
 BESIDE_WHOM = (
     "<p>Time and error of each kernel and of a peer in the same run, one thread. "
@@ -208,23 +210,25 @@ class Report:
 
     def _part(self, name: str, part: Part) -> str:
         one, module = self.found[name], part.load()
-        rows, empty = one["rows"], "<p>Not shown: see the top of this page.</p>"
-        with warnings.catch_warnings(record=True) as raised:
-            warnings.simplefilter("always", UserWarning)
-            figure = self.missing.attempt(
-                f"figure of {name}",
-                lambda: picture(chart(module, rows), "png", f"figure of {name}"),
-                empty,
-            )
-        for line in dict.fromkeys(str(warning.message) for warning in raised):
-            self.missing.add(f"figure of {name}", line)  # matplotlib draws an empty panel
+        rows = one["rows"]
+        figure = self._figure(name, module) if hasattr(module, "draw") else ""
         text = self.missing.attempt(
-            f"tables of {name}", lambda: tables(printed(module, rows), module.NOTES), empty
+            f"tables of {name}", lambda: tables(printed(module, rows), module.NOTES), EMPTY
         )
         load = one["machine"].get("load")
         kind = "quick" if one["quick"] else "full"
         run = f"{part.line} ({kind} run, seed {one['seed']}, load {load})."
-        return f"<p>{escape(run)}</p><figure>{figure}</figure>" + folded("Tables", text)
+        return f"<p>{escape(run)}</p>{figure}" + folded("Tables", text)
+
+    def _figure(self, name: str, module: ModuleType) -> str:
+        """The part's own figure; those of ``points`` stand on the first page."""
+        what, rows = f"figure of {name}", self.found[name]["rows"]
+        with warnings.catch_warnings(record=True) as raised:
+            warnings.simplefilter("always", UserWarning)
+            drawn = self.missing.attempt(what, lambda: chart(module, rows), b"")
+        for line in dict.fromkeys(str(warning.message) for warning in raised):
+            self.missing.add(what, line)  # matplotlib draws an empty panel
+        return f"<figure>{picture(drawn, 'png', what)}</figure>" if drawn else EMPTY
 
     def _lead(self) -> str:
         """Machines and versions, a paragraph each, and what the page does not show."""

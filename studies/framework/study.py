@@ -16,10 +16,10 @@ class Part:
     """One question of a study, answered by the functions of a module.
 
     The module has ``measure(quick, seed, **options)``, which returns rows (flat dictionaries, each
-    with its table's name under ``study``), ``draw(rows, figure)`` with a figure of matplotlib, and
-    ``NOTES``: what the columns of each table mean. Where it needs them it also has
-    ``judge(rows)``, which returns the rows of the summary, ``table(rows)``, which returns what is
-    printed instead of all rows, and ``SIZE``, of the figure [in].
+    with its table's name under ``study``), and ``NOTES``: what the columns of each table mean.
+    Where it needs them it also has ``judge(rows)``, which returns the rows of the summary,
+    ``table(rows)``, which returns what is printed instead of all rows, and ``draw(rows, figure)``
+    with a figure of matplotlib. Without ``draw`` the figure shows the study's ``points``.
     """
 
     module: str  #: within ``studies``

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +34,6 @@ from tauguard.detectors.events import SERIES, confirmation_samples, confirmed, f
 from tauguard.detectors.scores.free_motion import CONFIRMATION, FittedFreeMotion, FreeMotion
 from tauguard.report import Row, rate
 from tauguard.traces import Trace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Alarms = Callable[[Trace], NDArray[np.bool_]]
@@ -168,7 +165,7 @@ def _rows(arm: str, how: str, tally: Tally) -> list[Row]:
     return rows
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """False alarms per hour, and pushes found, of each detector."""
     axes = figure.subplots(1, 2)
     for axis, study in zip(axes, ("false alarms", "pushes"), strict=True):

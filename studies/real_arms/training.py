@@ -9,7 +9,7 @@ directions, and grow until they are found.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,6 @@ from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch, cura6, load_arm, pin_model
 from tauguard.report import Row
 from tauguard.traces import Trace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -221,7 +218,7 @@ def _per_newton(fitted: FittedFreeMotion, q: Array, rng: np.random.Generator) ->
     return torque
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """The force that is found, arm by arm, over the seconds of training."""
     axes = figure.subplots()
     lengths = list(dict.fromkeys(str(row["seconds"]) for row in rows))

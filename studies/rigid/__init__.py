@@ -51,6 +51,22 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         text = f"{missed} missed of {of:,}; time within {error:.0e}"
         axes = "microseconds a pair that meets", "largest error of the time [steps]"
         yield Point(question, row["method"], number(row["us_hit"]) or 0.0, error, text, role, *axes)
+    known = [row for row in table_rows(rows, "distance") if row["known"]]
+    for method, time, key, role in (
+        ("tauguard", "distance_ns", "error", "ours"),
+        ("coal", "coal_ns", "coal_error", "peer"),
+    ):
+        if known:
+            cost = 1e-3 * sum(number(row[time]) or 0.0 for row in known) / len(known)
+            error = min(1.0, max(row[key] for row in known))  # coal's may be any number
+            question, text = "signed distance of two bodies", f"within {error:.0e} of the size"
+            axes = "microseconds a pair, mean over kinds", "largest error, fraction of the size"
+            yield Point(question, method, cost, error, text, role, *axes)
+    for row in table_rows(rows, "figure 1.1 volumes"):
+        question, cost = "bounding volumes of pieces of a mesh", 1e-3 * row["test_ns"]["median"]
+        text = f"{row['volume']}, {row['tightness']:.2g} times the hull's volume"
+        axes = "microseconds a test", "hulls apart, volumes not"
+        yield Point(question, text, cost, row["false_hits"]["value"], "", "", *axes)
     meshes = groups(table_rows(rows, "table 2.2 static"), lambda row: str(row["volume"]))
     for volume, own in meshes.items():
         yield _mesh(own, volume, "batch_mean_us", "ours" if volume == "obb" else "")

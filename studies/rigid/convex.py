@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from functools import partial
 from time import process_time
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,11 +31,6 @@ from tauguard.rigid.queries import native_sweep, portable
 from tauguard.rigid.queries import overlap_boxes as overlap_boxes_native
 from tauguard.rigid.shapes import Bodies, Boxes
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-#: The figure's size [in].
-SIZE = (11.0, 5.0)
 #: Published static ratios of separating axes to elimination (collision, non-collision).
 PUBLISHED = {
     ("parallelepipeds", "parallelepipeds"): (1.39, 2.01),
@@ -241,23 +235,3 @@ def hard_row(name: str, rng: np.random.Generator, n: int) -> Row:
         if label == "abfme":
             row["exact_share"] = left / n
     return row
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """Ratios to textbook SAT per static cell, with the published ones as marks."""
-    axes, cells = figure.subplots(), table_rows(rows, "table 2.1 static")
-    names = [
-        f"{row['pair']}\n{row['outcome']}".replace("parallelepipeds", "cubes") for row in cells
-    ]
-    at = np.arange(len(cells))
-    for k, name in enumerate(("sat", "abfme", "auto")):
-        ratio = [row["textbook_ns"]["median"] / row[f"{name}_ns"]["median"] for row in cells]
-        wrong = sum(count(row[f"{name}_wrong"]) for row in cells)
-        axes.bar(at + 0.27 * (k - 1), ratio, 0.25, label=f"{name}, {wrong:g} wrong")
-    published = [row["published"] or np.nan for row in cells]
-    axes.plot(at, published, "k_", ms=18, mew=2, label="published ABFME")
-    axes.axhline(1.0, color="grey", lw=0.8)
-    axes.set_xticks(at, names, fontsize=8, rotation=30, ha="right")
-    axes.set(ylabel="times faster than textbook SAT", yscale="log", ylim=(0.8, 60))
-    axes.set_title(f"Table 2.1, static; {sum(row['pairs'] for row in cells):,} pairs")
-    axes.legend(loc="upper left", ncols=4)

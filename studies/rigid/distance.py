@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable
 from functools import partial
 from operator import itemgetter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,15 +16,12 @@ from oracles import coal_peer
 from oracles.convex_bodies import HARD, KINDS
 from oracles.convex_distance import exact_distance, exactly_meet, extent, relative_error
 from oracles.convex_pairs import random_bodies, take
-from studies.framework import number, table_rows, time_in_turn
+from studies.framework import table_rows, time_in_turn
 from studies.rigid.bars import count, error, faster, per
 from tauguard.report import Row, rate
 from tauguard.rigid import distance, overlap
 from tauguard.rigid.queries import native_overlap
 from tauguard.rigid.rounded import Solid
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PAIRS = (("boxes", "boxes"), ("boxes", "tetrahedra"), ("tetrahedra", "tetrahedra"))
 ROUNDED = (
@@ -110,16 +106,3 @@ def distance_row(pair: str, outcome: str, a: Solid, b: Solid, exact: int) -> Row
         "error": relative_error(got, truth, size),
         "coal_error": relative_error(coal, truth, size),
     }
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """Error over time of every pair that has an exact distance, ours and coal's."""
-    axes = figure.subplots()
-    known = [row for row in table_rows(rows, "distance") if row["known"]]
-    columns = ("tauguard", "distance_ns", "error"), ("coal", "coal_ns", "coal_error")
-    for name, ns, error_of in columns:
-        # An error of exactly zero is drawn at the lower rim, one above the size at the upper.
-        errors = np.clip([row[error_of] for row in known], 1e-18, 1.0)
-        axes.loglog([number(row[ns]) for row in known], errors, "o", label=name, alpha=0.7)
-    axes.set(xlabel="ns a pair", ylabel="largest error, fraction of the pair's size")
-    axes.legend()

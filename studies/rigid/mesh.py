@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,6 @@ from tauguard.arrays import Array
 from tauguard.report import Row, rate
 from tauguard.rigid import Impacts, MeshTree, Motion, distance, overlap, time_of_impact
 from tauguard.rigid.comparators import ComparedTree
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Pairs of each outcome that advancement over coal's distance is asked.
 ADVANCED = 16
@@ -260,18 +257,3 @@ def body_rows(
     columns = peer.motion_columns(call, coal, farthest(own))
     base = {"study": "mesh and convex in motion", "mesh": mesh.name, "body": kind}
     return [static, {**base, **columns}]
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """First hit per volume and outcome, beside coal."""
-    axes, cells = figure.subplots(), table_rows(rows, "table 2.2 static")
-    names = list(dict.fromkeys(row["volume"] for row in cells))
-    at = np.arange(len(names))
-    for k, outcome in enumerate(("collision", "non-collision")):
-        part = [row for row in cells if row["outcome"] == outcome]
-        us = [row["batch_mean_us"]["median"] for row in part]
-        bars = axes.bar(at + 0.4 * k - 0.2, us, 0.38, label=outcome)
-        axes.axhline(part[0]["coal_mean_us"], color=bars[0].get_facecolor(), ls="--", lw=1)
-    axes.set_xticks(at, names)
-    axes.set(ylabel="us a pose, mean", yscale="log", title=f"{cells[0]['mesh']}, coal dashed")
-    axes.legend()

@@ -8,8 +8,6 @@ distance over the largest speed, the distance from coal.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,9 +21,6 @@ from studies.rigid.bars import count, error, within
 from studies.rigid.distance import ROUNDED
 from tauguard.report import Row
 from tauguard.rigid import Impacts, time_of_impact
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NOTES = {
     "time of impact": "bodies about 2 m apart that move by up to 2 m and turn by less than half a "
@@ -103,17 +98,3 @@ def rounded_row(rng: np.random.Generator, kinds: tuple[str, str], n: int) -> Row
 
     columns = peer.motion_columns(call, distance, farthest(a) + farthest(b))
     return {"study": "motion of bodies with radii", "pair": "-".join(kinds), **columns}
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """Largest error over time per hit."""
-    axes = figure.subplots()
-    for row in table_rows(rows, "time of impact"):
-        us = row["us_hit"]["median"] if isinstance(row["us_hit"], dict) else row["us_hit"]
-        mark = "o" if row["bodies"] == "boxes" else "^"
-        who = "tauguard" if row["method"] == "tauguard" else "over coal"
-        axes.loglog(us, row["toi_error_max"], mark, ms=8, label=f"{who}, {row['bodies']}")
-    axes.axhline(1e-7, color="grey", lw=0.8)
-    axes.axvline(20, color="grey", lw=0.8)
-    axes.set(xlim=(1, 1000), ylim=(1e-13, 1), xlabel="us a hit", ylabel="largest error of the time")
-    axes.legend(fontsize="small", loc="lower right")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import partial
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +16,12 @@ from scipy.spatial.transform import Rotation
 
 from oracles.hull_volumes import HullVolumes, enclosed
 from oracles.surfaces import pieces
-from studies.framework import table_rows, time_in_turn
+from studies.framework import time_in_turn
 from studies.rigid.bars import count, error, per
 from studies.rigid.mesh import load
 from tauguard.report import Row, rate
 from tauguard.rigid.comparators import VOLUMES
 from tauguard.rigid.queries import native_overlap
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 NOTES = {
     "figure 1.1 volumes": "us a body to build and to update, ns a test of a pair. tightness: "
@@ -89,14 +86,3 @@ def errors(found: NDArray[np.bool_], hit: NDArray[np.bool_]) -> Row:
         "false_hits": rate(int((found & ~hit).sum()), int((~hit).sum())),
         "missed": rate(int((~found & hit).sum()), int(hit.sum())),
     }
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """Pairs that cannot be told apart, over the cost of a test."""
-    axes = figure.subplots()
-    for row in table_rows(rows, "figure 1.1 volumes"):
-        label = f"{row['volume']}: x{row['tightness']:.2g}, {row['update_us']['median']:.2g} us"
-        axes.plot(row["test_ns"]["median"], row["false_hits"]["value"], "o", label=label)
-    axes.set(xlabel="ns a test", ylabel="hulls apart, volumes not", xscale="log")
-    axes.set_title("volumes: size over the hull's, time of an update")
-    axes.legend()

@@ -30,12 +30,6 @@ STUDY = Study(
             "what an environment costs beside its physics, many at once, and reactions",
             alias="environments",
         ),
-        "arms": Part(
-            "simulation.arms",
-            "any arm: servo, residual, divergences, false alarms and a strike, arm by arm",
-            ("robot",),
-            alias="arms",
-        ),
     },
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -20,9 +20,6 @@ from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.envs.adapters.reactions import REACTIONS
 from tauguard.models import body_region
 from tauguard.report import Row, rate
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Copies of the vector environments.
 COPIES = 16
@@ -185,7 +182,7 @@ def reactions(count: int, seed: int, known: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """What a step costs, what many cost, and force over speed for each reaction."""
     top, vector, plain, detected = figure.subplots(2, 2).ravel()
     for axes, study, key, label in (

@@ -8,8 +8,6 @@ standard's M/2 + m_L, and how much more an arm under position control presses.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from oracles import two_mass_impact as impacts
@@ -17,9 +15,6 @@ from oracles.two_mass_impact import CONTACTS, SPEED
 from studies.framework import answer, table_rows
 from tauguard.models import BODY_REGIONS, SceneSpec, blow_velocity, reflected_mass, standard_mass
 from tauguard.report import Row
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 TIMESTEPS = (2.5e-4, 5e-4, 1e-3, 2e-3)
 NOTES = {
@@ -111,31 +106,3 @@ def arm(regions: tuple[str, ...], links: tuple[int, ...] = (4, 5, 6)) -> list[Ro
             }
         )
     return rows
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """Error against cost over the contact's parameters; peaks of the arm beside predictions."""
-    left, right = figure.subplots(1, 2)
-    for row in table_rows(rows, "rail"):
-        plain = row["integrator"] == "implicitfast" and row["contact"] == "direct"
-        other = row["contact"] if row["contact"] != "direct" else row["integrator"]
-        at = (row["us_per_simulated_ms"], 100 * row["peak_force_error"])
-        left.loglog(*at, "o" if plain else "s", color="C0" if plain else "C1")
-        if other in ("euler", "implicit"):
-            continue  # these two coincide with the default
-        label = f"{row['timestep_ms']:g} ms" if plain else f"{other}, 1 ms"
-        left.annotate(label, at, xytext=(7, 0), textcoords="offset points", fontsize=8, va="center")
-    left.margins(x=0.25)
-    left.axhline(2, color="0.5", lw=0.8, ls="--")
-    left.set(xlabel="microseconds per simulated millisecond", ylabel="error of the peak force [%]")
-    found = table_rows(rows, "arm")
-    names = [f"link {row['link']}, {row['region']}" for row in found]
-    height = np.arange(len(found))
-    labels = ("without drives", "by the reflected mass", "by M/2 + m_L", "position control")
-    keys = ("inertial_peak_n", "predicted_n", "standard_n", "driven_peak_n")
-    for k, (key, label) in enumerate(zip(keys, labels, strict=True)):
-        right.barh(height + 0.2 * k - 0.3, [row[key] for row in found], 0.2, label=label)
-    right.set_yticks(height, names, fontsize=8)
-    right.invert_yaxis()
-    right.set(xlabel="peak force [N]", title=f"The arm at {SPEED:g} m/s")
-    right.legend(fontsize=8)

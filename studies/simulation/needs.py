@@ -12,7 +12,7 @@ import functools
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +26,6 @@ from tauguard.models.drive import PARTS
 from tauguard.report import Row
 from tauguard.report.charts import errorbars
 from tauguard.traces import Trace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: False alarms an hour that the thresholds aim at.
 PER_HOUR = 10.0
@@ -119,7 +116,7 @@ def recordings(chosen: Episodes, part: str) -> list[Trace]:
     return [simulate(episode, without=(part,) if part in PARTS else ()) for episode in poorer]
 
 
-def draw(rows: list[Row], figure: Figure) -> None:
+def draw(rows: list[Row], figure: Any) -> None:
     """False alarms and misses, believed and found, by what was left out."""
     left, right = figure.subplots(1, 2, sharey=True)
     labels = ("in the whole simulation", "in the poorer one")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from oracles.bare_physics import rollout_along
-from studies.framework import table_rows, time_in_turn
+from studies.framework import time_in_turn
 from tauguard.arrays import Array
 from tauguard.envs import Motion, SimulationLoop, random_motion
 from tauguard.envs.episodes.simulate import workspace
@@ -26,9 +26,6 @@ from tauguard.models import (
     cura6_drive,
 )
 from tauguard.report import Row
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Time step of the reference [s].
 REFERENCE = 1e-4
@@ -121,20 +118,3 @@ def timesteps(seed: int, seconds: float) -> list[Row]:
             }
         )
     return rows
-
-
-def draw(rows: list[Row], figure: Figure) -> None:
-    """Cost of each thing as bars; error against cost over the time step."""
-    left, right = figure.subplots(1, 2)
-    cost = table_rows(rows, "cost")
-    left.barh([row["scene"] for row in cost], [row["us_per_step"]["median"] for row in cost])
-    left.invert_yaxis()
-    left.set(xlabel="microseconds a step", title="Cost of a scene's parts")
-    for row in table_rows(rows, "timestep"):
-        at = (row["us_per_simulated_ms"]["median"], row["q_error_rad"])
-        right.loglog(*at, "o", color="C1")
-        right.annotate(f" {row['timestep_ms']:g} ms", at)
-    right.margins(x=0.15)
-    right.set(xlabel="microseconds per simulated millisecond", ylabel="largest joint error [rad]")
-    right.set_title("Time step against 0.1 ms")
-    right.grid(alpha=0.3)
