@@ -23,7 +23,8 @@ KINDS = (
     "scene",
     "observer",
 )
-#: A time of impact may be early by this share of the step and is never late, but for one rounding.
+#: A right time of impact is early by at most this fraction of the step, and never late by more than
+#: one rounding.
 EARLY = 1e-5
 ROUNDING = 2.0**-52
 
@@ -37,10 +38,10 @@ class Case:
     Attributes:
         name: unique.
         kind: the adapter's method that answers it.
-        origin: where it was met first; ``of this project`` where it was made here.
+        origin: where the case was first found; ``of this project`` if it was made for this list.
         why: what makes it hard.
         given: the method's arguments by name.
-        explained: why tauguard's own answer is wrong, where it is.
+        explained: if tauguard's own answer is wrong, the reason.
         expected: ``{"toi": "1/2"}`` (a fraction of the step; ``None``: no contact),
             ``{"overlap": true}``, or ``{"low": 0, "high": 1}``, bounds of a number.
     """
@@ -64,8 +65,8 @@ class Case:
     def wrong(self, answer: object) -> str:
         """What is wrong with ``answer`` in a few words; empty if it is right.
 
-        ``missed`` or ``late by ...``: what relies on it lets bodies pass; ``invented`` or
-        ``early by ...``: it is too cautious; ``out of bounds``, ``not a number``.
+        ``missed`` and ``late by ...`` let bodies pass through each other. ``invented`` and ``early
+        by ...`` are too cautious. Others are ``out of bounds`` and ``not a number``.
 
         Raises:
             TypeError: of another type than the question asks for.
@@ -84,7 +85,7 @@ class Case:
         return "" if exact is None or said is None else mistimed(float(exact), said)
 
     def _plain(self, answer: object) -> Answer:
-        """The answer as a bool, a float or None; NumPy's scalars are taken for Python's."""
+        """The answer as a bool, a float or None; scalars of NumPy are converted."""
         said: Any = answer.item() if isinstance(answer, np.generic) else answer
         number = isinstance(said, int | float) and not isinstance(said, bool)
         if "overlap" in self.expected:
@@ -115,7 +116,7 @@ class Case:
 
 
 def mistimed(exact: float, said: float) -> str:
-    """How far a time is off where it is more than a right answer may be; else empty."""
+    """Say by how much a time exceeds what a right answer may be off; empty if it does not."""
     if exact - EARLY <= said <= exact * (1 + ROUNDING):
         return ""
     if math.isnan(said):

@@ -10,12 +10,11 @@ from tauguard.hard_cases.case import Case, answer_text
 
 
 def run(cases: Iterable[Case], libraries: Iterable[Adapter]) -> list[dict[str, Any]]:
-    """Rows with ``case``, ``library``, ``expected``, ``answer``, ``right``, ``wrong``, case.
-
-    ``wrong`` says in a few words what is, see :meth:`Case.wrong`. A library is not asked what it
-    has no method for, or what raises ``NotImplementedError``. What else it raises is its answer,
-    and ``wrong`` is ``failed``.
-    """
+    """Put every case to every library and return one row for each answer. A row has ``case``,
+    ``library``, ``expected``, ``answer``, ``right`` and ``wrong``. ``wrong`` says in a few words
+    what is wrong, see :meth:`Case.wrong`. A library without a method for a kind of case is not
+    asked. Nor is one that raises ``NotImplementedError``. Any other exception counts as its
+    answer, and ``wrong`` is ``failed``."""
     libraries = list(libraries)
     asked = [_row(case, one) for case in cases for one in libraries if hasattr(one, case.kind)]
     return [row for row in asked if row is not None]
@@ -46,11 +45,9 @@ def _row(case: Case, library: Adapter) -> dict[str, Any] | None:
 
 
 def verdicts(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """How many of each kind's cases each library answers, how many rightly, and what the rest is.
-
-    ``missed_or_late`` lets bodies pass through one another, ``invented_or_early`` is too cautious,
-    ``other`` is out of bounds, no number, or an error.
-    """
+    """Count by kind and library: cases asked, right answers, and wrong ones by what is wrong.
+    ``missed_or_late`` lets bodies pass through each other. ``invented_or_early`` is too
+    cautious. ``other`` is out of bounds, no number, or an error."""
     found: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         found.setdefault((row["kind"], row["library"]), []).append(row["wrong"])
@@ -74,7 +71,7 @@ def _counts(wrong: list[str]) -> dict[str, int]:
 
 
 def by_library(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row a kind and a column a library: ``11 of 13`` right, or None if not asked."""
+    """A row for each kind, a column for each library: ``11 of 13`` right, or None if not asked."""
     found: dict[tuple[str, str], list[bool]] = {}
     for row in rows:
         found.setdefault((row["kind"], row["library"]), []).append(row["right"])

@@ -35,12 +35,12 @@ def errorbars(
     across: bool = False,
     **style: Any,
 ) -> None:
-    """Figures with their intervals: ``value`` or ``median``, ``low`` and ``high`` of each.
+    """Draw values with their intervals: ``value`` or ``median``, ``low`` and ``high`` of each.
 
     Args:
         axes: of matplotlib.
-        at: where each stands on the other axis.
-        figures: at least one.
+        at: position of each value on the other axis.
+        figures: the values, at least one.
         across: along x instead of y.
         style: of matplotlib's errorbar.
     """

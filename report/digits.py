@@ -1,4 +1,4 @@
-"""Numbers in sentences: as many digits as say something, and no exponent."""
+"""Numbers in sentences: two digits and no exponent."""
 
 from __future__ import annotations
 

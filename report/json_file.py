@@ -1,4 +1,4 @@
-"""Figures as a JSON file."""
+"""Rows as a JSON file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from tauguard.atomic_write import write_atomic
 
 
 def write_json(path: Path, payload: Mapping[str, object]) -> None:
-    """Write ``payload`` to a file, whole or not at all; a number that is not finite is null."""
+    """Write ``payload`` to a file, completely or not at all.
+
+    Numbers that are not finite become null.
+    """
     text = json.dumps(_finite(payload), indent=2, allow_nan=False) + "\n"
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
@@ -21,7 +24,7 @@ def write_json(path: Path, payload: Mapping[str, object]) -> None:
 
 
 def _finite(value: object) -> object:
-    """Plain values, with null where JSON has no number."""
+    """Convert to plain values; NaN and infinity become None."""
     if isinstance(value, np.ndarray | np.generic):
         return _finite(value.tolist())
     if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""What figures were measured on, and with which versions."""
+"""The machine and the versions that results were measured with."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PACKAGES = (
 def measured(
     name: str, rows: Sequence[Mapping[str, Any]], quick: bool = False, seed: int | None = None
 ) -> dict[str, Any]:
-    """Rows as they go into a file: with what they were measured on."""
+    """Rows with the machine and versions that they were measured with, as a file holds them."""
     return {
         "name": name,
         "quick": quick,
@@ -36,12 +36,12 @@ def measured(
     }
 
 
-#: Programs that want to run, over the cores, above which times are those of a busy machine.
+#: A machine is busy if more programs than this want to run for each core.
 BUSY = 1.25
 
 
 def machine() -> dict[str, Any]:
-    """What the figures were measured on; ``load``: see :func:`load`, when this is asked."""
+    """Processor, cores and system; ``load`` is :func:`load` at this moment."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -56,7 +56,7 @@ def machine() -> dict[str, Any]:
 
 
 def load() -> float | None:
-    """Programs that wanted to run over the last minute, this one among them; None: not known."""
+    """Programs that wanted to run in the last minute, on average; None: unknown."""
     try:
         return round(os.getloadavg()[0], 1)
     except (AttributeError, OSError):  # Windows, or a system that does not say
@@ -64,7 +64,7 @@ def load() -> float | None:
 
 
 def load_line(begin: float | None, end: float | None) -> str:
-    """What a reader of times must know of the load, in one line.
+    """One line that says whether the load of the machine made times unreliable.
 
     Args:
         begin: :func:`load` before the times were measured.
@@ -81,7 +81,7 @@ def load_line(begin: float | None, end: float | None) -> str:
 
 
 def versions() -> dict[str, str]:
-    """The versions of what was measured; a package that is not installed is left out."""
+    """Versions of the packages that were measured; those that are not installed are left out."""
     found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:

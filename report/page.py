@@ -1,4 +1,4 @@
-"""Rows, text and pictures as one HTML file that needs nothing else."""
+"""Rows, text and pictures as one HTML file that needs no other file."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ td:last-child { min-width: 6em; }
 
 @dataclass(frozen=True)
 class Link:
-    """A cell of a table that leads somewhere."""
+    """A cell of a table that is a link."""
 
-    address: str  #: relative to the page, or whole
+    address: str  #: relative to the page, or absolute
     text: str
 
 
@@ -69,7 +69,7 @@ def page(title: str, sections: Mapping[str, str], lead: str = "") -> str:
 
 
 def tables(rows: Sequence[Mapping[str, Any]], notes: Mapping[str, str]) -> str:
-    """Rows as tables; neighbours of one study with the same columns share one."""
+    """Rows as tables; successive rows of one study with the same columns share a table."""
     parts: list[str] = []
     for study, keys, own in blocks_of(rows):
         if study is not None:
@@ -90,11 +90,14 @@ def _cell(value: object) -> str:
 
 
 def picture(data: bytes, kind: str, text: str) -> str:
-    """A picture within the file: ``kind`` is ``png`` or ``svg+xml``, ``text`` what it shows."""
+    """A picture inside the file.
+
+    ``kind`` is ``png`` or ``svg+xml``, ``text`` says what it shows.
+    """
     code = base64.b64encode(data).decode()
     return f'<img alt="{escape(text)}" src="data:image/{kind};base64,{code}">'
 
 
 def folded(title: str, body: str) -> str:
-    """A part that opens at a click."""
+    """A section that opens at a click."""
     return f"<details><summary>{escape(title)}</summary>\n{body}\n</details>"

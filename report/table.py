@@ -1,4 +1,4 @@
-"""Rows as text tables that a terminal can show; what does not fit is left to the JSON form."""
+"""Rows as text tables for a terminal."""
 
 from __future__ import annotations
 
@@ -29,12 +29,10 @@ def table(
     width: int = WIDTH,
     notes: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """Rows as aligned columns; neighbours of one study with the same keys share a heading.
-
-    The study stands above, with what ``notes`` says of it. Where a line would be longer than
-    ``width``, headings and long texts are broken first, then intervals are left out, and then the
-    columns that do not fit follow below, each part with the first columns again.
-    """
+    """Rows as aligned columns; successive rows of one study with the same keys share a heading.
+    The name of the study and its line of ``notes`` stand above. If a line would be longer than
+    ``width``, headings and long texts are broken. If that is not enough, intervals are left out.
+    Columns that still do not fit follow below, each part with the first columns again."""
     blocks: list[str] = []
     for study, keys, own in blocks_of(rows):
         if study is not None:
@@ -47,7 +45,7 @@ def table(
 def blocks_of(
     rows: Sequence[Mapping[str, Any]],
 ) -> Iterator[tuple[Any, list[str], list[Mapping[str, Any]]]]:
-    """Neighbours of one study with the same keys: the study, the keys without it, the rows."""
+    """Successive rows of one study with the same keys: the study, the other keys, the rows."""
     for (study, keys), own in itertools.groupby(rows, _kind):
         yield study, keys, list(own)
 
@@ -57,7 +55,7 @@ def _kind(row: Mapping[str, Any]) -> tuple[Any, list[str]]:
 
 
 def cell(value: object, brief: bool = False) -> str:
-    """One value: three digits; a rate or a time as value [low, high], ``brief`` without these."""
+    """A value with three digits; a rate or a time as ``value [low, high]``, unless ``brief``."""
     if value is None:
         return "-"
     if isinstance(value, Mapping):

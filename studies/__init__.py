@@ -1,4 +1,5 @@
-"""Speed against error, in a checkout: each package is one study, :mod:`studies.framework` runs it.
+"""Studies of speed against error, run from a checkout. Each package is one study;
+:mod:`studies.framework` runs it.
 
 A study's ``__init__.py`` says what is asked: its ``STUDY`` names the parts that a user can ask for.
 The other files of the package say how each part is measured.
@@ -18,7 +19,7 @@ STUDIES = (
 
 _SLOW = "is a slow test now: run `pytest -m slow -k {}` in a checkout"
 _NOTE = "has ended; its result is docs/notes/2026-11-23-{}.md"
-#: What was a study once, and what to do instead.
+#: Studies that have ended, and what to do instead.
 FORMER = {
     "mutants": _SLOW.format("damaged_file"),
     "kills": _SLOW.format("'interrupted or generate'"),

@@ -1,4 +1,4 @@
-"""``python -m studies bench`` and ``report``: behind tauguard's commands of these names."""
+"""``python -m studies bench`` and ``report``, which `tauguard bench` and `tauguard report` call."""
 
 import sys
 

@@ -26,7 +26,7 @@ def _hull(points: Any) -> Any:
     cloud, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for point in points:
         cloud.append(np.array(point, dtype=np.float64))
-    # coal's own hull builder ends the process where Qhull fails, as it does on flat bodies.
+    # coal's own hull builder ends the process if Qhull fails, and Qhull fails on flat bodies.
     for face in ConvexHull(points).simplices:
         triangles.append(coal.Triangle(*map(int, face)))
     return coal.Convex(cloud, triangles)

@@ -1,4 +1,4 @@
-"""ipctk's tight-inclusion queries (Wang et al. 2021), its defaults but for the rescaling."""
+"""ipctk's tight-inclusion queries (Wang et al. 2021); times are not rescaled."""
 
 from __future__ import annotations
 

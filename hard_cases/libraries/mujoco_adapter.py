@@ -19,7 +19,7 @@ def start(mjcf: str, flags: int = 0) -> tuple[Any, Any]:
 
 
 def answer(model: Any, data: Any) -> float:
-    """The last value of the sensor ``answer`` of the state as it is now."""
+    """Return the last value of the sensor ``answer`` in the present state."""
     mujoco.mj_forward(model, data)
     return float(data.sensor("answer").data[-1])
 
@@ -31,7 +31,7 @@ class MuJoCo:
     flags = 0
 
     def convex_overlap(self, a: Any, b: Any) -> bool:
-        """Two mesh geoms, their distance 0 or below."""
+        """Whether the distance of two mesh geoms is at most 0."""
         spec = mujoco.MjSpec()
         for name, points in (("a", a), ("b", b)):
             mesh = spec.add_mesh(name=name, uservert=np.array(points, dtype=float).ravel())
@@ -44,7 +44,7 @@ class MuJoCo:
         return bool(mujoco.mj_geomDistance(model, data, 0, 1, 1e300, None) <= 0.0)
 
     def scene(self, mjcf: str, seconds: float) -> float:
-        """``mj_step`` until the end."""
+        """Call ``mj_step`` until the end."""
         model, data = start(mjcf, self.flags)
         while data.time < seconds - model.opt.timestep / 2:
             mujoco.mj_step(model, data)

@@ -11,7 +11,7 @@ from tauguard.rigid import Hulls, Motion, overlap, sweep, time_of_impact
 
 
 class Ours:
-    """The defaults of every room, as a user gets them."""
+    """Every kernel with its default settings."""
 
     name = "tauguard"
 

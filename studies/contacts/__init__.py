@@ -22,12 +22,12 @@ STUDY = Study(
         ),
     },
 )
-#: Methods that begin so are peers.
+#: Methods whose names begin with one of these are peers.
 PEERS = ("MuJoCo", "mujoco", "plain", "speculative", "ipc")
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """When checkers report the first contact, and steps over fast contacts."""
+    """The error of the first reported contact, and the fraction of scenes with tunnelling."""
     question = "Contact checkers: when the first contact is reported"
     axes = ("microseconds a step", "error of the first report [ms]")
     for row in table_rows(rows, "scenes"):

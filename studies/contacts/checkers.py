@@ -1,10 +1,9 @@
-"""Contact checkers beside MuJoCo's own contacts: what each sees, how early, at what cost.
-
-``scenes``: every checker in every contact scene (:func:`tauguard.contacts.compare`). ``crossing``:
-a ball into pinned cloth, from starts spread over one step's travel, where a closed form gives the
-time of impact. ``cost``: a large cloth. MuJoCo's flags ``speculative`` and ``ipc`` leave a moving
-ball on cloth to ordinary contacts, so that their rows equal the plain ones.
-"""
+"""Contact checkers beside MuJoCo's own contacts: what each sees, how early, at what cost. Table
+``scenes`` holds every checker in every contact scene (:func:`tauguard.contacts.compare`). In
+``crossing`` a ball flies into pinned cloth, and a closed form gives the time of impact. Its
+start varies over the distance that it travels in one step. ``cost`` has a large cloth. MuJoCo
+treats a moving ball on cloth with ordinary contacts also under its flags ``speculative`` and
+``ipc``, so those rows equal the plain ones."""
 
 from __future__ import annotations
 
@@ -22,7 +21,7 @@ from tauguard.contacts.scenes.impacts import IMPACT_POINTS
 from tauguard.report import Row, rate
 
 CHECKERS = ("mujoco", "cloth", "rigid")
-#: Seconds of a scene in a quick run, where its own time is long.
+#: Seconds of long scenes in a quick run.
 QUICK_SECONDS = dict(arm_cloth=0.35, sleeve_arm=0.3, garment_chest=0.45) | dict.fromkeys(
     ("arm_boxes", "two_arms"), 1.2
 )
@@ -82,7 +81,7 @@ def _times(score: Score, report: Report) -> Row:
 
 
 def _crossing(speed: float, timestep: float, mode: str, offsets: int) -> Row:
-    """Flights from evenly spread starts to each impact point."""
+    """Let the ball fly to each impact point from evenly spread starts."""
     starts = np.arange(offsets) / offsets * speed * timestep
     flights = [
         _fly(speed, timestep, mode, impact, float(start))
@@ -107,9 +106,8 @@ def _fly(
 ) -> tuple[bool, bool, float]:
     """Whether MuJoCo lists and holds the contact, and the error of the checker's time [s].
 
-    Until the first contact the ball moves uniformly and the cloth rests, so that the time of impact
-    is their distance over the speed.
-    """
+    Until the first contact the ball moves uniformly and the cloth rests. The time of impact is
+    therefore their distance divided by the speed."""
     scene = ball_cloth(speed=speed, offset=offset, impact=impact, mode=mode)
     model, data = scene.start(timestep)
     scratch, check = mujoco.MjData(model), checker("cloth", model)

@@ -1,8 +1,8 @@
 """Guarded steps on random scenes, beside plain steps, MuJoCo's own modes and fine fixed steps.
 
-The tunnelling oracle judges every scene, at one time step of 0.5 to 10 ms. Which scenes come
-depends on the seed alone. ``overhead``: scenes in which nothing is to be guarded.
-"""
+The tunnelling oracle judges every scene, at one time step of 0.5 to 10 ms. The seed alone
+decides which scenes are drawn. Table ``overhead`` holds scenes in which nothing has to be
+guarded."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from tauguard.contacts.scenes import arm_boxes, arm_cloth
 from tauguard.contacts.scenes.impacts import MODES
 from tauguard.report import Row, rate
 
-#: By name: what draws a scene, and how many scenes in a full and a quick run. Seeds follow this
-#: order, so that a new family comes last.
+#: By name: the function that draws a scene, and the number of scenes in a full and a quick run.
+#: Seeds depend on this order, so a new family goes at the end.
 FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Drawn], int, int]] = {
     draw.__name__: (draw, full, quick)
     for draw, full, quick in (
@@ -39,9 +39,9 @@ FAMILIES: dict[str, tuple[Callable[[np.random.Generator], Drawn], int, int]] = {
         (soft.needles, 60, 2),
     )
 }
-#: Fixed steps that are tried, with stiff contacts [s]; one scene in so many, as they take long.
+#: Fixed steps with stiff contacts [s]. They take long, so only every fourth scene tries them.
 FIXED, FIXED_EVERY = (5e-4, 2e-4, 1e-4, 5e-5), 4
-#: An energy above this, over the first one, counts as added.
+#: Energy counts as added if it exceeds the first energy by this factor.
 ADDED = 1.02
 METHODS = ("plain", "speculative", "ipc", "guarded")
 
@@ -59,29 +59,29 @@ NOTES = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one scene with one method."""
+    """The result of one scene with one method."""
 
     held: bool
     exhausted: bool
     impact_zones: bool
-    rolled_back: bool  #: the guard redid a step
-    energy: float  #: the most, over the unit of the scene
-    seconds: float  #: processor time of stepping alone
+    rolled_back: bool  #: the guard rolled back a step
+    energy: float  #: largest energy, as a multiple of the scene's unit
+    seconds: float  #: processor time of the steps alone
     calls: float  #: of ``mj_step`` for each step
-    added: float = 0.0  #: most energy that rollbacks added in sum; 0 with actuators
+    added: float = 0.0  #: largest sum of energies that rollbacks added; 0 with actuators
 
 
 @dataclass(frozen=True)
 class Played:
     """One scene with every method."""
 
-    timestep: float  #: of all but the fixed steps [s]
+    timestep: float  #: of every method except the fixed steps [s]
     runs: dict[str, Outcome]  #: by method
-    fixed: dict[float, Outcome]  #: by fixed step [s]; empty where none was tried
+    fixed: dict[float, Outcome]  #: by fixed step [s]; empty if none was tried
 
     @property
     def first(self) -> float | None:
-        """The largest fixed step that holds with all finer ones that were tried [s]."""
+        """The largest fixed step [s] at which nothing tunnels, neither there nor at finer ones."""
         return max((step for step, run in self.fixed.items() if run.held), default=None)
 
 
@@ -123,8 +123,7 @@ def _play(job: tuple[str, int, int, Sequence[str], Sequence[float]]) -> Played:
 def fixed_steps(scene: Drawn, fixed: Sequence[float]) -> dict[float, Outcome]:
     """Stiff fixed steps, from fine to coarse, up to the first that does not hold.
 
-    The finest of all is tried only where the next one does not hold.
-    """
+    The finest step is tried only if the next one does not hold."""
     out: dict[float, Outcome] = {}
     finest, *coarser = sorted(fixed)
     for step in coarser:
@@ -138,7 +137,7 @@ def fixed_steps(scene: Drawn, fixed: Sequence[float]) -> dict[float, Outcome]:
 
 @contextmanager
 def unwarned() -> Iterator[None]:
-    """MuJoCo prints and logs no warnings: that plain steps diverge is what is studied here."""
+    """Silence MuJoCo's warnings: plain steps are expected to diverge here."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda message: None)
     try:
@@ -189,7 +188,7 @@ def play(scene: Drawn, method: str, timestep: float, stiff: bool = False) -> Out
 
 
 def _figures(chosen: list[Played], method: str) -> Row:
-    """The columns of one method over some scenes."""
+    """Compute the columns of one method over some scenes."""
     runs = [one.runs[method] for one in chosen]
     known = [(one, one.first) for one in chosen if one.first is not None]
     lost, guarded = [run for run in runs if not run.held], method == "guarded"
@@ -219,7 +218,7 @@ def _median(values: Iterable[float]) -> float | None:
 
 
 def _overhead(scene: Any, steps: int) -> Row:
-    """Plain and guarded steps in turn."""
+    """Time plain and guarded steps in turn."""
     times: dict[str, list[float]] = {"plain": [], "guarded": []}
     states = {name: scene.start(2e-3) for name in times}
     guard, cuts = GuardedStepper(*states["guarded"]), 0
@@ -250,7 +249,7 @@ def _overhead(scene: Any, steps: int) -> Row:
 
 
 def judge(rows: Sequence[Row]) -> list[Row]:
-    """Scenes held (without squeeze, which nothing can hold), silent tunnelling, and time."""
+    """Judge scenes held (nothing can hold squeeze), silent tunnelling, and time."""
     whole = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
     out: list[Row] = []
     for method in METHODS:

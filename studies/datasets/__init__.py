@@ -22,7 +22,7 @@ STUDY = Study(
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """False alarms against collisions missed, a point a detector and split."""
+    """False alarms against missed collisions: a point for each detector and split."""
     axes = ("false alarms an hour (none: 0.1)", "fraction missed from 16 N m up")
     for row in table_rows(rows, "entries"):
         question = f"Detectors trained from files, split {row['split']}"

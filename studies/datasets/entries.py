@@ -1,10 +1,9 @@
 """The leaderboard of the fixed dataset tauguard-collisions-v1: every detector of the registry.
 
-Each detector is trained on the first split of one arm, with a threshold for 10 false alarms an hour
-(the default of ``tauguard train``), and judged on the splits of the test, as ``tauguard train
---traces`` and ``tauguard evaluate --data`` do it. A detector is ranked by its sensitivity
-from 16 N m up on the split ``test`` over all arms, beside its false alarms.
-"""
+Each detector is trained on the first split of one arm, with a threshold for 10 false alarms an
+hour. It is judged on the test splits, as by ``tauguard train --traces`` and ``tauguard evaluate
+--data``. Detectors are ranked by their sensitivity from 16 N m up on the split ``test`` over all
+arms; their false alarms stand beside it."""
 
 from __future__ import annotations
 
@@ -33,9 +32,9 @@ from tauguard.detectors import (
 from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.report import Row
 
-#: The dataset, and the rate that thresholds aim at.
+#: The dataset, and the wanted rate of false alarms [1/h].
 NAME, PER_HOUR = "tauguard-collisions-v1", 10.0
-#: The detector of the quick run, and episodes of each split there, each so long [s].
+#: The quick run: its detector, the episodes of each split, and the length of each [s].
 QUICK, QUICK_EPISODES, QUICK_SECONDS = ("residual-thresholds",), {"train": 6, "test": 2}, 30.0
 
 NOTES = {
@@ -56,7 +55,7 @@ class Entry:
 
 
 def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
-    """A row a detector and split.
+    """Return a row for each detector and split.
 
     Args:
         quick: one detector on a few episodes of one arm.
@@ -75,7 +74,7 @@ def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
 
 
 def configuration(quick: bool, seed: int) -> Configuration:
-    """Two hours of the dataset; another seed draws another one of the same kind."""
+    """Two hours of the dataset; other seeds draw other datasets of the same kind."""
     whole = load(NAME).quick()
     whole = replace(whole, seed=seed) if seed else whole
     if not quick:
@@ -102,7 +101,7 @@ def _entry(job: tuple[Path, str, str]) -> Entry:
 
 
 def rows_of(name: str, entries: Sequence[Entry]) -> list[Row]:
-    """A detector's rows, a split each."""
+    """The rows of a detector, one for each split."""
     own = [entry for entry in entries if entry.detector == name]
     found: dict[str, list[Matching]] = {}
     for split, one in (pair for entry in own for pair in entry.splits):

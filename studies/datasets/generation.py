@@ -1,4 +1,4 @@
-"""Generation of datasets: rate beside ``mujoco.rollout``, bytes, reading of a column, memory."""
+"""Generation of datasets: speed beside ``mujoco.rollout``, size, reading speed and memory."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from tauguard.models import pin_model
 from tauguard.report import Row
 
 NAME = "tauguard-collisions-v1"
-#: Parts of the work, in their order; rows a second whose bytes are measured.
+#: Parts of the work in their order; the row rates [Hz] at which the size is measured.
 PARTS, RATES = ("prepare", "targets", "steps", "labels", "observer", "writing"), (1000, 500, 100)
-#: Generates a configuration in a process of its own and prints the peak memory [MiB] of it and of
-#: its largest worker. ``ru_maxrss`` counts what the parent had at the start, ``/proc`` does not.
+#: Generates a configuration in a new process and prints the peak memory [MiB] of this process and
+#: of its largest worker. ``/proc`` is used because ``ru_maxrss`` includes the parent's memory.
 PROGRAM = """
 import json, resource, sys
 from pathlib import Path
@@ -67,11 +67,9 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def rate_rows(quick: bool, seed: int) -> list[Row]:
-    """Microseconds a sample of episodes without and with collisions, and the rate of their mix.
-
-    The episodes are of a seed that nothing was developed on; every arm of the first split and the
-    arm of the last one take part.
-    """
+    """Microseconds for each sample of episodes without and with collisions, and the speed of a
+    mix of both. The seed was not used in development. All arms of the first split and the arm of
+    the last split take part."""
     configuration = replace(load(NAME), seed=987_000 + seed)
     count = 1 if quick else 4
     first, *_, last = configuration.splits
@@ -98,7 +96,7 @@ def rate_rows(quick: bool, seed: int) -> list[Row]:
 
 
 def timed_parts(one: Planned) -> dict[str, float]:
-    """Processor seconds of each part, of the rollout, and simulated samples, of one episode."""
+    """Processor seconds of each part and of the rollout, and samples, of one episode."""
     spent = dict.fromkeys(PARTS, 0.0)
     with untimed():
         with clock(spent, "prepare"):
@@ -145,7 +143,7 @@ def size_rows(quick: bool, seed: int) -> list[Row]:
 
 
 def memory_row(count: int, seed: int) -> Row:
-    """Peak resident memory of the command and of its largest worker, for so many episodes."""
+    """Peak resident memory of the command and of its largest worker, for ``count`` episodes."""
     split = {"name": "train", "episodes": count, "seconds": 1.0, "struck": 0.0, "speeds": [30]}
     split |= {"arms": ["cura6"], "individuals": [0]}
     top = {"name": "short", "seed": seed, "rate": 100, "episodes_per_shard": 20}

@@ -1,4 +1,4 @@
-"""Faults of samples, and logs played to a listener in real time."""
+"""Faults of samples, and logs played in real time."""
 
 from studies.framework import Part, Study
 

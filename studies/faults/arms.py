@@ -18,12 +18,12 @@ from tauguard.traces.trace import Trace
 
 #: Samples of a simulation that are kept [Hz].
 RATE = 500.0
-#: Of a real arm's collision-free logs every so many are left out of training.
+#: One in this many collision-free logs of a real arm is left out of training.
 LEFT_OUT = 3
 
 
 def trained(traces: Sequence[Trace], rate: float, per_hour: float) -> CollisionAlarm:
-    """A detector that trains in seconds, from collision-free motion at ``rate`` [Hz]."""
+    """Train a detector from collision-free motion at ``rate`` [Hz], which takes seconds."""
     own = [thinned(trace, rate) for trace in traces]
     return train(make_detector("moving-thresholds"), own, nominal_design(), per_hour)
 
@@ -48,7 +48,7 @@ class ArmLogs:
 
     @classmethod
     def struck(cls, name: str, alarm: CollisionAlarm, episodes: Sequence[Episode]) -> ArmLogs:
-        """With simulated episodes as its logs."""
+        """Make the logs from simulated episodes."""
         logs, contacts = {}, {}
         for k, episode in enumerate(episodes):
             trace = simulate(episode)
@@ -59,7 +59,7 @@ class ArmLogs:
 
 
 def arms(quick: bool, seed: int) -> Iterator[ArmLogs]:
-    """The simulated arm, then the real ones whose logs are there; quick: the simulated one."""
+    """Yield the simulated arm and, unless ``quick``, the real arms whose logs are available."""
     yield simulated(quick, seed)
     if quick:
         return
@@ -70,7 +70,7 @@ def arms(quick: bool, seed: int) -> Iterator[ArmLogs]:
 
 
 def simulated(quick: bool, seed: int) -> ArmLogs:
-    """A CURA6 drawn by the seed, 500 Hz; logs with collisions and other loads."""
+    """A CURA6 drawn by the seed, at 500 Hz; its logs have collisions and other loads."""
     drawn = Mismatch(seed=1000 + seed)
     speeds, loads = (20.0, 60.0), (0.0, 2000.0)
     free = free_episodes(seed, 3 if quick else 8, 20.0 if quick else 40.0, speeds, loads, drawn)
@@ -80,7 +80,7 @@ def simulated(quick: bool, seed: int) -> ArmLogs:
 
 
 def real(name: str) -> ArmLogs:
-    """A real arm, trained on two thirds of its collision-free logs; the rest and contacts judge."""
+    """A real arm, trained on two thirds of its collision-free logs and tested on all others."""
     arm = next(arm for arm in ARMS if arm.name == name)
     free = recordings(arm, ("free",))
     own = [log for k, log in enumerate(free) if k % LEFT_OUT]

@@ -1,8 +1,7 @@
-"""A log played by RTDE in real time and heard by a detector: losses, alarms, latency.
-
-The server and the listener of each rate are processes of their own, as ``tauguard play-ur`` and
-``tauguard listen`` are; all rates run at once. The alarms are held against those of the file.
-"""
+"""A log played by RTDE in real time, and a detector that receives it: losses, alarms, latency.
+Server and receiver of each rate are separate processes, as with ``tauguard play-ur`` and
+``tauguard listen``; all rates run at once. The alarms are compared with those that the detector
+gives on the file."""
 
 from __future__ import annotations
 
@@ -43,13 +42,15 @@ if TYPE_CHECKING:
     from tauguard.traces import Trace
 
 
-#: Samples a second: of UR's CB and e-Series; collisions in the log of a full and of a quick run.
+#: Sample rates [Hz] of UR's CB and e-Series; number of collisions in the log of a full and a quick
+#: run.
 RATES, COLLISIONS = (125.0, 500.0), (195, 3)
-#: Training: collision-free seconds, speeds [%], and false alarms an hour that it aims at.
+#: Training: seconds and number of collision-free episodes, their speeds [%], wanted false alarms an
+#: hour.
 SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
-#: Samples of which each stage is timed.
+#: Number of samples that each stage is timed on.
 TIMED = 4000
-#: The serving process starts, and counts what it sent, within this time [s].
+#: The serving process must answer within this time [s].
 ANSWERS = 120.0
 #: Percentiles of the latency.
 LEVELS = ("median", "p99", "p99_9", "p99_99", "max")
@@ -67,7 +68,7 @@ NOTES = {
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """A row a rate, and one for each stage of a sample."""
+    """Return a row for each sample rate, and one for each stage of processing."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_inputs(folder, quick, seed)
@@ -78,7 +79,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def write_inputs(folder: Path, quick: bool, seed: int) -> None:
-    """A log and a detector for each rate; the arm and its motions follow from the seed."""
+    """Write a log and a detector for each rate; the seed decides the arm and its motions."""
     drawn = Mismatch(seed=2000 + seed)
     free = free_episodes(seed, EPISODES, SECONDS, SPEEDS, (0.0,), drawn)
     training = [simulate(episode) for episode in free]
@@ -95,7 +96,7 @@ def read_inputs(folder: Path, rate: float) -> tuple[CollisionAlarm, Trace]:
 
 
 def serve(folder: Path, rate: float, pipe: Connection) -> None:
-    """Play the log: tell the port, and at the end how many packets were sent."""
+    """Play the log; send the port through the pipe, and at the end the number of packets."""
     with UrServer(Packets.of(read_log(folder / f"{rate:g}.mcap").trace), 0) as server:
         pipe.send(server.port)
         server.wait()
@@ -104,12 +105,12 @@ def serve(folder: Path, rate: float, pipe: Connection) -> None:
 
 @contextlib.contextmanager
 def served(folder: Path, rate: float) -> Iterator[Connection]:
-    """The pipe of a process that serves the log; it ends with the block, whatever happens there."""
+    """The pipe of a process that serves the log; the process ends with the block."""
     context = multiprocessing.get_context("spawn")
     mine, theirs = context.Pipe()
     process = context.Process(target=serve, args=(folder, rate, theirs), daemon=True)
     process.start()
-    theirs.close()  # so that its death ends the pipe
+    theirs.close()  # so that the pipe ends if the process dies
     try:
         yield mine
     finally:
@@ -119,7 +120,7 @@ def served(folder: Path, rate: float) -> Iterator[Connection]:
 
 
 def received(pipe: Connection) -> int:
-    """The next number from the serving process; ``RuntimeError`` if it says nothing."""
+    """The next number from the serving process; ``RuntimeError`` if none comes."""
     with contextlib.suppress(EOFError, OSError):
         if pipe.poll(ANSWERS):
             return int(pipe.recv())
@@ -162,11 +163,10 @@ def heard(folder: Path, rate: float) -> Row:
 
 
 def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool]) -> dict[str, Any]:
-    """Alarms of the file that begin at the same sample for the listener.
-
-    ``truth`` is whether the file's alarm is up at its ``times`` [s], shape (T,), ``said`` the same
-    of the listener by the time; alarms beside a sample that was not heard are not judged.
-    """
+    """The fraction of the file's alarms that begin at the same sample in the received stream.
+    ``truth`` says at each of the ``times`` [s], shape (T,), whether the file's alarm is up.
+    ``said`` says the same of the received stream, by time. An alarm whose first sample, or the
+    one before, was not received is left out."""
     begins = [
         k
         for k in np.flatnonzero(np.diff(truth.astype(int), prepend=0) > 0).tolist()
@@ -177,7 +177,7 @@ def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool])
 
 
 def stages(folder: Path, rate: float) -> list[Row]:
-    """What a sample costs, stage by stage, on the log's beginning."""
+    """Time each stage of processing on the first samples of the log."""
     alarm, trace = read_inputs(folder, rate)
     assert alarm.inputs is not None
     usual, stream = alarm.inputs, alarm.stream()
@@ -223,7 +223,7 @@ def draw(rows: list[Row], figure: Any) -> None:
     """Latency of each rate beside its period."""
     axes = figure.subplots()
     for k, row in enumerate(row for row in rows if row["study"] == "listen"):
-        # None: more than are told apart.
+        # None: longer than the histogram of latencies reaches.
         values = [float(row[f"{name} [us]"] or np.nan) / 1e3 for name in LEVELS]
         label = f"{row['rate [Hz]']:g} Hz, {row['heard']:,} samples"
         names = [name.replace("_", ".") for name in LEVELS]

@@ -1,16 +1,15 @@
-"""Every fault in every arm's samples, at random moments: seen or not, how soon, at what cost.
+"""Every kind of fault in the samples of every arm: is it seen, how soon, and at what cost. A fault
+of one second is put into logs that training has not seen. The answers are compared with those on
+the same samples without the fault. A fault is ``seen`` if a reason is given while it lasts or
+within 0.15 s after it. ``false alarms`` are collisions in or after the fault that the intact
+samples do not give. ``found after`` counts the alarms of the intact samples after the recovery that
+are also raised with the fault. ``silent`` is the time, from 20 ms after the fault begins, in which
+the answer is "free". A collision within a fault is ``missed`` if the intact samples give it and the
+answer stays "free".
 
-A fault of a second is put into logs that training has not seen; the same stretch without it is what
-the answers are held against. ``seen``: a reason is given while the fault lasts, or within 0.15 s
-after it. ``false alarms``: collisions said in or after the fault that the intact stretch does not
-have. ``found after``: alarms of the intact stretch, from the recovery on, that are there as well.
-``silent``: seconds of fault, from 20 ms on, in which the answer is "free". ``missed``: collisions
-within faults at which the answer stays "free", of those that the intact stretch finds.
-
-What is optimistic: the allowances of the position check (a velocity or time stamp one sample late)
-and the bounds on torque ratios were chosen on these logs of the real arms; the simulated arms are
-drawn by the seed, and nothing was chosen on them but that a load of training is no fault.
-"""
+The results of the real arms are optimistic: two settings were chosen on these logs, the
+allowances of the position check (a velocity or time stamp one sample late) and the bounds on
+torque ratios. On simulated arms only one thing was chosen: a load of training is no fault."""
 
 from __future__ import annotations
 
@@ -29,13 +28,15 @@ from tauguard.live.packets import FAULTS, Fault, Packets
 from tauguard.report import Row, rate
 from tauguard.traces.trace import Trace
 
-#: Moments of each fault, an arm, drawn at random and again at collisions: full run, quick one.
+#: How often each fault is tried on each arm at random moments, and again at collisions: full run,
+#: quick run.
 MOMENTS = (8, 3)
-#: A collision within a fault is missed if the answer is "free" for so long after its alarm [s].
+#: A collision within a fault is missed if the answer stays "free" for this time after its alarm
+#: [s].
 MISSED = 0.15
-#: A fault lasts so long [s]; it is looked at for as long after the detector has settled again.
+#: Length of a fault [s], and of the observation after the detector has settled again.
 LASTS, AFTER = 1.0, 2.5
-#: Faults that a single sample, or its neighbours, can show; the others need the arm's model.
+#: Faults that a sample and its neighbours show; the others need the arm's model.
 PLAIN = ("frozen", "stale", "encoder", "missing", "repeated", "rate", "jump", "nan", "late")
 NOTES = {
     "clean": "logs as they are: seconds at fault, each of them false, and alarms beside `detect`.",
@@ -95,7 +96,7 @@ class Tally:
     missed: int = 0  #: of them, with no answer but "free"
 
     def add(self, tested: ArmLogs, log: str, name: str, start: float) -> None:
-        """The fault at one moment, beside the same stretch without it."""
+        """Answers with the fault at one moment, beside those on the same samples without it."""
         trace = tested.logs[log]
         settle = tested.alarm.settle
         whole = Packets.of(trace)
@@ -160,7 +161,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def moments(tested: ArmLogs, rng: np.random.Generator, count: int) -> list[tuple[str, float]]:
-    """Logs and starts in them: so many at random, in motion, and as many just before alarms."""
+    """Logs and start samples: ``count`` at random in motion, as many just before alarms."""
     margin = tested.alarm.settle
     starts, struck = {}, []
     for name, trace in tested.logs.items():
@@ -196,7 +197,7 @@ def clean(tested: ArmLogs, name: str, trace: Trace) -> Row:
 
 
 def others(known: Sequence[ArmLogs]) -> list[Row]:
-    """One arm's samples to another's model, where the rates are alike to a quarter."""
+    """One arm's samples given to another's model, if their rates differ by less than a quarter."""
     rows: list[Row] = []
     for model, source in itertools.permutations(known, 2):
         if abs(source.alarm.detector.dt / model.alarm.detector.dt - 1) > 0.2:

@@ -36,18 +36,18 @@ def command(
 ) -> None:
     """Run a study of speed against error, or one part of it, and print its tables.
 
-    `tauguard bench all` runs every part of every study and leaves figures and tables in a folder;
-    parts that it holds already are not run again. `tauguard report` makes one page of the folder.
+    `tauguard bench all` runs every part of every study and writes figures and tables into a folder.
+    Parts that the folder holds are not run again. `tauguard report` makes one page of the folder.
 
     Args:
         name: a study, or a part by its own name: `tauguard bench list` names them; or `all`.
-        part: of the study, alone.
+        part: run only this part of the study.
         quick: a shorter run, 60 s or less a part on 2 cores (the full one takes up to 30 minutes).
         seed: of every random input.
         detector: a method of your own as module:Class, beside those of the study `detection`.
-        robot: arms by name or file, parted by commas, for the parts that take any arm.
-        keep: folder of the job cache; jobs that it holds are not run again. Results of other
-            versions, or of other sources of simulation and detectors, are not used.
+        robot: arms by name or file, separated by commas, for the parts that take any arm.
+        keep: folder of the job cache. Jobs whose results it holds are not run again, unless
+        versions or the sources of simulation and detectors have changed.
         json: write the rows here as JSON.
         figure: write the figure here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.
@@ -88,7 +88,7 @@ def _print_list() -> None:
 
 
 def _taking(parts: Mapping[str, Part], given: Mapping[str, str], name: str) -> Mapping[str, Part]:
-    """The parts to run: with ``--detector`` or ``--robot`` only those that take it."""
+    """The parts to run; with ``--detector`` or ``--robot``, only the parts that accept the flag."""
     for option in given:
         taking = {full: part for full, part in parts.items() if option in part.options}
         if not taking:
@@ -100,7 +100,7 @@ def _taking(parts: Mapping[str, Part], given: Mapping[str, str], name: str) -> M
 
 
 def _own_path(path: Path | None, full: str, parts: Mapping[str, Part]) -> Path | None:
-    """The file of one part: where there are several, its name is added."""
+    """The file of one part; if several parts run, the part's name is added."""
     if path is None or len(parts) == 1:
         return path
     return path.with_stem(f"{path.stem}-{full.partition('-')[2]}")
@@ -144,20 +144,23 @@ def run_part(
 def _measured(
     module: ModuleType, quick: bool, seed: int, options: Mapping[str, str]
 ) -> tuple[list[Row], Incomplete | None]:
-    """The part's rows with its summary, and why there are not all of them."""
+    """The part's rows with its summary, and the reason if some are missing."""
     try:
         rows, broken = module.measure(quick=quick, seed=seed, **options), None
     except Incomplete as stop:
         rows, broken = stop.rows, stop
     except ValueError as error:
         if _of_our_own(error):
-            raise  # bad input, in our words
+            raise  # bad input, with a message of this project
         raise RuntimeError(f"{type(error).__name__}: {error}") from error
     return (rows + module.judge(rows) if hasattr(module, "judge") else rows), broken
 
 
 def _of_our_own(error: BaseException) -> bool:
-    """Whether our code raised it, in this process: workers start when the input is known to do."""
+    """Whether code of this project raised it in this process.
+
+    Workers start after the input was checked.
+    """
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

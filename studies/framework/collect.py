@@ -1,4 +1,4 @@
-"""Every part in a process of its own, into a folder; what is there already is not run again."""
+"""Run every part in a separate process and write its files into a folder."""
 
 from __future__ import annotations
 
@@ -14,21 +14,20 @@ from typing import Any
 
 from tauguard.report import versions
 
-#: Quick parts at a time: one a core of the smallest machine.
+#: Number of quick parts that run at once: the smallest machine has two cores.
 TOGETHER = 2
-#: What a file of rows holds beside them.
+#: Keys of a part's file.
 FIELDS = ("name", "quick", "machine", "versions", "seed", "rows")
-#: What it says of the machine.
+#: Keys of ``machine`` in a part's file.
 MACHINE = ("processor", "cores", "system")
 
 
 def collect(folder: Path, names: Iterable[str], *, quick: bool, seed: int) -> dict[str, str]:
     """Run the parts ``names`` that ``folder`` does not hold with these settings and versions.
 
-    Each leaves ``NAME.json``, ``NAME.png`` and ``NAME.log``; a file that no part wrote is left as
-    it is. Full parts run alone, since others would disturb their times. Returns why each part
-    failed that did: its last line, or what is wrong with the file that is there.
-    """
+    Each part writes ``NAME.json``, ``NAME.png`` and ``NAME.log``. Files that no part wrote stay
+    unchanged. Full parts run one at a time, since others would disturb their times. Returns the
+    parts that failed, each with its last line or with what is wrong with its existing file."""
     folder.mkdir(parents=True, exist_ok=True)
     failed: dict[str, str] = {}
     missing: list[str] = []
@@ -48,13 +47,13 @@ def collect(folder: Path, names: Iterable[str], *, quick: bool, seed: int) -> di
     try:
         reasons = list(pool.map(run, missing) if quick else map(run, missing))
     finally:
-        pool.shutdown(cancel_futures=True)  # at Ctrl-C those that have not begun do not begin
+        pool.shutdown(cancel_futures=True)  # at Ctrl-C no further part begins
     found = zip(missing, reasons, strict=True)
     return failed | {name: reason for name, reason in found if reason is not None}
 
 
 def _there(path: Path, name: str, quick: bool, seed: int) -> bool:
-    """Whether the file holds what this run would; ``ValueError`` if no part wrote it."""
+    """Whether the file holds a complete result of this run; ``ValueError`` if no part wrote it."""
     if not path.exists():
         return False
     found = read_rows(path, name)
@@ -81,7 +80,7 @@ def _run(folder: Path, name: str, quick: bool, seed: int) -> str | None:
 
 
 def read_rows(path: Path, name: str) -> dict[str, Any]:
-    """The file that the part ``name`` wrote; ``ValueError`` says what is wrong with another."""
+    """Read the file of the part ``name``; ``ValueError`` says what is wrong with it."""
     try:
         found = json.loads(path.read_text())
     except (ValueError, RecursionError) as error:

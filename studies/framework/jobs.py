@@ -1,6 +1,7 @@
-"""Jobs over processes, and the cache of their results: a run that was stopped goes on there.
+"""Jobs over processes, and a cache of their results, with which a stopped run continues.
 
-A file of the cache is a pickle that is read with data classes and arrays alone: it runs no code.
+A file of the cache is a pickle. Reading it creates data classes and arrays only, so it cannot run
+code.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from threadpoolctl import threadpool_limits
 from tauguard.atomic_write import atomic_file
 from tauguard.report import versions
 
-#: Packages whose data classes results may hold, and what NumPy builds an array or a number with.
+#: Packages whose data classes a result may hold, and NumPy's constructors of arrays and numbers.
 OURS = ("tauguard", "studies")
 ARRAYS = {
     ("numpy", "dtype"),
@@ -33,9 +34,9 @@ Each = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
 
 class Workers:
-    """A context manager that gives a map over processes, in this one if one worker is asked for.
+    """A context manager that gives a map over processes; with one worker it maps in this process.
 
-    Each process has one thread; answers come in the order of the jobs.
+    Each process has one thread. Results come in the order of the jobs.
     """
 
     def __init__(self, count: int | None = None) -> None:
@@ -48,7 +49,8 @@ class Workers:
         if self._count == 1:
             return lambda call, jobs: map(call, jobs)
         context = multiprocessing.get_context("spawn")
-        # One thread a process: more of both than processors slows linear algebra many times over.
+        # One thread for each process: linear algebra is many times slower with more threads than
+        # processors.
         self._processes = context.Pool(self._count, threadpool_limits, (1,))
         imap: Callable[..., Iterator[Any]] = self._processes.imap
         return imap
@@ -60,7 +62,7 @@ class Workers:
 
 
 def build(*more: object) -> str:
-    """A hash of what decides a detector's answers: versions, sources, and ``more``."""
+    """A hash of everything that decides a detector's answers: versions, sources, and ``more``."""
     from tauguard.datasets.code_identity import detection_sources
 
     return hashlib.sha256(repr((more, versions(), *detection_sources())).encode()).hexdigest()[:16]
@@ -74,9 +76,10 @@ class JobCache:
 
     @classmethod
     def of(cls, keep: str | None, study: str, seed: int, size: object) -> JobCache:
-        """One folder a seed, size and build.
+        """Use one folder for each seed, size and build.
 
-        A change of native code or of the study itself is not seen: take another folder then.
+        After a change of native code or of the study itself, use another folder: such a change is
+        not noticed.
         """
         if keep is None:
             return cls(None)
@@ -88,7 +91,7 @@ class JobCache:
         return cls(folder)
 
     def over(self, each: Each, name: str) -> Each:
-        """``each`` for jobs of this name: those whose results are kept are not done again."""
+        """``each`` for jobs of this name, without those whose results are kept."""
         return functools.partial(self._map, each, name)
 
     def _map(
@@ -105,9 +108,9 @@ class JobCache:
 
 @dataclass(frozen=True)
 class _InOrder:
-    """Results in the order of the jobs; after one that raises the others still come."""
+    """Results in the order of the jobs; if one raises, iteration can continue with the next."""
 
-    jobs: Iterator[tuple[Path, bool]]  #: and whether they are kept
+    jobs: Iterator[tuple[Path, bool]]  #: and whether its result is kept
     fresh: Iterator[Any]
 
     def __iter__(self) -> _InOrder:
@@ -119,7 +122,7 @@ class _InOrder:
 
 
 def _done(job: tuple[Callable[[Any], Any], Any, Path]) -> Any:
-    """Do a job and keep its result, whole or not at all."""
+    """Do a job and keep its result in a file."""
     call, own, path = job
     result = call(own)
     with atomic_file(path) as stream:
@@ -132,7 +135,7 @@ def read(path: Path) -> Any:
     try:
         with path.open("rb") as stream:
             return _Results(stream).load()
-    except Exception as error:  # whatever a damaged file makes its reader raise
+    except Exception as error:  # a damaged file can make the reader raise anything
         raise ValueError(f"{path}: damaged, or of another build: delete it ({error})") from error
 
 

@@ -12,7 +12,7 @@ from studies.framework.jobs import build
 from tauguard.replay.event_page import OFFLINE
 from tauguard.report import write_json
 
-#: A collision that is found later than this is shown [s].
+#: A collision that is found later than this is shown as late [s].
 LATE = 0.05
 #: Rows of each kind in the report; the folder's own page has all.
 SHOWN = 8
@@ -21,10 +21,9 @@ SHOWN = 8
 def mistakes(folder: Path, seed: int) -> str:
     """HTML with a link for every collision missed or found late and every false alarm.
 
-    The detector and the motions are those of `tauguard demo`. The recordings lie in
-    ``folder/wrong`` and their list in ``folder/wrong.json``; both are made where they are not of
-    this seed and build, which is said before it begins.
-    """
+    The detector and the motions are those of `tauguard demo`. The recordings are in
+    ``folder/wrong``, their list in ``folder/wrong.json``. If they are of another seed or build,
+    a message says so and they are made again."""
     kept = folder / "wrong.json"
     found, why = _kept(kept, seed)
     if why:
@@ -35,7 +34,7 @@ def mistakes(folder: Path, seed: int) -> str:
 
 
 def _kept(path: Path, seed: int) -> tuple[dict[str, Any], str]:
-    """What is there, and why it has to be made again (nothing if it has not)."""
+    """The existing list, and why it has to be made again (empty if it need not)."""
     if not path.exists():
         return {}, "none are recorded yet"
     try:
@@ -93,7 +92,7 @@ def _html(folder: Path, counts: str, rows: list[dict[str, Any]]) -> str:
 
 
 def _pictures(folder: Path, rows: list[dict[str, Any]]) -> str:
-    """The first of each kind, drawn: the score beside its threshold."""
+    """A figure for the first mistake of each kind: the score and its threshold."""
     from tauguard.report.page import picture
 
     first: dict[str, Path] = {}

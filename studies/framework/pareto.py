@@ -1,4 +1,4 @@
-"""Error against microseconds: one figure a question, peers as marks of their own."""
+"""Error against microseconds: a figure for each question; peers have their own marks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OURS, PEER = COLOURS[:2]
 
 
 def front(points: Sequence[Point]) -> list[Point]:
-    """The points that no other beats in cost and error both, by cost."""
+    """The points that no other point beats in both cost and error, by cost."""
     best: list[Point] = []
     for point in sorted(points, key=lambda p: (p.cost, p.error)):
         if not best or point.error < best[-1].error:
@@ -75,7 +75,7 @@ def _draw(points: Sequence[Point], figure: Any) -> None:
 
 
 def _scale(points: Sequence[Point], axes: Any) -> None:
-    """Logarithmic in cost, and in error where it spans more than a factor of 20."""
+    """Use a logarithmic cost axis, and error axis if errors span more than a factor of 20."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     axes.set_xscale("log")

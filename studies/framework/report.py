@@ -27,10 +27,10 @@ from tauguard.report.page import folded, page, picture, tables
 BESIDE = ("hard-cases.json", "wrong.json")
 #: Units of time and how many microseconds each is.
 UNITS = (("s", 1e6), ("ms", 1e3), ("µs", 1.0), ("ns", 1e-3))
-#: Characters of a line about something that is missing.
+#: Longest line about something that is missing.
 LENGTH = 300
 
-#: What the page says above its sections.
+#: Text of the page.
 EMPTY = "<p>Not shown: see the top of this page.</p>"
 NONE = "<p>None of these studies is in this report.</p>"
 BESIDE_WHOM = (
@@ -69,9 +69,9 @@ def command(
 ) -> None:
     """Run the studies that the folder does not hold yet, and write `index.html` of all of them.
 
-    A run that was stopped goes on where it was. The page opens offline. It also links to
-    recordings of what the detector of `tauguard demo` gets wrong: `tauguard replay --web OUT`
-    opens them. What cannot be shown is named on the page and here, with exit code 1.
+    A stopped run continues where it stopped. The page opens offline. It also links to recordings of
+    the mistakes of `tauguard demo`'s detector; `tauguard replay --web OUT` opens them. If something
+    cannot be shown, the page and a message name it, and the exit code is 1.
 
     Args:
         out: the folder of the page and of each part's rows (JSON) and figure.
@@ -79,10 +79,9 @@ def command(
             take up to 30 minutes each).
         seed: of every random input.
         study: these studies or parts only (default: all that `tauguard bench list` names).
-        bound: run no study and no hard case, write the page of what the folder holds.
-        mistakes: train the detector of `tauguard demo` and record its mistakes, where the folder
-            does not hold them of this build.
-    """
+        bound: write the page from what the folder holds; run no study and no hard case.
+        mistakes: train the detector of `tauguard demo` and record its mistakes, unless the
+        folder holds those of this build."""
     from studies.framework import mistakes as recorded
     from tauguard.hard_cases import adapters, load_cases, run
 
@@ -112,30 +111,30 @@ def command(
 
 
 class Missing:
-    """What the page cannot show, and why: a line each."""
+    """Lines that say what the page cannot show, and why."""
 
     def __init__(self) -> None:
         """Nothing is missing yet."""
         self.lines: list[str] = []
 
     def add(self, what: str, why: str) -> None:
-        """Name a part and why it is not there; control characters of foreign text are left out."""
+        """Add a line that names a part and why it is missing, without control characters."""
         text = " ".join(f"{what}: {why}".split())
         self.lines.append("".join(c if c.isprintable() else "?" for c in text)[:LENGTH])
 
     def attempt(self, what: str, make: Callable[[], T], instead: T) -> T:
-        """What ``make`` returns; ``instead``, and a line, where the rows are not as it expects."""
+        """Return what ``make`` returns. If it raises, add a line and return ``instead``."""
         try:
             return make()
         except KeyError as error:
             self.add(what, f"no {error} in its rows")
-        except Exception as error:  # a file may be of another build, or of somebody else
+        except Exception as error:  # the file may come from another build or another program
             self.add(what, f"{type(error).__name__}: {error}")
         return instead
 
 
 class Report:
-    """The page of a folder: files that are damaged or of another program are named on it."""
+    """The page of a folder; it names files that are damaged or come from another program."""
 
     def __init__(self, folder: Path, failed: Mapping[str, str], missing: Missing) -> None:
         """Read the files of ``folder``; ``failed`` says why a part has none."""
@@ -172,7 +171,7 @@ class Report:
         return target
 
     def _of_studies(self, function: str) -> list[Any]:
-        """What a function of every study's package makes of the rows of all its parts."""
+        """Call a function of each study's package with the rows of its parts; join the results."""
         found: list[Any] = []
         for study in STUDIES:
             own = [one for name, one in self.found.items() if name.startswith(f"{study}-")]
@@ -192,7 +191,7 @@ class Report:
         return f'{FIGURES}<div class="figures">{"".join(drawn)}</div>'
 
     def _not_reached(self) -> str:
-        """Every line of a summary whose figure was not reached."""
+        """The lines of all summaries in which the wanted value was not reached."""
         rows = [(name, row) for name, one in self.found.items() for row in one["rows"]]
         judged = [(n, r) for n, r in rows if "asked" in r and isinstance(r.get("met"), bool)]
         lost = [
@@ -231,7 +230,7 @@ class Report:
         return f"<figure>{picture(drawn, 'png', what)}</figure>" if drawn else EMPTY
 
     def _lead(self) -> str:
-        """Machines and versions, a paragraph each, and what the page does not show."""
+        """Machines and versions in paragraphs, and a list of what the page does not show."""
         machines: dict[str, list[str]] = {}
         for name, one in self.found.items():
             on = one["machine"]
@@ -262,7 +261,7 @@ def time_text(us: float) -> str:
 
 
 def _beside(points: Sequence[Point]) -> str:
-    """Every question's line: tauguard's time and error, the peer's, and the ratio of the times."""
+    """A line a question: times and errors of tauguard and the peer, and the ratio of times."""
     lines = [
         {
             "what": ours.question,

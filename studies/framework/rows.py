@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 class Incomplete(RuntimeError):
-    """Some of a part's measurements failed; ``rows`` holds the others."""
+    """Some measurements of a part failed; ``rows`` holds the others."""
 
     def __init__(self, rows: list[Row], reasons: Mapping[str, BaseException]) -> None:
         """Keep the rows; ``reasons`` is by measurement."""
@@ -27,7 +27,7 @@ class Incomplete(RuntimeError):
 
 @dataclass(frozen=True)
 class Point:
-    """Time and error of one method: a mark of a figure and a line of the report's first page."""
+    """Time and error of one method: a mark in a figure and a line of the report's first page."""
 
     question: str  #: the figure's title
     method: str
@@ -40,12 +40,12 @@ class Point:
 
 
 def timed(met: bool, quick: bool) -> bool | str:
-    """Whether a timing meets its bar; few repeats of small cases can say yes, but not no."""
+    """Whether a timing meets its bound. A quick run has too few repeats to say that it does not."""
     return "full run" if quick and not met else bool(met)
 
 
 def answer(question: str, asked: str, measured: str, met: bool | str | None = None) -> Row:
-    """A line of a summary; ``met`` is ``None`` where nothing was asked of the figure."""
+    """A line of a summary; ``met`` is ``None`` if no value was asked."""
     return {
         "study": "summary",
         "question": question,
@@ -62,8 +62,9 @@ def time_in_turn(
 ) -> dict[str, dict[str, float]]:
     """Seconds of each call, the calls taken in turn (A B A B ...) after one warm-up each.
 
-    Taking turns lets a drift of the machine's speed affect every method alike. Work of a single
-    thread may be timed by ``time.process_time``, which leaves out what other programs take.
+    Because the calls take turns, a drift of the machine's speed affects all methods alike.
+    ``time.process_time`` as the clock leaves out the time of other programs, for work in a single
+    thread.
 
     Returns:
         Per name ``{"median", "low", "high"}``: median, minimum and maximum over the repeats [s].
@@ -96,7 +97,7 @@ def groups(rows: Sequence[T], key: Callable[[T], str]) -> dict[str, list[T]]:
 
 
 def number(value: object) -> float | None:
-    """A plain number, or the middle of a rate or of a time; ``None`` for what is neither."""
+    """The number, or the middle of a rate or a time; ``None`` for anything else."""
     if isinstance(value, Mapping):
         value = value.get("median", value.get("value"))
     return float(value) if isinstance(value, int | float) else None

@@ -1,4 +1,4 @@
-"""Lines of the summary: the worst of several figures beside what is asked of it."""
+"""Lines of the summary: the worst of several values, beside the value that is asked."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from tauguard.report import Row
 
 
 def faster(question: str, ratio: float, ratios: Sequence[float], quick: bool) -> Row:
-    """The smallest ratio of times reaches the bound; few repeats cannot say no."""
+    """Ask that the smallest ratio of times reaches ``ratio``."""
     least = min(ratios)
     return answer(question, f"at least {ratio:g}", f"{least:.3g}", timed(least >= ratio, quick))
 
 
 def within(question: str, bound: float, times: Sequence[float], quick: bool) -> Row:
-    """The longest time keeps within the bound; few repeats cannot say no."""
+    """Ask that the longest time is at most ``bound``."""
     most = max(times)
     return answer(question, f"at most {bound:g}", f"{most:.3g}", timed(most <= bound, quick))
 
 
 def error(question: str, bound: float, values: Iterable[float | None]) -> Row:
-    """The largest error, or count of errors, keeps within the bound."""
+    """Ask that the largest error, or number of errors, is at most ``bound``."""
     known = [value for value in values if value is not None]
     most = max(known, default=None)
     if most is None:
@@ -30,10 +30,10 @@ def error(question: str, bound: float, values: Iterable[float | None]) -> Row:
 
 
 def count(rate: Row) -> float:
-    """The number behind a rate."""
+    """The number of cases that a rate counts."""
     return 0.0 if rate["value"] is None else float(round(rate["value"] * rate["n"]))
 
 
 def per(seconds: dict[str, float], number: int, unit: float = 1e9) -> dict[str, float]:
-    """A measured time for each of ``number`` pairs, in nanoseconds unless ``unit`` is another."""
+    """A measured time divided by ``number`` pairs [ns], or in another ``unit``."""
     return {name: value * unit / max(1, number) for name, value in seconds.items()}

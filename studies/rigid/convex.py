@@ -1,14 +1,13 @@
 """Table 2.1: elimination (ABFME) against separating axes on random convex bodies, beside coal.
 
-"Cubes" of the published table are random parallelepipeds, *static* is one pose, *dynamic* a
-constant relative translation over t in [0, 1]. Its two dynamic collision entries 2.58 and 1.37 are
-not inverted in their source: there elimination is 2.58 and 1.37 times *slower* than separating
-axes.
+The "cubes" of the published table are random parallelepipeds. *Static* means one pose, *dynamic* a
+constant relative translation over t in [0, 1]. In its two dynamic collision entries, 2.58 and 1.37,
+elimination is that many times *slower* than separating axes; all other entries say how many times
+faster it is.
 
-Textbook SAT tests all face normals, then all edge pairs, projects every vertex, and ends at the
-first separating axis, without error bounds; it shares data layout, compiler flags and the loop with
-ours. Times are the processor's, of one thread.
-"""
+Textbook SAT tests all face normals, then all edge pairs. It projects every vertex, ends at the
+first separating axis, and has no error bounds. Data layout, compiler flags and loop are the same
+as for the other methods. Times are processor time of one thread."""
 
 from __future__ import annotations
 
@@ -71,7 +70,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def summary(rows: list[Row], quick: bool) -> list[Row]:
-    """Wrong answers of every method; ratios of times to the published ones, to SAT and to coal."""
+    """Wrong answers of every method; ratios of times beside the published ones, SAT and coal."""
     static, hard = table_rows(rows, "table 2.1 static"), table_rows(rows, "hard cases")
     found = []
     for method in ("abfme", "sat", "auto"):
@@ -127,7 +126,7 @@ def static_row(pair: tuple[str, str], outcome: str, a: Bodies, b: Bodies, coal_p
 def dynamic_rows(
     rng: np.random.Generator, pair: tuple[str, str], per_cell: int, exact_sample: int
 ) -> list[Row]:
-    """Sweeps, hit and time: elimination with time against axes cast along the motion."""
+    """Answer and time of swept bodies: elimination with time against axes cast along the motion."""
     a, b = KINDS[pair[0]](rng, 2 * per_cell), KINDS[pair[1]](rng, 2 * per_cell)
     d = rng.uniform(-1, 1, (2 * per_cell, 3))
     hit, out, _ = native_sweep(a, b, d, "abfme", points=False)
@@ -161,7 +160,7 @@ def dynamic_rows(
 
 
 def batch_row(rng: np.random.Generator, n: int) -> Row:
-    """The batch path of boxes: the vector path against the portable one, and what packing costs."""
+    """Boxes in a batch: vector instructions against portable code, and the time of packing."""
     a, b = KINDS["boxes"](rng, n), KINDS["boxes"](rng, n)
     assert isinstance(a, Boxes)
     assert isinstance(b, Boxes)
@@ -187,7 +186,7 @@ def batch_row(rng: np.random.Generator, n: int) -> Row:
 
 
 def coherent_row(rng: np.random.Generator, kind: str, n: int, frames: int) -> Row:
-    """Cached planes on slowly moving bodies, about one pair in eight in contact."""
+    """Cached planes on slowly moving bodies; about one pair in eight is in contact."""
     a, b = KINDS[kind](rng, n), KINDS[kind](rng, n)
     velocity, offset = rng.normal(0, 0.01, (n, 3)), rng.uniform(-2, 2, (n, 3))
     cache = PlaneCache(n)
@@ -222,7 +221,7 @@ def coherent_row(rng: np.random.Generator, kind: str, n: int, frames: int) -> Ro
 
 
 def hard_row(name: str, rng: np.random.Generator, n: int) -> Row:
-    """False hits and false clears of one hard case, and what exactness costs there."""
+    """Wrong answers of one hard case, and the fraction that needs exact arithmetic."""
     a, b = HARD[name](rng, n)
     expected = truth(a, b)
     row: Row = {"study": "hard cases", "case": name, "pairs": n, "hits": float(expected.mean())}

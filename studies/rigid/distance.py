@@ -1,4 +1,4 @@
-"""Signed distances of convex bodies and of bodies with radii: time beside coal's, error of both.
+"""Signed distances of convex bodies and of bodies with radii: time and error beside coal's.
 
 The truth is rational arithmetic. coal's own tolerance is 1e-6 of the pair's size.
 """
@@ -39,7 +39,7 @@ NOTES = {
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Random pairs apart and in each other, hard cases of tetrahedra, bodies with radii."""
+    """Random pairs that are apart or overlap, hard cases of tetrahedra, bodies with radii."""
     rng = np.random.default_rng(seed)
     # The exact distance of two boxes takes half a minute.
     n, exact, of_boxes = (1_000, 10, 0) if quick else (20_000, 300, 2)
@@ -79,7 +79,7 @@ def summary(rows: list[Row], quick: bool) -> list[Row]:
 
 
 def distance_row(pair: str, outcome: str, a: Solid, b: Solid, exact: int) -> Row:
-    """Times of a pair, and errors relative to its size over the first ``exact`` rows."""
+    """Time of a pair, and the error of the first ``exact`` rows relative to their size."""
     got, hit = distance(a, b).distance, overlap(a, b).hit
     calls: dict[str, Callable[[], object]] = {
         "distance": partial(distance, a, b),

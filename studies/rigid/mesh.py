@@ -1,8 +1,8 @@
 """Meshes: build, first hit (Table 2.2 static), motion (dynamic), and beside convex bodies.
 
-The mesh is the one that the environment variable ``TAUGUARD_MESH`` names (any file trimesh reads),
-else the Stanford bunny in ``TAUGUARD_DATA/meshes``, else a generated one of the bunny's size.
-"""
+The environment variable ``TAUGUARD_MESH`` names the mesh (any file that trimesh reads). Without
+it the mesh is the Stanford bunny in ``TAUGUARD_DATA/meshes`` or, if that is missing, a generated
+one of the bunny's size."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from tauguard.report import Row, rate
 from tauguard.rigid import Impacts, MeshTree, Motion, distance, overlap, time_of_impact
 from tauguard.rigid.comparators import ComparedTree
 
-#: Pairs of each outcome that advancement over coal's distance is asked.
+#: Number of pairs of each outcome on which advancement over coal's distance is run.
 ADVANCED = 16
-#: coal knows no rounded shapes beside a mesh but spheres and capsules.
+#: Of rounded shapes, coal takes only spheres and capsules beside a mesh.
 BODIES = ("spheres", "capsules", "tetrahedra", "boxes")
 NOTES = {
     "mesh build": "one tree; times_faster: the time of coal's OBBRSS over ours.",
@@ -182,7 +182,7 @@ def static_rows(mesh: Mesh, model: Any, poses: Array, repeats: int) -> list[Row]
 def dynamic_rows(
     mesh: Mesh, model: Any, poses: Array, rng: np.random.Generator, n: int
 ) -> list[Row]:
-    """A straight sweep and one that also turns, from poses apart."""
+    """A straight motion and one that also turns, from poses that do not overlap."""
     tree = MeshTree(mesh.vertices, mesh.faces)
     start = poses[~tree.overlap(tree, poses).hit][:n]
     away = mesh.center - (start[:, :3, :3] @ mesh.center + start[:, :3, 3])

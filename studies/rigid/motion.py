@@ -1,10 +1,10 @@
 """Time of impact of convex bodies that move and turn, beside advancement over coal's distance.
 
-For boxes and tetrahedra the truth is a bracket that shares nothing with the code under test
-(`oracles.convex_impact`). For bodies with radii coal judges: its distance at the time found and at
-24 moments before it. coal has no continuous query, so the peer is the textbook one: step by the
-distance over the largest speed, the distance from coal.
-"""
+For boxes and tetrahedra the truth is a bracket around the first contact, from code that shares
+nothing with the code under test (`oracles.convex_impact`). For bodies with radii, coal's
+distance is the judge: at the time found and at 24 moments before it. coal has no continuous
+query. The peer is therefore the textbook method over coal's distance: step by the distance
+divided by the largest speed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NOTES = {
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """Two rows a kind of body, ours and the peer's; a row a pair of bodies with radii."""
+    """Two rows for each kind of body, ours and the peer's; one for each pair with radii."""
     rng = np.random.default_rng(seed)
     rows: list[Row] = []
     for kind in ("boxes", "tetrahedra"):

@@ -1,4 +1,4 @@
-"""coal beside ours: its overlap net of the call, and advancement over its distance."""
+"""coal as the peer: its overlap without the time of the call, and advancement over its distance."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from tauguard.rigid.shapes import Bodies
 
 
 def overlap(a: Bodies, b: Bodies) -> tuple[NDArray[np.bool_], dict[str, float], float]:
-    """coal's answers, its nanoseconds a pair, and the median net of the loop and the call.
+    """coal's answers, its nanoseconds for each pair, and the median of these without loop and call.
 
-    The overhead is that of the same loop on two spheres far apart, the fastest query there is.
+    Loop and call are timed on two spheres far apart, the fastest query there is.
     """
     coal, n = coal_peer.coal_module(), len(a)
     left, right = coal_peer.geometries(a), coal_peer.geometries(b)
@@ -37,7 +37,7 @@ def overlap(a: Bodies, b: Bodies) -> tuple[NDArray[np.bool_], dict[str, float], 
 
 
 def outcomes(toi: Array) -> dict[str, NDArray[np.intp]]:
-    """Rows that first touch within the step, and rows that stay apart."""
+    """The rows that touch during the step, and the rows that stay apart."""
     return {
         "hit": np.flatnonzero(np.isfinite(toi) & (toi > 0)),
         "miss": np.flatnonzero(np.isinf(toi)),
@@ -61,14 +61,13 @@ def motion_columns(
     lever: Array | float,
     most: int | None = None,
 ) -> Row:
-    """Time of impact where coal judges: its distance on the path and at the time.
+    """Time of impact judged by coal's distance, before the time found and at it.
 
     Args:
-        call: ours, of the chosen rows.
+        call: gives our times of impact of the chosen rows.
         distance: coal's, of the same pairs.
         lever: sum of both bodies' largest distances from the origins of their frames [m].
-        most: advance so many pairs only (default: all).
-    """
+        most: advance only this many pairs of each outcome (default: all)."""
     every = np.arange(distance.n)
     found = call(every)
     end, hits = (

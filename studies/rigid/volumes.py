@@ -1,8 +1,8 @@
 """Bounding volumes compared: build, update, overlap test and tightness (figure 1.1).
 
-The bodies are pieces of the mesh of about 64 triangles, under random poses near the origin. A ball
-and an oriented box are moved by a pose; an axis-aligned box and an 18-DOP are computed again.
-"""
+The bodies are pieces of a mesh, of about 64 triangles each, in random poses near the origin. For
+a new pose a ball and an oriented box are moved. An axis-aligned box and an 18-DOP are computed
+again."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NOTES = {
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
-    """A row a volume, the hull last."""
+    """Return a row for each volume, the hull last."""
     rng = np.random.default_rng(seed)
     mesh = load(quick)
     corners, offsets = pieces(mesh.vertices[mesh.faces], 64)
@@ -81,7 +81,7 @@ def columns(name: str, calls: Any, bodies: int, pairs: int, repeats: int) -> Row
 
 
 def errors(found: NDArray[np.bool_], hit: NDArray[np.bool_]) -> Row:
-    """Pairs that the volumes cannot tell apart, and pairs that they miss."""
+    """Pairs whose volumes overlap though their hulls do not, and pairs that the volumes miss."""
     return {
         "false_hits": rate(int((found & ~hit).sum()), int((~hit).sum())),
         "missed": rate(int((~found & hit).sum()), int(hit.sum())),

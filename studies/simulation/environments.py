@@ -23,7 +23,8 @@ from tauguard.report import Row, rate
 
 #: Copies of the vector environments.
 COPIES = 16
-#: The peers of one environment: MuJoCo's own loop with the forces given, and with the drives.
+#: The peers of one environment: MuJoCo's rollout with given forces, and a bare loop with the
+#: drives.
 ROLLOUT, PHYSICS = "mujoco.rollout, forces given", "physics and drives, no environment"
 WHOLE, THREADED = "the environment", "make_vec, 2 threads"
 NOTES = {
@@ -43,7 +44,7 @@ NOTES = {
 
 def measure(quick: bool, seed: int) -> list[Row]:
     """Tables ``step``, ``vector`` and ``reaction``; the full run trains the demo's detector."""
-    # Many short blocks in turn: whatever else the machine does affects every method alike.
+    # Many short blocks in turn: the load of other programs affects every method alike.
     rows = steps(50, 5 if quick else 60, seed) + vectors(50, 5 if quick else 40, seed)
     known: dict[str, Any] = {"contact": None, "observer": "observer"}
     if not quick:
@@ -76,7 +77,7 @@ def judge(rows: list[Row]) -> list[Row]:
 
 
 def steps(count: int, repeats: int, seed: int) -> list[Row]:
-    """Microseconds an action at 100 Hz: the same motion as bare physics and with ever more."""
+    """Microseconds of an action at 100 Hz: bare physics, then with one more thing each."""
     env = reach(seed)
     actions = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 6)).astype(np.float32)
     forces, error = recorded(env, actions, seed)
@@ -122,7 +123,7 @@ def acting(env: Any, actions: np.ndarray, seed: int) -> Callable[[], object]:
 
 
 def vectors(count: int, repeats: int, seed: int) -> list[Row]:
-    """Actions a second of many environments, beside Gymnasium's and MuJoCo's own form."""
+    """Actions a second of many environments, beside Gymnasium's and MuJoCo's vector forms."""
     envs: dict[str, Any] = {
         "SyncVectorEnv": SyncVectorEnv([lambda: gymnasium.make(REACH)] * COPIES)
     }
@@ -156,13 +157,13 @@ def vectors(count: int, repeats: int, seed: int) -> list[Row]:
 
 
 def trained_detector(seed: int) -> CollisionAlarm:
-    """The demo's detector; none of its training is a swing of this study."""
+    """The demo's detector; it was not trained on swings of this study."""
     episodes = list(simulate_all(demo_plan(seed).train, None, "simulate training"))
     return train(make_detector("srq-svr"), episodes, nominal_arm(episodes), 10.0)
 
 
 def reactions(count: int, seed: int, known: Mapping[str, Any]) -> list[Row]:
-    """Each reaction at three speeds; ``known`` names the detectors, None stands for the contact."""
+    """Each reaction at three speeds; ``known`` names the detectors (None: the contact itself)."""
     rows: list[Row] = []
     for speed in SPEEDS:
         for source, detector in known.items():

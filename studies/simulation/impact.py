@@ -1,10 +1,9 @@
-"""Impacts on body regions beside the two masses and one spring of the standard.
-
-``rail``: a mass on a rail against every region, over time step, integrator and contact parameters:
-the error of peak force and transferred energy against the cost. ``arm``: links of the arm against
-regions: the peak of an arm without drives beside the one that its reflected mass predicts and the
-standard's M/2 + m_L, and how much more an arm under position control presses.
-"""
+"""Impacts on body regions beside the standard's model of two masses and one spring. In ``rail``
+a mass on a rail hits every region, over time steps, integrators and contact parameters. The row
+gives the errors of peak force and transferred energy, and the cost. In ``arm`` links of the arm
+hit regions. The peak force without drives stands beside the predictions from the arm's reflected
+mass and from the standard's mass M/2 + m_L. The last column is the peak force under position
+control."""
 
 from __future__ import annotations
 
@@ -36,7 +35,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def judge(rows: list[Row]) -> list[Row]:
-    """The error at the default settings, and of the arm without drives."""
+    """Judge the error on the rail at the default settings, and of the arm without drives."""
     default = (1e3 * SceneSpec.timestep, SceneSpec.integrator, CONTACTS[0])
     at_default = [
         row["peak_force_error"]

@@ -1,10 +1,8 @@
 """Model only what a scene needs: what a part costs, and what leaving it out does to a detector.
-
-The shipped detector is trained on recordings whose simulation lacks one part, and its threshold
-comes from them. It is then judged twice on other motion: in the same poorer simulation (what one
-would believe) and in the whole one (what holds). A part whose absence changes neither can be left
-out of data for this detector.
-"""
+The shipped detector and its threshold are trained on recordings whose simulation lacks one part.
+It is then judged on other motion, twice: in the same poorer simulation (what a user would
+believe) and in the complete one (what is true). If leaving a part out changes neither result,
+data for this detector do not need it."""
 
 from __future__ import annotations
 
@@ -29,12 +27,12 @@ from tauguard.traces import Trace
 
 #: False alarms an hour that the thresholds aim at.
 PER_HOUR = 10.0
-#: Left out beside parts of the drives: the arm's deviation from its design, and loads.
+#: Things left out besides parts of the drives: the arm's deviation from its design, and loads.
 OTHERS = ("model errors", "payloads")
-#: Loads where a detector is judged [g].
+#: Loads with which a detector is judged [g].
 PAYLOADS = (0.0, 1016.0, 4039.0, 2298.0, 782.0)
-#: Episodes to train on (with 5 collisions each, collision-free of 40 s) and to judge on (with 8
-#: collisions each, collision-free of 50 s).
+#: Numbers of episodes: to train on with 5 collisions each and without (40 s), to judge on with 8
+#: collisions each and without (50 s).
 FULL, QUICK = (12, 18, 9, 24), (2, 3, 1, 1)
 NOTES = {
     "needs": "srq-svr trained on simulations without a part, 10 false alarms an hour aimed at, and "
@@ -75,7 +73,7 @@ def episodes(size: tuple[int, int, int, int], seed: int) -> tuple[Episodes, Epis
 
 
 def costs(episode: Episode, parts: Sequence[str], repeats: int) -> dict[str, dict[str, float]]:
-    """Processor time of an episode without each part over that of the whole one, in turn."""
+    """Processor time of an episode without each part, divided by that of the complete one."""
     calls = {part: functools.partial(recordings, (episode,), part) for part in parts}
     taken = time_in_turn(calls, repeats, time.process_time)
     whole = taken["nothing"]["median"]

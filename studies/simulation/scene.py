@@ -47,7 +47,7 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def costs(motion: Motion, repeats: int) -> list[Row]:
-    """Microseconds a step: MuJoCo alone, then with one more thing each."""
+    """Microseconds for each step: MuJoCo alone, then the arm with one thing more each."""
     drive = cura6_drive()
     ideal = replace(drive, friction=None, ripple=None, sensors=None, electrical_time_constant=None)
     bare = SceneSpec(labels=False)
@@ -95,7 +95,7 @@ def loop_call(scene: Scene, motion: Motion) -> Callable[[], Any]:
 
 
 def timesteps(seed: int, seconds: float) -> list[Row]:
-    """Largest joint error, every 2 ms, against the reference step, and cost."""
+    """Largest joint error against the reference time step, compared every 2 ms, and the cost."""
     rows: list[Row] = []
     paths: dict[float, Array] = {}
     for timestep in (REFERENCE, 2e-4, 5e-4, 1e-3, 2e-3):
