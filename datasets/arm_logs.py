@@ -1,4 +1,4 @@
-"""Logs of one real arm as commands take them: files, joints, units, loads."""
+"""Logs of one real arm for the commands: files, joints, units, loads."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording, moves
 from tauguard.traces import Trace
 
-#: Heaviest load that is accepted [kg]; a larger number is taken for grams.
+#: Heaviest load that is accepted [kg]; a larger number probably means grams.
 HEAVIEST = 100.0
 
 
@@ -152,7 +152,7 @@ def log_named(name: str, flag: str, logs: Sequence[str]) -> str:
 
 
 def with_loads(traces: dict[str, Trace], payload: Sequence[str]) -> list[Recording]:
-    """Each trace with its load.
+    """Give each trace its load.
 
     Args:
         traces: by file name.

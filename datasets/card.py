@@ -1,8 +1,7 @@
 """A dataset's card for the Hugging Face hub, its Croissant metadata, and their checksums.
 
-Card and metadata are computed from ``dataset.json`` and the manifest alone: one dataset, one card.
-Shards and arms have checksums elsewhere, in the manifest and in ``dataset.json``.
-"""
+Card and metadata depend only on ``dataset.json`` and the manifest, so a dataset always has the
+same card. The checksums of shards and arms are in the manifest and in ``dataset.json``."""
 
 from __future__ import annotations
 
@@ -191,7 +190,7 @@ def croissant(folder: Path, configuration: Configuration, summary: dict[str, Spl
 
 
 def _records(split: str, configuration: Configuration) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The set of a split's files, and what a row of them holds."""
+    """The files of a split, and the columns of their rows."""
     files = {
         "@type": "cr:FileSet",
         "@id": f"{split}-files",

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-#: Tasks submitted for each core; more would only fill the cluster's memory.
+#: Tasks submitted for each core; more would only use memory.
 WAITING = 2
 
 

@@ -34,16 +34,16 @@ class Split:
     episodes: int  #: number of episodes
     quick_episodes: int  #: number with ``--quick``: the first ones
     seconds: float  #: length of an episode [s]
-    arms: tuple[str, ...]  #: designs; this and every list below is cycled
+    arms: tuple[str, ...]  #: names of designs; this list and every one below is cycled
     individuals: tuple[int, ...]  #: seeds of the mismatch to the design; -1: none
     speeds: tuple[float, ...]  #: percent of the largest joint speeds
     payloads_g: tuple[float, ...]  #: carried, not known to the observer [g]
     struck: float  #: fraction of the episodes that have collisions
-    collisions: int  #: planned in each of those
-    kinds: tuple[str, ...]  #: of collisions; a kind listed twice occurs twice as often
-    links: tuple[int, ...]  #: that collisions act on, 1-based
+    collisions: int  #: planned in each episode that has collisions
+    kinds: tuple[str, ...]  #: kinds of collisions; a kind listed twice occurs twice as often
+    links: tuple[int, ...]  #: links that collisions act on, 1-based
     severities: tuple[tuple[float, float], ...]  #: wanted peak ``|tau_ext|`` of joints 1-4 [N m]
-    temperature: tuple[float, float]  #: of the gears, drawn between these [degC]
+    temperature: tuple[float, float]  #: temperature of the gears, drawn between these [degC]
     picks: float  #: fraction of collision-free episodes with a payload picked up
     unseen: tuple[str, ...]  #: properties without a value of the first split: "arm", ...
 
@@ -190,7 +190,7 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
 
 
 TABLES = ("mismatch", "episodes", "splits")
-#: Length of a collision's slot; time before the first and after the last slot together [s].
+#: Length of a collision's slot; total time before the first and after the last slot [s].
 SLOT, MARGIN = 3.0, 3.5
 
 

@@ -20,7 +20,7 @@ from tauguard.datasets.shard import digest, fault, manifest_path, read_lines
 #: Version of the folder's layout; readers refuse newer ones.
 FORMAT = 2
 HEAD = "dataset.json"
-#: Checksums of the files that no other file has a checksum of; written when all else is there.
+#: Checksums of the files that have no checksum elsewhere; written last.
 SUMS = "SHA256SUMS"
 CARD, CROISSANT = "README.md", "croissant.json"
 #: Endings of an arm's files in ``arms``, by the name of the trace's attachment.
@@ -105,10 +105,9 @@ def checksums(folder: Path) -> str:
 
 
 def changed(folder: Path) -> list[tuple[str, str]]:
-    """Which of head, card and metadata, or the checksums themselves, are not as written.
+    """Names of those among head, card, metadata and the checksums that have changed.
 
-    A dataset without checksums was made by an earlier version, or is not complete: nothing is
-    found then.
+    A dataset without checksums gives none: an earlier version made it, or it is not complete.
     """
     if not (folder / SUMS).exists():
         return []
@@ -128,12 +127,11 @@ def changed(folder: Path) -> list[tuple[str, str]]:
 
 @contextlib.contextmanager
 def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
-    """In this block ``folder`` belongs to this dataset and this process is its only writer.
-
-    An empty folder is begun: head, arms and subfolders are written.
+    """In this block ``folder`` holds this dataset and this process is its only writer. Into an
+    empty folder, head, arms and subfolders are written first.
 
     Raises:
-        ValueError: it holds something else.
+        ValueError: the folder holds something else.
         OSError: somebody else is writing there, or it cannot be made.
     """
     made = not folder.exists()
@@ -235,7 +233,7 @@ def _begin(folder: Path, head: dict[str, Any], configuration: Configuration) -> 
         _write_once(folder / "arms" / name, text)
     text = json.dumps(head, indent=1, sort_keys=True) + "\n"
     if not _holds(folder / HEAD, text):
-        (folder / SUMS).unlink(missing_ok=True)  # they are of another head; the end writes new ones
+        (folder / SUMS).unlink(missing_ok=True)  # of another head; the end writes new ones
         write_atomic(folder / HEAD, text)
 
 
@@ -272,7 +270,7 @@ def _is_part(entry: Path) -> bool:
 
 @contextlib.contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """One writer at a time; the lock ends with the process, however it ends."""
+    """Allow one writer at a time; the lock ends with the process, however the process ends."""
     try:
         import fcntl
     except ImportError:  # no such locks on this system

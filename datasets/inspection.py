@@ -35,7 +35,8 @@ from tauguard.traces import Trace, stratum
 
 #: Properties of collisions that are counted from the labels.
 ACHIEVED = ("kind", "link", "severity")
-#: A class is off balance if it differs from the plan by this fraction and this many collisions.
+#: A class is off balance if it differs from the plan by more than this fraction and more than this
+#: number of collisions.
 SLACK, SLACK_COUNT = 0.25, 10
 
 
@@ -177,7 +178,7 @@ def unchecked(folder: Path) -> list[str]:
 
 
 def off_balance(stated: Balance, one: SplitSummary) -> list[str]:
-    """Classes whose planned count is not the stated one, or whose achieved count is far off."""
+    """Classes whose planned count is not as stated, or whose achieved count differs much."""
     lines = []
     for name, classes in stated.items():
         if {k: v for k, v in classes.items() if v} != dict(one.planned.get(name, {})):

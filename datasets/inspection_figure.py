@@ -1,4 +1,4 @@
-"""A page of charts of what a dataset holds."""
+"""A page of charts of a dataset's content."""
 
 from __future__ import annotations
 

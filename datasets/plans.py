@@ -67,10 +67,8 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
 
 
 def torque_scale(robot: str) -> float:
-    """Factor on severities and loads for this robot, at most 1.
-
-    The factor brings the lower end of the highest severity of :data:`~tauguard.traces.STRATA` to
-    the robot's largest torque limit.
+    """Factor on severities and loads for this robot, at most 1. With it, the lower end of the
+    highest severity of :data:`~tauguard.traces.STRATA` equals the robot's largest torque limit.
 
     Raises:
         ValueError: a robot that cannot be used.
@@ -99,9 +97,9 @@ def struck_episodes(
     mismatch: Mismatch | None = None,
     robot: str = "cura6",
 ) -> list[Episode]:
-    """Episodes with ``collisions`` each; speeds [%] and payloads [g] as :func:`pairing` has it.
+    """Episodes with ``collisions`` each; :func:`pairing` combines speeds [%] and payloads [g].
 
-    The collisions' severities are those of the robot's :func:`torque_scale`, its payloads as given.
+    Severities are multiplied by the robot's :func:`torque_scale`; payloads are not.
 
     Raises:
         ValueError: a robot that cannot be used.

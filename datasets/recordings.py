@@ -91,9 +91,9 @@ def write_dataset(
 
 
 def _place(folder: Path, number: int, episode: Episode) -> Path:
-    """The file of an episode; runs with other settings have other names beside it."""
+    """The file of an episode; another run's settings give another name."""
     kind = "episode" if episode.collisions or episode.objects else "free"
-    old = folder / f"episode-{number:05d}.mcap"  # as it was called before
+    old = folder / f"episode-{number:05d}.mcap"  # the name in earlier versions
     if old.exists() and read_mcap(old)[0].meta.get("config_sha256") == episode.config_hash:
         return old
     return folder / f"{kind}-{number:05d}-{episode.config_hash[:6]}.mcap"

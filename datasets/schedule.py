@@ -1,9 +1,8 @@
 """The episodes of a configuration, each a pure function of the configuration and its number.
 
-Each property (arm, individual, speed, payload, collisions or none; kind, link and severity of a
-collision) is dealt from a deck of its own that is shuffled every round. Any stretch of a split is
-balanced to within one round, and no two properties are correlated.
-"""
+Each property (arm, individual, speed, payload, with or without collisions; kind, link and
+severity of a collision) is dealt from a separate deck, which is shuffled every round. So any
+part of a split is balanced to within one round, and no two properties are correlated."""
 
 from __future__ import annotations
 

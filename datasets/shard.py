@@ -1,4 +1,4 @@
-"""One shard: a few episodes of one split, simulated and written; the work of one task."""
+"""A shard is a few episodes of one split. One task simulates and writes one shard."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Done:
     number: int
     episodes: int
     seconds: float  #: simulated [s]
-    kept: bool  #: it existed already, intact
+    kept: bool  #: it existed already and was intact
 
 
 def data_path(split: str, number: int) -> str:

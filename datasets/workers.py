@@ -1,4 +1,4 @@
-"""Worker processes: none outlives the command, and the death of one is an error."""
+"""Worker processes: none outlives the command, and it is an error if one dies."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Co
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, work), daemon=True)
-    resource_tracker.ensure_running()  # start() would begin it and unblock Ctrl-C
+    resource_tracker.ensure_running()  # start() would otherwise start it and unblock Ctrl-C
     with _stop_signals_deferred(), _ctrl_c_blocked():
         process.start()
         crew[ours] = process
@@ -124,7 +124,7 @@ def _hire(work: Callable[[Any], Any], crew: dict[Connection, BaseProcess]) -> Co
 def _stop_signals_deferred() -> Iterator[None]:
     """Signals to stop are handled after the block.
 
-    A mask of this thread would not do: the signal then reaches another thread of the process.
+    Masking them in this thread is not enough: they would reach another thread of the process.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -186,7 +186,7 @@ def _receive(pipe: Connection, process: BaseProcess) -> Any:
     try:
         result, error, trace = pipe.recv()
     except (EOFError, ConnectionError):
-        process.join(1)  # its pipe is closed: it is about to end, and the command with it
+        process.join(1)  # its pipe is closed: the worker is about to end, and so is the command
         code = process.exitcode or 0
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         raise WorkerDied(f"a worker process died ({how})") from None

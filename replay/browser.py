@@ -1,8 +1,6 @@
-"""Recordings in a browser: their folder served on 127.0.0.1, beside rerun's own web viewer.
-
-The viewer is the one that comes with the rerun SDK, so it reads what this SDK has written. Nothing
-is fetched from elsewhere.
-"""
+"""Recordings in a browser: a server of their folder on 127.0.0.1, and rerun's own web viewer.
+The viewer comes with the rerun SDK, so it reads what this SDK has written. Nothing is fetched
+from other hosts."""
 
 from __future__ import annotations
 
@@ -21,11 +19,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
 
-#: Both servers listen here only; the viewer is waited for this long [s].
+#: The only address of both servers; the longest wait for the viewer [s].
 HOST, PATIENCE = "127.0.0.1", 20.0
 #: Endings of the files that are served.
 SERVED = (".rrd", ".html", ".png")
-#: Pages load nothing from elsewhere and send nothing there, whoever wrote them.
+#: Content policy: whoever wrote a page, it loads from and sends to no other host.
 POLICY = "default-src 'self' data: 'unsafe-inline'; form-action 'none'; base-uri 'none'"
 
 
@@ -59,7 +57,7 @@ class BrowserReplay:
             raise
 
     def url(self, name: str) -> str:
-        """Where a browser sees the recording ``name`` of the folder."""
+        """The address of the recording ``name`` of the folder."""
         return _viewed(self._files.viewer, self.address, name)
 
     def wait(self) -> None:
@@ -91,13 +89,13 @@ class _Server(http.server.ThreadingHTTPServer):
     viewer = address = ""
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that leaves before it has read all is no error of ours."""
+        """A browser that closes the connection early is not an error."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
 
 class _Folder(http.server.SimpleHTTPRequestHandler):
-    """The folder's own files; ``open/NAME`` leads to the viewer with that recording."""
+    """Serve the folder's own files; ``open/NAME`` redirects to the viewer with that recording."""
 
     server: _Server
 
@@ -125,7 +123,7 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
         return self.headers.get_all("Host") in ([f"{HOST}:{port}"], [f"localhost:{port}"])
 
     def _own_file(self) -> bool:
-        """Whether the path is a regular file of the folder that is served and behind no link."""
+        """Whether the path is a regular file inside the folder and not reached through a link."""
         file, folder = Path(self.translate_path(self.path)), Path(self.directory)
         if file == folder:
             file = folder / "index.html"
@@ -154,7 +152,7 @@ class _Folder(http.server.SimpleHTTPRequestHandler):
 
 
 def _viewed(viewer: str, files: str, name: str) -> str:
-    """The viewer's address with a recording, drawn by WebGL, which every browser has."""
+    """The viewer's address with a recording; WebGL draws it, since every browser has that."""
     return f"{viewer}/?url={quote(f'{files}/{quote(name)}', safe='')}&renderer=webgl"
 
 

@@ -20,7 +20,7 @@ from tauguard.replay.rrd import COLOURS, TIMELINE, drawn, entity, lay_out, log_p
 #: Contacts of one checker: their times [s], shape (K,), points [m] and normals, shape (K, 3).
 Marks = tuple[Array, Array, Array]
 POINT = 6e-3  # [m] radius of a drawn contact
-NORMAL = 0.06  # [m] an arrow along its normal begins and ends this far from it, to be seen outside
+NORMAL = 0.06  # [m] half length of the arrow along the normal, visible outside the bodies
 CLOTH = (170, 120, 90)
 
 
@@ -89,7 +89,7 @@ def write_contacts_rrd(
 def _eye(
     marks: Mapping[str, Marks], positions: Array, vertices: Array | None
 ) -> rrb.EyeControls3D | None:
-    """Across the contacts' mean normal, so that both partners are seen from the side."""
+    """A viewing direction across the mean normal of the contacts: it shows both partners."""
     known = [np.isfinite(seen[1]).all(axis=1) for seen in marks.values()]
     points = [seen[1][rows] for seen, rows in zip(marks.values(), known, strict=True)]
     normals = [seen[2][rows] for seen, rows in zip(marks.values(), known, strict=True)]
@@ -108,7 +108,7 @@ def _eye(
 
 
 def _blueprint(eye: rrb.EyeControls3D | None) -> rrb.Blueprint:
-    """The scene; beside it how many contacts each checker saw, and where they disagree."""
+    """The layout: scene, number of contacts by checker, and where the checkers disagree."""
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Spatial3DView(origin="/", name="scene", eye_controls=eye),
@@ -161,7 +161,7 @@ def _log_cloth(recording: Any, model: Any, t: Array, vertices: Array) -> None:
 def _log_marks(
     recording: Any, name: str, colour: NDArray[np.uint8], t: Array, marks: Marks
 ) -> None:
-    """The contacts of each interval between two states, shown at its end; none where none."""
+    """Show the contacts of each interval between two states at its end."""
     when, points, normals = marks
     row = np.searchsorted(t, when)
     known = np.flatnonzero((row < len(t)) & np.isfinite(points).all(axis=1))
@@ -184,7 +184,7 @@ def _log_marks(
 def _log_count(
     recording: Any, name: str, colour: NDArray[np.uint8], t: Array, counts: NDArray[np.int64]
 ) -> None:
-    """How many contacts fell into each interval, as a line over time."""
+    """The number of contacts in each interval, as a line over time."""
     place = entity("seen", name)
     recording.log(place, rr.SeriesLines(names=[name], colors=[colour], widths=[2]), static=True)
     columns = rr.Scalars.columns(scalars=counts.astype(np.float64))

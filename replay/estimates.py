@@ -10,7 +10,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.traces.trace import Alarm
 
-#: Least time for which an estimate is shown, from its alarm on [s].
+#: An estimate is shown from its alarm on for at least this time [s].
 SHOWN = 0.5
 
 
@@ -39,9 +39,9 @@ class Explained(Protocol):
 
 
 def during(explained: Sequence[Explained], frames: Array) -> list[Explained | None]:
-    """The estimated contact at each frame time [s], or None where there is none.
+    """The estimated contact at each frame time [s], or None.
 
-    Where several contacts overlap in time, the latest one counts. A payload change is no contact.
+    If several contacts overlap in time, the latest is taken. A payload change is not a contact.
     """
     found: list[Explained | None] = [None] * len(frames)
     for one in sorted(explained, key=lambda e: e.alarm.start):
@@ -54,10 +54,10 @@ def during(explained: Sequence[Explained], frames: Array) -> list[Explained | No
 
 
 def arrows(shown: Sequence[Explained | None], metres: float, longest: float) -> dict[str, Any]:
-    """Vectors and origins of arrows that end at the points, labels, and their number at each frame.
+    """Arrows that end at the points: vectors, origins, labels, and the number at each frame.
 
     Args:
-        shown: one or none a frame.
+        shown: at most one for each frame.
         metres: length of one newton [m/N].
         longest: no arrow is longer [m].
     """

@@ -1,4 +1,4 @@
-"""A picture of ten seconds: the score beside its threshold, and how fast the arm moved."""
+"""A picture of ten seconds: the score with its threshold, and how fast the arm moved."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from tauguard.arrays import Array
     from tauguard.traces import Detection, Trace
 
-#: Scores above so many thresholds are drawn on a logarithmic scale.
+#: The scale is logarithmic if the score exceeds this many thresholds.
 CROWDED = 8.0
 
 
@@ -20,8 +20,8 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
         path: of the picture.
         trace: the stretch, with its truth.
         detection: of that stretch.
-        held: the score that was reached throughout the confirmation time: above the threshold it
-            is an alarm, shape (T,) of that stretch.
+        held: the score that was reached during the whole confirmation time, shape (T,) of that
+        stretch. It is an alarm if it exceeds the threshold.
         title: of the picture.
 
     Raises:
@@ -62,7 +62,7 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
 
 
 def _spread(axes: Any, detection: Detection) -> None:
-    """A logarithmic scale beyond the usual scores, if peaks would hide the threshold."""
+    """Use a logarithmic scale above the usual scores, if peaks would hide the threshold."""
     import numpy as np
 
     scores, edge = detection.score[np.isfinite(detection.score)], abs(detection.threshold)
@@ -70,7 +70,7 @@ def _spread(axes: Any, detection: Detection) -> None:
         return
     usual = max(2 * edge, float(np.quantile(np.abs(scores), 0.9)))
     linear = 10 ** np.ceil(np.log10(usual)) if usual > 0 else np.inf
-    if scores.max() > linear:  # or a logarithmic axis would have no round number to name
+    if scores.max() > linear:  # otherwise a logarithmic axis may have no round number to label
         axes.set_yscale("symlog", linthresh=linear)
 
 
@@ -82,7 +82,7 @@ def _drawn(values: Array) -> Array:
 
 
 def _shade(axes: Any, trace: Trace, detection: Detection) -> None:
-    """Contacts and alarms as bands, each with one line of the legend."""
+    """Draw contacts and alarms as bands, each with one entry of the legend."""
     from tauguard.report.charts import COLOURS
 
     truth = trace.truth

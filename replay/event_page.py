@@ -1,4 +1,4 @@
-"""What a page of wrong detections says of each: its row, its picture, and what the words mean."""
+"""The page of wrong detections: a row and a picture of each, and what the words mean."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from tauguard.replay.events import Event
     from tauguard.traces import Trace
 
-#: Without `tauguard replay --web` nothing answers at these links: they become plain text.
+#: A script that turns the links into plain text when `tauguard replay --web` does not serve the
+#: page.
 OFFLINE = (
     "<script>if (location.protocol === 'file:') "
     "document.querySelectorAll('a[href^=\"open/\"]')"
@@ -23,14 +24,13 @@ OFFLINE = (
 
 
 def row_of(event: Event, trace: Trace, threshold: float, held: Array) -> dict[str, Any]:
-    """What happened, in the columns of the page; what is not known is empty.
+    """The columns of the page for one event; unknown values are empty.
 
     Args:
         event: of this trace.
         trace: with truth.
         threshold: of the score.
-        held: the score that was reached throughout the confirmation time, shape (T,).
-    """
+        held: the score that was reached during the whole confirmation time, shape (T,)."""
     import numpy as np
 
     first, last = np.searchsorted(trace.t, [event.span[0] - 1e-9, event.span[1] + 1e-9])
@@ -52,7 +52,7 @@ def row_of(event: Event, trace: Trace, threshold: float, held: Array) -> dict[st
 
 
 def _planned_speed(trace: Trace) -> float | str:
-    """Percent of the joints' largest speeds that the motion was planned with, if it is written."""
+    """Planned speed in percent of the joints' largest speeds, if the recording states it."""
     try:
         given = trace.meta.get("speed") or json.loads(trace.attachments["episode.json"])["speed"]
         return round(float(given), 1)
@@ -61,7 +61,7 @@ def _planned_speed(trace: Trace) -> float | str:
 
 
 def facts(row: Mapping[str, Any]) -> str:
-    """Of a row: which recording it is, how fast the arm was to move, and what it carried."""
+    """The recording of a row, the planned speed of the arm, and its load."""
     known = (("speed", "%"), ("payload", "g"))
     pairs = [(what, row[f"{what} [{unit}]"], unit) for what, unit in known]
     found = [f"{what} {value:g} {unit}" for what, value, unit in pairs if value != ""]
@@ -69,7 +69,7 @@ def facts(row: Mapping[str, Any]) -> str:
 
 
 def events_html(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A table of the rows of one kind, and below it a picture of each."""
+    """A table of the rows of one kind, with a picture of each below."""
     from tauguard.report.page import Link, tables
 
     if not rows:
@@ -101,8 +101,7 @@ def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
 
     Args:
         late: a collision found later than this is late [s].
-        alarm: the detector, whose times are then given.
-    """
+        alarm: the detector; its times are then part of the definitions."""
     from tauguard.detectors.events import MERGE_GAP, WINDOW
 
     ms = f"{1e3 * late:.0f} ms"

@@ -1,4 +1,4 @@
-"""What a detector got wrong, as recordings of ten seconds and a page that opens them."""
+"""The mistakes of a detector: recordings of ten seconds, and a page that opens them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 #: A recording begins this long before its event and lasts this long [s].
 BEFORE, LENGTH = 0.5, 10.0
-#: Recordings written of one kind of event, at most.
+#: At most this many recordings are written for each kind of event.
 MOST = 100
 KINDS = ("missed", "late", "false alarm")
 #: The names of the recordings.
@@ -25,17 +25,17 @@ OWN = re.compile(r"(missed|late|false-alarm)-\d+\.(rrd|png)")
 
 
 def command_to_open(folder: Path) -> str:
-    """What to type to see the page of a folder of recordings."""
+    """The command that shows the page of a folder of recordings."""
     return f"tauguard replay --web {shlex.quote(str(folder))}"
 
 
 @dataclass(frozen=True)
 class Event:
-    """One thing that a detector got wrong."""
+    """One mistake of a detector."""
 
     kind: str  #: one of :data:`KINDS`
     at: float  #: onset of the collision, or start of the alarm [s]
-    span: tuple[float, float]  #: its window of detection; of a false alarm, the alarm [s]
+    span: tuple[float, float]  #: window of its detection, or span of the false alarm [s]
     collision: str = ""  #: its kind
     link: int | None = None
     peak_torque: float | None = None  #: [N m]
@@ -74,18 +74,18 @@ def events_of(matching: Matching, late: float) -> Iterator[Event]:
 
 
 def _before(alarm: Alarm, collision: Collision) -> str:
-    """The alarm's start [s], so that it reads earlier than the touch."""
+    """The alarm's start [s] as text, with enough digits that it reads earlier than the contact."""
     text = f"{alarm.start:.2f}"
     return text if text != f"{collision.onset:.2f}" else f"{alarm.start:.3f}"
 
 
 def _covers(alarm: Alarm, collision: Collision) -> bool:
-    """Whether the alarm began before the touch and was still up: such an alarm finds nothing."""
+    """Whether the alarm was already up when the contact began: it then detects nothing."""
     return alarm.start < collision.onset <= alarm.end
 
 
 class EventFolder:
-    """Writes a recording and a picture of each event, and in the end the page."""
+    """Writes a recording and a picture of each event, and at the end the page."""
 
     def __init__(self, folder: Path, late: float, alarm: CollisionAlarm | None = None) -> None:
         """Make the folder.
@@ -109,12 +109,12 @@ class EventFolder:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A row for every recording: what happened, and ``file``, its name."""
+        """A row for every recording: what happened, and its name as ``file``."""
         return self._rows
 
     @property
     def counts(self) -> str:
-        """How many of each kind there were, as text."""
+        """The number of events of each kind, as text."""
         many = {"false alarm": "false alarms"}
         return ", ".join(
             f"{count} {kind if count == 1 else many.get(kind, kind)}"
@@ -122,7 +122,7 @@ class EventFolder:
         )
 
     def add(self, name: str, matching: Matching, of: tuple[Trace, Detection]) -> None:
-        """The events of one recording, under the name by which a reader finds it."""
+        """Add the events of one recording. ``name`` tells a reader which recording it is."""
         from tauguard.replay.event_page import row_of
 
         trace, detection = of
@@ -137,7 +137,7 @@ class EventFolder:
                 self._rows.append(row)
 
     def _held(self, trace: Trace, detection: Detection) -> Array:
-        """The score that was reached throughout the confirmation time, shape (T,)."""
+        """The score that was reached during the whole confirmation time, shape (T,)."""
         from tauguard.detectors.events import confirmation_samples, sustained
 
         if self._alarm is None:

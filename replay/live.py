@@ -1,4 +1,4 @@
-"""A running simulation in the rerun viewer, or in a file: what is there is shown as it happens."""
+"""A running simulation, shown in the rerun viewer or written to a file while it runs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from tauguard.replay.robot import bodies
 from tauguard.replay.rrd import ARROW, COLOURS, GREEN, LONGEST_ARROW, RED, TIMELINE, drawn, entity
 
-#: The viewer listens here only, and is waited for this long [s].
+#: The only address that the viewer listens on; the longest wait for it [s].
 HOST, PATIENCE = "127.0.0.1", 20.0
 #: Radius of a target's mark [m].
 MARK = 0.03
@@ -27,7 +27,7 @@ CLOTH = (90, 130, 190)
 
 
 class LiveView:
-    """Sends a scene, and then one instant after the other, to a viewer or a file."""
+    """Sends a scene, and then its states one by one, to a viewer or a file."""
 
     def __init__(self, model: Any, save: Path | None = None, port: int = 9876) -> None:
         """Open the viewer on 127.0.0.1, or the file.
@@ -56,7 +56,7 @@ class LiveView:
         self._named: set[str] = set()
 
     def layout(self, charts: Mapping[str, str]) -> None:
-        """3D left, the named charts (origin -> title) right."""
+        """The layout: 3D on the left, the charts (origin: title) on the right."""
         views = [rrb.TimeSeriesView(origin=origin, name=name) for origin, name in charts.items()]
         scene = rrb.Spatial3DView(origin="scene", name="The scene")
         self._recording.send_blueprint(
@@ -68,7 +68,7 @@ class LiveView:
         )
 
     def show(self, data: Any, seconds: float, targets: ArrayLike) -> None:
-        """Where everything is at ``seconds``, and a ball at each target, shape (k, 3) [m]."""
+        """Show the state at ``seconds``, with a ball at each target, shape (k, 3) [m]."""
         self._recording.set_time(TIMELINE, duration=seconds)
         for index, body in enumerate(self._bodies):
             if body.shapes and (body.moves or seconds == 0):
@@ -97,7 +97,7 @@ class LiveView:
         self._recording.log(f"scene/cloth_{flex}", sheet)
 
     def contact(self, point: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """An arrow at ``point`` [m] along ``force`` [N]; a zero force takes it away."""
+        """Show an arrow at ``point`` [m] along ``force`` [N]; a zero force removes it."""
         size = float(np.linalg.norm(force))
         if size == 0:
             self._recording.log("scene/contact", rr.Clear(recursive=False))
@@ -108,7 +108,7 @@ class LiveView:
         )
 
     def chart(self, origin: str, names: list[str], values: ArrayLike) -> None:
-        """One sample of a chart: a line a name."""
+        """Add a sample to a chart, which has a line for each name."""
         if origin not in self._named:
             colours = [COLOURS[i % len(COLOURS)] for i in range(len(names))]
             lines = rr.SeriesLines(names=names, colors=colours)

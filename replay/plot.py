@@ -1,4 +1,4 @@
-"""A figure of a recording: currents, what contacts do, what a detector says."""
+"""A figure of a recording: currents, contact torques, and the detector's output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot looks like and where its bodies are: a MuJoCo model as shapes and poses."""
+"""Shapes and poses of the bodies of a MuJoCo model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 
-LARGEST_SHOWN_GROUP = 2  # the menagerie's convention, and MuJoCo's viewer's: 3 is for collisions
+LARGEST_SHOWN_GROUP = 2  # in MuJoCo's viewer and the menagerie, group 3 holds collision geoms
 STICK_RADIUS = 0.02  # [m] of the lines that stand for links without geometry
 
 
@@ -48,9 +48,8 @@ class Motion:
 
 
 def load_model(source: Any) -> Any:
-    """A ``mujoco.MjModel`` from itself, an MJCF or URDF file, or MJCF text.
-
-    A URDF whose meshes are not at hand is drawn as sticks between its joints.
+    """A ``mujoco.MjModel`` from a model, an MJCF or URDF file, or MJCF text. A URDF whose meshes
+    are missing is drawn as sticks between its joints.
 
     Raises:
         ValueError: the file or text is no such model, or compiling it takes too much (see
@@ -88,7 +87,7 @@ def load_model(source: Any) -> Any:
 
 
 def bodies(model: Any) -> list[Body]:
-    """Every body of the model that has something to show, the world first."""
+    """Every body of the model that has shapes, the world first."""
     found = []
     for index in range(model.nbody):
         body = model.body(index)
@@ -107,7 +106,7 @@ def bodies(model: Any) -> list[Body]:
 
 
 def shape(model: Any, geom: int) -> Shape | None:
-    """A geom as a shape; None for what is hidden or has no surface of its own (planes, fields)."""
+    """A geom as a shape; None if it is hidden, a plane or a height field."""
     import mujoco
 
     kinds = {

@@ -1,4 +1,4 @@
-"""A trace as a rerun recording (``.rrd``). With :mod:`.live` the only one that knows rerun."""
+"""A trace as a rerun recording (``.rrd``). Only this module and :mod:`.live` import rerun."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FRAME_RATE = 60.0  # [Hz] of the moving bodies
 SERIES_RATE = 200.0  # [Hz] of the charts
 MOST_FRAMES = 30_000  # a long recording is thinned to this, so that the file stays below 30 MB
 MOST_POINTS = 60_000
-SCORE_TOP = 8.0  # times the threshold: the chart of the score ends there, so that both are seen
+SCORE_TOP = 8.0  # times the threshold: end of the chart of the score, so that both are visible
 ARROW = 2e-3  # [m/N]: 100 N is drawn 0.2 m long
 LONGEST_ARROW = 0.5  # [m]
 NORMAL = 0.06  # [m], length of a checked contact's normal
@@ -56,8 +56,8 @@ def write_rrd(
 ) -> None:
     """Write a recording that ``rerun FILE`` opens with its own layout.
 
-    A viewer puts its time cursor at a recording's beginning and nothing in the file can say
-    otherwise, so the recording begins at the first detection of a collision, if there is one.
+    A viewer starts at the beginning of a recording, and nothing in the file can change that. So the
+    recording begins at the first detection of a collision, if there is one.
 
     Args:
         path: the ``.rrd`` file; written atomically.
@@ -66,8 +66,8 @@ def write_rrd(
         model: the scene: ``mujoco.MjModel``, a path of an MJCF or URDF file or MJCF text; by
             default the trace's first attachment that ends in ``.xml``.
         whole: keep what comes before the first detection.
-        explained: what each alarm was; contacts are drawn as blue arrows.
-        about: a line above the text, on what the recording is shown for.
+        explained: the diagnosis of each alarm; contacts are drawn as blue arrows.
+        about: a line above the text that says why the recording is shown.
 
     Raises:
         ValueError: no model, a model without the trace's joints, an empty trace.
@@ -106,7 +106,7 @@ def write_rrd(
 
 
 def lay_out(recording: Any, layout: rrb.Blueprint) -> None:
-    """The layout, before any data: a viewer plays until it has read that it is to wait.
+    """Send the layout before any data, since a viewer plays until it has read that it should wait.
 
     Without the flush a busy machine may write data first.
     """
@@ -115,7 +115,7 @@ def lay_out(recording: Any, layout: rrb.Blueprint) -> None:
 
 
 def thin(t: Array, rate: float, most: int) -> NDArray[np.int64]:
-    """First rows of bins that are 1/``rate`` s long, longer if there would be over ``most``."""
+    """First rows of bins of 1/``rate`` s; bins are longer if there would be over ``most``."""
     span = max(t[-1] - t[0], 1e-9)
     rate = min(rate, most / span)
     bins = np.floor((t - t[0]) * rate + 1e-6).astype(np.int64)
@@ -140,7 +140,7 @@ def entity(*parts: str) -> str:
 
 
 def seen(trace: Trace, shown: Sequence[Body], moved: Motion) -> tuple[Array, float]:
-    """Center [m] and radius [m] of what moves, obstacles apart."""
+    """Center [m] and radius [m] of the moving bodies without the obstacles."""
     names = trace.truth.obstacle_names if trace.truth is not None else ()
     arm = [i for i, body in enumerate(shown) if body.moves and body.name not in names] or [0]
     corners = moved.positions[:, arm].reshape(-1, 3)
@@ -224,7 +224,7 @@ def matrix(quat_wxyz: Array) -> Array:
 
 
 def log_contacts(recording: Any, trace: Trace, starts: NDArray[np.int64]) -> None:
-    """At every frame the strongest contact of its bin, as a point and an arrow; none if none."""
+    """Show the strongest contact of the bin at every frame, as a point and an arrow."""
     truth = trace.truth
     assert truth is not None
     size = np.linalg.norm(truth.contact_vector, axis=1)
@@ -251,7 +251,7 @@ def log_contacts(recording: Any, trace: Trace, starts: NDArray[np.int64]) -> Non
 
 
 def log_checked(recording: Any, trace: Trace) -> None:
-    """What each contact checker reported, as dots with a normal, for the length of a frame."""
+    """Show what each contact checker reported as dots with a normal, for the length of a frame."""
     frames = trace.t[thin(trace.t, FRAME_RATE, MOST_FRAMES)]
     for number, contacts in enumerate(trace.contacts):
         place = f"scene/{entity('checked', contacts.checker)}"
@@ -273,7 +273,7 @@ def log_checked(recording: Any, trace: Trace) -> None:
 
 
 def log_explained(recording: Any, trace: Trace, explained: Sequence[Explained]) -> None:
-    """The contacts that are believed in, as arrows from the alarm on."""
+    """Show the estimated contacts as arrows, from the alarm on."""
     if not explained:
         return
     frames = trace.t[thin(trace.t, FRAME_RATE, MOST_FRAMES)]
@@ -311,7 +311,7 @@ def log_series(recording: Any, trace: Trace, detection: Detection | None) -> Non
 
 
 def log_states(recording: Any, trace: Trace, detection: Detection | None) -> None:
-    """Two lanes: what was true, and when the alarm was up."""
+    """Two lanes: the true contacts, and when the alarm was up."""
     if trace.truth is not None:
         spans = [(c.onset, c.end, c.kind) for c in trace.truth.collisions]
         log_lane(recording, "states/truth", "free", spans, trace.t)
@@ -338,7 +338,7 @@ def log_lane(
 
 
 def blueprint(trace: Trace, detection: Detection | None, center: Array, radius: float) -> Any:
-    """3D left, text below it, charts right."""
+    """The layout: 3D on the left with the text below it, charts on the right."""
     eye = rrb.EyeControls3D(
         position=center + 2.4 * radius * np.array([0.62, -0.68, 0.4]),
         look_target=center,

@@ -1,4 +1,4 @@
-"""What a viewer of a recording should look at: the first detection, and a page of text."""
+"""Guidance for the viewer of a recording: the first detection, and a page of text."""
 
 from __future__ import annotations
 
@@ -20,15 +20,14 @@ def alarm_of(collision: Collision, alarms: tuple[Alarm, ...]) -> Alarm | None:
     onset = collision.onset
     last = collision.end if collision.kind == "clamp" else onset + ALARM_WINDOW
     if any(a.start < onset <= a.end for a in alarms):
-        return None  # it was up before: that is no detection
+        return None  # it was up before, so it detects nothing
     return next((a for a in alarms if onset <= a.start <= last), None)
 
 
 def first_moment(trace: Trace, detection: Detection | None) -> float:
-    """Where to begin [s]: the first alarm of a detected collision, else the first sample.
-
-    At the collision's end, if the alarm comes later: the body that was hit is visible.
-    """
+    """Where to begin [s]: at the first alarm of a detected collision, else at the first sample.
+    If the alarm comes after the collision's end, begin at that end, because the body that was
+    hit is visible there."""
     if trace.truth is None or detection is None:
         return float(trace.t[0])
     found = [(alarm_of(c, detection.alarms), c) for c in trace.truth.collisions]
@@ -39,7 +38,7 @@ def first_moment(trace: Trace, detection: Detection | None) -> float:
 def cut(
     trace: Trace, detection: Detection | None, start: float, end: float = np.inf
 ) -> tuple[Trace, Detection | None]:
-    """What lies between ``start`` and ``end`` [s]; events that lie outside are dropped."""
+    """Cut out the samples and events between ``start`` and ``end`` [s]."""
     first, last = np.searchsorted(trace.t, [start - 1e-9, end + 1e-9])
     rows = slice(int(first), int(last))
 
@@ -67,7 +66,7 @@ def cut(
 def page(
     trace: Trace, detection: Detection | None, explained: Sequence[Explained] = (), about: str = ""
 ) -> str:
-    """The text beside the pictures, in Markdown: what happened first, then how to read it."""
+    """The text beside the pictures, in Markdown: what happened, then how to read them."""
     lines = [f"## {about}", ""] if about else []
     if trace.truth is not None:
         lines += collision_table(trace, detection, explained)

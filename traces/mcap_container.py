@@ -1,10 +1,9 @@
 """MCAP files whose topics are tables: a chunk of messages is packed and unpacked at once.
 
-The container format is the public one (mcap.dev/spec), and the records are the ``mcap`` package's
-own; only the inside of a chunk and its message index, which that package handles a message at a
-time, are laid out here as arrays. Topics of one group share their times and are interleaved row by
-row, in the order of time.
-"""
+The format is the public one (mcap.dev/spec), and the records are those of the ``mcap`` package.
+That package handles one message at a time. Therefore the inside of a chunk and its message index
+are laid out here, as arrays. Topics of one group share their times and are interleaved row by
+row, in the order of time."""
 
 from __future__ import annotations
 
@@ -88,7 +87,7 @@ class Contents:
             self.profile = record.profile
 
     def check_sum(self) -> None:
-        """Hold everything before the end of the data against its checksum, if there is one.
+        """Compare everything before the end of the data with its checksum, if there is one.
 
         Raises:
             ValueError: metadata, names or messages were damaged or changed.
@@ -112,8 +111,8 @@ class Contents:
 
 CHUNK = int(Opcode.CHUNK)
 
-#: A chunk that claims more bytes than this is no recording's [bytes], and neither is a file that
-#: unpacks to more than `MOST_UNPACKED` and to more than `MOST_RATIO` times its size.
+#: Limits of a recording: bytes of a chunk, bytes of a whole unpacked file, and its ratio to the
+#: size of the packed file. The last two must both be exceeded.
 MOST_CHUNK, MOST_UNPACKED, MOST_RATIO = 1 << 27, 1 << 29, 64
 
 
@@ -136,7 +135,7 @@ def check_chunks(chunks: Sequence[tuple[int, memoryview]], size: int) -> None:
 
 
 def unpacked_size(chunk: records.Chunk) -> int:
-    """Bytes that decompression would give, counted no further than a chunk may go."""
+    """Count the bytes that decompression would give, at most to the limit of a chunk."""
     if chunk.compression == "zstd":
         import zstandard
 

@@ -1,4 +1,4 @@
-"""The ROS 2 message types of a trace, as ``ros2msg`` schemas: what any MCAP reader decodes with."""
+"""The ROS 2 message types of a trace as ``ros2msg`` schemas, with which any MCAP reader decodes."""
 
 from __future__ import annotations
 

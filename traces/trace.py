@@ -1,4 +1,4 @@
-"""The typed values that flow: what a robot gives, what is true, what a detector said."""
+"""The typed values that flow: measured signals, the truth, and a detector's output."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Collision:
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true and no real robot tells; rows are samples, as in :class:`Trace`."""
+    """The truth, which no real robot measures; rows are samples, as in :class:`Trace`."""
 
     tau_ext: Array  #: torque of contacts and applied wrenches at the joints [N m], shape (T, n)
     contact_force: Array  #: norm of the net external contact force on the arm [N], shape (T,)
@@ -136,11 +136,9 @@ class Detection:
     detector: str  #: the detector's name
     t: Array  #: [s], shape (T,)
     residual: Array
-    """The observer's estimate of ``tau_ext`` [N m], shape (T, n).
-
-    Without the payload, offsets and friction errors that ``srq-svr`` and the free-motion detector
-    track; of any other detector, all that an observer sees.
-    """
+    """The observer's estimate of ``tau_ext`` [N m], shape (T, n). ``srq-svr`` and the
+    free-motion detector subtract the payload, offsets and friction errors that they track; other
+    detectors subtract nothing."""
     score: Array  #: the detector's output; above ``threshold`` is a raw alarm, shape (T,)
     threshold: float
     alarm: Bools  #: after the output filter, shape (T,)

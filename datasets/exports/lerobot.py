@@ -108,7 +108,7 @@ def columns_of(trace: Trace, episode: int, first: int) -> dict[str, Array]:
 
 
 class Moments:
-    """Smallest, largest, mean and standard deviation of columns, added up by parts."""
+    """Smallest, largest, mean and standard deviation of columns, accumulated part by part."""
 
     def __init__(self, values: Array) -> None:
         """Of rows (T,) or (T, c)."""

@@ -25,7 +25,7 @@ __version__ = version("tauguard")
 
 register_environments()
 
-#: Loaded when they are first asked for.
+#: Packages that are loaded at their first use.
 _PACKAGES = (
     "cloth", "contacts", "datasets", "detectors", "envs", "geometry", "hard_cases", "live",
     "models", "replay", "report", "rigid", "traces",
@@ -35,7 +35,7 @@ _FUNCTIONS = {"plot": "tauguard.replay.plot", "residual": "tauguard.detectors.ca
 
 
 def __getattr__(name: str) -> Any:
-    """A package, or one of the functions that need no package's name."""
+    """Load a package, or one of the functions of the front module."""
     if name in _PACKAGES:
         return importlib.import_module(f"tauguard.{name}")
     if name in _FUNCTIONS:
@@ -44,5 +44,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Everything, loaded or not."""
+    """All public names, loaded or not."""
     return sorted({*globals(), *_PACKAGES, *_FUNCTIONS})

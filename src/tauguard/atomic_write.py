@@ -47,7 +47,7 @@ def write_atomic(path: Path, content: bytes | str) -> None:
 
 
 def remove_parts(folder: Path) -> None:
-    """Remove what killed writers left in ``folder`` and below; nobody may be writing there."""
+    """Remove the files that killed writers left in ``folder``; no writer may be running there."""
     for part in folder.rglob(f".*{PART}"):
         _remove(part)
 

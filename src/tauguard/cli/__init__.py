@@ -37,7 +37,7 @@ COMMANDS = {
     "bench": "run one study of speed against error: a table, a figure, --json",
 }
 
-#: ``module:Class`` of the user's own, which may lie in the working folder.
+#: ``module:Class`` of a user; the module may be in the working folder.
 OWN = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 EPILOG = """\
@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
     """Parse the flags of the function ``command`` in the module ``path`` and call it."""
     if any(OWN.fullmatch(arg) for arg in args):
-        sys.path.append(os.getcwd())  # last, so that nothing of this folder hides a library
+        sys.path.append(os.getcwd())  # last, so that no file of this folder hides a library
     module = importlib.import_module(path)
     for flag, kind in module.command.__annotations__.items():
         given = f"--{flag.replace('_', '-')}"
@@ -111,7 +111,7 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
 
 
 def said(error: Exception) -> str:
-    """What went wrong in words: a system's error by its file, not by its number."""
+    """The message of an error; a system error names its file, not its number."""
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return str(error)

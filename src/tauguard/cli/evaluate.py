@@ -1,4 +1,4 @@
-"""``tauguard evaluate``: a detector's figures on labelled recordings."""
+"""``tauguard evaluate``: a detector's metrics on labelled recordings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def command(
     events: Path | None = None,
     late: float = 0.05,
 ) -> None:
-    """Evaluate a trained detector on labelled recordings; they must not be those of its training.
+    """Evaluate a trained detector on labelled recordings that it was not trained on.
 
     Args:
         traces: folder of MCAP recordings with truth.
@@ -83,7 +83,7 @@ def command(
 def evaluated(
     alarm: CollisionAlarm, recordings: Iterable[Trace], wrong: EventFolder | None
 ) -> tuple[list[Matching], dict[str, Any]]:
-    """Alarms matched with the truth, and all figures; what went wrong is kept by ``wrong``."""
+    """Match alarms with the truth and compute all metrics; ``wrong`` records the mistakes."""
     from tauguard.detectors import detection_metrics, diagnosis_metrics
 
     matchings, said = [], []
@@ -98,7 +98,7 @@ def evaluated(
 def _judged(
     alarm: CollisionAlarm, recordings: Iterable[Trace]
 ) -> Iterator[tuple[str, JudgedRecording]]:
-    """Recordings with their names, which an error gives in place of a number."""
+    """Recordings with their names; an error names the recording."""
     from tauguard.detectors.evaluation.recordings import judged_recordings
 
     names: list[str] = []
@@ -119,5 +119,5 @@ def _judged(
 
 
 def name_of(trace: Trace, number: int) -> str:
-    """By which a reader finds a recording: its file, or its split and number in the dataset."""
+    """The name of a recording: its file, or its split and number in the dataset."""
     return trace.meta.get("log") or trace.meta.get("episode") or str(number)

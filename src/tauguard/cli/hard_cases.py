@@ -1,4 +1,4 @@
-"""``tauguard hard-cases``: named cases with exact answers, put to our kernels and to others."""
+"""``tauguard hard-cases``: cases with exact answers, for tauguard and other libraries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text that all commands print alike: arguments of ``--help``, notes."""
+"""Text that all commands share: arguments of ``--help``, notes."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from typing import Annotated, Any, get_type_hints
 
 import tyro
 
-#: An argument of a docstring: its name, and its text with the lines that go on.
+#: An argument of a docstring: its name, and its text with continuation lines.
 ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
 
 
 def tidy(command: Callable[..., Any]) -> None:
-    """Break an argument's text where the terminal needs it, and name its default once.
-
-    tyro's own note of the default is left out where it is nothing, or where the text has one.
-    """
+    """Join the lines of an argument's text so that the terminal breaks them, and name its
+    default once. tyro's own note of the default is left out if the default is nothing or the
+    text names it."""
     hints = get_type_hints(command, include_extras=True)
     texts = dict(ARGUMENT.findall(inspect.getdoc(command) or ""))
     for name, parameter in inspect.signature(command).parameters.items():

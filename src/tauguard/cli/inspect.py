@@ -35,9 +35,8 @@ def command(
             and check that it has the same bytes.
         mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
             turns that into an .rrd.
-        robot: with --episode, the file of its arm, if that is not the package's own: the dataset
-            has its hash and the numbers that training needs, not its shapes.
-    """
+        robot: with --episode, the file of its arm, if the arm does not come with the package.
+        The dataset holds the file's hash and the numbers for training, but not the shapes."""
     from tauguard.datasets import inspection
     from tauguard.datasets.dataset_folder import HEAD
     from tauguard.report import write_json
@@ -103,7 +102,7 @@ def classes(name: str, one: Mapping[str, Any]) -> list[str]:
 
 
 def verdict(report: Mapping[str, Any]) -> list[str]:
-    """What is missing, shared or damaged."""
+    """Print what is missing, damaged, or shared between splits."""
     lines = []
     gone, damaged = report["missing"], report["damaged"]
     if gone:

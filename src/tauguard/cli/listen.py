@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tauguard.live import RobotStream, Sample
     from tauguard.live.session import Session
 
-#: Pictures a second in rerun.
+#: Frames a second in rerun.
 FRAMES = 30
 DISCLAIMER = "tauguard listens only: it stops nothing and certifies nothing"
 
@@ -58,7 +58,7 @@ def command(
         seconds: how long.
         reconnect: seconds to go on trying when the connection breaks.
         json: write events and latencies here.
-        record: write what was heard as MCAP here.
+        record: write the received samples as MCAP here.
         rerun: `view` opens the rerun viewer; FILE.rrd records what it would show.
     """
     from tauguard.datasets.real_arms import check_robot
