@@ -1,6 +1,9 @@
 """The smallest part of the contacts study, run as a user runs it."""
 
+import pytest
 
+
+@pytest.mark.slow
 def test_checkers_are_compared(bench):
     found, _ = bench("contacts", "--part", "checkers")
     rows = {

@@ -1,6 +1,9 @@
 """The smallest part of the study datasets, through the command line."""
 
+import pytest
 
+
+@pytest.mark.slow
 def test_a_detector_has_its_row_on_every_split_of_a_small_dataset(bench):
     payload, said = bench("datasets", "--part", "entries")
     rows = [row for row in payload["rows"] if row["study"] == "entries"]

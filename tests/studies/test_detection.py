@@ -50,6 +50,7 @@ def test_the_experiment_has_the_dissertations_cells_beside_a_detector_of_ones_ow
     assert whole[0]["hours"] >= 0.09
 
 
+@pytest.mark.slow
 def test_false_alarms_are_counted_beside_the_rate_asked_for(bench):
     file, _ = bench("false_alarms")
     rows = {(r["detector"], r["threshold"], r["asked"]): r for r in file["rows"]}
@@ -72,6 +73,7 @@ def test_a_robot_is_judged_by_its_own_torques(bench):
     assert ours["sensitivity"]["value"] > 0.8
 
 
+@pytest.mark.slow
 def test_a_sample_online_has_the_score_of_the_batch(bench):
     file, _ = bench("detection_online")
     steps = [row for row in file["rows"] if row["study"] == "step"]
@@ -84,6 +86,7 @@ def test_a_sample_online_has_the_score_of_the_batch(bench):
     assert fewer[-1]["us"]["median"] < full["us"]["median"]
 
 
+@pytest.mark.slow
 def test_diagnosis_names_links_kinds_and_forces(bench):
     file, _ = bench("diagnosis")
     tables = {row["study"] for row in file["rows"]}

@@ -1,6 +1,9 @@
 """The study of faults: quick runs of its parts."""
 
+import pytest
 
+
+@pytest.mark.slow
 def test_a_fault_of_samples_is_reported_and_clean_logs_have_none(bench):
     file, _ = bench("faults", "--part", "samples")
     clean = [row for row in file["rows"] if row["study"] == "clean"]
@@ -14,6 +17,7 @@ def test_a_fault_of_samples_is_reported_and_clean_logs_have_none(bench):
         assert faults[name]["median_ms"] < 150
 
 
+@pytest.mark.slow
 def test_a_played_log_is_heard_whole(bench):
     file, _ = bench("listen")
     heard = [row for row in file["rows"] if row["study"] == "listen"]

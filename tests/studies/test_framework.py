@@ -115,6 +115,27 @@ def checkout(tmp_path):
     return run
 
 
+def test_every_part_of_every_study_has_what_the_framework_asks_for():
+    """The parts themselves run in the slow tests; mypy holds what they call."""
+    code = """
+import inspect
+from studies.framework.study import all_parts, package
+for name, part in all_parts().items():
+    module = part.load()
+    assert {"quick", "seed", *part.options} == set(inspect.signature(module.measure).parameters)
+    assert module.NOTES and all(text.endswith(".") for text in module.NOTES.values()), name
+    assert hasattr(module, "draw") or hasattr(package(name.partition("-")[0]), "points"), name
+"""
+    path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+
+
 def rows(path):
     return json.loads(path.read_text())["rows"]
 
