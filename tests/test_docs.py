@@ -38,7 +38,8 @@ def test_the_blocks_run(page, tmp_path, monkeypatch):
 def test_links_lead_somewhere(page):
     prose = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
     for link in re.findall(r"\]\(([^)#:]+)\)", prose):
-        assert (page.parent / link).exists(), f"{page.name}: {link}"
+        if not (page.parent / link).is_relative_to(ROOT / "docs" / "gallery"):  # made by the build
+            assert (page.parent / link).exists(), f"{page.name}: {link}"
 
 
 @pytest.fixture(scope="module")
