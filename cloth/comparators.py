@@ -1,8 +1,8 @@
 """For comparison only: narrow phases of earlier work, which miss collisions and report false ones.
 
-They get the candidates, data layout, compiler flags and threads of ab2pf, so that a comparison
-measures the narrow phase alone. ``comparators.hpp`` says what was taken from which publication and
-what was inferred.
+They use the candidates, data layout, compiler flags and threads of ab2pf, so a comparison
+measures the narrow phase alone. ``comparators.hpp`` says what was taken from which publication
+and what was inferred.
 """
 
 from __future__ import annotations
@@ -75,11 +75,11 @@ def solve(
         rows: Four vertices a query. Shape (N, 4).
         method: One of :data:`METHODS`.
         hit: Written. Shape (N,).
-        out: toi, point, normal, weights as in :class:`tauguard.cloth.Impacts`, written where there
-            is a hit.
+        out: toi, point, normal, weights as in :class:`tauguard.cloth.Impacts`, written for hits
+            only.
 
     Returns:
-        How many queries each stage decided, as in :class:`tauguard.cloth.FrameStats`.
+        The number of queries that each stage decided, as in :class:`tauguard.cloth.FrameStats`.
     """
     if method in COMPARATORS:
         return _mesh.solve_compared(vertex, x_t0, x_t1, rows, COMPARATORS[method], hit, *out)

@@ -1,4 +1,4 @@
-"""What a step of a mesh leads to."""
+"""The result of a step of a mesh."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tauguard.cloth.impacts import Impacts
 
 @dataclass(frozen=True)
 class FrameStats:
-    """How a frame was answered.
+    """Counts and times of a frame.
 
     Attributes:
         vf: Counts of the vertex-face side, in the order in which work is left out: ``node_tests``,
@@ -68,6 +68,6 @@ class Frame:
     stats: FrameStats
 
     def first_time(self) -> float:
-        """When the first collision is, in [0, 1] of the step; inf where there is none."""
+        """Time of the first collision, in [0, 1] of the step; inf if there is none."""
         kinds = self.vf_impacts, self.ee_impacts, self.pe_impacts, self.pp_impacts
         return min(float(impacts.toi.min(initial=np.inf)) for impacts in kinds)

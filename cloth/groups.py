@@ -12,11 +12,13 @@ from tauguard.geometry import Rebuilt, frozen, frozen_indices
 
 @dataclass(frozen=True, eq=False)
 class Groups(Rebuilt):
-    """A group for every vertex and a table of the groups that meet; own copies, read-only.
+    """The group of every vertex, and a table that says which groups meet.
+
+    Both are read-only copies.
 
     Attributes:
-        ids: Shape (V,), the group of every vertex, 0 to G - 1. All vertices of a face belong to
-            one.
+        ids: Shape (V,), the group of every vertex, 0 to G - 1. All vertices of a face belong to one
+            group.
         meets: Shape (G, G), symmetric. ``meets[a, b]`` is False where features of ``a`` and ``b``
             are not to be tested; ``meets[a, a]`` is False for a body that is not tested against
             itself.

@@ -1,15 +1,16 @@
 """Single queries: does a moving vertex meet a moving face, do two moving edges meet?
 
-Points meet edges and points likewise, which are faces without area to the same kernels.
+Points also meet edges and points, which the same kernels treat as faces without area.
 
-ab2pf answers for the doubles given: contact at some time of the step, in exact arithmetic, is a
-hit, nothing else is, and ``toi`` is at most 1e-9 of the step before the first such time. What a
-query can cost is bounded: three cuts of its cubic into at most three pieces of one root, 40 Newton
-steps each; then 41 cuts into intervals (124 at most) of 20 separating directions each; then a fixed
-number of signs of polynomials of degree 3 in exact integers, of fixed width first, of any length
-where those do not tell. That is some 20 ns for most, 3 us where the fixed width tells, 200 us at
-worst for positions of like magnitude; 0.2 s where magnitudes within one query span 10^600, the
-widest that doubles can. With a minimum distance: 4001 cuts, no exact arithmetic, conservative.
+ab2pf takes the given doubles as exact. A query is a hit if and only if there is a contact at
+some time of the step in exact arithmetic. ``toi`` is at most 1e-9 of the step before the first
+such time. The cost of a query is bounded: three cuts of its cubic into at most three pieces of
+one root, 40 Newton steps each; then 41 cuts into intervals (124 at most) of 20 separating
+directions each; then a fixed number of signs of polynomials of degree 3 in exact integers, of
+fixed width first, and of any length if these do not decide. Most queries take some 20 ns, those
+that the fixed width decides 3 us. The worst take 200 us for positions of similar magnitude, and
+0.2 s if magnitudes within one query span 10^600, the widest range of doubles. With a minimum
+distance: 4001 cuts, no exact arithmetic, conservative.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Impacts:
     Attributes:
         hit: Shape (N,).
         toi: Time of impact in [0, 1] of the step, never late; inf without a hit. Shape (N,).
-        point: Where, at that time; NaN where there is no hit. Shape (N, 3).
+        point: The point of contact at that time; NaN without a hit. Shape (N, 3).
         normal: Unit normal at that time of the face by its winding, (f1 - f0) x (f2 - f0), or of
             both edges, (ea1 - ea0) x (eb1 - eb0): not of the side that the features come from,
             nor the direction between them at a ``min_distance``. Zeros where they have none (a

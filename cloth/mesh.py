@@ -2,10 +2,10 @@
 
 The broad phase keeps a hierarchy of k-DOPs (Klosowski et al. 1998), refitted every frame, and the
 front of its bounding-volume traversal tree (Li & Chen 1998; Tang et al. 2010). Three choices are
-ours. Vertices, edges and faces have a tree each, 16 features to a leaf, so that every elementary
-pair comes up exactly once. Volumes may *move*: an interval at each end of the step instead of one
-that sweeps it, which keeps fewer candidates and misses nothing (see ``k_dop.hpp``). And features
-come and go (``update_topology``) without a rebuild.
+our own. Vertices, edges and faces have separate trees with 16 features to a leaf, so that every
+elementary pair comes up exactly once. Volumes may *move*: instead of one interval that covers
+the step they have one at each of its ends. This leaves fewer candidates and misses nothing (see
+``k_dop.hpp``). And features can be added and removed without a rebuild (``update_topology``).
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ class MeshCCD:
             an edge or a point uses take part.
         method: How the narrow phase decides: one of :data:`tauguard.cloth.METHODS`.
         threads: 0 means all processors. Results do not depend on it.
-        groups: Which parts meet; ``None``: everything meets everything, itself included.
+        groups: Which parts meet. ``None``: every part meets every part and itself.
         volume: One of :data:`VOLUMES`. Any of them finds the same collisions; they differ in cost.
-        edges: Edges of no face (rods, wires), shape (L, 2); those that a face has change nothing.
+        edges: Edges of no face (rods, wires), shape (L, 2); edges that a face has are ignored.
         points: Vertices of no face or edge that take part (particles), shape (P,).
 
     Attributes:
@@ -55,10 +55,10 @@ class MeshCCD:
         broad_stats: Counts and seconds of the last :meth:`candidates`; empty before.
 
     The hierarchy is built in the first frame and kept; a call is one step of a motion in which
-    every vertex moves linearly. It works on copies of what it is given. Calls from several Python
+    every vertex moves linearly. It works on copies of its arguments. Calls from several Python
     threads on one object wait for each other; Ctrl-C ends a call, and the object can be used again.
-    So can its copy in a forked process, unless another thread was in a call when it was forked:
-    that raises a ``RuntimeError``. Attributes cannot be assigned; :meth:`update_topology` changes
+    Its copy in a forked process can be used, too. If another thread was in a call at the fork, the
+    copy raises a ``RuntimeError``. Attributes cannot be assigned; :meth:`update_topology` changes
     faces and groups.
 
     Raises:
@@ -77,7 +77,7 @@ class MeshCCD:
         edges: ArrayLike = (),
         points: ArrayLike = (),
     ) -> None:
-        """Check the faces and number the edges; the hierarchy waits for positions."""
+        """Check the faces and number the edges; the first frame builds the hierarchy."""
         self._check_method(method)
         if not isinstance(volume, str) or volume not in VOLUMES:
             raise ValueError(f"volume {volume!r}: there are {', '.join(VOLUMES)}")
@@ -96,7 +96,7 @@ class MeshCCD:
 
     @property
     def edges(self) -> NDArray[np.int32]:
-        """Edges of faces and those given, each once, smaller vertex first, read-only.
+        """Edges of faces and the given ones, each once, smaller vertex first, read-only.
 
         ``Frame.ee`` counts them. Shape (E, 2).
         """
@@ -104,7 +104,7 @@ class MeshCCD:
 
     @property
     def points(self) -> NDArray[np.int32]:
-        """Those given that no face or edge has. Shape (P,)."""
+        """The given points that no face or edge has. Shape (P,)."""
         return self._topology.isolated.points
 
     @property
@@ -210,10 +210,11 @@ class MeshCCD:
         fraction: float = 0.9,
         limit: int = MOST_COLLISIONS,
     ) -> float:
-        """The fraction ``s`` of a step that is free of contact, for a solver to scale its step by.
+        """The fraction ``s`` of a step that is free of contact; a solver scales its step by it.
 
-        The step from ``x_t0`` to ``x_t0 + s * (x_t1 - x_t0)``, as rounded to doubles, is tested
-        again until it has no contact. So rounding cannot add one, and the next step starts apart.
+        The step from ``x_t0`` to ``x_t0 + s * (x_t1 - x_t0)`` is rounded to doubles and tested
+        again until it has no contact. So rounding cannot add a contact, and the next step starts
+        without one.
 
         Args:
             x_t0: Positions at the start of the step [any unit]. Shape (V, 3).
@@ -223,8 +224,8 @@ class MeshCCD:
             limit: As in :meth:`find`.
 
         Returns:
-            1.0 where nothing meets in the whole step; 0.0 where something touches at its start or
-            no positive step is found.
+            1.0 if nothing meets in the whole step. 0.0 if something touches at its start, or no
+            positive step is found.
 
         Raises:
             ValueError: as :meth:`find`, or a ``fraction`` outside (0, 1).

@@ -67,7 +67,7 @@ class Topology:
         edges: NDArray[np.int32],
         groups: Groups | None,
     ) -> None:
-        """All checked; edges are those of the faces and the isolated ones, sorted."""
+        """Check everything; the edges are those of the faces and the isolated ones, sorted."""
         self.faces, self.isolated, self.edges, self.groups = faces, isolated, edges, groups
         used = max(
             (int(x.max()) for x in (faces, isolated.edges, isolated.points) if x.size), default=-1

@@ -1,4 +1,4 @@
-"""Checkers on a run that is already recorded: what they would have reported, step by step."""
+"""Checkers on a recorded run: what they would have reported, step by step."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tauguard.traces import CheckedContacts
 def check_states(
     model: Any, states: Iterable[State | None], checkers: Sequence[str | Checker]
 ) -> tuple[CheckedContacts, ...]:
-    """What each checker sees in a sequence of states.
+    """Return what each checker reports in a sequence of states.
 
     Args:
         model: MjModel.
-        states: in the order of time; ``None`` where something was put elsewhere, so that what lies
-            between its neighbours is no motion.
+        states: in the order of time. ``None`` marks a jump: there is no motion between the states
+            around it.
         checkers: names of registered checkers, or checkers.
 
     Raises:

@@ -31,7 +31,7 @@ KINDS = (
 )
 
 
-#: What the kinematics of a state follow from, beside the model.
+#: The data from which the kinematics of a state follow, besides the model.
 _POSE = int(
     mujoco.mjtState.mjSTATE_QPOS
     | mujoco.mjtState.mjSTATE_MOCAP_POS
@@ -48,8 +48,8 @@ class State:
 
     Between two states a body's point y moves as ``xpos + t dx + exp(t [w]x) xmat y``, t in [0, 1],
     with dx the difference of both xpos and w the shortest rotation vector from one xmat to the
-    other (what ``mj_integratePos`` does with a free joint); a flex vertex moves linearly. That
-    path is what checkers answer about, and the ground truth too.
+    other (what ``mj_integratePos`` does with a free joint); a flex vertex moves linearly. Checkers
+    and the ground truth answer about this path.
 
     Attributes:
         time: [s].
@@ -75,8 +75,8 @@ class State:
     def of(cls, model: Any, data: Any, scratch: Any = None) -> State:
         """The state of ``data`` at its own ``qpos``; ``data`` is not changed.
 
-        After ``mj_step`` the positions in ``data`` are still those that the step began with, so
-        the kinematics are done anew in ``scratch``.
+        After ``mj_step`` the positions in ``data`` are still those from the start of the step. So
+        the kinematics are computed again, in ``scratch``.
 
         Args:
             model: MjModel.
@@ -138,11 +138,12 @@ class Contacts:
     """Contacts of one step, one a row.
 
     Attributes:
-        time: When, as a fraction of the step in [0, 1]; 0 where they touch from the start. (K,).
+        time: When, as a fraction of the step in [0, 1]; 0 for contacts that exist at the start.
+            (K,).
         geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
         flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
         feature: Which vertex, edge or element of each partner, in the checker's own numbering (of
-            MuJoCo: ``contact.vert`` or ``contact.elem``); -1 where it has no say. Shape (K, 2).
+            MuJoCo: ``contact.vert`` or ``contact.elem``); -1 if it names none. Shape (K, 2).
         point: World frame. Shape (K, 3), m; NaN where it is not known.
         normal: Unit vector from the first partner to the second. Shape (K, 3); NaN where unknown.
         distance: Between both surfaces at ``time``, negative in penetration. Shape (K,), m.
@@ -205,7 +206,7 @@ _EMPTY = Contacts(*(np.zeros((0, *tail), dtype=dtype) for _, dtype, tail in _COL
 
 @runtime_checkable
 class Checker(Protocol):
-    """Says what touches in a step. A factory ``(model, **options)`` makes one.
+    """Reports what touches in a step. A factory ``(model, **options)`` makes one.
 
     Attributes:
         name: As registered.
@@ -216,7 +217,7 @@ class Checker(Protocol):
     covers: frozenset[tuple[str, str]]
 
     def check(self, before: State, after: State) -> Contacts:
-        """What touches on the way between both states; see :class:`State` for the way."""
+        """What touches on the path between both states; :class:`State` defines the path."""
         ...
 
 
@@ -225,7 +226,7 @@ _FACTORIES: dict[str, Factory] = {}
 
 
 def asked(one: Checker, before: State, after: State) -> Contacts:
-    """What ``one`` says of the step.
+    """What the checker ``one`` reports of the step.
 
     Raises:
         TypeError: its ``check`` returned something else than :class:`Contacts`.
@@ -245,7 +246,7 @@ def register(name: str, factory: Factory, *, replace: bool = False) -> None:
     Args:
         name: Not empty.
         factory: ``factory(model, **options)`` returns a :class:`Checker`.
-        replace: Take the place of another factory of that name.
+        replace: Replace another factory of that name.
 
     Raises:
         ValueError: an empty name, a name that another factory has, or a factory that cannot be

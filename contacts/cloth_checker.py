@@ -73,7 +73,7 @@ class ClothChecker:
         self._last: tuple[State, State, Contacts] | None = None
 
     def check(self, before: State, after: State) -> Contacts:
-        """What touches on the way; at most one contact a triangle and geom, or two triangles.
+        """What touches on the path: at most one contact for a triangle and a geom or triangle.
 
         Raises:
             ValueError: a state of another model, or that is not finite.
@@ -212,7 +212,7 @@ def _incidence(keys: NDArray[Any], values: NDArray[Any], repeat: int) -> tuple[A
 
 
 def _expand(table: tuple[Any, Any], keys: NDArray[Any], beside: NDArray[Any]) -> tuple[Any, Any]:
-    """Every value of every key, and beside it the key's own companion."""
+    """Every value of every key, each with the key's companion."""
     start, values = table
     counts = start[keys + 1] - start[keys]
     offset = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -37,9 +37,9 @@ def compare(
     fine: int | None = None,
     keep: bool = False,
 ) -> Report:
-    """Run a scene in MuJoCo as it is and let every checker judge every step.
+    """Run a scene in MuJoCo unchanged and let every checker judge every step.
 
-    The checkers only look on. All of them, and the ground truth, get the same path: see
+    The checkers do not influence the run. All of them, and the ground truth, get the same path: see
     :class:`tauguard.contacts.State`.
 
     Args:
@@ -47,11 +47,11 @@ def compare(
         checkers: Names of registered checkers.
         timestep: Of MuJoCo [s]; ``None``: the scene's.
         seconds: How long [s]; ``None``: the scene's own time.
-        options: By checker, what to hand to its factory.
+        options: By checker, keyword arguments of its factory.
         ground_truth: Whether true contacts are computed (slow); without them there is no precision
             or recall.
-        fine: A second yardstick: the scene is also run with steps this many times shorter, up to
-            its first contact (from there on the two runs part); ``None``: it is not.
+        fine: A second reference: the scene is also run with steps this many times shorter, up to
+            its first contact (after it the two runs differ). ``None``: it is not.
         keep: Whether the report keeps the states, for a recording.
 
     Raises:
@@ -78,7 +78,7 @@ def compare(
     chosen = {
         name: checker(name, model, **dict((options or {}).get(name, {}))) for name in checkers
     }
-    # MuJoCo's own contacts are the yardstick of leads and depths, asked for or not.
+    # MuJoCo's own contacts are always needed: leads and depths refer to them.
     yardstick = chosen.get("mujoco") or MujocoChecker(model)
     truth = GroundTruth(model) if ground_truth else None
     judged = truth.covers if truth is not None else None
@@ -144,7 +144,7 @@ def _simulate(
 
 
 def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
-    """What a checker reported, if it is of this model and of this step.
+    """Check that a report fits this model and this step, and return it.
 
     Raises:
         ValueError: a geom or flex that is none, or a time outside the step.
@@ -163,9 +163,9 @@ def _fitting(name: str, model: Any, found: Contacts) -> Contacts:
 def _first_contact(
     scene: ContactScene, timestep: float, seconds: float
 ) -> tuple[float, set[tuple[str, str]]] | None:
-    """When MuJoCo alone first lists surfaces that touch, in steps of ``timestep`` [s], and whose.
+    """When MuJoCo alone, in steps of ``timestep`` [s], first lists touching surfaces, and which.
 
-    Whose: kinds of pairs, see :func:`pair_kind`.
+    The kinds are those of :func:`pair_kind`.
     """
     model, data = scene.start(timestep)
     kinds = geom_kinds(model)

@@ -28,7 +28,7 @@ _NONE = np.zeros((0, 3))
 
 
 def native_scene(model: Any, geoms: Iterable[int], checker: str, surfaces: bool = False) -> Scene:
-    """A native scene of these geoms, numbered as in the list.
+    """Make a native scene of these geoms, numbered as in the list.
 
     Args:
         model: MjModel.

@@ -45,7 +45,7 @@ class Pairs:
         return Pairs(self.first[rows], self.second[rows], self.margin[rows], self.gap[rows])
 
     def reach(self, threshold: str) -> Array:
-        """How far apart counts as contact: 0, the margin, or margin + gap; never below 0."""
+        """The distance that counts as contact: 0, the margin, or margin + gap; never below 0."""
         zero = np.zeros(len(self))
         reach = {"surface": zero, "margin": self.margin, "gap": self.margin + self.gap}
         if threshold not in reach:

@@ -1,4 +1,4 @@
-"""What a comparison says: a score for every checker, events and disagreements."""
+"""The result of a comparison: a score for every checker, events and disagreements."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ class Disagreement:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What MuJoCo made of one event."""
+    """What MuJoCo did in one event."""
 
     partners: tuple[str, str]
     onset: float  #: [s]
     end: float  #: [s]
-    generated: bool  #: MuJoCo listed a contact of this pair while it lasted
+    generated: bool  #: MuJoCo listed a contact of this pair during the event
     held: bool  #: and it kept the partners from passing through one another
 
 
 @dataclass(frozen=True)
 class Score:
-    """How one checker did. ``None``: there was nothing to count, or no ground truth.
+    """The score of one checker. ``None``: there was nothing to count, or no ground truth.
 
     Attributes:
         checker: Its name.
         events: Contacts of two partners, from touch to parting, over the pairs it covers.
-        recalled: Of them, seen: a report within a step of them.
+        recalled: How many of these events it reported, at most one step outside them.
         reports: Steps and partners that it reported.
-        correct: Of them, those that are true, or no deeper than the tolerance.
+        correct: How many of these reports are true, or no deeper than the tolerance.
         steps: Steps and partners that touch beyond the tolerance.
-        steps_found: Of them, reported in that very step.
+        steps_found: How many of these it reported in the same step.
         delay_ms: From an event's onset to its first report, median [ms].
         first: Its first report of any pair [s].
         first_error_ms: How much later that is than the first contact of a finely stepped run of
@@ -86,12 +86,12 @@ class Score:
 
     @property
     def recall(self) -> float | None:
-        """Share of the events that were seen."""
+        """Fraction of the events that were seen."""
         return self.recalled / self.events if self.events and self.recalled is not None else None
 
     @property
     def precision(self) -> float | None:
-        """Share of the reports that are right."""
+        """Fraction of the reports that are right."""
         return self.correct / self.reports if self.reports and self.correct is not None else None
 
 
@@ -99,7 +99,7 @@ class Score:
 class Report:
     """The comparison of several checkers on one run of a scene.
 
-    Printed, it is a table of a line a checker. precision: fraction of its reports that are
+    It prints as a table with a line for each checker. precision: fraction of its reports that are
     true. recall: fraction of the true contacts that it reported within a step. events: contacts of
     the pairs that it covers. delay_ms: from the touch to its first report; lead_ms: how much
     earlier than MuJoCo. depth_mm, normal_deg: difference from MuJoCo's. us_per_step: of one check;
@@ -115,7 +115,7 @@ class Report:
         first_contact: The scene's first contact in a finely stepped run of MuJoCo [s].
         step_us: Of ``mj_step``, median [us].
         state_us: Of copying a state with its kinematics, which all checkers share, median [us].
-        run: States and contacts, where they were kept.
+        run: States and contacts, if they were kept.
     """
 
     scene: str

@@ -17,11 +17,11 @@ from tauguard.contacts.surface_pairs import SurfacePairs
 
 @dataclass(frozen=True)
 class Work:
-    """What the last call had to do.
+    """The work of the last call.
 
     Attributes:
         moved: Bodies whose motion changed since the call before.
-        reused: Pairs answered from the call before, neither body having moved.
+        reused: Pairs answered from the call before, as neither body's motion changed.
         candidates: Pairs whose swept boxes met.
     """
 
@@ -39,8 +39,8 @@ class RigidChecker:
 
     Args:
         model: MjModel.
-        threshold: ``"surface"``: contacts are surfaces that touch; ``"margin"``: or that come
-            within MuJoCo's margin, where a force acts; ``"gap"``: within margin + gap, as MuJoCo
+        threshold: ``"surface"``: a contact is two surfaces that touch. ``"margin"``: or that come
+            within MuJoCo's margin, where a force acts. ``"gap"``: or within margin + gap, as MuJoCo
             lists them. A row whose surfaces do not touch has a positive distance.
         skip: Kinds of geoms to leave out.
         mesh: ``"hull"``: a mesh is its convex hull, as in MuJoCo; ``"surface"``: its triangles,
@@ -86,7 +86,7 @@ class RigidChecker:
         self._bodies = int(model.nbody)
 
     def check(self, before: State, after: State) -> Contacts:
-        """What touches on the way; at most one contact a pair, the first.
+        """What touches on the path: the first contact of each pair.
 
         Raises:
             ValueError: a state of another model, or that is not finite.

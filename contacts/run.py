@@ -1,4 +1,4 @@
-"""A run of a scene under the eyes of several checkers."""
+"""A run of a scene that several checkers observe."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Run:
     states: list[State] = field(default_factory=list)
 
     def recording(self) -> dict[str, Any]:
-        """What :func:`tauguard.replay.contacts.write_contacts_rrd` draws, but for the notes.
+        """Arguments of :func:`tauguard.replay.contacts.write_contacts_rrd`, except the notes.
 
         Raises:
             ValueError: the states were not kept.

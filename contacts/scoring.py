@@ -1,4 +1,4 @@
-"""How a checker did in one run, beside the ground truth and MuJoCo."""
+"""The score of a checker in one run, beside the ground truth and MuJoCo."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _Rows = dict[tuple[int, ...], tuple[float, float, NDArray[np.float64]]]
 def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run) -> Score:
     """Precision, recall, lead, differences and cost of one checker.
 
-    Recall counts events: contacts of two partners from touch to parting, without those that stay
-    within the tolerance. Precision counts reports: a step and two partners whose surfaces touch;
-    margins are not scored. Both count only kinds of pairs that the checker and the ground truth
-    cover; all other metrics count the kinds that the checker covers.
+    Recall counts events: contacts of two partners from the first touch to separation, except
+    those that stay within the tolerance. Precision counts reports: a step and two partners whose
+    surfaces touch; margins are not scored. Both count only kinds of pairs that the checker and
+    the ground truth cover; all other metrics count the kinds that the checker covers.
     """
     kinds = geom_kinds(model)
     given = run.contacts[name]
@@ -78,7 +78,7 @@ def score(model: Any, name: str, covers: Covers, judged: Covers | None, run: Run
 def judge(
     model: Any, times: Sequence[float], touches: Sequence[Touches], mine: Sequence[Contacts]
 ) -> tuple[Outcome, ...]:
-    """What MuJoCo made of every event: did it list it, and did it hold?
+    """For every event: did MuJoCo list it, and did the contact hold?
 
     Held: listed, never deeper than the thinner partner's inner radius (planes and cloth have
     none), and no geom or triangle is pushed the other way from one step to the next.
@@ -200,7 +200,7 @@ def _delay(truth: Sequence[Event], reports: dict[Pair, list[float]], step: float
 
 
 def _lead(mine: dict[Pair, list[float]], theirs: dict[Pair, list[float]]) -> float | None:
-    """Median of how much earlier than MuJoCo each pair's first contact was reported [ms]."""
+    """By how much earlier than MuJoCo the first contact of a pair was reported, median [ms]."""
     leads = [1e3 * (theirs[pair][0] - mine[pair][0]) for pair in mine if pair in theirs]
     return float(np.median(leads)) if leads else None
 
@@ -237,7 +237,7 @@ def _deepest(contacts: Contacts) -> dict[tuple[int, ...], tuple[float, NDArray[n
 
 
 def _passed(before: _Rows, rows: _Rows) -> bool:
-    """Whether a partner is through: too deep, or the same features pushed the other way."""
+    """Whether a partner passed through: too deep, or the same features pushed the opposite way."""
     if any(depth >= inner for depth, inner, _ in rows.values()):
         return True
     return any(before[key][2] @ rows[key][2] < 0 for key in before.keys() & rows.keys())

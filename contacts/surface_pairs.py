@@ -81,7 +81,7 @@ class SurfacePairs:
         return Motion(pose, after.xpos[body] - before.xpos[body], turn)
 
     def _apart(self, a: int, b: int, one: Motion, other: Motion) -> bool:
-        """Whether balls around both bodies' origins stay apart on the whole way."""
+        """Whether balls around both bodies' origins stay apart on the whole path."""
         start: Array = other.pose_t0[0, :3, 3] - one.pose_t0[0, :3, 3]
         drift: Array = other.linear[0] - one.linear[0]
         along = float(np.clip(-(start @ drift) / max(float(drift @ drift), 1e-300), 0, 1))

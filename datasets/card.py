@@ -1,7 +1,8 @@
 """A dataset's card for the Hugging Face hub, its Croissant metadata, and their checksums.
 
 Card and metadata depend only on ``dataset.json`` and the manifest, so a dataset always has the
-same card. The checksums of shards and arms are in the manifest and in ``dataset.json``."""
+same card. The checksums of shards and arms are in the manifest and in ``dataset.json``.
+"""
 
 from __future__ import annotations
 

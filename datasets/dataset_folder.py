@@ -127,8 +127,9 @@ def changed(folder: Path) -> list[tuple[str, str]]:
 
 @contextlib.contextmanager
 def claimed(folder: Path, configuration: Configuration) -> Iterator[None]:
-    """In this block ``folder`` holds this dataset and this process is its only writer. Into an
-    empty folder, head, arms and subfolders are written first.
+    """In this block ``folder`` holds this dataset and this process is its only writer.
+
+    Into an empty folder, head, arms and subfolders are written first.
 
     Raises:
         ValueError: the folder holds something else.

@@ -67,8 +67,10 @@ def episode_seconds(collisions: int, begin: float = BEGIN) -> float:
 
 
 def torque_scale(robot: str) -> float:
-    """Factor on severities and loads for this robot, at most 1. With it, the lower end of the
-    highest severity of :data:`~tauguard.traces.STRATA` equals the robot's largest torque limit.
+    """Factor on severities and loads for this robot, at most 1.
+
+    With it, the lower end of the highest severity of :data:`~tauguard.traces.STRATA` equals the
+    robot's largest torque limit.
 
     Raises:
         ValueError: a robot that cannot be used.

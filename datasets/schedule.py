@@ -2,7 +2,8 @@
 
 Each property (arm, individual, speed, payload, with or without collisions; kind, link and
 severity of a collision) is dealt from a separate deck, which is shuffled every round. So any
-part of a split is balanced to within one round, and no two properties are correlated."""
+part of a split is balanced to within one round, and no two properties are correlated.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Controllers to start from, on the nominal Pinocchio model: each gives joint torques [N m]."""
+"""Basic controllers on the nominal Pinocchio model; each gives joint torques [N m]."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ __all__ = ["Admittance", "ComputedTorque", "GravityPD", "OperationalSpace", "fri
 
 #: The Coulomb part rises over this speed [rad/s].
 SMOOTHING = 0.02
-#: A direction whose mobility is below this fraction of the largest one is nearly singular. There
-#: the tool's stiffness falls, so that torques stay bounded; other directions are not damped.
+#: A direction whose mobility is below this fraction of the largest one is nearly singular. In such
+#: a direction the tool's stiffness is reduced, so that torques stay bounded. Other directions are
+#: not damped.
 NEARLY_LOST = 1e-4
-#: The integral stays within what the spring gives at this error [m, rad].
+#: The integral is limited to the force of the spring at this error [m, rad].
 INTEGRAL_REACH = 0.05
 
 
@@ -116,8 +117,8 @@ class OperationalSpace:
     """tau = J^T L (K e + D (v_des - v) + I sum e) + h + N^T (Kn (q_rest - q) - Dn qd).
 
     L = (J M^-1 J^T)^-1. The tool's error e decays as if every direction had the same unit mass
-    (Khatib 1987); what the tool does not need is held near a rest pose in the null space, which
-    does not move the tool. The integral overcomes static friction.
+    (Khatib 1987); In the null space, which does not move the tool, the arm is held near a rest
+    pose. The integral overcomes static friction.
     """
 
     def __init__(
@@ -230,8 +231,8 @@ class Admittance:
             mass: M [kg m^2], a number or (n,), above 0.
             damping: D [N m s/rad], a number or (n,).
             stiffness: K [N m/rad], a number or (n,).
-            dead_band: torque that counts as none [N m], a number or (n,): what an observer's
-                residual shows without any contact.
+            dead_band: torque that counts as zero [N m], a number or (n,): the residual of an
+                observer without contact.
 
         Raises:
             ValueError: gains of another shape or out of range, or a ``dt`` not above 0.

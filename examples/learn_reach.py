@@ -1,10 +1,10 @@
 """Learn to reach by the cross-entropy method: no deep-learning stack, better within a minute.
 
-A policy is a matrix: joint velocities = tanh(W e), where e is the way from tool to target as the
-first joint sees it. Every generation draws matrices around the best of the last one, lets all of
-them play the same episodes side by side in the vector environment, and keeps the best quarter
-(Rubinstein 1999; Mannor, Rubinstein & Gat 2003). What a blow against a person costs is taken off
-the return.
+A policy is a matrix: joint velocities = tanh(W e), where e is the vector from tool to target in
+the frame of the first joint. Every generation draws matrices around the best of the last one,
+lets all of them play the same episodes side by side in the vector environment, and keeps the
+best quarter (Rubinstein 1999; Mannor, Rubinstein & Gat 2003). The cost of collisions with a
+person is subtracted from the return.
 """
 
 import argparse

@@ -1,11 +1,11 @@
 """Learn to reach beside a person, with and without a budget of force; compare on fresh episodes.
 
-A policy is joint velocities = tanh(W e + V r) (1 - slow c): e the way from tool to target, r the
-way from the person's nearest region to the tool, both as the first joint sees them; c, from 0 to 1,
-how close that region is. The cross-entropy method ranks what it draws by return alone, or, with a
-budget, by return among those whose mean cost an episode keeps the budget, and by cost while there
-are too few of them (Wen & Topcu, "Constrained Cross-Entropy Method", 2018). It learns to reach,
-and goes on from there twice, with and without the budget.
+A policy is joint velocities = tanh(W e + V r) (1 - slow c). e is the vector from tool to target,
+r the vector from the person's nearest region to the tool, both in the frame of the first joint.
+c, from 0 to 1, says how close that region is. Without a budget, the cross-entropy method ranks
+policies by return. With a budget, it ranks those whose mean cost keeps the budget by return, and
+by cost while these are too few (Wen & Topcu, "Constrained Cross-Entropy Method", 2018). It first
+learns to reach, then continues twice, with and without the budget.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Checked conversion of arguments to the arrays that native kernels take."""
+"""Conversion of arguments to the arrays that native kernels take, with checks."""
 
 from __future__ import annotations
 

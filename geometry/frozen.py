@@ -1,4 +1,4 @@
-"""Arrays that nobody can change: what a native kernel keeps must stay what was checked."""
+"""Arrays that nobody can change, for native kernels that keep what was checked."""
 
 from __future__ import annotations
 

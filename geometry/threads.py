@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 import os
 
-#: More threads than this are a mistake in the argument, not a wish.
+#: A larger number of threads is probably a mistake and is refused.
 MOST_THREADS = 1024
 
 

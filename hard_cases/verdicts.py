@@ -10,11 +10,13 @@ from tauguard.hard_cases.case import Case, answer_text
 
 
 def run(cases: Iterable[Case], libraries: Iterable[Adapter]) -> list[dict[str, Any]]:
-    """Put every case to every library and return one row for each answer. A row has ``case``,
-    ``library``, ``expected``, ``answer``, ``right`` and ``wrong``. ``wrong`` says in a few words
-    what is wrong, see :meth:`Case.wrong`. A library without a method for a kind of case is not
-    asked. Nor is one that raises ``NotImplementedError``. Any other exception counts as its
-    answer, and ``wrong`` is ``failed``."""
+    """Put every case to every library and return one row for each answer.
+
+    A row has ``case``, ``library``, ``expected``, ``answer``, ``right`` and ``wrong``. ``wrong``
+    says in a few words what is wrong, see :meth:`Case.wrong`. A library without a method for a kind
+    of case is not asked. Nor is one that raises ``NotImplementedError``. Any other exception counts
+    as its answer, and ``wrong`` is ``failed``.
+    """
     libraries = list(libraries)
     asked = [_row(case, one) for case in cases for one in libraries if hasattr(one, case.kind)]
     return [row for row in asked if row is not None]
@@ -46,8 +48,10 @@ def _row(case: Case, library: Adapter) -> dict[str, Any] | None:
 
 def verdicts(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     """Count by kind and library: cases asked, right answers, and wrong ones by what is wrong.
-    ``missed_or_late`` lets bodies pass through each other. ``invented_or_early`` is too
-    cautious. ``other`` is out of bounds, no number, or an error."""
+
+    ``missed_or_late`` lets bodies pass through each other. ``invented_or_early`` is too cautious.
+    ``other`` is out of bounds, no number, or an error.
+    """
     found: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         found.setdefault((row["kind"], row["library"]), []).append(row["wrong"])

@@ -1,4 +1,4 @@
-"""What is shown runs behind: a slow terminal or viewer loses answers, never the detector time."""
+"""Display in a separate thread: a slow viewer drops answers and never delays the detector."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tauguard.live.stream import Sample
 
 #: Answers that wait to be shown; further ones are dropped, changes of state last.
 WAITING = 1000
-#: Seconds that the end waits for what has not been shown yet.
+#: At the end, wait this long for answers that have not been shown [s].
 PATIENCE = 1.0
 
 
 class BackgroundDisplay:
-    """Shows answers in a thread of its own, and drops what that cannot keep up with.
+    """Shows answers in a separate thread, and drops those that come too fast for it.
 
     Attributes:
         dropped: answers that were not shown.
@@ -47,7 +47,7 @@ class BackgroundDisplay:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Show what is left, for a second at most."""
+        """Show the remaining answers, for a second at most."""
         self._over = True
         self._wake.set()
         self._thread.join(PATIENCE)

@@ -1,14 +1,15 @@
-"""How far answers are behind the robot: arrivals held against the robot's own clock."""
+"""The delay of answers: arrival times compared with the robot's own clock."""
 
 from __future__ import annotations
 
 from tauguard.detectors.alarms.monitor import COLLISION, FAULT, Answer
 
-#: No sample for so long, or samples this much behind the least late of them, are a fault [s].
+#: It is a fault if no sample comes for this time, or if a sample is later than the least late one
+#: by this time [s].
 BEHIND = 20e-3
-#: Or so many sample intervals, where that is longer.
+#: Or this number of sample intervals, if that is longer.
 INTERVALS = 2.5
-#: Two clocks may run apart by this share: each crystal is off by at most 5e-5 by its data sheet
+#: Two clocks may drift apart at this rate: by its data sheet each crystal is off by at most 5e-5
 #: (20 to 50 ppm with temperature and age). A delay that grows more slowly is not seen.
 DRIFT = 1e-4
 
@@ -19,10 +20,10 @@ def most_behind(dt: float) -> float:
 
 
 class Lateness:
-    """How late a sample comes, beside the sample that came least late.
+    """How late a sample is, compared with the least late sample so far.
 
-    The two clocks' difference is not known; its least value so far stands for a sample that came at
-    once. It may grow by ``DRIFT``, so clocks that run apart are not taken for lateness.
+    The difference of the two clocks is unknown, so its least value counts as no delay. This value
+    may grow by ``DRIFT``, so that a drift of the clocks is not taken for lateness.
     """
 
     def __init__(self, dt: float) -> None:
@@ -31,11 +32,11 @@ class Lateness:
         self._least, self._arrived, self._time = float("inf"), 0.0, float("-inf")
 
     def judge(self, answer: Answer, t: float, arrived: float) -> Answer:
-        """The monitor's answer, or a fault where its sample came too late.
+        """Return the monitor's answer, or a fault if the sample came too late.
 
-        The time stamp of a sample that the monitor does not believe says nothing: one stale packet
-        leaves the others as late as they were. A robot whose clock began anew is measured anew once
-        the monitor has settled on it.
+        Time stamps of samples that the monitor rejects are ignored, so one stale packet does not
+        change the lateness of others. After a restart of the robot's clock the measurement restarts
+        when the monitor has settled.
 
         Args:
             answer: the monitor's.
@@ -61,6 +62,9 @@ class Lateness:
 
 
 def late_answer(answer: Answer, late: float) -> Answer:
-    """An answer that comes too late: no collision is not "free", as the robot is further on."""
+    """The answer to a late sample.
+
+    Without a collision it is not "free", since the robot has moved on.
+    """
     reason = f"late: the samples are {1e3 * late:.0f} ms behind the robot"
     return answer._replace(state=COLLISION if answer.alarm else FAULT, reason=reason)

@@ -21,7 +21,7 @@ from tauguard.live.lateness import Lateness
 from tauguard.live.stream import RobotStream, Sample, StreamClosed
 from tauguard.traces.trace import Trace
 
-#: Latencies are counted in so many bins of a microsecond, and one more for longer ones.
+#: Number of bins of a microsecond in which latencies are counted; one more holds longer ones.
 BINS = 100_000
 #: Before the first sample.
 NONE_YET = Answer(FAULT, False, 0.0, "no samples")

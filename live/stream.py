@@ -8,7 +8,7 @@ from typing import Protocol, Self
 
 from tauguard.arrays import Array
 
-#: Events of one stream that are kept; a robot that is lost every second has more in an hour.
+#: Largest number of events that a stream keeps.
 MOST_EVENTS = 1000
 
 
@@ -44,7 +44,7 @@ class RobotStream(Protocol):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """What its joints are called, in the order of the samples."""
+        """Names of the joints, in the order of the samples."""
 
     @property
     def rate(self) -> float:
@@ -62,7 +62,7 @@ class RobotStream(Protocol):
         """
 
     def close(self) -> None:
-        """Let go of the connection; may be called twice."""
+        """Close the connection; may be called twice."""
 
 
 def add_event(events: list[str], event: str) -> None:

@@ -1,8 +1,8 @@
 """A server that speaks RTDE on this machine and plays a log, so that a client has a robot to read.
 
 It answers what a UR controller answers to a client that reads: the handshake, the recipe of output
-variables, start and pause. Inputs are refused. Its clock begins with the first start; whoever
-connects later joins in the middle, as with a robot.
+variables, start and pause. Inputs are refused. Its clock begins with the first start. A client
+that connects later receives the log from the present time on, as from a robot.
 """
 
 from __future__ import annotations

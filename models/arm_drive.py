@@ -1,4 +1,4 @@
-"""The drives of an arm whose file says little of them: stated, assumed, or like the CURA6's."""
+"""The drives of an arm whose file says little: as stated, assumed, or like the CURA6's."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tauguard.models import cura6
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.robot import RobotDrive, RobotRipple, RobotSensors, per_joint
 
-#: Presliding of joints whose friction is known by its level alone [rad].
+#: Presliding distance of joints of which only the friction level is known [rad].
 PRESLIDING = 1.5e-3
 #: The back-EMF brakes a joint no faster than with this time constant [s].
 _FADE_TIME = 4e-3
-#: Gear and gain [N m/A] of drives that nobody states.
+#: Gear and gain [N m/A] of drives for which none are stated.
 _GEAR, _GAIN = 100.0, 10.0
 
 
@@ -34,7 +34,7 @@ def level_friction(coulomb: Array, viscous: Array) -> Friction:
 
 
 def stated_drive(stated: RobotDrive, limit: Array, sources: dict[str, str]) -> Drive:
-    """What a robot's description says of its drives; ``sources`` gets a note of what is assumed."""
+    """The drives that a description states; ``sources`` receives a note of what is assumed."""
     n = len(limit)
     gear, constant = stated.row("gear", n), stated.row("torque_constant", n)
     current, gain = stated.row("current_limit", n), stated.row("gain", n)

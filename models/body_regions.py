@@ -1,9 +1,9 @@
 """Body regions of a person and how hard a robot may press them: power and force limiting.
 
 The numbers are those of the power-and-force-limiting annex of ISO 10218-2:2025, formerly ISO/TS
-15066. Public copies contradict one another, so each value says whether it was confirmed from an
-open source; the others must be verified against the standard before anybody relies on them, and
-nothing here replaces the risk assessment of a real workplace.
+15066. Public copies contradict each other, so each value says whether an open source confirmed
+it. Verify the others against the standard before you rely on them. Nothing here replaces the
+risk assessment of a real workplace.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-#: What to show beside a value that no open source confirmed.
+#: Text to show beside a value that no open source confirmed.
 UNCONFIRMED = "verify against the standard"
 
 
 @dataclass(frozen=True)
 class BodyRegion:
-    """One region: what it bears, how stiff it is and how much of the body moves with it."""
+    """One region: the force that it bears, its stiffness, and the mass that moves with it."""
 
     name: str
     quasi_static_force: float  #: F_QS, when clamped [N]

@@ -24,7 +24,8 @@ RAYLEIGH = 1e-5
 class Cloth:
     """A square cloth of ``count`` x ``count`` vertices in its own x-y plane, edges along x and y.
 
-    At about 20 x 20 a cloth costs a hundred times what the arm costs: list it only where needed.
+    A cloth of about 20 x 20 costs a hundred times as much as the arm: list it only if it is
+    needed.
     """
 
     count: int = 15  #: vertices along each side
@@ -35,10 +36,12 @@ class Cloth:
     quat_wxyz: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 0.5)
     """Orientation; the default hangs it across the x axis, y edge up."""
     pinned: str = "edge"  #: one of :data:`PINS`
-    damping: float = 0.01  #: of the edges [1/s], against ringing; not of an elastic sheet
+    damping: float = 0.01  #: of the edges [1/s], against ringing; not used for an elastic sheet
     young: float | None = None
-    """Young's modulus of an elastic sheet of thickness 2 ``radius`` [Pa], Poisson's ratio 0.3. It
-    needs the integrator ``discrete``. ``None``: edges that hold their length by constraints."""
+    """Young's modulus of an elastic sheet of thickness 2 ``radius`` [Pa], Poisson's ratio 0.3.
+
+    It needs the integrator ``discrete``. ``None``: edges that hold their length by constraints.
+    """
     solref: tuple[float, float] = (0.003, 1.0)  #: MuJoCo's contact parameters
     self_collide: bool = False
 

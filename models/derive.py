@@ -1,4 +1,4 @@
-"""What a robot file leaves open, derived from what it says: each rule with its reason."""
+"""Numbers that a robot file leaves open, derived from stated ones: each rule with its reason."""
 
 from __future__ import annotations
 
@@ -12,26 +12,29 @@ from tauguard.arrays import Array
 #: small motors (about 0.002: 1e-5 kg m^2 behind a gear of 101 for 54 N m) and the DLR arm's
 #: (0.016: 3.2 kg m^2 for 200 N m).
 ROTOR_PER_TORQUE = 0.005
-#: Where there is no torque limit either: this fraction of the joint's largest inertia.
+#: Without a torque limit: this fraction of the joint's largest inertia.
 ROTOR_FRACTION = 0.05
-#: A torque limit that nobody states holds the arm this many times, overcomes the friction of the
-#: file twice, and accelerates the largest inertia so [rad/s^2] (a UR10e's base: 27).
+#: A torque limit that is not stated is the sum of three: this multiple of the torque that holds the
+#: arm, twice the file's friction, and the torque for this acceleration of the largest inertia
+#: [rad/s^2] (a UR10e's base: 27).
 HOLDING_FACTOR, SPARE_ACCELERATION = 2.0, 30.0
-#: Strongest joint's torque limit over what gravity asks of the most loaded one: UR5, UR10, Panda,
-#: xArm7, Z1, Kinova j2s6s200 and the CURA6-like arm have 1.6 to 4.1. Outside of this it is marked.
+#: Torque limit of the strongest joint over gravity's torque at the most loaded joint. UR5, UR10,
+#: Panda, xArm7, Z1, Kinova j2s6s200 and the CURA6-like arm have 1.6 to 4.1. A ratio outside this
+#: range is reported.
 PLAUSIBLE = (1.0, 8.0)
-#: Gravity turns no hinge of an arm whose largest such torque over its weight is below this [m].
+#: If the largest gravity torque over the arm's weight is below this [m], gravity turns no hinge.
 SHORTEST_LEVER = 0.02
 #: Joint speed of an arm whose file states none [rad/s], and acceleration of every such arm.
 DEFAULT_SPEED, DEFAULT_ACCELERATION = 2.0, 10.0
-#: Poses that inertia and gravity are looked at in.
+#: Number of poses in which inertia and gravity are computed.
 POSES = 64
-#: A pose is drawn within this of zero where a joint has no range [rad].
+#: A joint without a range is drawn within this of zero [rad].
 FREE_RANGE = np.pi
 #: Distance of the home pose from both ends of a joint's range, as a fraction of it.
 HOME_MARGIN = 0.1
-#: A default bandwidth is lowered until the servo's stiffest mode (:func:`stiffest_mode`) changes by
-#: at most this much a step; a stated one may go up to the second number, 2 would be unstable.
+#: A default bandwidth is lowered until the change of the servo's fastest mode in a step
+#: (:func:`stiffest_mode`) is at most the first number. With a stated bandwidth it may be up to the
+#: second. At 2 the servo would be unstable.
 MOST_PER_STEP, LIMIT_PER_STEP = 1.0, 1.5
 #: A joint turns by less than this while a contact builds up [rad]: 5 cm at a lever of 0.2 m.
 PRESSING = 0.25
@@ -95,9 +98,9 @@ def holding_torque(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
 
 
 def implausible_limit(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) -> str:
-    """What is odd about a file's torque limits [N m], shape (n,), in words; "" for nothing.
+    """Say what is odd about a file's torque limits [N m], shape (n,); "" if nothing is.
 
-    A serial arm's strongest joint gives a few times what gravity asks of the most loaded one.
+    The strongest joint of a serial arm gives a few times the gravity torque of the most loaded one.
     """
     hinge = model.jnt_type[joint_ids(model, joints)] == mujoco.mjtJoint.mjJNT_HINGE
     if not hinge.any():
@@ -106,7 +109,7 @@ def implausible_limit(model: mujoco.MjModel, joints: tuple[str, ...], limit: Arr
     weight = float(np.linalg.norm(model.opt.gravity)) * float(model.body_mass.sum())
     held, most = int(np.argmax(needed)), int(np.argmax(np.where(hinge, limit, 0.0)))
     if needed[held] < SHORTEST_LEVER * weight:
-        return ""  # axes that gravity does not turn: nothing to compare with
+        return ""  # gravity turns no axis: nothing to compare with
     low, high = PLAUSIBLE
     ratio = limit[most] / needed[held]
     if low <= ratio <= high:
@@ -132,10 +135,10 @@ def rotor_inertia(model: mujoco.MjModel, joints: tuple[str, ...], limit: Array) 
 def largest_energy(
     model: mujoco.MjModel, joints: tuple[str, ...], speed: Array, limit: Array
 ) -> tuple[float, float]:
-    """What an arm can put into a contact [J]: in motion at its speeds, and by its drives.
+    """Energy that an arm can put into a contact [J]: of its motion, and the work of its drives.
 
-    The kinetic energy 1/2 v^T |M| v is that of the worst signs of the joints' largest speeds, over
-    the random poses. The work is that of all drives at their limits over :data:`PRESSING`.
+    The kinetic energy 1/2 v^T |M| v takes the largest joint speeds with the worst signs, over the
+    random poses. The work is that of all drives at their limits over :data:`PRESSING`.
     """
     masses = np.abs(inertia_matrices(model, joints, random_poses(model, joints)))
     moving = 0.5 * float(np.einsum("i,kij,j->k", speed, masses, speed).max())
@@ -156,14 +159,14 @@ def torque_limit(model: mujoco.MjModel, joints: tuple[str, ...], stated: Array) 
 
 
 def servo_inertia(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
-    """What a joint's servo has to move [kg m^2]: the largest inertia over the poses, shape (n,)."""
+    """Inertia that a joint's servo has to move: the largest over the poses [kg m^2], shape (n,)."""
     masses = inertia_matrices(model, joints, random_poses(model, joints))
     most: Array = masses.diagonal(axis1=1, axis2=2).max(axis=0)
     return most
 
 
 def lightest_inertia(model: mujoco.MjModel, joints: tuple[str, ...]) -> Array:
-    """The least that a joint alone has to move, the others free: 1 / (M^-1)_ii, shape (n,)."""
+    """Least inertia that a joint moves, with the others free: 1 / (M^-1)_ii, shape (n,)."""
     masses = inertia_matrices(model, joints, random_poses(model, joints))
     least: Array = 1 / np.linalg.inv(masses).diagonal(axis1=1, axis2=2).max(axis=0)
     return least
@@ -192,10 +195,10 @@ def stiffest_mode(
 
 
 def home_pose(model: mujoco.MjModel, joints: tuple[str, ...], tip: int) -> Array:
-    """A pose to work from: in front of the base, clear of singular poses and of the joints' ends.
+    """A home pose [rad], shape (n,): in front of the base, away from singular poses and limits.
 
-    Of fixed random poses the one with the most manipulability, weighted by how far the joints are
-    from the ends of their ranges and the tool from the middle of its reach. [rad], shape (n,)
+    Of fixed random poses it has the largest manipulability, weighted by the distance of the joints
+    from their limits and of the tool from the middle of its reach.
     """
     at = joint_ids(model, joints)
     adr, dof = model.jnt_qposadr[at], model.jnt_dofadr[at]

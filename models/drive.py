@@ -84,7 +84,7 @@ class Ripple:
         return series
 
 
-#: An error that changes sign with the velocity does so over this speed [rad/s].
+#: Speed range over which an error that follows the sign of the velocity changes its sign [rad/s].
 DIRECTION_SPEED = 0.02
 
 
@@ -98,8 +98,8 @@ class Sensors:
     velocity_noise: float = 5e-4  #: standard deviation [rad/s]
     velocity_quantum: float = 0.0  #: [rad/s]
     directional: Ripple | None = None
-    """Error of the current that changes sign with the velocity: added to what is reported, without
-    an effect on the motion. Its cycles are those of a joint's revolution."""
+    """Error of the reported current that changes sign with the velocity; it has no effect on the
+    motion. Its cycles count per revolution of a joint."""
 
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
@@ -116,7 +116,7 @@ class Sensors:
     def measure(
         self, rng: np.random.Generator, q: Array, qd: Array, current: Array
     ) -> tuple[Array, Array, Array]:
-        """What the sensors say of true signals of shape (T, n); noise first, then the quantum.
+        """Measured signals from true ones of shape (T, n): noise is added, then they are quantised.
 
         Raises:
             ValueError: signals that are not all of one shape (T, n) for the n of these sensors.
@@ -138,7 +138,7 @@ class Sensors:
 
 
 def _rounded(signal: Array, quantum: Array | float) -> Array:
-    """To the nearest multiple of ``quantum``; a quantum of 0 leaves the signal as it is."""
+    """Round to the nearest multiple of ``quantum``; a quantum of 0 changes nothing."""
     given = np.asarray(quantum) > 0
     if given.all():
         return np.rint(signal / quantum) * quantum
@@ -146,9 +146,9 @@ def _rounded(signal: Array, quantum: Array | float) -> Array:
     return np.where(given, np.rint(signal / step) * step, signal)
 
 
-#: Parts that :meth:`Drive.without` leaves out: all friction; its higher level near standstill, its
-#: growth with the torque, its change with temperature; torque ripple; the current loop's lag; noise
-#: and quantisation of the sensors.
+#: Parts that :meth:`Drive.without` can leave out: all friction; three parts of it (the higher level
+#: near standstill, the growth with the torque, the change with temperature); torque ripple; the
+#: current loop's lag; noise and quantisation of the sensors.
 PARTS = ("friction", "stribeck", "load", "warmth", "ripple", "lag", "sensors")
 
 
@@ -164,8 +164,11 @@ class Drive:
     ripple: Ripple | None = None
     sensors: Sensors | None = None
     rated_speed: Array | None = None
-    """Up to it the full torque is available [rad/s], shape (n,); above it the back-EMF takes of the
-    torque along the motion, all of it at ``no_load_speed``, and brakes beyond."""
+    """Up to this speed the full torque is available [rad/s], shape (n,).
+
+    Above it the back-EMF reduces the torque along the motion, to zero at ``no_load_speed``, and
+    brakes beyond.
+    """
     no_load_speed: Array | None = None  #: [rad/s], above the rated speed, shape (n,)
 
     def __post_init__(self) -> None:

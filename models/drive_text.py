@@ -1,4 +1,4 @@
-"""The numbers of a drive as text, so that a recording of any arm has them with it."""
+"""The numbers of a drive as text, which a recording carries with it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors
 
-#: Of the text; a reader refuses newer ones.
+#: Version of the text; a reader refuses newer ones.
 VERSION = 1
 _PARTS = {"friction": Friction, "ripple": Ripple, "sensors": Sensors}
 
 
 def drive_text(drive: Drive) -> str:
-    """``drive`` as JSON, every digit; :func:`drive_of` makes an equal one."""
+    """``drive`` as JSON with every digit; :func:`drive_of` gives back an equal drive."""
     values = {"version": VERSION, **asdict(drive)}
     if drive.sensors is not None and drive.sensors.directional is None:
         del values["sensors"]["directional"]

@@ -1,4 +1,4 @@
-"""How heavy an arm is where it strikes: its reflected mass, and the standard's simple estimate."""
+"""The effective mass of an arm at an impact: reflected mass, and the standard's estimate."""
 
 from __future__ import annotations
 
@@ -47,7 +47,8 @@ def blow_velocity(
 ) -> Array:
     """Joint velocities [rad/s] that move the point at ``speed`` [m/s] along the direction, (n,).
 
-    Of all of them the ones with the least kinetic energy; arguments as in :func:`reflected_mass`.
+    Of all such velocities these have the least kinetic energy; arguments as in
+    :func:`reflected_mass`.
     """
     mass, column = _along(scene, q, body, point, direction)
     step = np.linalg.solve(mass, column)

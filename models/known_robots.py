@@ -1,6 +1,7 @@
 """Arms by name: where their model comes from, and the numbers that no model file has.
 
-Every number names its source. What a row leaves out is derived, see :mod:`tauguard.models.derive`.
+Every number names its source. Numbers that a row leaves out are derived, see
+:mod:`tauguard.models.derive`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class KnownRobot:
     robot: Robot  #: its ``file`` is the name
     urdf: str | None  #: path below ``robots`` of example-robot-data
     menagerie: str | None
-    sources: Mapping[str, str]  #: of each field that the row states
+    sources: Mapping[str, str]  #: source of each field that the row states
 
 
 def _row(
@@ -151,7 +152,7 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
 
 
 def known_names() -> tuple[str, ...]:
-    """Names of the table, then those of mujoco-menagerie's arms where it is installed."""
+    """Names of the table, then those of mujoco-menagerie's arms if it is installed."""
     names = list(ROBOTS)
     if importlib.util.find_spec("mujoco_menagerie") is not None:
         import mujoco_menagerie
@@ -193,14 +194,14 @@ def find_file(name: str) -> Path:
 
 
 def robot_data_folders() -> list[Path]:
-    """Where example-robot-data keeps its models; ``package://example-robot-data`` is its share."""
+    """The folder of example-robot-data's models, which ``package://example-robot-data`` means."""
     inside = Path("cmeel.prefix", "share", "example-robot-data")
     found = [Path(folder) / inside for folder in sys.path if folder]
     return [folder for folder in found if folder.is_dir()]
 
 
 def menagerie_file(name: str, download: bool = False) -> Path | None:
-    """The MJCF file of a menagerie model, None where it is not at hand.
+    """The MJCF file of a menagerie model, None if it was not downloaded.
 
     Args:
         name: as mujoco-menagerie has it.

@@ -1,4 +1,4 @@
-"""Points all over the links of an arm: where something can touch it."""
+"""Points on the surface of an arm's links, where something can touch it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class LinkSurface:
             raise ValueError("link: expected 0-based numbers in rising order")
 
     def only(self, links: Iterable[int]) -> LinkSurface:
-        """The surface of some links alone (1-based): what can be reached, where that is known.
+        """The surface of some links only (1-based), for an arm of which only these can be touched.
 
         Raises:
             ValueError: a link that has no surface here.
@@ -60,8 +60,8 @@ def link_surface(
     """Sample the surface of every moving link of an arm.
 
     Straight lines with uniformly distributed direction and offset meet a convex surface with equal
-    density everywhere (Crofton), so the points where such lines enter a link are spread evenly over
-    what can be touched from outside; what lies inside another geom of the link is never met.
+    density everywhere (Crofton). So the points where such lines enter a link are spread evenly over
+    the surface that can be touched from outside. No line enters where one geom lies inside another.
 
     Args:
         source: MJCF or URDF (text or file), a spec or a compiled model, holding the arm only.
@@ -104,7 +104,8 @@ def arm_surface(
     """The surface of the arm in a robot file, and the links whose shape is a capsule only.
 
     Meshes of a URDF are looked for from its folder upwards. A link without a shape that MuJoCo
-    reads is a capsule of 50 mm radius along it; how far the last one reaches, nobody knows.
+    reads becomes a capsule of 50 mm radius along it. This is impossible for the last link, whose
+    end is unknown.
 
     Args:
         path: MJCF or URDF file.

@@ -1,4 +1,4 @@
-"""How the simulated arm differs from the nominal one that the observer believes in."""
+"""How the simulated arm differs from the nominal one that the observer assumes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from tauguard.models.drive import Drive
 
 @dataclass(frozen=True)
 class Mismatch:
-    """One arm out of many: each number is a half-width of a uniform, relative (com: absolute).
+    """An individual arm.
+
+    Each number is the half-width of a uniform distribution, relative (com: absolute).
 
     The inertia of a link is scaled with its mass and by a common factor. Its principal moments are
     scaled by independent factors, each at most a quarter of ``inertia``, so that the inertia stays
@@ -95,7 +97,7 @@ def _inertia_matrix(body: mujoco.MjsBody) -> np.ndarray:
 
 
 def _possible(moments: np.ndarray) -> np.ndarray:
-    """Principal moments that obey the triangle inequality: the largest is cut to fit."""
+    """Principal moments that obey the triangle inequality; the largest is reduced if necessary."""
     order = np.argsort(moments)
     out = moments.copy()
     out[order[2]] = min(out[order[2]], 0.999 * (out[order[0]] + out[order[1]]))

@@ -1,4 +1,4 @@
-"""Specs compiled without meshes that are not at hand; text that gives the same numbers again."""
+"""Compiling a spec whose meshes are missing, and MJCF text with every digit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DIGITS = 17
 
 @functools.cache
 def _precise_library() -> ctypes.CDLL | None:
-    """The MuJoCo library, if it lets the digits of its XML be chosen."""
+    """The MuJoCo library, if it lets a caller choose the digits of its XML."""
     try:
         found = library()
     except OSError:
@@ -59,7 +59,7 @@ class SpecText:
         return self._text
 
     def dynamics(self) -> mujoco.MjModel:
-        """The compiled model without shapes; inertial numbers that they would give are kept."""
+        """The compiled model without shapes, with the inertia that the shapes would give."""
         spec = self._spec.copy()
         if not all(body.explicitinertial for body in spec.bodies if body.name != "world"):
             return mujoco.MjModel.from_xml_string(str(self))
@@ -68,7 +68,7 @@ class SpecText:
 
 
 def without_shapes(spec: mujoco.MjSpec, geoms: list[mujoco.MjsGeom]) -> None:
-    """Delete geoms, and the meshes and materials that nothing uses any more."""
+    """Delete geoms, and the meshes and materials that are then unused."""
     for geom in geoms:
         spec.delete(geom)
     used = {geom.meshname for geom in spec.geoms}
@@ -78,7 +78,7 @@ def without_shapes(spec: mujoco.MjSpec, geoms: list[mujoco.MjsGeom]) -> None:
 
 
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The model of ``spec``, without its mesh geoms where these keep it from compiling.
+    """The model of ``spec``; without its mesh geoms if it does not compile with them.
 
     Raises:
         ValueError: it compiles neither with nor without shapes; MuJoCo's first message.

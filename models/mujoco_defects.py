@@ -1,4 +1,4 @@
-"""Known defects of MuJoCo versions that change results, and which models they hit."""
+"""Known defects of MuJoCo versions that change results, and the models that they concern."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 
 import mujoco
 
-#: Versions whose Newton solver factors a wrong Hessian where the Jacobian is sparse: it may stop at
-#: its limit of iterations, with wrong accelerations. Mended in 4.0.1.
+#: Versions whose Newton solver factors a wrong Hessian if the Jacobian is sparse. It may then stop
+#: at its limit of iterations with wrong accelerations. Fixed in 4.0.1.
 WRONG_SPARSE_NEWTON = ("4.0.0",)
 
 

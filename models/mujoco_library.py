@@ -25,7 +25,7 @@ def library() -> ctypes.CDLL:
 
 @functools.cache
 def function_address(name: str) -> int:
-    """Where one of its functions begins."""
+    """The address of one of its functions."""
     address = ctypes.cast(getattr(library(), name), ctypes.c_void_p).value
     assert address is not None
     return address
@@ -33,5 +33,5 @@ def function_address(name: str) -> int:
 
 @functools.cache
 def variable_address(name: str) -> int:
-    """Where one of its global variables lies."""
+    """The address of one of its global variables."""
     return ctypes.addressof(ctypes.c_void_p.in_dll(library(), name))

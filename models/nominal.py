@@ -1,8 +1,8 @@
 """The nominal rigid-body model of an arm in Pinocchio, from the numbers that MuJoCo compiles.
 
-``pin.buildModelFromMJCF`` ignores base rotations, ``<option gravity>`` and everything below the
-first top-level body, without a word. Here MuJoCo compiles the file, and the Pinocchio model is
-built from the compiled numbers, so that both describe the same arm, for MJCF and URDF alike.
+``pin.buildModelFromMJCF`` silently ignores base rotations, ``<option gravity>`` and everything
+below the first top-level body. Here MuJoCo compiles the file, and the Pinocchio model is built
+from the compiled numbers, so that both describe the same arm, for MJCF and URDF alike.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tauguard.models.checks import rigid_pose
 from tauguard.models.robot_check import checked_robot, checked_text
 from tauguard.untrusted_input import read_text
 
-#: Elements of a robot file inside one another, at most.
+#: Deepest nesting of elements in a robot file.
 MOST_DEPTH = 200
 
 
@@ -77,7 +77,7 @@ def _without_shapes(urdf: str) -> str:
 
 
 def _check_depth(root: ElementTree.Element) -> None:
-    """Elements nested deeper than any robot's exhaust the stack of what writes them again."""
+    """Refuse deep nesting, which would exhaust the stack when the text is written again."""
     level, depth = [root], 0
     while level:
         level, depth = [child for one in level for child in one], depth + 1

@@ -1,4 +1,4 @@
-"""What the arm may meet, and contacts that are as stiff as they say."""
+"""Obstacles that the arm may touch, and contacts of a stated stiffness."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tauguard.models.checks import above_zero, not_negative
 
 Vector = tuple[float, float, float]
 
-#: Where an obstacle waits until it is needed [m].
+#: Position of an obstacle until it is used [m].
 PARKED = (0.0, 0.0, 50.0)
 
 
@@ -103,7 +103,7 @@ Obstacle = Striker | Clamp | BodyProxy
 
 
 class Springy(Protocol):
-    """What a contact is as stiff as."""
+    """An object that states the stiffness and damping of its contacts."""
 
     @property
     def stiffness(self) -> float:
@@ -175,7 +175,7 @@ def add_floor(spec: mujoco.MjSpec) -> None:
 def add_pairs(
     spec: mujoco.MjSpec, shapes: list[mujoco.MjsGeom], obstacles: Mapping[str, Springy]
 ) -> None:
-    """One contact pair for every shape of the arm and every obstacle, as stiff as it says.
+    """Add a contact pair for each shape of the arm and each obstacle, of the stated stiffness.
 
     With d = solimp's dmin small, MuJoCo's direct solref format gives f = (K pen + B v) / A for a
     ``solref`` of (-K, -B), whatever the pose; A is the sum of both bodies' translational

@@ -16,7 +16,7 @@ _NO_MASS, _NO_INERTIA = 1e-6, 1e-9
 
 
 def add_payload_body(spec: mujoco.MjSpec, flange: mujoco.MjsSite) -> None:
-    """Add the body ``payload`` at ``flange``: nearly weightless, visible, touching nothing."""
+    """Add the body ``payload`` at ``flange``: nearly weightless, visible, without contacts."""
     body = flange.parent.add_body(name="payload", pos=flange.pos, quat=flange.quat)
     body.explicitinertial = True
     body.mass = _NO_MASS
@@ -35,7 +35,7 @@ def add_payload_body(spec: mujoco.MjSpec, flange: mujoco.MjsSite) -> None:
 
 
 def load_body(model: mujoco.MjModel, body: int, mass: float) -> None:
-    """Mass [kg] and inertia of the payload body alone; derived constants are left as they are."""
+    """Set mass [kg] and inertia of the payload body; derived constants stay unchanged."""
     load = max(mass, _NO_MASS)
     model.body_mass[body] = load
     model.body_inertia[body] = max(load * 0.4 * _RADIUS**2, _NO_INERTIA)
@@ -44,8 +44,7 @@ def load_body(model: mujoco.MjModel, body: int, mass: float) -> None:
 def set_payload(model: mujoco.MjModel, data: mujoco.MjData, body: int, mass: float) -> None:
     """Give the payload body a mass [kg], from now on; a compact load in front of the flange.
 
-    The model's derived constants are brought up to date and contact pairs keep the stiffness that
-    they say.
+    The model's derived constants are updated, and contact pairs keep their stated stiffness.
 
     Args:
         model: the scene's; changed.

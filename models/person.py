@@ -1,17 +1,17 @@
-"""A person of capsules, a body region each, sized by stature.
+"""A person made of capsules, one for each body region, sized by stature.
 
 Lengths are fractions of the stature after Drillis & Contini, "Body Segment Parameters" (1966), as
 in Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1. Statures are those of
 Huston, "Principles of Biomechanics" (2009). The radii are estimates from girths of adults (no
-source was at hand): verify them where a clearance counts.
+source was found): verify them if a clearance depends on them.
 
 Each capsule hangs in a frame that follows the person's motion exactly (a MuJoCo mocap body) and
 may give way in it: three slides with the region's effective mass behind them, held by a weak
-spring. An impact then involves the two masses and the spring of ISO 10218-2 and its peak is the
-standard's; a frame alone would weigh infinitely much (a hand's peak 2.8 times too high against
-an arm of 4 kg), and a chain of driven links would weigh what the pose makes of it, for which the
-limits do not hold. Pelvis and legs carry the person and do not give way: against their 40 to 75 kg
-that is at most 6 % more force for an arm of 5 kg.
+spring. An impact then involves the two masses and the spring of ISO 10218-2, and its peak is the
+standard's. A frame alone would act as an infinite mass: a hand's peak would be 2.8 times too
+high against an arm of 4 kg. The effective mass of a chain of driven links would depend on the
+pose, and the limits do not hold for that. Pelvis and legs carry the person and do not give way.
+With their 40 to 75 kg, the error is at most 6 % more force for an arm of 5 kg.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ STATURES = {
     "male 5": 1.649, "male 50": 1.759, "male 95": 1.869,
 }  # fmt: skip
 POSTURES = ("standing", "seated")
-#: What a person does: works with the hands and walks, works in place, or stands with arms hanging.
+#: What a person does: work with the hands and walk, work in place, or stand with hanging arms.
 MOTIONS = ("walk", "work", "still")
 #: Lengths in units of the stature. Trunk: from hip to shoulder; grip: from wrist to palm.
 LENGTHS = {
@@ -39,9 +39,9 @@ LENGTHS = {
     "head": 0.130, "upper_arm": 0.186, "lower_arm": 0.146, "hand": 0.108, "grip": 0.054,
     "thigh": 0.245, "shank": 0.246, "foot": 0.039,
 }  # fmt: skip
-#: A region gives way against this spring [N/m], a heavy one at this frequency [rad/s], and at this
-#: fraction of critical damping: much slower than an impact. (A hand held still: 300 N/m,
-#: Mussa-Ivaldi, Hogan & Bizzi 1985; the rest are estimates.)
+#: A region gives way against this spring [N/m] (a heavy one: at this frequency [rad/s]) with this
+#: fraction of critical damping, much more slowly than an impact. A hand held still has 300 N/m
+#: (Mussa-Ivaldi, Hogan & Bizzi 1985); the rest are estimates.
 GIVE_STIFFNESS, GIVE_FREQUENCY, GIVE_DAMPING = 300.0, 2 * np.pi, 0.5
 
 
@@ -84,17 +84,17 @@ SEGMENTS = (
 
 @dataclass(frozen=True)
 class Person:
-    """One person; every number has a default, the environment fills in the place."""
+    """One person; every number has a default, and the environment chooses the place."""
 
     position: tuple[float, float] = (1.0, 0.0)  #: where they work: below the hips [m]
     facing: float = np.pi  #: about z; 0 looks along x [rad]
     floor: float = -0.75  #: height of the floor: the arm stands on a bench [m]
     stature: float = STATURES["male 50"]  #: [m]
     posture: str = "standing"  #: one of :data:`POSTURES`
-    motion: str = "walk"  #: one of :data:`MOTIONS`; who sits does not walk
+    motion: str = "walk"  #: one of :data:`MOTIONS`; a seated person does not walk
     hand_speed: float = 1.6  #: peak of a reach [m/s], as ISO 13855 has it
     walk_speed: float = 1.0  #: peak of a walk [m/s]
-    reacts: bool = True  #: draws back after a touch
+    reacts: bool = True  #: whether they draw back after a touch
     reaction_time: float = 0.2  #: from touch to motion [s]
     damping: float = 0.0  #: of the contacts [N s/m]; the standard's spring has none
 

@@ -1,6 +1,8 @@
 """Recordings in a browser: a server of their folder on 127.0.0.1, and rerun's own web viewer.
-The viewer comes with the rerun SDK, so it reads what this SDK has written. Nothing is fetched
-from other hosts."""
+
+The viewer comes with the rerun SDK, so it reads what this SDK has written. Nothing is fetched from
+other hosts.
+"""
 
 from __future__ import annotations
 

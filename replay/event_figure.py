@@ -21,7 +21,7 @@ def draw_event(path: Path, trace: Trace, detection: Detection, held: Array, titl
         trace: the stretch, with its truth.
         detection: of that stretch.
         held: the score that was reached during the whole confirmation time, shape (T,) of that
-        stretch. It is an alarm if it exceeds the threshold.
+            stretch. It is an alarm if it exceeds the threshold.
         title: of the picture.
 
     Raises:

@@ -30,7 +30,8 @@ def row_of(event: Event, trace: Trace, threshold: float, held: Array) -> dict[st
         event: of this trace.
         trace: with truth.
         threshold: of the score.
-        held: the score that was reached during the whole confirmation time, shape (T,)."""
+        held: the score that was reached during the whole confirmation time, shape (T,).
+    """
     import numpy as np
 
     first, last = np.searchsorted(trace.t, [event.span[0] - 1e-9, event.span[1] + 1e-9])
@@ -101,7 +102,8 @@ def definitions(late: float, alarm: CollisionAlarm | None = None) -> str:
 
     Args:
         late: a collision found later than this is late [s].
-        alarm: the detector; its times are then part of the definitions."""
+        alarm: the detector; its times are then part of the definitions.
+    """
     from tauguard.detectors.events import MERGE_GAP, WINDOW
 
     ms = f"{1e3 * late:.0f} ms"

@@ -48,8 +48,9 @@ class Motion:
 
 
 def load_model(source: Any) -> Any:
-    """A ``mujoco.MjModel`` from a model, an MJCF or URDF file, or MJCF text. A URDF whose meshes
-    are missing is drawn as sticks between its joints.
+    """A ``mujoco.MjModel`` from a model, an MJCF or URDF file, or MJCF text.
+
+    A URDF whose meshes are missing is drawn as sticks between its joints.
 
     Raises:
         ValueError: the file or text is no such model, or compiling it takes too much (see

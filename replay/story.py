@@ -26,8 +26,10 @@ def alarm_of(collision: Collision, alarms: tuple[Alarm, ...]) -> Alarm | None:
 
 def first_moment(trace: Trace, detection: Detection | None) -> float:
     """Where to begin [s]: at the first alarm of a detected collision, else at the first sample.
-    If the alarm comes after the collision's end, begin at that end, because the body that was
-    hit is visible there."""
+
+    If the alarm comes after the collision's end, begin at that end, because the body that was hit
+    is visible there.
+    """
     if trace.truth is None or detection is None:
         return float(trace.t[0])
     found = [(alarm_of(c, detection.alarms), c) for c in trace.truth.collisions]

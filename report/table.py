@@ -30,9 +30,11 @@ def table(
     notes: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Rows as aligned columns; successive rows of one study with the same keys share a heading.
+
     The name of the study and its line of ``notes`` stand above. If a line would be longer than
     ``width``, headings and long texts are broken. If that is not enough, intervals are left out.
-    Columns that still do not fit follow below, each part with the first columns again."""
+    Columns that still do not fit follow below, each part with the first columns again.
+    """
     blocks: list[str] = []
     for study, keys, own in blocks_of(rows):
         if study is not None:

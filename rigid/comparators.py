@@ -1,8 +1,8 @@
 """For comparison only: methods that the studies measure and no query of the package uses.
 
-Textbook separating axes (Ericson 2005, 5.2.1) in plain arithmetic, wrong where rounding makes them
-so; mesh trees of 18-DOPs (Klosowski et al. 1998) and of balls; and single bounding volumes, built,
-moved and tested as in figure 1.1 of the dissertation.
+Textbook separating axes (Ericson 2005, 5.2.1) in plain arithmetic, whose answers rounding can
+make wrong; mesh trees of 18-DOPs (Klosowski et al. 1998) and of balls; and single bounding
+volumes, which are built, moved and tested as in figure 1.1 of the dissertation.
 """
 
 from __future__ import annotations

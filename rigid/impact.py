@@ -38,7 +38,7 @@ def time_of_impact(
     """When do moving bodies first touch, t in [0, 1]?
 
     The bodies' numbers are coordinates of their own frame, which the motion moves. The answer is
-    conservative: at every time before ``time_of_impact`` the bodies are apart, rounding included.
+    conservative, also under rounding: at every time before ``time_of_impact`` the bodies are apart.
     Advancement along separating directions (after Mirtich 1996 and Zhang, Lee and Kim 2006) with a
     bound on the second derivative: it converges quadratically, from below.
 

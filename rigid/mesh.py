@@ -38,8 +38,8 @@ class MeshContacts:
         pose: The row of the pose. Shape (M,).
         faces: Face of this mesh and face of the other. Shape (M, 2).
         point: The middle of what the two triangles share, in this mesh's frame. Shape (M, 3).
-        normal: Unit, from this mesh to the other: the direction in which the other's triangle comes
-            free of this one over the shortest path. Shape (M, 3).
+        normal: Unit, from this mesh to the other: the direction of the shortest path on which the
+            other's triangle leaves this one. Shape (M, 3).
         penetration: That path's length, 0 where they just touch. Shape (M,), m.
     """
 
@@ -58,11 +58,11 @@ class MeshTree:
 
     Nodes have eight children, split by the surface-area heuristic. ``obb``, the default, gives
     every child an oriented box along the principal axes of its surface (Gottschalk, Lin and Manocha
-    1996), kept in single precision and tested eight at a time; it answers fastest, apart or not, on
-    every mesh measured (``tauguard bench rigid``). ``aabb`` keeps axis-aligned boxes in the mesh's
-    own frame, tested in the same way against the other mesh's boxes, which the pose turns; it
-    builds in two thirds of the time, which pays for a mesh that is asked a few thousand poses or
-    fewer. The volume never changes an answer.
+    1996), kept in single precision and tested eight at a time; it was fastest on every mesh that
+    was measured (``tauguard bench rigid``). ``aabb`` keeps axis-aligned boxes in the mesh's own
+    frame. They are tested in the same way against the other mesh's boxes, which the pose turns. It
+    builds in two thirds of the time, so it is the better choice for at most a few thousand poses.
+    The volume never changes an answer.
 
     What is exact: a pose places a vertex ``y`` of the other mesh at ``R y + t``, evaluated in
     double precision and rounded; whether two triangles of the resulting corners share a point is
@@ -153,9 +153,10 @@ class MeshTree:
     ) -> MeshContacts:
         """All pairs of triangles that meet: points, normals, penetrations; see :meth:`overlap`.
 
-        Asking the other way round (the inverse pose) gives the same contacts with the normals
-        turned about, and moving both meshes together moves the contacts with them, to rounding.
-        More than ``limit`` pairs over all poses are a ``ValueError``: coincident meshes have them.
+        With the meshes exchanged (and the inverse pose) the contacts are the same and the
+        normals opposite. If both meshes are moved together, the contacts move with them, except
+        for rounding. More than ``limit`` pairs over all poses are a ``ValueError``: coincident
+        meshes have them.
         """
         self._check(other)
         if isinstance(limit, bool) or not isinstance(limit, int) or not 0 < limit < 2**62:
@@ -208,7 +209,7 @@ class MeshTree:
 def first_touch(
     a: MeshTree, b: MeshTree, motion_a: Motion, motion_b: Motion, threads: int
 ) -> MeshImpacts:
-    """When two moving meshes first touch; their volumes may differ."""
+    """The first contact of two moving meshes, whose volumes may differ."""
     count = common_length({"motion_a": len(motion_a), "motion_b": len(motion_b)})
     out, faces = np.empty((count, 7)), np.empty((count, 2), dtype=np.int32)
     moved = (*motion_a.packed, *motion_b.packed)

@@ -1,4 +1,4 @@
-"""A mesh against convex bodies: what `overlap`, `distance` and `time_of_impact` do with one."""
+"""A mesh against convex bodies, for `overlap`, `distance` and `time_of_impact`."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from tauguard.rigid.queries import native
 from tauguard.rigid.results import MeshDistances, MeshImpacts
 from tauguard.rigid.rounded import Solid, solid_parts
 
-#: Coordinates and radii beyond this are refused beside a mesh, whose own bound it is.
+#: Coordinates and radii beyond this are refused with a mesh; it is the limit of meshes, too.
 MOST_COORDINATE = 1e30
 
 
 def mesh_beside(a: Solid | MeshTree, b: Solid | MeshTree) -> tuple[MeshTree, Solid, bool] | None:
-    """The mesh, the bodies and whether the mesh is ``b``; ``None`` where neither is one.
+    """The mesh, the bodies, and whether the mesh is ``b``; ``None`` if there is no mesh.
 
     Raises:
         ValueError: both are.

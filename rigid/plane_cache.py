@@ -17,9 +17,9 @@ from tauguard.rigid.shapes import Bodies
 class PlaneCache:
     """Overlap queries on the same pairs frame after frame.
 
-    A pair that was apart keeps the normal of its separating plane; while that still separates, it
-    is the whole query. Answers are those of :func:`tauguard.rigid.overlap`, whatever is cached.
-    Calls from several threads wait for each other.
+    A pair that was apart keeps the normal of its separating plane. As long as this normal separates
+    the bodies, nothing else is computed. Answers are those of :func:`tauguard.rigid.overlap`,
+    whatever is cached. Calls from several threads wait for each other.
 
     Args:
         count: The number of pairs N, the same in every frame.

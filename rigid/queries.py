@@ -2,8 +2,8 @@
 
 ``abfme`` eliminates the unknowns of a separating plane (Fourier-Motzkin elimination with facet
 functions scaled by determinants, redundant combinations left out); ``sat`` tests separating axes
-(Gottschalk et al. 1996; Ericson 2005, 5.2). Both run in floating point with derived error bounds
-and hand what they cannot tell to exact arithmetic.
+(Gottschalk et al. 1996; Ericson 2005, 5.2). Both run in floating point with derived error
+bounds. What they cannot decide goes to exact arithmetic.
 """
 
 from __future__ import annotations
@@ -73,9 +73,10 @@ def sweep(
         a: N bodies of one kind at rest, or one.
         b: N bodies, or one.
         displacement: Over the step t in [0, 1]. Shape (N, 3) or (3,).
-        method: ``abfme`` eliminates the separating plane with t as one more unknown and casts
-            separating axes for the time of hits only; ``sat`` casts them in any case; ``auto`` is
-            the faster of both. ``hit`` is exact for each, ``time_of_impact`` never late.
+        method: ``abfme`` eliminates the separating plane with t as a further unknown, and casts
+            separating axes only for the time of hits. ``sat`` always casts separating axes.
+            ``auto`` is the faster of both. ``hit`` is exact for each, ``time_of_impact`` never
+            late.
         threads: 0 means all processors; the answer does not depend on it.
 
     Returns:

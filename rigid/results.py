@@ -1,4 +1,4 @@
-"""What the queries answer, row by row: frozen values of arrays."""
+"""Answers of the queries, row by row: frozen values of arrays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Witness:
-    """Why a pair overlaps or not, to rounding; rows of the other case are NaN.
+    """Why a pair overlaps or not, except for rounding; rows of the other case are NaN.
 
     Attributes:
         point: A common point where the pair overlaps. Shape (N, 3).
@@ -80,11 +80,11 @@ class Distances:
         distance: Above zero the length of the shortest path between the bodies, zero where they
             touch, below zero minus the penetration: the length of the shortest path that separates
             them. Shape (N,).
-        point_a: The point of a nearest to b; in each other, a's deepest point along the normal.
+        point_a: The point of a nearest to b; if they overlap, a's deepest point along the normal.
             Shape (N, 3).
         point_b: Likewise of b. Shape (N, 3).
-        normal: Unit, from a to b: the direction in which b leaves a. Where bodies without
-            thickness touch, any normal of what they span. Shape (N, 3).
+        normal: Unit, from a to b: the direction in which b leaves a. If bodies without thickness
+            touch, any normal of the plane or line that they span. Shape (N, 3).
     """
 
     distance: NDArray[np.float64]
@@ -101,8 +101,8 @@ class Distances:
 class MeshDistances(Distances):
     """Signed distance of a mesh and convex bodies, row by row.
 
-    Below zero it is that of the triangle that is deepest in the body: how far the body is to move
-    to leave that triangle, not the whole mesh.
+    A negative distance is that of the triangle deepest in the body: how far the body must move to
+    leave that triangle, not the whole mesh.
 
     Attributes:
         face: The triangle nearest to the body, or deepest in it. Shape (N,).

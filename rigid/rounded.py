@@ -125,7 +125,7 @@ _SHARP = np.zeros(1)
 
 
 def parts(solid: Solid) -> tuple[Bodies, NDArray[np.float64]]:
-    """The core of a batch and its radii, one zero where it has none."""
+    """The core of a batch and its radii; a single zero if it has none."""
     if isinstance(solid, Rounded | Spheres | Capsules):
         return solid.core, solid.radius
     return solid, _SHARP

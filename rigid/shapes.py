@@ -3,8 +3,8 @@
 A batch holds N bodies of one kind. Degenerate bodies are legal: a flat tetrahedron, a box without
 thickness, a single point. Lengths are in any one unit, the same for both sides of a query.
 
-A batch keeps its own copy of its arrays, which nobody can change: what was checked is what the
-kernels read.
+A batch keeps its own copy of its arrays, which nobody can change, so the kernels read what was
+checked.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class Tetrahedra(Rebuilt):
 class Boxes(Rebuilt):
     """The sets ``center + rotation @ diag(half_extents) @ u``, ``|u| <= 1`` per coordinate.
 
-    The set is that of the doubles as given: a rotation that is orthonormal to rounding only spans a
-    slightly oblique box, and answers are about that one.
+    The set is that of the given doubles. A rotation that is orthonormal only up to rounding spans a
+    slightly oblique box, and the answers hold for that box.
 
     Args:
         center: Shape (N, 3).

@@ -37,7 +37,7 @@ def rounded_witness(a: Solid, b: Solid, hit: NDArray[np.bool_], threads: int = 1
     """A common point or a separating plane of each row, to rounding."""
     (core_a, radius_a), (core_b, radius_b) = solid_parts("a", a), solid_parts("b", b)
     cores = solid_distances(core_a, core_b, threads)
-    # Where the cores meet they have a common point; else it lies on the way between them.
+    # If the cores meet they have a common point; otherwise it lies on the line between them.
     point = find_witness(core_a, core_b, cores.distance <= 0, threads).point
     way = np.maximum(cores.distance, 0.0)
     share = 0.5 * (np.maximum(way - radius_b, 0.0) + np.minimum(way, radius_a))

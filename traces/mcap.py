@@ -5,7 +5,8 @@ Topics: ``/joint_states`` (``sensor_msgs/msg/JointState``), ``/motor_currents``,
 ``/detection/alarms`` and ``/contacts/CHECKER`` (package ``tauguard_msgs``). Log times are the
 trace's own times. Nothing in the file depends on when or where it was written, so equal traces
 give equal bytes. The metadata record ``tauguard.meta`` holds :attr:`Trace.meta`, the attachments
-:attr:`Trace.attachments`."""
+:attr:`Trace.attachments`.
+"""
 
 from __future__ import annotations
 

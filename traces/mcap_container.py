@@ -3,7 +3,8 @@
 The format is the public one (mcap.dev/spec), and the records are those of the ``mcap`` package.
 That package handles one message at a time. Therefore the inside of a chunk and its message index
 are laid out here, as arrays. Topics of one group share their times and are interleaved row by
-row, in the order of time."""
+row, in the order of time.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """Deforming meshes to test and time with: generators of any size, and a loader of recorded ones.
 
-The generated motions are prescribed, not simulated: smooth formulas of time whose surfaces fold,
-touch and pass through themselves, which is what a collision query has to find. Each builder takes
-the number of triangles to aim for and a seed; the same arguments give the same bytes.
+The generated motions are prescribed, not simulated. They are smooth formulas of time. Their
+surfaces fold, touch and pass through themselves, and collision queries have to find this. Each
+builder takes the number of triangles to aim for and a seed; the same arguments give the same
+bytes.
 """
 
 from __future__ import annotations

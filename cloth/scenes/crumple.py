@@ -10,12 +10,11 @@ WAVES = 28
 
 
 def crumpling(triangles: int = 20_000, seed: int = 0) -> Scene:
-    """A flat sheet is drawn together from all sides; what it loses in width goes into creases.
+    """A flat sheet is drawn together from all sides, and creases take up its width.
 
-    The creases are random waves of the sheet in random directions of space, from four to thirty to
-    a width. Their slopes grow as the width shrinks, so that the area stays about the same: drawn
-    in to a fifth of its width the sheet passes through itself all over. One cloth, which meets
-    itself.
+    The creases are random waves of the sheet in random directions of space, four to thirty in a
+    width. Their slopes grow as the width shrinks, so the area stays about the same. At a fifth of
+    its width the sheet passes through itself in many places. It is one cloth, which meets itself.
     """
     rng = np.random.default_rng(seed)
     rows, columns = grid_size(triangles, 1.0)

@@ -16,8 +16,8 @@ DROPPED = 4
 def packed_cubes(triangles: int = 20_000, seed: int = 0) -> Scene:
     """A lattice of rigid cubes closes until faces touch exactly; then its layers slide.
 
-    From half of the time on the faces of neighbours lie in one plane: nothing but touching, and
-    coplanar. Every cube is a group, which does not meet itself.
+    From half of the time on, the faces of neighbours touch and lie in one plane. Every cube is a
+    group, which does not meet itself.
     """
     rng = np.random.default_rng(seed)
     side, fine = _lattice(triangles)
@@ -94,7 +94,7 @@ def cubes_on_cloth(triangles: int = 20_000, seed: int = 0) -> Scene:
 
 
 def _lattice(triangles: int) -> tuple[int, int]:
-    """Cubes a side, and squares a side of their faces, nearest to so many triangles."""
+    """Cubes along a side, and squares along a side of a face, for about this many triangles."""
     sizes = [(side, fine) for side in (2, 3, 4) for fine in range(1, 200)]
     return min(sizes, key=lambda s: abs(12 * s[0] ** 3 * s[1] ** 2 - triangles))
 

@@ -1,7 +1,7 @@
 """OBJ and PLY files as vertices and triangles, in the file's order; nothing is guessed.
 
-A line or a count that does not fit is refused: a reader that leaves it out would renumber all
-vertices after it.
+A line or a count that does not fit is refused. Leaving it out would renumber all vertices after
+it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Polygons = list[list[int]] | NDArray[np.int64]
 
 #: Most bytes of a mesh file.
 MOST_BYTES = 1 << 30
-#: Lines of an OBJ file that say nothing of positions and faces.
+#: Lines of an OBJ file that do not concern positions and faces.
 OTHER = (b"vn", b"vt", b"vp", b"l", b"p", b"o", b"g", b"s", b"mtllib", b"usemtl")
 #: PLY's names of types, the old and the new ones.
 TYPES = {
@@ -186,7 +186,7 @@ def _binary(data: bytes, elements: Sequence[_Element], order: str) -> tuple[Poin
 
 
 def _lists(data: bytes, face: _Element, order: str) -> tuple[Polygons, int]:
-    """The polygons, and how many bytes follow them."""
+    """The polygons, and the number of bytes that follow them."""
     ((_, kind, number),) = face.columns
     triangle = np.dtype([("n", order + number), ("v", order + kind, 3)])
     whole = face.count * triangle.itemsize

@@ -18,7 +18,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MeshSequence:
-    """Frames of one mesh, read when they are asked for.
+    """Frames of one mesh; a frame is read when it is used.
 
     Attributes:
         faces: Shape (F, 3), the same in every frame.
@@ -77,7 +77,7 @@ def load_sequence(folder: str | Path, pattern: str = "*") -> MeshSequence:
 def read_mesh(path: str | Path) -> tuple[Points, NDArray[np.int32]]:
     """Vertices, shape (V, 3), and faces, shape (F, 3), in the file's order, nothing merged.
 
-    Warns where vertices belong to no face.
+    Warns if vertices belong to no face.
     """
     vertices, faces = load_mesh(path)
     unused = len(vertices) - len(np.unique(faces))

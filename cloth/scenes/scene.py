@@ -1,4 +1,4 @@
-"""A scene: faces, who meets whom, and where every vertex is at any time."""
+"""A scene: faces, which bodies meet, and the position of every vertex at any time."""
 
 from __future__ import annotations
 
@@ -94,5 +94,5 @@ def smooth_step(x: float | Points, start: float, stop: float) -> Points:
 
 
 def frames_for(triangles: int) -> int:
-    """Steps that keep the motion of a step in proportion to the edges: as the root of the size."""
+    """Steps that keep the motion of a step in proportion to the edges: the root of the size."""
     return max(12, round(0.6 * float(np.sqrt(triangles))))

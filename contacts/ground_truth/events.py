@@ -1,4 +1,4 @@
-"""From touches step by step to events, and which of them a checker saw."""
+"""From contacts in single steps to events, and which events a checker saw."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Event:
     counts: bool  #: False: don't-care throughout
 
     def seen(self, times: Sequence[float], timestep: float) -> bool:
-        """Whether one of a checker's ``times`` [s] falls to it, up to one step beside it."""
+        """Whether a checker's ``times`` [s] contain one in the event or within a step of it."""
         return any(self.onset - timestep <= t <= self.end + timestep for t in times)
 
 

@@ -1,4 +1,4 @@
-"""Where geoms and flex vertices are within a step: the path that checkers are told."""
+"""The positions of geoms and flex vertices within a step: the path that checkers get."""
 
 from __future__ import annotations
 
@@ -58,6 +58,6 @@ class Step:
         return center, turn.as_matrix() @ self.xmat[geoms]
 
     def reach(self, geoms: NDArray[Any], radius: Array) -> Array:
-        """How far turning can move any point of ``geoms`` within ``radius`` (K,) of its centre."""
+        """How far rotation can move points of ``geoms`` within ``radius`` (K,) of the centre."""
         spin = np.linalg.norm(self.turn[geoms], axis=1)
         return np.asarray(spin * (np.linalg.norm(self.arm[geoms], axis=1) + radius))

@@ -1,4 +1,4 @@
-"""Which geoms and flexes may touch, by MuJoCo's rules, written down a second time."""
+"""Which geoms and flexes may touch by MuJoCo's rules: a second, independent implementation."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""First touch and depth along a path, from nothing but a distance and a bound on its change.
+"""First contact and depth along a path, from a distance and a bound on its change alone.
 
 A signed distance d(s) between two things whose points move by at most L relative to one another
 over the step obeys |d(s) - d(t)| <= L |s - t|. Hence d has no zero in [a, b] while
 d(a) + d(b) > L (b - a): intervals are halved until each is cleared, known to be deep, or shorter
 than the resolution (Piyavskii 1972; the same bound moves a conservative advancement on). Samples
-alone would prove nothing between them.
+alone would prove nothing about the times between them.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ Distance = Callable[[NDArray[Any], Array], Array]
 
 @dataclass(frozen=True)
 class Found:
-    """What a search says about each pair; every field has shape (N,)."""
+    """The result of a search for each pair; every field has shape (N,)."""
 
     time: (
         Array  #: of the first touch, fraction of the step, late by less than resolution / L; or inf
     )
     depth: Array  #: largest depth seen [m]; 0 where none
-    near: NDArray[np.bool_]  #: within the resolution of touching, and not known to be deep
+    near: NDArray[np.bool_]  #: closer to contact than the resolution, and not known to be deep
 
 
 def search(
@@ -60,7 +60,7 @@ def search(
     da, db = sample(rows, a), sample(rows, b)
     while len(rows):
         length = bound[rows] * (b - a)
-        # After the first touch only a depth is looked for that tips the touch.
+        # After the first contact only a depth above the tolerance matters.
         known = (deepest[rows] < -tolerance) | ((da + db - length) / 2 > -tolerance)
         settled = known & (a >= first[rows])
         open_ = (da + db <= length) & ~settled
@@ -69,7 +69,7 @@ def search(
         np.minimum.at(first, rows[short], b[short])
         keep = open_ & ~short
         rows, a, b, da, db = rows[keep], a[keep], b[keep], da[keep], db[keep]
-        # Both ends are clear for d / L: the middle of what is left splits it best.
+        # Both ends are clear for d / L: split at the middle of the remaining interval.
         low = a + np.maximum(da, 0) / bound[rows]
         high = np.maximum(b - np.maximum(db, 0) / bound[rows], low)
         middle = np.clip((low + high) / 2, a + 0.05 * (b - a), b - 0.05 * (b - a))

@@ -1,4 +1,4 @@
-"""Which pairs touch on the very path that checkers get, and when."""
+"""Which pairs touch on the path that checkers get, and when."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tauguard.contacts.ground_truth.motion import Step
 from tauguard.contacts.ground_truth.pairs import Index, flex_geoms, geom_pairs
 from tauguard.contacts.ground_truth.search import Found, search
 
-#: A pair that is never deeper than this is not scored, reported or not [m].
+#: A pair that is never deeper than this is not scored, whether reported or not [m].
 TOLERANCE = 1e-5
 #: Kinds of geoms that a flex may meet here.
 FLEX_MEETS = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
@@ -31,9 +31,8 @@ class Touches:
         geom: Both geoms, -1 where the partner is a flex. Shape (K, 2).
         flex: Both flexes, -1 where the partner is a geom. Shape (K, 2).
         time: Of the first touch, as a fraction of the step. Shape (K,).
-        depth: Largest depth seen; once it is above the tolerance no deeper one is looked for.
-            Shape (K,), m.
-        counts: False: don't-care, no deeper than :data:`TOLERANCE` anywhere. Shape (K,).
+        depth: Largest depth found; the search for depth ends above the tolerance. Shape (K,), m.
+        counts: False: not scored, as it is never deeper than :data:`TOLERANCE`. Shape (K,).
     """
 
     geom: Index
@@ -145,7 +144,7 @@ class GroundTruth:
         return out
 
     def _soft(self, step: Step, flex: int, geom: int, kind: str) -> list[tuple[Any, ...]]:
-        """The row of one flex and one geom, if they touch: the first and deepest element's."""
+        """The row of a flex and a geom: time of the first element that touches, largest depth."""
         model = self.model
         begin, count = int(model.flex_elemdataadr[flex]), int(model.flex_elemnum[flex])
         elements = model.flex_elem[begin : begin + 3 * count].reshape(-1, 3)

@@ -73,7 +73,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 class HullDistance:
-    """Distance of a triangle to a box, cylinder, ellipsoid or mesh hull, asked of coal's GJK."""
+    """Distance of a triangle to a box, cylinder, ellipsoid or mesh hull, by coal's GJK."""
 
     def __init__(self, model: Any, geom: int, kind: str) -> None:
         """Make coal's shape of ``geom``."""

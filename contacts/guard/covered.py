@@ -1,4 +1,4 @@
-"""Which pairs a guard covers, and by which eroded shapes it judges them."""
+"""The pairs that a guard covers, and the eroded shapes by which it judges them."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ LEVELS = (0.0, 0.5, 0.75, 0.95)
 #: MuJoCo pushes a cloth's triangles out of a geom each by its own shortest way.
 NEAR_FLEX = 4.0
 
-#: Numbers of the native places: what carries the parameters of a contact.
+#: Numbers in the native module of what carries the parameters of a contact.
 _PLACES = {"pair": 0, "geom": 1, "flex": 2}
 
 
 class Covered:
-    """Tells a native guard its pairs.
+    """Gives a native guard its pairs.
 
     Attributes:
         pairs: Those that are covered, by their numbers; flexes against flexes last.
@@ -37,7 +37,7 @@ class Covered:
 
     Args:
         model: MjModel.
-        guard: What is told.
+        guard: The native guard.
         rigid: Whether geoms against geoms are covered.
         cloth: Whether flexes are covered, against geoms, one another and themselves.
     """

@@ -14,7 +14,7 @@ from tauguard.arrays import Array
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """What a step did to energy and momentum of all moving bodies."""
+    """Energy and momentum of all moving bodies before and after a step."""
 
     energy: Array
     """Before and after (rows): of position as MuJoCo counts it (gravity, springs), kinetic, and of

@@ -1,4 +1,4 @@
-"""ErodedShapes: a geom less a layer of its surface, as shapes of the native kernel."""
+"""Geoms without a layer of their surface, as shapes of the native kernel."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class _Hull:
         try:
             self._faces = np.unique(ConvexHull(vertices).equations, axis=0)
         except QhullError:
-            return  # flat: its middle is all of it
+            return  # flat: nothing but its middle
         # The largest ball inside: n.x + r <= -d for every face.
         n, d = self._faces[:, :3], self._faces[:, 3]
         ball = linprog([0, 0, 0, -1], np.c_[n, np.ones(len(n))], -d, bounds=[(None, None)] * 4)
@@ -109,7 +109,7 @@ class _Hull:
             self._middle, self.radius = ball.x[:3], float(ball.x[3])
 
     def core(self, layer: float) -> Array:
-        """Its corners, less a layer."""
+        """Its corners, without a layer."""
         from scipy.spatial import HalfspaceIntersection, QhullError
 
         if layer <= 0 or self._faces is None:
@@ -120,8 +120,8 @@ class _Hull:
             corners = corners[np.isfinite(corners).all(axis=1)]
         except QhullError:
             corners = _NONE
-        if len(corners) < 4:  # a hair of a body: towards the middle instead
+        if len(corners) < 4:  # a very thin body: towards the middle instead
             corners = self._middle + (1 - layer / self.radius) * (self._vertices - self._middle)
-        # The mesh's own centre belongs to every core, though a thinner end may lie deeper.
+        # The mesh's own centre is in every eroded shape, although a thinner end may lie deeper.
         about_centre = (1 - layer / self.radius) * self._vertices
         return np.ascontiguousarray(np.unique(np.concatenate([corners, about_centre]), axis=0))

@@ -1,4 +1,4 @@
-"""Fields of a model that a guard copies or derives something from; others it reads at each step."""
+"""Fields of a model that a guard copies or derives from; it reads all others at each step."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Regions = list[tuple[int, int]]
 
 
 def followed_fields(model: Any, options: Regions) -> Regions:
-    """Addresses and sizes in bytes of all that a guard of this model goes by.
+    """Addresses and sizes in bytes of the fields that a guard of this model depends on.
 
     Args:
         model: MjModel.
@@ -68,7 +68,7 @@ def hull_rows(model: Any) -> NDArray[np.int64]:
 
 
 def refuse_shapes(model: Any) -> None:
-    """Look for shapes that no guard can go by.
+    """Refuse shapes with which no guard can work.
 
     Raises:
         ValueError: a number that is not finite, a negative size or a quaternion that is not of

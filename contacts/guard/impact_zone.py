@@ -23,7 +23,7 @@ class Hit:
     vertices: NDArray[np.int32]  #: of flexes, that take part; empty for two geoms
 
 
-#: Times that further pairs are added before everything stands still.
+#: Further pairs are added this many times before everything is stopped.
 ROUNDS = 8
 
 
@@ -37,12 +37,12 @@ def impact_zone(
 ) -> tuple[list[Hit], float]:
     """Take a sub-step again so that no pair passes through.
 
-    The velocity at its end is changed by as little as possible, in the metric of the inertia, such
-    that the partners of each hit do not move against one another (rigid impact zones: Provot 1997;
-    Bridson, Fedkiw and Anderson 2002); beyond the work of mocap bodies, that takes kinetic energy
-    and never adds any. The bodies then follow that velocity for the sub-step. Pairs that meet on
-    this new path are added. If that does not end, everything but mocap bodies stands still for the
-    sub-step.
+    The velocity at its end is changed by as little as possible, in the metric of the inertia, so
+    that the partners of each hit do not move relative to each other (rigid impact zones: Provot
+    1997; Bridson, Fedkiw and Anderson 2002). This removes kinetic energy and adds none, except for
+    the work of mocap bodies. The bodies then follow that velocity for the sub-step. Pairs that meet
+    on this new path are added. If this does not end, everything except mocap bodies stands still
+    for the sub-step.
 
     Args:
         model: MjModel.
@@ -50,7 +50,7 @@ def impact_zone(
             poses those of the end.
         qpos: At the sub-step's start.
         length: Of the sub-step [s].
-        hits: What it let through.
+        hits: The pairs that passed through.
         judge: Judges the path from the start to ``data.qpos``.
 
     Returns:

@@ -1,4 +1,4 @@
-"""What mocap bodies carry, and how fast, for what is stopped against them."""
+"""The bodies that mocap bodies carry, and their velocity, for impact zones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tauguard.arrays import Array
 
 
 class MocapVelocityField:
-    """The velocity that mocap bodies give to all that hangs on them, over a sub-step of a step.
+    """The velocity that mocap bodies give to all bodies attached to them, over a sub-step.
 
     Args:
         model: MjModel.

@@ -32,16 +32,16 @@ class Cut:
     """One sub-step that was rolled back."""
 
     time: float  #: at which the next attempt ends [s]
-    pair: Pair  #: that would have passed through, become too deep, or parted unseen
+    pair: Pair  #: that would have passed through, become too deep, or separated unseen
     stiffened: bool  #: its contact parameters were changed, until the pair parts
 
 
 @dataclass(frozen=True)
 class StepReport:
-    """What one guarded step did; ``guard.partners(pair)`` gives the names of a pair."""
+    """The report of one guarded step; ``guard.partners(pair)`` gives the names of a pair."""
 
-    steps: int  #: calls of ``mj_step``, those that were taken back included
-    contacts: int  #: that MuJoCo listed, the most in any sub-step of the step that stood
+    steps: int  #: calls of ``mj_step``, including those that were rolled back
+    contacts: int  #: contacts that MuJoCo listed, the most in any accepted sub-step
     cuts: tuple[Cut, ...] = ()
     restored: tuple[Pair, ...] = ()  #: pairs whose contact parameters are as before again
     passed: tuple[Pair, ...] = ()  #: pairs that may have passed through: the work ran out

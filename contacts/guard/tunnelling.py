@@ -1,4 +1,4 @@
-"""Flexes of triangles against one another and themselves: middles that cross."""
+"""Flexes of triangles against each other and themselves: do their middle surfaces cross?"""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class TunnellingEvents:
         self._number = {pair: first + k for k, pair in enumerate(pairs)}
 
     def find(self, x_t0: Array, x_t1: Array) -> list[tuple[int, list[int], float]]:
-        """A row for everything that crosses: the pair's number, the vertices, how far they go [m].
+        """A row for each crossing: the pair's number, the vertices, how far they move [m].
 
         Args:
             x_t0: Vertices of all flexes at the start of a step. Shape (V, 3), m.

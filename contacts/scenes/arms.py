@@ -17,7 +17,7 @@ REACH = (0.15, 0.25, 0.1)
 
 
 def arm_boxes(speed: float = 1.0) -> ContactScene:
-    """The arm swings its base joint between two rows of boxes and a loose one in its way.
+    """The arm swings its base joint between two rows of boxes; a free box stands in its path.
 
     Args:
         speed: of the swing, 1 is a period of 1.2 s.

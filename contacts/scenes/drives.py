@@ -1,4 +1,4 @@
-"""What moves the arms of the contact scenes: a stiff position control along a formula of time."""
+"""The control of the arms in contact scenes: stiff position control along a function of time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.contacts.scenes.scene import Control
 
-#: Where the joints should be and how fast at a time: ``reference(t) -> (q, qd)``, rad and rad/s.
+#: Wanted positions and velocities at a time: ``reference(t) -> (q, qd)``, rad and rad/s.
 Reference = Callable[[float], tuple[Array, Array]]
 #: Natural frequency of every joint's loop [rad/s].
 BANDWIDTH = 25.0

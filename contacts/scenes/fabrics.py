@@ -36,7 +36,7 @@ def arm_cloth(count: int = 15, speed: float = 1.5) -> ContactScene:
 
 
 def sleeve_arm(around: int = 14, along: int = 10, speed: float = 1.0) -> ContactScene:
-    """A loose tube of fabric lies around the forearm, which sways; nothing else holds it.
+    """A wide tube of fabric lies around the forearm, which sways; nothing else holds the tube.
 
     Args:
         around: vertices around the tube.

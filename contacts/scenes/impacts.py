@@ -1,4 +1,4 @@
-"""Fast spheres against thin things: what steps of fixed length pass by."""
+"""Fast spheres against thin objects, which steps of fixed length skip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a contact scene is: a compiled model, where it starts, and what drives it."""
+"""A contact scene: a compiled model, its first state, and its control."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Control = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
 @dataclass(frozen=True)
 class ContactScene:
-    """One scene to look for contacts in; the same arguments give the same bits."""
+    """One contact scene; the same arguments give the same bits."""
 
     name: str
     model: mujoco.MjModel

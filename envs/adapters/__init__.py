@@ -1,1 +1,1 @@
-"""What stands between an environment and its user: wrappers, and other libraries' interfaces."""
+"""Wrappers of environments, and interfaces of other libraries."""

@@ -15,8 +15,8 @@ from tauguard.envs.gym.settings import positive
 class CostBudget(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
     """Ends an episode once its costs exceed a budget.
 
-    ``info["cost_left"]`` is what is left of it, below 0 at the end; ``info["cost_sum"]`` and
-    ``info["cost"]`` are the environment's own.
+    ``info["cost_left"]`` is the rest of the budget, below 0 at the end. ``info["cost_sum"]`` and
+    ``info["cost"]`` are those of the environment.
     """
 
     def __init__(self, env: gymnasium.Env[Array, Array], limit: float) -> None:

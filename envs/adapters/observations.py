@@ -18,7 +18,7 @@ Pictures = dict[str, Any]
 
 #: Bound of the residual in the observation [N m].
 RESIDUAL_BOUND = 1e4
-#: Depths beyond this read as this [m].
+#: Largest depth of a picture [m].
 FARTHEST = 10.0
 MODES = ("rgb", "depth", "rgbd")
 

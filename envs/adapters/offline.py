@@ -1,4 +1,4 @@
-"""What a policy does, as a Minari dataset for offline learning (extra ``export``)."""
+"""Episodes of a policy as a Minari dataset for offline learning (extra ``export``)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import tauguard  # noqa: F401  (registers the environments)
 from tauguard.arrays import Array
 
-#: What of ``info`` is kept at every step, as ``infos``.
+#: Keys of ``info`` that are stored at every step, as ``infos``.
 KEYS = ("cost", "success", "force", "limit_ratio", "tau_ext_peak")
 
 
@@ -23,7 +23,7 @@ def record_policy(
     seed: int = 0,
     **keywords: Any,
 ) -> int:
-    """Play a policy and write what happened into Minari's own folder of datasets.
+    """Play a policy and write its episodes into Minari's folder of datasets.
 
     Args:
         name: of the environment, such as "tauguard/Reach-v0".
@@ -48,7 +48,7 @@ def record_policy(
     if dataset in minari.list_local_datasets():
         raise ValueError(f"{dataset}: Minari has a dataset of that name; name another version")
     env = gymnasium.make(name, **keywords)
-    try:  # all of them first: what is there is whole
+    try:  # record all episodes first, so that a stored dataset is complete
         buffers = [_episode(env, policy, number, seed + number) for number in range(episodes)]
         minari.create_dataset_from_buffers(
             dataset, buffers, env=env, algorithm_name=getattr(policy, "__name__", "policy")

@@ -1,4 +1,4 @@
-"""What an arm does once a collision is known: a wrapper that acts in the policy's place."""
+"""Reactions to a collision: a wrapper that acts in place of the policy."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from tauguard.envs.gym.settings import one_of
 
 #: The reactions, by name.
 REACTIONS = ("continue", "stop0", "stop1", "stop2", "retract", "admittance")
-#: What starts one: the detector's alarm, or the contact itself (which no real robot knows).
+#: What starts a reaction: the detector's alarm, or the contact itself (which no real robot knows).
 TRIGGERS = ("alarm", "contact")
-#: Brakes hold this long after the power is cut [s] (assumed; data sheets say 10 to 50 ms).
+#: Brakes hold this long after power-off [s] (assumed; data sheets say 10 to 50 ms).
 BRAKE_DELAY = 0.02
-#: A retraction goes back along the path at this fraction of the speed with which the arm came, and
-#: for this long [s] beyond where it was when the reaction began.
+#: A retraction goes back along the path at this fraction of the arm's speed before. It ends this
+#: long [s] after it has passed the point where the reaction began.
 RETRACT_SPEED, RETRACT_TIME = 0.5, 0.3
 #: The admittance's virtual inertia in units of the joint's own, and its time constant [s].
 ADMITTANCE_INERTIA, ADMITTANCE_TIME = 0.5, 0.1
 
 
 class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
-    """Lets the policy act until the trigger; from then on the reaction does, to the episode's end.
+    """The policy acts until the trigger. From then on the reaction acts, to the end of the episode.
 
     * ``continue``: nothing happens.
     * ``stop0``: category 0 of IEC 60204-1: power off at once, brakes after :data:`BRAKE_DELAY`.
     * ``stop1``: category 1: the drives stop the arm along its path, then power off and brakes.
-      The deceleration is the arm's own limit, which is gentler than a brake: the peak force comes
-      within 50 ms of the touch and is higher than with ``stop0``. It is that of ``stop2`` and
-      ``retract`` too, which begin with the same stop.
+      The deceleration is the arm's own limit, which is gentler than a brake. The peak force occurs
+      within 50 ms of the contact and is higher than with ``stop0``. ``stop2`` and ``retract`` begin
+      with the same stop and have the same peak.
     * ``stop2``: category 2: the drives stop the arm and hold it.
     * ``retract``: stop as in category 2, go back along the path beyond where the arm was at the
       trigger, hold.
@@ -86,7 +86,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         self._forget()
 
     def _dead_zone(self) -> Array:
-        """What the residual may be without contact [N m]; nothing where it is the truth."""
+        """Largest residual without contact [N m]; zero if the residual is the truth."""
         sensing = self._arm.batch.sensing
         if not sensing or self.trigger != "alarm":
             return np.zeros(len(self._deceleration))
@@ -121,7 +121,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return observation, reward, terminated, truncated, info
 
     def _look(self, info: dict[str, Any]) -> None:
-        """Remember where the arm has been, and see whether the reaction must begin."""
+        """Store the path of the arm, and decide whether the reaction begins."""
         n = len(self._deceleration)
         observation = self._arm.batch.observation[0]
         self._past.append(observation[:n].copy())
@@ -132,7 +132,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         self._tau = info["residual"] if self.trigger == "alarm" else info["tau_ext"]
 
     def _react(self) -> tuple[int, Array]:
-        """What replaces the next action: native code and joint velocities [rad/s]."""
+        """The replacement of the next action: native code and joint velocities [rad/s]."""
         assert self._since is not None
         if self.reaction == "stop0":
             return (
@@ -154,10 +154,10 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return Override.VELOCITY, self._speed
 
     def _slow_down(self) -> bool:
-        """All joints together, so that the arm stays on its path; whether it stands.
+        """Slow all joints together, so that the arm stays on its path; say whether it stands.
 
-        Where the person has already slowed the arm down, the stop goes on from that speed: a ramp
-        by the clock alone would push.
+        If the person has already slowed the arm down, the stop continues from that speed: a ramp
+        over time alone would push.
         """
         squared = float(self._speed @ self._speed)
         if squared > 0:
@@ -171,7 +171,7 @@ class Reaction(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorA
         return False
 
     def _back(self) -> Array:
-        """Velocity backwards along the remembered path; zero once the time is over."""
+        """Velocity backwards along the stored path; zero when the time is over."""
         if self._returning is None:
             rows, each = np.array(self._past), round(1 / RETRACT_SPEED)
             assert self._since is not None

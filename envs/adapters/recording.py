@@ -1,4 +1,4 @@
-"""A wrapper that leaves every episode behind as an MCAP recording, a row a physics step."""
+"""A wrapper that writes every episode as an MCAP recording, with a row for each physics step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tauguard.traces import Detection, Trace, Truth, write_mcap
 
 @dataclass
 class _Rows:
-    """What one episode left so far; a block an action."""
+    """The recorded data of one episode so far; a block for each action."""
 
     q: list[Array] = field(default_factory=list)
     qd: list[Array] = field(default_factory=list)
@@ -58,14 +58,14 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Write what there is, and begin an episode."""
+        """Write the present episode, and begin another."""
         self._finish()
         self._seed = "" if seed is None else str(seed)
         result: tuple[Array, dict[str, Any]] = self.env.reset(seed=seed, options=options)
         return result
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Act, and keep the rows of the action."""
+        """Act, and store the rows of the action."""
         result = self.env.step(action)
         if not self._arm.batch.metrics["diverged"][0]:
             self._keep()
@@ -74,7 +74,7 @@ class RecordMcap(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructo
         return result
 
     def close(self) -> None:
-        """Write what there is."""
+        """Write the present episode."""
         self._finish()
         super().close()
 

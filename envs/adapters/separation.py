@@ -14,7 +14,7 @@ from tauguard.envs.gym.base import ArmEnv, arm_env
 from tauguard.envs.gym.batch import Override
 from tauguard.envs.gym.settings import positive
 
-#: Distances beyond this are not looked at [m].
+#: Largest distance that is computed [m].
 FAR = 3.0
 
 

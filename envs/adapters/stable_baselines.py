@@ -14,16 +14,16 @@ from stable_baselines3.common.vec_env import VecEnv
 import tauguard  # noqa: F401  (registers the environments)
 from tauguard.envs.gym.vector import VectorArmEnv
 
-#: What of ``info`` goes to each copy.
+#: Keys of ``info`` that each copy gets.
 KEYS = ("cost", "cost_sum", "success", "force", "limit_ratio")
 
 
 class NativeVecEnv(VecEnv):  # type: ignore[misc, unused-ignore]
-    """``num_envs`` copies of an environment, stepped natively, as Stable-Baselines3 wants them.
+    """``num_envs`` natively stepped copies of an environment for Stable-Baselines3.
 
     A finished copy begins anew at once; its last observation is in
-    ``infos[i]["terminal_observation"]``, and ``infos[i]["TimeLimit.truncated"]`` says whether only
-    the time was over.
+    ``infos[i]["terminal_observation"]``, and ``infos[i]["TimeLimit.truncated"]`` says whether
+    the episode was truncated.
     """
 
     def __init__(self, name: str, num_envs: int, keys: Sequence[str] = KEYS, **keywords: Any):

@@ -13,14 +13,14 @@ from tauguard.envs.episodes.loop import Rollout
 from tauguard.models import Scene
 from tauguard.traces import CheckedContacts
 
-#: An obstacle that is this much farther after one step was put there and did not move there [m].
+#: An obstacle that moves farther than this in one step was placed there and did not travel [m].
 JUMP = 0.25
 
 
 def checked(
     scene: Scene, t: Array, rollout: Rollout, checkers: Sequence[str | Checker]
 ) -> tuple[CheckedContacts, ...]:
-    """What each checker sees on the true motion of an episode.
+    """Return what each checker reports on the true motion of an episode.
 
     Args:
         scene: whose arm and obstacles were recorded.

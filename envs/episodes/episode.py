@@ -1,4 +1,4 @@
-"""What an episode is: one run of the arm, described completely by plain values and a seed."""
+"""An episode: one run of the arm, completely described by plain values and a seed."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class CollisionPlan:
         kind: "strike" (a moving obstacle), "clamp" (a fixed one) or "pulse" (a wrench pulse).
         time: when it should begin [s].
         link: 1-based link to strike.
-        severity: wanted peak of abs(tau_ext), joints 1-4 (low, high) [N m]; the strength is sought
-            until the achieved peak lies there.
+        severity: wanted peak of abs(tau_ext), joints 1-4 (low, high) [N m]; the strength is varied
+            until the achieved peak is in this range.
         strength: first guess: strike speed [m/s], clamp depth [m, from 0.03 m], pulse force [N].
-        duration: of a pulse or of a clamp [s]; a strike lasts as long as it lasts.
+        duration: of a pulse or of a clamp [s]; it does not apply to a strike.
         at_rest: a pulse or strike while the arm dwells, where one is near ``time``.
         force: wanted peak contact force (low, high) [N]; targets whose lever arms cannot give
-            ``severity`` at such a force are passed over.
+            ``severity`` at such a force are skipped.
     """
 
     kind: str
@@ -101,7 +101,7 @@ class Episode:
     def to_json(self) -> str:
         """The episode as JSON text, from which :meth:`from_json` makes an equal one."""
         values = dataclasses.asdict(self)
-        if not self.objects:  # the text, and its hash, of an episode without any is as ever
+        if not self.objects:  # without them the text and its hash are as in earlier versions
             del values["objects"]
         return json.dumps(values, sort_keys=True)
 

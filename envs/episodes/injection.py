@@ -1,4 +1,4 @@
-"""How a planned collision is carried out: where it strikes, and what the loop must do for it."""
+"""How a planned collision is carried out: its target, and the obstacle or wrench that causes it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CLAMP_SPEED = 0.005
 CLAMP_TRAVEL = (0.002, 0.06)
 #: A clamp stands for its duration and this long [s].
 CLAMP_HOLD = 0.1
-#: A motion is looked at in strides of this length [s], with this many rays at each.
+#: Interval at which targets along a motion are sought [s], and number of rays at each time.
 STRIDE, CASTS = 0.02, 8
 #: An obstacle is in place this long before it touches [s].
 LEAD = 0.15
@@ -39,7 +39,7 @@ class Target:
 
 @dataclass(frozen=True)
 class _LinkPath:
-    """A link and the arm's joints at rows of the motion; the link's rows go on beyond the last."""
+    """A link and the arm's joints at rows of the motion; the link has further rows at the end."""
 
     rows: list[int]  #: R of them
     body: int  #: MuJoCo body of the link
@@ -110,9 +110,9 @@ class Aim:
         return _LinkPath(list(rows), body, position, rotation, anchor, axis, speed, spin)
 
     def _quick_enough(self, plan: CollisionPlan, path: _LinkPath) -> NDArray[np.bool_]:
-        """At which rows some point that :meth:`_inside` gives may be quick enough for a clamp.
+        """The rows at which some point of :meth:`_inside` can be fast enough for a clamp.
 
-        Speed is convex along a line, so that the ends of the line in each geom have the largest.
+        Speed is convex along a line, so it is largest at one of the ends of the line in each geom.
         """
         if plan.kind != "clamp":
             return np.ones(len(path.rows), dtype=bool)
@@ -130,7 +130,7 @@ class Aim:
     def _draw(
         self, plan: CollisionPlan, rng: np.random.Generator, count: int
     ) -> tuple[list[int], Array, Array]:
-        """What ``count`` casts need: geoms, places along their axes, pushes (none for clamps)."""
+        """Draw for ``count`` rays: geoms, places along their axes, pushes (none for clamps)."""
         own, size = self._geoms[plan.link - 1], self._scene.model.geom_size
         if plan.kind == "clamp" and len(own) == 1:  # nothing is drawn to choose one of one
             reach = float(size[own[0], 1]) * 0.8
@@ -148,7 +148,7 @@ class Aim:
     def _cast(
         self, plan: CollisionPlan, path: _LinkPath, number: int, rng: np.random.Generator
     ) -> Target | None:
-        """The first target of :data:`CASTS` rays at a row; only what it took is drawn."""
+        """The first target of :data:`CASTS` rays at a row; draws no more numbers than it needs."""
         data = self._data
         data.qpos[self._scene.qpos_adr] = self._motion.q[path.rows[number]]
         mujoco.mj_kinematics(self._scene.model, data)
@@ -175,7 +175,7 @@ class Aim:
     def _hits(
         self, body: int, inside: Array, pushes: Array, wanted: NDArray[np.bool_]
     ) -> tuple[Array, NDArray[np.bool_]]:
-        """Where rays towards points in a body meet it, and whether they do so before another."""
+        """Where rays towards points in a body meet it, and whether no other body is before it."""
         model, geom, normal = self._scene.model, np.full(1, -1, dtype=np.int32), np.zeros(3)
         origins, distances = inside - 2.0 * pushes, np.zeros(len(inside))
         hit = wanted.copy()
@@ -189,7 +189,7 @@ class Aim:
     def _reaches(
         self, plan: CollisionPlan, path: _LinkPath, number: int, point: Array, push: Array
     ) -> bool:
-        """Whether some force of the plan's range gives a torque of its severity here."""
+        """Whether a force in the plan's range gives a torque of its severity here."""
         if plan.severity is None or plan.force is None:
             return True
         levers = [0.0]
@@ -210,7 +210,7 @@ class Aim:
     def _stops_soon(
         self, plan: CollisionPlan, path: _LinkPath, number: int, points: Array, pushes: Array
     ) -> NDArray[np.bool_]:
-        """Whether the surface travels only a little further, so that it presses, not sweeps."""
+        """Whether the surface moves only a little further: it presses, and does not sweep past."""
         count = len(range(0, self._standing(plan), self._stride))
         stand = slice(number, number + count)
         position, rotation = path.position[stand], path.rotation[stand]

@@ -1,4 +1,4 @@
-"""Truth from the contact forces and applied wrenches themselves, free of limits and friction."""
+"""The truth, from contact forces and applied wrenches; without limits and friction."""
 
 from __future__ import annotations
 

@@ -18,12 +18,12 @@ SENSOR_WIDTH = _plant.SENSOR_WIDTH
 
 
 class SimulationDiverged(RuntimeError):
-    """The simulated arm left every sensible range; the message says when."""
+    """The simulation diverged; the message says when."""
 
 
 @dataclass(frozen=True)
 class Rollout:
-    """What the loop saw; row k belongs to the state before step k."""
+    """The record of a loop; row k belongs to the state before step k."""
 
     q: Array  #: true joint positions [rad], shape (T, n)
     qd: Array  #: true joint velocities [rad/s], shape (T, n)
@@ -147,7 +147,7 @@ class SimulationLoop:
 
 @dataclass(frozen=True)
 class AlongMotion:
-    """A loop along one motion: runs rows of it, recorded over what was recorded before."""
+    """A loop along one motion. It runs some of its rows and overwrites their record."""
 
     loop: SimulationLoop
     motion: Motion

@@ -81,7 +81,7 @@ def segment_time(path: Array, speed: float, max_speed: Array, max_acceleration: 
 
 @dataclass(frozen=True)
 class Workspace:
-    """Where random motions go."""
+    """The space in which random motions are drawn."""
 
     low: Array  #: [rad], shape (n,)
     high: Array  #: [rad], shape (n,)

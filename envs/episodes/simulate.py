@@ -1,4 +1,4 @@
-"""From an episode to a trace: compose, move, strike, record, label, measure."""
+"""From an episode to a trace: scene, motion, collisions, record, labels, measured signals."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ CLEARANCE = (0.15, 0.22)
 
 
 def workspace(scene: Scene) -> Workspace:
-    """Where the arm works: a box around its home pose, free of self-collision and of the floor."""
+    """The workspace: a box around home in which the arm touches neither itself nor the floor."""
     model, data, facts = scene.model, mujoco.MjData(scene.model), scene.facts
     own = facts.name in cura6.NAMES
     spread = np.array(OWN_SPREAD) if own else facts.spread
@@ -63,7 +63,8 @@ def workspace(scene: Scene) -> Workspace:
         near = min((float(np.hypot(*data.xpos[b][:2])) for b in links[1:]), default=np.inf)
         return low, near
 
-    # An arm whose home is itself nearer to the floor or its base than that may come half as near.
+    # If an arm's home pose is nearer to the floor or the base than that, its links may come half as
+    # near as in that pose.
     at_home = (np.inf, np.inf) if own else clearance(facts.home)
     least = [min(*pair) for pair in zip(CLEARANCE, np.multiply(at_home, 0.5), strict=True)]
 
@@ -119,7 +120,7 @@ def can_touch(model: mujoco.MjModel) -> bool:
 
 
 class Simulation:
-    """An episode while it runs."""
+    """The simulation of one episode."""
 
     def __init__(
         self,
@@ -186,7 +187,7 @@ class Simulation:
         return self._trace(self._rollout, payload, injected)
 
     def _known_friction(self) -> Array:
-        """What the servo adds to make up for the friction that it knows of [N m], (T, n)."""
+        """The torque that the servo adds to compensate the friction that it knows [N m], (T, n)."""
         friction, fraction = self.nominal.friction, self.scene.facts.compensation
         if friction is None or fraction == 0:
             return np.zeros_like(self.motion.qd)

@@ -1,4 +1,4 @@
-"""Carrying a planned collision out: find a target, search the strength, run the window."""
+"""Carrying out a planned collision: find a target, search the strength, run its window."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ from tauguard.models import Scene
 PARKED = np.array([0.0, 0.0, 50.0])
 #: Targets to try for one collision, and strengths to try on each.
 TARGETS, TRIES = 16, 10
-#: A person is not pushed harder in a collision worth detecting: such a target is given up [N].
+#: Largest force of a collision that is still worth detecting [N]; a target that needs more is given
+#: up.
 FORCE_LIMIT = 400.0
-#: An obstacle that touches the arm sooner than this [s] overlapped it where it was placed.
+#: An obstacle that touches the arm sooner than this [s] overlapped it from the start.
 CLEAR = 0.01
 #: A clamp's strength counts from this far in front of the arm's deepest reach [m]: its depth is
 #: the strength less this, and may be negative where another part of the link reaches further.
@@ -37,13 +38,13 @@ CLAMP_OFFSET = 0.03
 STRENGTH = {"strike": 0.5, "clamp": CLAMP_OFFSET, "pulse": 80.0}
 #: What an obstacle or a person can do: strikes [m/s], clamps [m], pulses [N].
 STRENGTH_RANGE = {"strike": (0.02, 6.0), "clamp": (0.005, 0.1), "pulse": (1.0, 1500.0)}
-#: Largest factor between two tries of a strength.
+#: Largest ratio of two successive strengths.
 STRENGTH_FACTOR = {"strike": 10.0, "clamp": 1.3, "pulse": 10.0}
 
 
 @dataclass(frozen=True)
 class Window:
-    """One injected collision as it was carried out."""
+    """An injected collision as it happened."""
 
     begin: int  #: first row
     rollout: Rollout
@@ -63,8 +64,8 @@ class Striking:
     ) -> None:
         """For one scene and its motion; ``rng`` draws where and from where it is hit.
 
-        It knows nothing of the simulation that it serves: a cycle of references would keep each
-        one's megabytes of native memory until Python next looks for cycles, hundreds later.
+        It has no reference to the simulation that uses it. Such a cycle would keep megabytes of
+        native memory for each simulation until Python next collects cycles.
         """
         motion = follow.motion
         self._scene, self._motion, self._loop, self._follow = scene, motion, follow.loop, follow
@@ -78,10 +79,10 @@ class Striking:
     def carry_out(
         self, plan: CollisionPlan, row: int, start: int, stop: int
     ) -> tuple[int, Window | None]:
-        """Runs from ``row`` up to the collision's window and carries the collision out there.
+        """Run from ``row`` up to the collision's window and carry out the collision there.
 
         Returns:
-            The row reached before the window, and the window; none where no target fitted.
+            The row before the window, and the window; none if no target fitted.
         """
         lead = 0 if plan.kind == "pulse" else self._row(LEAD)
         tail = self._row(0.3 if plan.kind == "strike" else plan.duration + CLAMP_HOLD)
@@ -104,9 +105,9 @@ class Striking:
         return max(at, start), None
 
     def _relaxed(self, plan: CollisionPlan, attempt: int) -> CollisionPlan:
-        """The plan as asked at first, then without what the motion may not offer.
+        """The plan as asked, then weaker plans for motions that cannot offer it.
 
-        A dwell may be missing, and a link may not move towards where a clamp could stand.
+        A dwell may be missing, or no link may move towards a place for a clamp.
         """
         if attempt < TARGETS // 4:
             return plan
@@ -116,10 +117,10 @@ class Striking:
         return replace(plan, link=int(self._rng.integers(2, links + 1)))
 
     def _search(self, plan: CollisionPlan, target: Target, begin: int, end: int) -> Window | None:
-        """Repeats the window until the achieved peak torque lies in the plan's stratum.
+        """Repeat the window until the achieved peak torque lies in the plan's stratum.
 
-        The strength is scaled by what was achieved until the stratum is bracketed, then bisected
-        (geometrically). ``None`` where it cannot be reached from this target.
+        The strength is scaled by the achieved torque until the stratum is bracketed, then bisected
+        (geometrically). ``None`` if the stratum cannot be reached from this target.
         """
         strength = plan.strength or STRENGTH[plan.kind]
         below, above = STRENGTH_RANGE[plan.kind]
@@ -204,7 +205,7 @@ class Striking:
     def _pulse_truth(
         self, wrench: Array, target: Target, rollout: Rollout, dt: float
     ) -> labels.Wrenches:
-        """The wrench that acted, told about the pushed point instead of the centre of mass."""
+        """The wrench that acted, expressed about the pushed point instead of the centre of mass."""
         rows = len(wrench)
         found = labels.Wrenches.empty(rows, len(self._scene.link_bodies))
         link = int(np.flatnonzero(np.asarray(self._scene.link_bodies) == target.body)[0])

@@ -11,7 +11,8 @@ from tauguard.envs.gym.compiled import CompiledScene
 
 #: Largest Cartesian increment: at this speed [m/s] and turning at this speed [rad/s].
 CARTESIAN_SPEED, CARTESIAN_TURN = 0.5, 1.5
-#: The position mode reaches this far to both sides of home [rad], within the joint's range.
+#: In position mode an action reaches this far to both sides of home [rad], within the joint's
+#: range.
 POSITION_REACH = 2.0
 #: A joint that has no torque limit takes an action of 1 as this position error of its servo [rad].
 SOFT_LIMIT = 0.1
@@ -30,7 +31,7 @@ class Entry:
 
 
 def action_table(compiled: CompiledScene) -> list[Entry]:
-    """What -1 and 1 stand for, entry by entry."""
+    """The values that -1 and 1 mean, entry by entry."""
     centre, scale = action_scale(compiled)
     unit = {
         "current": "A",
@@ -54,7 +55,7 @@ def action_table(compiled: CompiledScene) -> list[Entry]:
 
 
 def action_scale(compiled: CompiledScene) -> tuple[Array, Array]:
-    """Centre and half-width of what an action stands for, shapes (m,)."""
+    """Centre and half-width of the range of an action, shapes (m,)."""
     settings, n = compiled.settings, len(compiled.scene.joint_names)
     zero = np.zeros(n)
     if settings.control == "cartesian":

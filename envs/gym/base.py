@@ -1,4 +1,4 @@
-"""What every environment shares: the step, the information beside it, seeing, and errors."""
+"""The base of every environment: reset, step, ``info``, rendering and errors."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ DIVERGED_REASON = (
     "diverged: a position is not finite or a speed beyond 1000; a smaller timestep would hold"
 )
 RENDER_MODES = ("rgb_array", "human")
-#: Value of :attr:`StepMetrics.diverged` where the force is what cannot be.
+#: Value of :attr:`StepMetrics.diverged` for an impossible force.
 IMPOSSIBLE = 2
-#: Beginnings of an episode that are drawn until the arm touches nothing.
+#: At most this many beginnings of an episode are drawn until the arm touches nothing.
 BEGINNINGS = 20
-#: Seeds of the beginnings by which a scene is arranged.
+#: Seeds of the beginnings that decide how a scene is arranged.
 ARRANGED = 6
 
 
 class Outcome(NamedTuple):
-    """What a task says of one step: numbers of one copy, or arrays of all."""
+    """A task's result of one step: numbers of one copy, or arrays of all."""
 
     rewards: dict[str, Any]  #: named terms, the task's :attr:`Task.terms`; the reward is their sum
     success: Any
-    memory: Any  #: what :meth:`Task.score` gets at the next step
+    memory: Any  #: the memory that :meth:`Task.score` gets at the next step
     terminated: Any = False
 
 
 class Task(Usual):
-    """What is to be done: where an episode starts, what a step is worth, when it is over."""
+    """A task: where an episode starts, the reward of a step, and when the episode ends."""
 
     #: Keywords that differ from those of :class:`tauguard.envs.gym.settings.Settings`.
     defaults: ClassVar[dict[str, Any]] = {}
@@ -51,25 +51,25 @@ class Task(Usual):
     options: ClassVar[dict[str, Any]] = {}
     #: Names of the terms of the reward; ``info`` has each as ``reward_NAME``.
     terms: ClassVar[tuple[str, ...]] = ()
-    #: ``info["reason"]`` where the task terminates an episode, after a success and without one.
+    #: ``info["reason"]`` of an episode that the task terminates, after a success and without one.
     ended: ClassVar[str] = ""
     failed: ClassVar[str] = ""
 
     def __init__(self, batch: Batch, **options: Any) -> None:
         """Keep the batch."""
         self.batch = batch
-        #: What :meth:`score` remembers from one step to the next, a number a copy.
+        #: The memory of :meth:`score` from one step to the next, a number for each copy.
         self.memory = np.zeros(batch.rows)
 
     def start(self, i: int, rng: np.random.Generator) -> None:
-        """Begin an episode of copy ``i``; the last thing it does is :meth:`Batch.start`."""
+        """Begin an episode of copy ``i``; end with :meth:`Batch.start`."""
         raise NotImplementedError
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
         """Judge a step; the same arithmetic for one copy and for arrays of all gives equal bits.
 
         Args:
-            step: what the action came to.
+            step: the result of the action.
             memory: what the last step, or :meth:`start`, left.
         """
         raise NotImplementedError
@@ -91,7 +91,7 @@ class Task(Usual):
         """What follows a success of copy ``i``, before its observation is shown."""
 
     def get_state(self) -> Any:
-        """What the task remembers beside :attr:`memory`."""
+        """The state of the task besides :attr:`memory`."""
         return None
 
     def set_state(self, state: Any) -> None:
@@ -168,7 +168,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
 
     @property
     def data(self) -> Any:
-        """The ``mujoco.MjData`` that is stepped; to look at, not to write to."""
+        """The ``mujoco.MjData`` that is stepped; read it, do not write to it."""
         return self.batch.datas[0]
 
     @property
@@ -256,7 +256,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         self._begun = state["begun"]
 
     def __getstate__(self) -> dict[str, Any]:
-        """How it was made and where it is; the window stays behind."""
+        """Its keywords and state; the window is not copied."""
         return {
             "made": (self.render_mode, self._keywords),
             "spec": self.spec,
@@ -264,7 +264,7 @@ class ArmEnv(gymnasium.Env[Array, Array]):
         }
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
-        """Make it anew and go there."""
+        """Make it again and restore the state."""
         mode, keywords = saved["made"]
         type(self).__init__(self, mode, **keywords)
         self.spec = saved["spec"]
@@ -358,7 +358,7 @@ def build(
 
 
 def _overlap(task: Task) -> StartsInContact | None:
-    """What the arm overlaps in one of some beginnings."""
+    """What the arm overlaps in some of the drawn beginnings."""
     for seed in range(ARRANGED):
         try:
             task.begin(0, np.random.default_rng(seed))
@@ -375,7 +375,7 @@ def _movable(settings: Settings, default: frozenset[str], task_type: type[Task])
 
 
 def divergence(compiled: CompiledScene, kind: float) -> str:
-    """Why a simulation is not to be believed any more, by :attr:`StepMetrics.diverged`."""
+    """Why the results of a simulation are not valid, by :attr:`StepMetrics.diverged`."""
     if kind != IMPOSSIBLE:
         return DIVERGED_REASON
     return (
@@ -385,7 +385,7 @@ def divergence(compiled: CompiledScene, kind: float) -> str:
 
 
 def touches(batch: Batch, rows: int | slice) -> dict[str, Array]:
-    """What each body region felt in one copy, or in all, at its peak."""
+    """Force, pressure, point and direction of each body region at its peak."""
     peak = batch.peak[rows].copy()
     return {
         "region_force": peak["force"],

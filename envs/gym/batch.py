@@ -26,16 +26,16 @@ from tauguard.models import Person
 
 
 class StepMetrics(NamedTuple):
-    """What one action came to: numbers of one copy, or arrays with a number a copy.
+    """The result of one action: numbers of one copy, or arrays with a number for each copy.
 
-    Every field is a number for the native side's sake: flags are 0 or 1.
+    Native code writes the fields, so all are numbers: flags are 0 or 1.
     """
 
     time: Any  #: since the episode began [s]
     distance: Any  #: of the tool, of several the farthest, from its target [m]
     force: Any  #: largest force on a link [N]
-    cost: Any  #: largest sum of the forces on body regions beyond their limits [N]
-    limit_ratio: Any  #: largest force on a body region over its limit
+    cost: Any  #: largest sum over the body regions of forces beyond their limits [N]
+    limit_ratio: Any  #: largest force on a body region divided by its limit
     region_force: Any  #: largest force on a body region [N]
     onset: Any  #: a collision began
     onset_time: Any  #: of the latest collision [s]; -1: none yet
@@ -45,7 +45,7 @@ class StepMetrics(NamedTuple):
     speed_ratio: Any  #: of the fastest joint over its largest speed, after the action
 
 
-#: The same as columns of :attr:`Batch.metrics`.
+#: The same fields as columns of :attr:`Batch.metrics`.
 METRICS = np.dtype([(name, np.float64) for name in StepMetrics._fields])
 #: At a physics step: net force on the arm [N]; link (1-based, 0: none), point [m] and force [N] of
 #: the largest force on a link.
@@ -60,7 +60,7 @@ assert PEAK.itemsize == 8 * _plant.PEAK_WIDTH
 
 
 class Override(IntEnum):
-    """What replaces an action, by its native code."""
+    """Replacements of an action, by their native codes."""
 
     FREE = 0  #: nothing: the action counts
     VELOCITY = 1  #: joint velocities
@@ -68,8 +68,8 @@ class Override(IntEnum):
     BRAKE = 3  #: no power, and brakes
 
 
-#: What a snapshot holds: MuJoCo's integration state, derived fields that are read before the next
-#: physics step, and rows of a copy.
+#: A snapshot holds MuJoCo's integration state, derived fields that are read before the next physics
+#: step, and the rows of a copy.
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 DERIVED = ("xpos", "xquat", "xmat", "xanchor", "xaxis", "site_xpos", "sensordata")
 ROWS = (
@@ -207,7 +207,8 @@ class Batch:
         physics = np.empty(mujoco.mj_stateSize(model, STATE))
         mujoco.mj_getState(model, data, physics, STATE)
         listener = self.sensing[i].detector if self.sensing else None
-        # Derived quantities as they stand: labels and kinematics are read before the next forward.
+        # Derived fields must be restored, too: labels and kinematics are read before the next
+        # forward.
         derived = {name: getattr(data, name).copy() for name in DERIVED}
         return {
             "physics": physics,
@@ -285,7 +286,7 @@ class Batch:
         return [one.fault for one in self.sensing] if self.sensing else [""] * self.rows
 
     def _time_alarm(self, i: int, before: bool) -> None:
-        """How long after the onset the alarm rose; one that was up before detects nothing."""
+        """The delay of the alarm after the onset; an alarm that was up before detects nothing."""
         alarms = self.sensing[i].alarms if self.sensing else np.zeros(0)
         dt, now = self.compiled.settings.timestep, self.metrics["time"][i]
         rises = alarms & ~np.append(before, alarms[:-1])
@@ -335,7 +336,7 @@ class Batch:
 
 
 def _numbers(table: NDArray[np.void], i: int) -> Array:
-    """Row ``i`` of a table with named columns, as the numbers that it consists of."""
+    """Row ``i`` of a table with named columns, as its plain numbers."""
     return table[i : i + 1].view(np.float64)
 
 

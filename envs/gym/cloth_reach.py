@@ -19,7 +19,7 @@ ASIDE = 0.12
 
 
 class ClothReach(Reach):
-    """Reach across a hanging cloth and, where asked for, contact checkers that watch it."""
+    """Reach across a hanging cloth, with contact checkers if they are asked for."""
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "cloth": SHEET}
 

@@ -36,12 +36,12 @@ from tauguard.models.person import PersonPart
 
 #: A tool pose to reach lies at least this high and this far from the base's axis [m].
 LOWEST, NEAREST = 0.12, 0.2
-#: A region turns back this far from the middle of its line, in units of the reach.
+#: A region moves this far to both sides of the middle of its line, in units of the reach.
 SPAN = 0.6
 #: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
 #: a torso at less.
 HAND_SPEED, BODY_SPEED = 0.8, 0.3
-#: A free object falls this fast at most [m/s]: from a metre.
+#: Largest speed of a falling free object [m/s]: from a metre.
 FALL_SPEED = 4.5
 
 
@@ -85,7 +85,7 @@ class CompiledScene:
     """A scene, and what the controller and the observation need to know about it."""
 
     settings: Settings
-    scene: Scene  #: without the shapes that only show
+    scene: Scene  #: without visual shapes
     nominal: Drive  #: what the controller believes about the drive
     gains: Gains
     nominal_mass: Array  #: of the links [kg], shape (n,)
@@ -110,7 +110,7 @@ class CompiledScene:
         return np.array([r.stiffness / (np.pi * r.radius) for r in self.regions]) / 1e4
 
     def shown(self) -> mujoco.MjModel:
-        """The scene with the shapes that only show; bodies, joints and flexes have the same ids."""
+        """The scene with visual shapes; bodies, joints and flexes have the same ids."""
         return mujoco.MjModel.from_xml_string(self.scene.xml)
 
     def ids(self) -> NDArray[np.int64]:
@@ -177,7 +177,7 @@ def compile_scene(
     if settings.payload_g > 0:
         data = mujoco.MjData(scene.model)
         set_payload(scene.model, data, scene.payload_body, settings.payload_g / 1000)
-    # A diverged state must stay visible instead of starting again at the origin by itself.
+    # A diverged state must stay visible; MuJoCo would restart it at the origin.
     scene.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return _known(settings, scene, bare, layout, arms)
 
@@ -209,7 +209,7 @@ def _known(
     gains = Gains.for_scene(bare)
     own = bare.facts.max_speed
     speed = own if settings.max_speed is None else np.full(len(own), settings.max_speed)
-    # A gripper that moves is rigid in what the controller believes.
+    # The controller assumes that a moving gripper is rigid.
     rigid = bare.arm_model if bare.facts.gripper else bare.model
     bodies = [rigid.body(bare.model.body(int(b)).name).id for b in bare.link_bodies]
     return CompiledScene(
@@ -233,7 +233,7 @@ def _known(
 def _force_bound(
     settings: Settings, scene: Scene, bare: Scene, speed: Array, arms: int
 ) -> ForceBound:
-    """Of everything in the scene against its stiffest contact."""
+    """The largest force of the scene's energies against its stiffest contact."""
     limit = bare.facts.drive.torque_limit
     moving, driven = derive.largest_energy(bare.model, bare.facts.joints, speed, limit)
     moving, driven = arms * moving, arms * driven
@@ -341,9 +341,9 @@ def _path_speed(obj: SceneObject) -> float:
 def region_pressure(compiled: CompiledScene, force: Array) -> Array:
     """Mean pressure on each body region [N/cm^2] under forces of shape (..., k) [N].
 
-    Over the setting ``contact_area`` where it is stated. Else over the circle that a flat surface
-    makes with a round region at the depth that its stiffness allows, area = pi radius F / k
-    (Hertz' geometry): an estimate, and a low one, since a robot's edge presses harder.
+    The area is the setting ``contact_area`` if it is given. Otherwise it is the circle in which
+    a flat surface touches a round region at the depth that its stiffness allows, pi radius F / k
+    (Hertz' geometry). This pressure is a low estimate, since a robot's edge presses harder.
     """
     if compiled.settings.contact_area is not None:
         return force / compiled.settings.contact_area
@@ -351,7 +351,7 @@ def region_pressure(compiled: CompiledScene, force: Array) -> Array:
 
 
 def find_tools(scene: Scene, arms: int) -> tuple[tuple[int, int, int], ...]:
-    """The tool of each arm: the flange's site where its file has one, else the last link."""
+    """The tool of each arm: the flange's site if its file has one, else the last link."""
     model, each = scene.model, len(scene.joint_names) // arms
     found = []
     for a in range(arms):

@@ -10,14 +10,14 @@ from tauguard.models import Person
 from tauguard.models.person import SEGMENTS
 
 assert len(SEGMENTS) == _plant.PERSON_SEGMENTS
-#: A script has so many reaches of each hand and so many places to walk to, then begins anew.
+#: Number of reaches of each hand and of places to walk to in a script, which then repeats.
 REACHES, WALKS = 24, 8
-#: Between two reaches, and at the goal [s].
+#: Time between two reaches, and at the goal [s].
 PAUSE, HOLD = (0.2, 1.5), (0.2, 1.0)
-#: At work and away [s]; away is so far aside and behind [m].
+#: Time at work and away [s]; distance of the other place, to the side and behind [m].
 STAY, AWAY = (3.0, 8.0), (1.0, 3.0)
 ASIDE, BEHIND = (0.5, 1.2), (0.0, 0.6)
-#: A reach goes so far ahead and aside, in units of the arm's length, and above the hips [m].
+#: Range of a reach ahead and to the side, in units of the arm's length, and above the hips [m].
 AHEAD, ACROSS, ABOVE = (0.5, 1.3), (-0.5, 0.8), (0.0, 0.55)
 
 

@@ -1,4 +1,4 @@
-"""Where an environment puts what it was asked for by name, and whether an episode begins clear."""
+"""Places of things that were asked for by name; a check that episodes begin without contact."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from tauguard.models import BodyProxy, Cloth, Person, Scene, Table, cura6
 
-#: Where the body regions cross: position and direction in units of the arm's reach, span [reach].
+#: The lines on which body regions cross: position, direction and length in units of the arm's
+#: reach.
 LINES = {
     "hand": ((0.55, 0.0, 0.40), (0.0, 1.0, 0.0)),
     "lower_arm": ((0.70, 0.10, 0.30), (1.0, 0.0, 0.0)),
@@ -19,13 +20,13 @@ LINES = {
 }
 #: Any other region's.
 OTHER_LINE = ((0.85, 0.0, 0.50), (0.0, 1.0, 0.0))
-#: A person's hips are this far from the arm [reach], at least so far [m].
+#: Distance of a person's hips from the arm [reach], and the least distance [m].
 OPPOSITE, NEAREST_PERSON = 0.9, 0.6
 #: Reach of the arm for which tables, cloths and second arms are placed in metres [m].
 USUAL_REACH = 1.146
 #: Names of a second arm's parts begin with this.
 SECOND = "arm2_"
-#: What overlaps is moved by this [m] a time, at most so often.
+#: A thing that overlaps the arm is moved by this distance [m], at most this number of times.
 STEP, MOVES = 0.05, 16
 
 
@@ -43,7 +44,7 @@ class StartsInContact(ValueError):
 
 @dataclass(frozen=True)
 class Layout:
-    """How to place what was asked for by name."""
+    """Places of the things that were asked for by name."""
 
     reach: float  #: of the arm [m]
     own: bool = True  #: the arm of the package, for which places are stated in metres
@@ -103,7 +104,7 @@ class Layout:
 
 
 class Usual:
-    """Where things go that were asked for by name, unless a task wants them elsewhere."""
+    """The places of things that were asked for by name, unless a task defines others."""
 
     @classmethod
     def proxy(cls, region: str, bare: Scene, layout: Layout) -> BodyProxy:

@@ -1,4 +1,4 @@
-"""What may differ from episode to episode: distributions, and how a draw changes one copy."""
+"""What can differ between episodes: distributions, and how a drawn value changes one copy."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def _distribution(name: str, value: Any) -> Distribution:
 
 
 def _numbers(value: Any) -> Array:
-    """One or several numbers; none where it is something else."""
+    """One or several numbers; none for anything else."""
     try:
         row = np.atleast_1d(np.asarray(value, dtype=np.float64))
     except (TypeError, ValueError):
@@ -191,7 +191,7 @@ def draw(
     rng: np.random.Generator,
     stated: Mapping[str, Any],
 ) -> dict[str, Array]:
-    """One episode's values; what is stated replaces a draw, which is made all the same."""
+    """The values of one episode; stated values replace drawn ones, which are drawn all the same."""
     n, found = len(compiled.scene.joint_names), {}
     for name, spread in known.items():
         size = n if PARAMETERS[name].each else 1
@@ -229,7 +229,7 @@ def vary(compiled: CompiledScene, model: mujoco.MjModel, drawn: Mapping[str, Arr
 def _weigh(
     scene: Scene, base: mujoco.MjModel, model: mujoco.MjModel, drawn: Mapping[str, Array]
 ) -> None:
-    """Masses of links and payload; contact pairs keep the stiffness that they say."""
+    """Set the masses of links and payload; contact pairs keep their stated stiffness."""
     if "mass" not in drawn and "payload_g" not in drawn:
         return
     scale = drawn.get("mass", np.ones(len(scene.link_bodies)))

@@ -1,4 +1,4 @@
-"""Pictures of an environment; nothing of it is imported before the first one."""
+"""Pictures of an environment; this module is imported with the first picture."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tauguard.envs.gym.compiled import CompiledScene
 HEIGHT, WIDTH = 480, 640
 #: Groups that are shown: bodies and obstacles, and the arm's visual shapes; not its collision ones.
 SHOWN = (0, 1, 2)
-#: Lights, and what is seen where nothing is.
+#: Lights and background.
 AMBIENT, DIFFUSE, SKY = 0.35, 0.4, ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90))
 #: The floor that is drawn, not simulated: half extents and grid [m], height [m] and colour.
 FLOOR, FLOOR_HEIGHT, FLOOR_COLOUR = (8.0, 8.0, 1.0), -0.001, (0.80, 0.82, 0.85, 1.0)
@@ -77,7 +77,7 @@ def _staged(compiled: CompiledScene) -> mujoco.MjModel:
 def _draw(
     spec: mujoco.MjSpec, kind: Any, size: Sequence[float], place: Sequence[float], rgba: Any
 ) -> None:
-    """A shape that only shows."""
+    """A visual shape."""
     spec.worldbody.add_geom(type=kind, size=size, pos=place, rgba=rgba, contype=0, conaffinity=0)
 
 
@@ -88,7 +88,7 @@ def _bases(compiled: CompiledScene) -> list[NDArray[np.float64]]:
 
 
 class Stage:
-    """The scene as it is shown, and its own state, which follows the simulated one."""
+    """The shown scene with a state of its own, which follows the simulated state."""
 
     def __init__(self, compiled: CompiledScene, data: mujoco.MjData) -> None:
         """Set the lights and place the camera."""

@@ -21,8 +21,8 @@ PLACE = (1.1, 0.0, 0.0)
 def add_second_arm(scene: Scene, place: tuple[float, float, float] = PLACE) -> Scene:
     """The scene with a second, nominal arm of the same kind; joints and links of both in a row.
 
-    The two arms can touch one another, and both can touch what stands around. The model is without
-    the shapes that only show; ``xml`` has them.
+    The two arms can touch each other and everything around them. The model has no visual shapes;
+    ``xml`` has them.
     """
     whole = mujoco.MjSpec.from_string(scene.xml)
     other = mujoco.MjSpec.from_string(scene.arm_xml)
@@ -65,9 +65,9 @@ def add_second_arm(scene: Scene, place: tuple[float, float, float] = PLACE) -> S
 
 
 def _set_bits(whole: mujoco.MjSpec, other: mujoco.MjSpec) -> None:
-    """The second arm, its base too, touches the first; everything else touches both.
+    """Set the contact bits: the second arm and its base touch the first, other things both.
 
-    The base is part of the world: with the first arm's bits it would touch its own first link,
+    The base is part of the world. With the first arm's bits it would touch its own first link,
     which cannot move away, and MuJoCo would hold it with 1e13 N.
     """
     for geom in whole.geoms:

@@ -1,4 +1,4 @@
-"""A detector in the loop of an environment: it sees what the sensors measure, sample by sample."""
+"""A detector in the loop of an environment, which gets the measured signals sample by sample."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Listener(Protocol):
 
     @property
     def bounds(self) -> Array:
-        """What the residual may be without contact [N m], shape (n,)."""
+        """Largest residual without contact [N m], shape (n,)."""
 
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """Samples of shape (T, n) in turn: residuals (T, n) [N m] and alarms (T,)."""
@@ -72,11 +72,11 @@ class Listener(Protocol):
 
 
 class JointEnds:
-    """Takes the torque of the joints' stops out of residuals, sample by sample.
+    """Removes the torque of the joints' stops from residuals, sample by sample.
 
-    A stop acts on its own joint alone. From the sample that nears an end until the observer has
-    forgotten, that joint's residual counts as zero: a collision that it alone would show is not
-    seen meanwhile.
+    A stop acts on its own joint only. While a joint is near an end of its range, and until the
+    observer has forgotten it, its residual counts as zero. A collision that only this joint would
+    show is not detected meanwhile.
     """
 
     def __init__(self, ranges: Array, dt: float, gain: float) -> None:
@@ -105,8 +105,8 @@ class JointEnds:
 class ObserverListener:
     """The momentum observer with fixed thresholds: nothing is trained, so any arm can have it.
 
-    Friction is compensated by its nominal Coulomb and viscous part; what static friction may hide
-    decides the threshold. A trained detector is several times as sensitive.
+    The nominal Coulomb and viscous friction is compensated; the static friction decides the
+    threshold. A trained detector is several times as sensitive.
     """
 
     name, settle, fault = "observer", 0.0, ""
@@ -173,7 +173,7 @@ class AlarmListener:
         self.fault = ""
 
     def _monitored(self, alarm: CollisionAlarm) -> Callable[[Array, Array, Array], bool]:
-        """The alarm at one sample; a model that knows its samples names their faults."""
+        """The alarm at one sample. A model with checks of its input also names faults."""
         if alarm.inputs is None:
             return alarm.stream().step
         monitor, times = Monitor(alarm, alarm.inputs), itertools.count()
@@ -248,7 +248,7 @@ class PerArm:
 
 
 def listening(compiled: CompiledScene, wanted: object) -> Callable[[], Listener] | None:
-    """What makes a detector for each copy of ``compiled``: by name, of a model file, or trained.
+    """Find what makes a detector for each copy of ``compiled``: a name, a model file, an alarm.
 
     Raises:
         ValueError: nothing that can detect, or a model file of another arm.
@@ -346,7 +346,7 @@ class Sensing:
 
     @property
     def bounds(self) -> Array:
-        """What the residual may be without contact [N m], shape (n,)."""
+        """Largest residual without contact [N m], shape (n,)."""
         return self.detector.bounds if self.detector else self._none
 
     def measure(

@@ -1,4 +1,4 @@
-"""What can be chosen about an environment by keyword, checked."""
+"""The keywords of an environment, and their checks."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Settings:
     ideal_drive: bool = False  #: no friction, ripple, lag or sensor errors
     max_speed: float | None = None  #: of every joint [rad/s]; default: the arm's own, else 2
     randomize: Mapping[str, Any] | None = None  #: drawn each episode: see ``envs.randomization``
-    contact_area: float | None = None  #: of the robot's striking surface [cm^2], where known
+    contact_area: float | None = None  #: of the robot's contact surface [cm^2], if known
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the one that is wrong and what would work."""

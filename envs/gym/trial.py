@@ -18,7 +18,7 @@ ACTIONS = 60
 
 @dataclass(frozen=True)
 class ArmTrial:
-    """What episodes of one environment came to."""
+    """The results of the episodes in one environment."""
 
     environment: str
     episodes: int
@@ -26,7 +26,7 @@ class ArmTrial:
     force: float  #: largest on a link [N]
     bound: float  #: largest that the arm can exert [N]
     diverged: int  #: episodes
-    moved: dict[str, float]  #: what was placed farther from the arm, and by how much [m]
+    moved: dict[str, float]  #: things that were placed farther from the arm, and by how much [m]
     refused: str = ""  #: why there is no such environment
 
     @property

@@ -1,4 +1,4 @@
-"""Many copies of an environment at once, on threads; every copy as if it were alone."""
+"""Many copies of an environment at once, on threads, each with the bits of a single one."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
     """``num_envs`` copies of an :class:`tauguard.envs.gym.base.ArmEnv`, stepped on a thread pool.
 
     Bit for bit what the single environments give, for any number of threads. The scene is compiled
-    once and shared. Finished copies begin anew at the next step (``AutoresetMode.NEXT_STEP``) or
-    in the same one (``SAME_STEP``), as ``autoreset_mode`` says.
+    once and shared. Finished copies begin a new episode at the next step
+    (``AutoresetMode.NEXT_STEP``) or in the same one (``SAME_STEP``), as ``autoreset_mode`` says.
     """
 
     task_type: ClassVar[type[Task]] = Task
@@ -170,7 +170,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         return batch.observation.copy(), rewards, terminated, truncated, infos
 
     def _restart(self, infos: dict[str, Any]) -> dict[str, Any]:
-        """SAME_STEP: the finished copies begin anew; what they ended with goes into ``final_``."""
+        """SAME_STEP: finished copies begin again; their last values go into ``final_`` keys."""
         done = self._over.copy()
         observations = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(done):
@@ -192,7 +192,7 @@ class VectorArmEnv(VectorEnv[Array, Array, Array]):
         } | infos
 
     def _metrics(self) -> StepMetrics:
-        """What the last action came to; no view of what the next one writes."""
+        """The results of the last action, as copies that the next action does not overwrite."""
         table = self.batch.metrics.copy()
         return StepMetrics(*(table[name] for name in StepMetrics._fields))
 

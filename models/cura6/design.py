@@ -117,7 +117,7 @@ LINKS = (
     ),
 )  # fmt: skip
 
-#: How far the caps of the joint housings bulge, relative to their radius.
+#: Height of the caps of the joint housings, relative to their radius.
 _BULGE = 0.28
 #: Where a tool is fixed, in the frame of link 6 [m]; the flange's outward normal is +y.
 FLANGE = (0.0, 0.018, 0.0)

@@ -1,6 +1,7 @@
 """Arms of other sizes, drawn after the CURA6-like one: same joints, other links, masses, drives.
 
-They are designs, not products: a family to test on arms that nothing was developed on.
+They are designs, not products. They test whether something works on arms that it was not
+developed on.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from tauguard.models.cura6.design import FLANGE, LINKS, Link, Part
 
 @dataclass(frozen=True)
 class Size:
-    """Factors on the arm's numbers; a tuple has one a link, base to tip."""
+    """Factors on the arm's numbers; a tuple holds one for each link, base to tip."""
 
     length: tuple[float, ...]  #: of every distance along and between the joints
     mass: tuple[float, ...]

@@ -1,9 +1,11 @@
-"""Contact checkers beside MuJoCo's own contacts: what each sees, how early, at what cost. Table
-``scenes`` holds every checker in every contact scene (:func:`tauguard.contacts.compare`). In
-``crossing`` a ball flies into pinned cloth, and a closed form gives the time of impact. Its
-start varies over the distance that it travels in one step. ``cost`` has a large cloth. MuJoCo
-treats a moving ball on cloth with ordinary contacts also under its flags ``speculative`` and
-``ipc``, so those rows equal the plain ones."""
+"""Contact checkers beside MuJoCo's own contacts: what each sees, how early, at what cost.
+
+Table ``scenes`` holds every checker in every contact scene (:func:`tauguard.contacts.compare`). In
+``crossing`` a ball flies into pinned cloth, and a closed form gives the time of impact. Its start
+varies over the distance that it travels in one step. ``cost`` has a large cloth. MuJoCo treats a
+moving ball on cloth with ordinary contacts also under its flags ``speculative`` and ``ipc``, so
+those rows equal the plain ones.
+"""
 
 from __future__ import annotations
 
@@ -107,7 +109,8 @@ def _fly(
     """Whether MuJoCo lists and holds the contact, and the error of the checker's time [s].
 
     Until the first contact the ball moves uniformly and the cloth rests. The time of impact is
-    therefore their distance divided by the speed."""
+    therefore their distance divided by the speed.
+    """
     scene = ball_cloth(speed=speed, offset=offset, impact=impact, mode=mode)
     model, data = scene.start(timestep)
     scratch, check = mujoco.MjData(model), checker("cloth", model)

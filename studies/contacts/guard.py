@@ -2,7 +2,8 @@
 
 The tunnelling oracle judges every scene, at one time step of 0.5 to 10 ms. The seed alone
 decides which scenes are drawn. Table ``overhead`` holds scenes in which nothing has to be
-guarded."""
+guarded.
+"""
 
 from __future__ import annotations
 
@@ -123,7 +124,8 @@ def _play(job: tuple[str, int, int, Sequence[str], Sequence[float]]) -> Played:
 def fixed_steps(scene: Drawn, fixed: Sequence[float]) -> dict[float, Outcome]:
     """Stiff fixed steps, from fine to coarse, up to the first that does not hold.
 
-    The finest step is tried only if the next one does not hold."""
+    The finest step is tried only if the next one does not hold.
+    """
     out: dict[float, Outcome] = {}
     finest, *coarser = sorted(fixed)
     for step in coarser:

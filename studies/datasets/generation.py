@@ -67,9 +67,11 @@ def measure(quick: bool, seed: int) -> list[Row]:
 
 
 def rate_rows(quick: bool, seed: int) -> list[Row]:
-    """Microseconds for each sample of episodes without and with collisions, and the speed of a
-    mix of both. The seed was not used in development. All arms of the first split and the arm of
-    the last split take part."""
+    """Microseconds for each sample, without and with collisions, and the speed of a mix of both.
+
+    The seed was not used in development. All arms of the first split and the arm of the last split
+    take part.
+    """
     configuration = replace(load(NAME), seed=987_000 + seed)
     count = 1 if quick else 4
     first, *_, last = configuration.splits

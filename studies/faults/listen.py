@@ -1,7 +1,9 @@
 """A log played by RTDE in real time, and a detector that receives it: losses, alarms, latency.
-Server and receiver of each rate are separate processes, as with ``tauguard play-ur`` and
-``tauguard listen``; all rates run at once. The alarms are compared with those that the detector
-gives on the file."""
+
+Server and receiver of each rate are separate processes, as with ``tauguard play-ur`` and ``tauguard
+listen``; all rates run at once. The alarms are compared with those that the detector gives on the
+file.
+"""
 
 from __future__ import annotations
 
@@ -164,9 +166,11 @@ def heard(folder: Path, rate: float) -> Row:
 
 def alike(times: list[float], truth: NDArray[np.bool_], said: dict[float, bool]) -> dict[str, Any]:
     """The fraction of the file's alarms that begin at the same sample in the received stream.
+
     ``truth`` says at each of the ``times`` [s], shape (T,), whether the file's alarm is up.
-    ``said`` says the same of the received stream, by time. An alarm whose first sample, or the
-    one before, was not received is left out."""
+    ``said`` says the same of the received stream, by time. An alarm whose first sample, or the one
+    before, was not received is left out.
+    """
     begins = [
         k
         for k in np.flatnonzero(np.diff(truth.astype(int), prepend=0) > 0).tolist()

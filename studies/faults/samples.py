@@ -1,7 +1,8 @@
-"""Every kind of fault in the samples of every arm: is it seen, how soon, and at what cost. A fault
-of one second is put into logs that training has not seen. The answers are compared with those on
-the same samples without the fault. A fault is ``seen`` if a reason is given while it lasts or
-within 0.15 s after it. ``false alarms`` are collisions in or after the fault that the intact
+"""Every kind of fault in the samples of every arm: is it seen, how soon, and at what cost.
+
+A fault of one second is put into logs that training has not seen. The answers are compared with
+those on the same samples without the fault. A fault is ``seen`` if a reason is given while it lasts
+or within 0.15 s after it. ``false alarms`` are collisions in or after the fault that the intact
 samples do not give. ``found after`` counts the alarms of the intact samples after the recovery that
 are also raised with the fault. ``silent`` is the time, from 20 ms after the fault begins, in which
 the answer is "free". A collision within a fault is ``missed`` if the intact samples give it and the
@@ -9,7 +10,8 @@ answer stays "free".
 
 The results of the real arms are optimistic: two settings were chosen on these logs, the
 allowances of the position check (a velocity or time stamp one sample late) and the bounds on
-torque ratios. On simulated arms only one thing was chosen: a load of training is no fault."""
+torque ratios. On simulated arms only one thing was chosen: a load of training is no fault.
+"""
 
 from __future__ import annotations
 

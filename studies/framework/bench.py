@@ -47,7 +47,7 @@ def command(
         detector: a method of your own as module:Class, beside those of the study `detection`.
         robot: arms by name or file, separated by commas, for the parts that take any arm.
         keep: folder of the job cache. Jobs whose results it holds are not run again, unless
-        versions or the sources of simulation and detectors have changed.
+            versions or the sources of simulation and detectors have changed.
         json: write the rows here as JSON.
         figure: write the figure here (PNG; the default is bench-NAME.png in the working folder).
         out: the folder of all studies.

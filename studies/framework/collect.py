@@ -27,7 +27,8 @@ def collect(folder: Path, names: Iterable[str], *, quick: bool, seed: int) -> di
 
     Each part writes ``NAME.json``, ``NAME.png`` and ``NAME.log``. Files that no part wrote stay
     unchanged. Full parts run one at a time, since others would disturb their times. Returns the
-    parts that failed, each with its last line or with what is wrong with its existing file."""
+    parts that failed, each with its last line or with what is wrong with its existing file.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     failed: dict[str, str] = {}
     missing: list[str] = []

@@ -23,7 +23,8 @@ def mistakes(folder: Path, seed: int) -> str:
 
     The detector and the motions are those of `tauguard demo`. The recordings are in
     ``folder/wrong``, their list in ``folder/wrong.json``. If they are of another seed or build,
-    a message says so and they are made again."""
+    a message says so and they are made again.
+    """
     kept = folder / "wrong.json"
     found, why = _kept(kept, seed)
     if why:

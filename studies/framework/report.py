@@ -81,7 +81,8 @@ def command(
         study: these studies or parts only (default: all that `tauguard bench list` names).
         bound: write the page from what the folder holds; run no study and no hard case.
         mistakes: train the detector of `tauguard demo` and record its mistakes, unless the
-        folder holds those of this build."""
+            folder holds those of this build.
+    """
     from studies.framework import mistakes as recorded
     from tauguard.hard_cases import adapters, load_cases, run
 

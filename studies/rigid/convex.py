@@ -7,7 +7,8 @@ faster it is.
 
 Textbook SAT tests all face normals, then all edge pairs. It projects every vertex, ends at the
 first separating axis, and has no error bounds. Data layout, compiler flags and loop are the same
-as for the other methods. Times are processor time of one thread."""
+as for the other methods. Times are processor time of one thread.
+"""
 
 from __future__ import annotations
 

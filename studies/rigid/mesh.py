@@ -2,7 +2,8 @@
 
 The environment variable ``TAUGUARD_MESH`` names the mesh (any file that trimesh reads). Without
 it the mesh is the Stanford bunny in ``TAUGUARD_DATA/meshes`` or, if that is missing, a generated
-one of the bunny's size."""
+one of the bunny's size.
+"""
 
 from __future__ import annotations
 

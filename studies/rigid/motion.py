@@ -4,7 +4,8 @@ For boxes and tetrahedra the truth is a bracket around the first contact, from c
 nothing with the code under test (`oracles.convex_impact`). For bodies with radii, coal's
 distance is the judge: at the time found and at 24 moments before it. coal has no continuous
 query. The peer is therefore the textbook method over coal's distance: step by the distance
-divided by the largest speed."""
+divided by the largest speed.
+"""
 
 from __future__ import annotations
 

@@ -67,7 +67,8 @@ def motion_columns(
         call: gives our times of impact of the chosen rows.
         distance: coal's, of the same pairs.
         lever: sum of both bodies' largest distances from the origins of their frames [m].
-        most: advance only this many pairs of each outcome (default: all)."""
+        most: advance only this many pairs of each outcome (default: all).
+    """
     every = np.arange(distance.n)
     found = call(every)
     end, hits = (

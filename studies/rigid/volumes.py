@@ -2,7 +2,8 @@
 
 The bodies are pieces of a mesh, of about 64 triangles each, in random poses near the origin. For
 a new pose a ball and an oriented box are moved. An axis-aligned box and an 18-DOP are computed
-again."""
+again.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,11 @@
-"""Impacts on body regions beside the standard's model of two masses and one spring. In ``rail``
-a mass on a rail hits every region, over time steps, integrators and contact parameters. The row
-gives the errors of peak force and transferred energy, and the cost. In ``arm`` links of the arm
-hit regions. The peak force without drives stands beside the predictions from the arm's reflected
-mass and from the standard's mass M/2 + m_L. The last column is the peak force under position
-control."""
+"""Impacts on body regions beside the standard's model of two masses and one spring.
+
+In ``rail`` a mass on a rail hits every region, over time steps, integrators and contact parameters.
+The row gives the errors of peak force and transferred energy, and the cost. In ``arm`` links of the
+arm hit regions. The peak force without drives stands beside the predictions from the arm's
+reflected mass and from the standard's mass M/2 + m_L. The last column is the peak force under
+position control.
+"""
 
 from __future__ import annotations
 

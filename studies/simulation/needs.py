@@ -1,8 +1,10 @@
 """Model only what a scene needs: what a part costs, and what leaving it out does to a detector.
-The shipped detector and its threshold are trained on recordings whose simulation lacks one part.
-It is then judged on other motion, twice: in the same poorer simulation (what a user would
-believe) and in the complete one (what is true). If leaving a part out changes neither result,
-data for this detector do not need it."""
+
+The shipped detector and its threshold are trained on recordings whose simulation lacks one part. It
+is then judged on other motion, twice: in the same poorer simulation (what a user would believe) and
+in the complete one (what is true). If leaving a part out changes neither result, data for this
+detector do not need it.
+"""
 
 from __future__ import annotations
 

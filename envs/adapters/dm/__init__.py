@@ -1,4 +1,4 @@
-"""For users of dm_control: the arm as a composer entity, the environments as ``dm_env`` ones.
+"""For users of dm_control: the arm as a composer entity, environments as ``dm_env`` ones.
 
 dm_control has no wheels for Python 3.13 and later; there this package raises ``ImportError``.
 """

@@ -14,7 +14,7 @@ from tauguard.arrays import Array
 from tauguard.models import load_arm
 from tauguard.models.mjcf import xml_text
 
-#: Elements that a frame can hold and that have a place of their own.
+#: Elements of a frame that have a pose of their own.
 _PLACED = ("body", "geom", "site", "camera", "light", "inertial", "joint")
 
 
@@ -74,7 +74,7 @@ class ArmEntity(composer.Entity):  # type: ignore[misc]
 
 
 class ArmObservables(composer.Observables):  # type: ignore[misc]
-    """What is seen of an :class:`ArmEntity`."""
+    """The observables of an :class:`ArmEntity`."""
 
     @composer.observable  # type: ignore[untyped-decorator]
     def joint_positions(self) -> observable.MJCFFeature:
@@ -93,7 +93,7 @@ class ArmObservables(composer.Observables):  # type: ignore[misc]
 
 
 def without_frames(xml: str) -> str:
-    """The same MJCF, every frame's pose given to what it holds.
+    """The same MJCF without frames: each element of a frame gets the frame's pose.
 
     Args:
         xml: text that MuJoCo has written: orientations are quaternions.

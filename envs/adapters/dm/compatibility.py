@@ -1,4 +1,4 @@
-"""dm_control on a MuJoCo that is newer than it: the one place that knows about it."""
+"""Repairs dm_control for a MuJoCo that is newer than it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from __future__ import annotations
 def repair() -> list[str]:
     """Drop the array names that MuJoCo's structures lack from dm_control's tables.
 
-    dm_control 1.0.50 lists arrays that MuJoCo 4 no longer has and reads all of them. Does nothing
-    where the two agree.
+    dm_control 1.0.50 lists arrays that MuJoCo 4 no longer has, and reads all of them. If the two
+    agree, this does nothing.
 
     Returns:
         The names dropped, as ``structure.name``; empty once it is no longer needed.

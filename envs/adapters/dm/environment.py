@@ -14,9 +14,8 @@ from gymnasium import spaces
 class DmEnvironment(dm_env.Environment):  # type: ignore[misc]
     """Any of the environments with the interface of ``dm_env``.
 
-    An episode that was cut off (``truncated``) ends with discount 1, one that ended
-    (``terminated``) with discount 0, as ``dm_env`` has it. What Gymnasium calls ``info`` is in
-    :attr:`info`.
+    A truncated episode ends with discount 1, a terminated one with discount 0, as ``dm_env``
+    defines it. :attr:`info` holds Gymnasium's ``info``.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], seed: int | None = None) -> None:

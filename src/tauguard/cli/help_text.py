@@ -14,9 +14,11 @@ ARGUMENT = re.compile(r"^    (\w+): (.*(?:\n {8,}.*)*)", re.MULTILINE)
 
 
 def tidy(command: Callable[..., Any]) -> None:
-    """Join the lines of an argument's text so that the terminal breaks them, and name its
-    default once. tyro's own note of the default is left out if the default is nothing or the
-    text names it."""
+    """Join the lines of an argument's text, and name its default once.
+
+    The terminal breaks the lines. tyro's own note of the default is left out if the default is
+    nothing or the text names it.
+    """
     hints = get_type_hints(command, include_extras=True)
     texts = dict(ARGUMENT.findall(inspect.getdoc(command) or ""))
     for name, parameter in inspect.signature(command).parameters.items():

@@ -36,7 +36,8 @@ def command(
         mcap: with --episode, write it here as a recording, obstacles included; `tauguard replay`
             turns that into an .rrd.
         robot: with --episode, the file of its arm, if the arm does not come with the package.
-        The dataset holds the file's hash and the numbers for training, but not the shapes."""
+            The dataset holds the file's hash and the numbers for training, but not the shapes.
+    """
     from tauguard.datasets import inspection
     from tauguard.datasets.dataset_folder import HEAD
     from tauguard.report import write_json
