@@ -77,6 +77,48 @@ ends at the last one; contacts less than 0.5 s apart are one. Its kind, link, po
 torque are in the manifest; the column `collision` gives its index. Episodes with other collisions
 than planned are kept, and their `outcome` says so.
 
+`tau_ext` is the sum over all contacts of the instant, `contact_x` and `force_x` are those of the
+largest one. Where several act at once, J^T f of the largest one is not the whole `tau_ext`.
+
+## Load it
+
+```python
+import polars as pl  # pandas, DuckDB and pyarrow read the same files
+
+rows = pl.scan_parquet("data/{first}-*.parquet")
+print(rows.filter(pl.col("collision") >= 0).group_by("episode").agg(pl.col("t").min()).collect())
+```
+
+```python
+from datasets import load_dataset  # Hugging Face datasets
+
+rows = load_dataset("FOLDER", split="{first_name}")  # the path of this folder
+```
+
+```python
+from tauguard.datasets import read  # traces with their collisions
+
+for trace in read(".", splits=["{first}"]):
+    print(trace, trace.truth.collisions)
+```
+
+## What it is for, and what not
+
+For training and comparing detectors of collisions, and estimators of contact force, from joint
+signals. Report figures of the splits whose names begin with "test"; train a detector for each arm.
+It does not show how a detector does on a real arm: drives, sensors and contacts are models. It is
+no evidence for the safety of a workplace.
+
+## Cite
+
+```bibtex
+@misc{{{key},
+  title = {{{name}: simulated collisions of robot arms}},
+  author = {{the tauguard authors}},
+  note = {{configuration {sha256}}}
+}}
+```
+
 ## How it was made
 
 By tauguard {tauguard} on MuJoCo {mujoco}, from the configuration with the SHA-256
@@ -116,7 +158,7 @@ def card(
         f"  - split: {name.replace('-', '_')}\n    path: data/{name}-*.parquet\n"
         for name in summary
     )
-    rows = sum(one.rows for one in summary.values())
+    rows, first = sum(one.rows for one in summary.values()), next(iter(summary))
     return CARD_TEXT.format(
         license=LICENSE,
         name=configuration.name,
@@ -126,6 +168,9 @@ def card(
         splits=_split_rows(summary),
         columns=_column_rows(configuration),
         joints=configuration.most_joints,
+        first=first,
+        first_name=first.replace("-", "_"),
+        key=configuration.name.replace("-", "_"),
         sha256=head["configuration_sha256"],
         tauguard=head["code"]["tauguard"],
         mujoco=head["code"]["mujoco"],
