@@ -1,4 +1,4 @@
-"""What an alarm is, and which rows of a trace are free of collisions.
+"""Definition of an alarm, and the collision-free rows of a trace.
 
 The alarm series is True where the score has stayed above the threshold for the confirmation time
 t_c. An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm that starts
@@ -20,9 +20,9 @@ CONFIRMATION = 3e-3
 
 
 def confirmation_samples(confirmation: float, dt: float) -> int:
-    """How many successive True samples stand for ``confirmation`` seconds at interval ``dt`` [s].
+    """How many successive True samples make ``confirmation`` seconds at interval ``dt`` [s].
 
-    Sample k stands for the interval that ends with it, so n samples are n dt; at least one.
+    Sample k represents the interval that ends with it, so n samples are n dt; at least one.
     """
     if not (np.isfinite(confirmation) and confirmation >= 0 and dt > 0):
         raise ValueError(f"confirmation {confirmation} s and dt {dt} s: expected >= 0 and > 0")
@@ -56,7 +56,7 @@ MERGE_GAP = 0.5
 #: An alarm this long after the onset still detects the collision [s].
 WINDOW = 0.5
 
-#: What follows a collision so closely is not counted as collision-free [s].
+#: Time after a collision that is not counted as collision-free [s].
 RECOVER = 0.5
 
 #: Length of a non-collision case [s].

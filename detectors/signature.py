@@ -1,4 +1,4 @@
-"""Signatures of model files, for who keeps a key: a checksum finds damage, not intent."""
+"""Signatures of model files for users who keep a key: a checksum finds damage, not manipulation."""
 
 from __future__ import annotations
 

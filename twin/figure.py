@@ -1,4 +1,4 @@
-"""The page on which a twin stands beside its arm."""
+"""A figure that compares a twin with its arm."""
 
 from __future__ import annotations
 

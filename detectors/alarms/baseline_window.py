@@ -1,4 +1,4 @@
-"""Collisions in a real arm's log: momentum observer, and a threshold a joint from quiet seconds."""
+"""Collisions in a real arm's log: momentum observer, thresholds from its quiet seconds."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ CONFIRMATION = 0.05  # [s]
 
 FACTOR = 1.5  # threshold over the largest residual of the quiet seconds
 
-STRANGE = 0.2  # fraction of a log in alarm that says that the log is another arm's
+STRANGE = 0.2  # fraction of a log in alarm above which the log is taken for another arm's
 
 BEFORE = 0.2  # [s] before an alarm from which residuals count as changed
 
 AROUND = 1.0  # [s] around an alarm in which a contact may change the torques
 
-SETTLING = 3.0  # time constants of the observer that are not looked at
+SETTLING = 3.0  # time constants of the observer that are left out
 
 
 @dataclass(frozen=True)
 class LogDetection:
-    """What was found in a log, and by which thresholds."""
+    """Alarms and faults of a log, and the thresholds that were used."""
 
     detection: Detection
     thresholds: Array
@@ -54,7 +54,7 @@ def detect_after_baseline(
     factor: float = FACTOR,
     joints: Sequence[int] | None = None,
 ) -> LogDetection:
-    """Look for collisions with thresholds that are learned from the log's own beginning.
+    """Find collisions with thresholds that are learned from the beginning of the log.
 
     The score is the largest ratio of |residual| to its joint's threshold; above 1 for
     ``confirmation`` seconds is an alarm.
@@ -67,7 +67,7 @@ def detect_after_baseline(
         gain: rate of the observer [1/s].
         confirmation: [s]; counted in whole samples.
         factor: threshold over the largest |residual| of the quiet seconds.
-        joints: whose residuals are looked at, 1-based (default: all).
+        joints: whose residuals are used, 1-based (default: all).
 
     Raises:
         ValueError: joints that the robot does not have; too few quiet seconds, or more than the
@@ -116,7 +116,7 @@ def _learning(trace: Trace, gain: float, quiet: float) -> Bools:
 
 
 def used(joints: Sequence[int] | None, count: int) -> np.ndarray:
-    """Which of ``count`` joints are meant, shape (count,).
+    """Which of ``count`` joints are used, shape (count,).
 
     Raises:
         ValueError: a joint that there is not.
@@ -128,7 +128,7 @@ def used(joints: Sequence[int] | None, count: int) -> np.ndarray:
 
 
 def detect_with(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
-    """Look for collisions with a trained detector.
+    """Find collisions with a trained detector.
 
     Raises:
         ValueError: another number of joints or another sample rate than it was trained at, a log

@@ -1,4 +1,4 @@
-"""Free, collision or fault: a detector on samples that cannot always be believed."""
+"""Free, collision or fault: a detector on samples that may be faulty."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ FREE, COLLISION, FAULT = "free", "collision", "fault"
 #: By the number that the native monitor answers.
 STATES = (FREE, COLLISION, FAULT)
 
-#: So many samples in a row that are missing or faulty are interpolated, or as many as last SPAN;
-#: after more the detector begins anew.
+#: This number of successive missing or faulty samples, or as many as SPAN holds, are interpolated;
+#: after more the detector starts again.
 BRIDGED = 2
 
 #: After a bridged fault nothing is judged until its samples have left the detector's window [s].
@@ -30,26 +30,24 @@ WINDOW = 0.1
 
 
 class Answer(NamedTuple):
-    """What is thought of the robot at one sample."""
+    """The state of the robot at one sample."""
 
     state: str  #: "free", "collision" or "fault"
     alarm: bool  #: a collision's alarm is up; during a fault: it was up when the fault began
-    score: float  #: of the detector, the last one known
+    score: float  #: score of the detector, the last known one
     reason: str  #: what is wrong with the input; empty without a fault
 
 
 class Monitor:
-    """A detector that says so when it cannot see.
+    """A detector that reports a fault when its samples cannot be used.
 
     A sample with a fault never reaches the detector. While faults last, and afterwards until the
     detector has settled again, the state is ``fault``. A collision whose alarm was up before the
-    fault stays a collision. An alarm that came within 20 ms of the fault is the fault's own.
-
-    Torques that cannot be this arm's are a fault as well; as a hard contact looks the same for half
-    a second, the detector goes on, and an alarm that is up stays a collision with that reason.
-
-    From a sample to its answer it is one native call that allocates nothing but the answer, unless
-    the detector's own stream is Python's.
+    fault stays a collision. An alarm that starts within 20 ms before the fault is attributed to
+    the fault. Torques that are impossible for this arm are a fault as well. A hard contact looks
+    the same for half a second, so the detector continues, and an alarm that is up stays a
+    collision with that reason. A sample takes one native call that allocates only the answer,
+    unless the detector's stream is written in Python.
     """
 
     def __init__(self, alarm: CollisionAlarm, usual: UsualInput) -> None:
@@ -74,7 +72,7 @@ class Monitor:
         return self._native.settled
 
     def step(self, t: float, q: Array, qd: Array, current: Array) -> Answer:
-        """What to think at this sample.
+        """Judge this sample.
 
         Args:
             t: its time stamp [s].
@@ -114,7 +112,10 @@ class Span:
 
 @dataclass
 class Spans:
-    """The spans so far; a collision that began within 20 ms before a fault was the fault's own."""
+    """The spans so far.
+
+    A collision that began within 20 ms before a fault is attributed to the fault.
+    """
 
     found: list[Span] = field(default_factory=list)
     _open: dict[str, Span] = field(default_factory=dict)
@@ -133,10 +134,10 @@ class Spans:
         return [span for span in self.found if span.state == state]
 
     def mark(self, state: str, up: bool, t: float, reason: str) -> None:
-        """Open, prolong or close the span of one state."""
+        """Open, extend or close the span of one state."""
         span = self._open.get(state)
         if up and span is None and not np.isfinite(t):
-            return  # it begins with the next time that is a number
+            return  # the span begins with the next finite time
         if up and span is None:
             last = next((span for span in reversed(self.found) if span.state == state), None)
             if last is not None and t - last.end < MERGED:
@@ -160,7 +161,7 @@ class Spans:
 
 @dataclass(frozen=True)
 class Monitored:
-    """What a detector and its fault checks say of a log."""
+    """The answers of a detector and its fault checks on a log."""
 
     detection: Detection
     faults: tuple[Span, ...]  #: in order; while one lasts, no alarm is looked for
@@ -170,8 +171,8 @@ class Monitored:
 def detect_with_faults(alarm: CollisionAlarm, trace: Trace) -> Monitored:
     """Alarms and faults of a log, as :class:`Monitor` gives them sample by sample.
 
-    Where no sample is at fault this is ``alarm.detect`` to the bit. A detector that does not know
-    what its samples look like names no faults.
+    Without faults this equals ``alarm.detect`` bit for bit. A detector without checks of its input
+    names no faults.
 
     Raises:
         ValueError: another number of joints or another sample rate.

@@ -1,4 +1,4 @@
-"""How good a calibration is on logs that it has not seen."""
+"""The error of a calibration on logs that it was not made from."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknown
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.traces.trace import Trace
 
-#: Fraction of a joint's torque that a calibration may leave, and from which on a note says so.
-#: Right logs leave 5 % on a UR10e, 17 % on a UR5 and 23 to 31 % of a wrist joint on a UR3 whose
-#: friction warms up; two joints or two currents exchanged leave 14 to 25 % on the UR10e. Between
-#: the two only a note is possible.
+#: Fraction of a joint's torque that may stay unexplained before a log is refused, and before a note
+#: says so. Right logs leave 5 % on a UR10e, 17 % on a UR5 and 23 to 31 % of a wrist joint on a UR3
+#: whose friction warms up; two joints or two currents exchanged leave 14 to 25 % on the UR10e.
+#: Between the two only a note is possible.
 UNEXPLAINED, DOUBTFUL = 0.35, 0.1
-#: A log held out whose residual is so many times the others' may have carried something: on a
-#: UR10e 4.3 and 4.6 with a load in one of seven, 2.4 with loads in two of eight, 1.2 without; 4.5
-#: where the others move single joints only. From the second on if much is unexplained as well.
+#: If the residual of a held-out log is the first multiple of the others', the arm may have carried
+#: a load. If much torque is unexplained as well, the second multiple is enough. On a UR10e the
+#: multiple is 4.3 and 4.6 with a load in one of seven logs, 2.4 with loads in two of eight, 1.2
+#: without a load, and 4.5 where the others move single joints only.
 OUTLYING, OUTLYING_IN_DOUBT = 2.5, 1.5
-#: A given load is off by more than so many kg, and than this fraction of it, before it is refused:
-#: a UR10e's torques show 2.2 kg of 2.6 kg, and 0.05 kg of none.
+#: A given load is refused if it differs from the torques' by more than this [kg] and by more than
+#: this fraction. A UR10e's torques show 2.2 kg for 2.6 kg, and 0.05 kg without a load.
 WRONG_LOAD = (0.8, 0.3)
-#: Slower joints are not judged [rad/s]: static friction explains itself.
+#: Slower joints are not judged [rad/s], because static friction hides their torque.
 FAST_ENOUGH = 0.05
 
 
@@ -93,7 +94,7 @@ def explained(arm: ArmModel, traces: Sequence[Trace], rate: float = 20.0) -> tup
 
 
 def outlier(held: Sequence[Array], least: float = OUTLYING) -> tuple[int, float] | None:
-    """The log that the others predict far worse than each other, and how many times worse.
+    """Find the log that the others predict far worse than each other, and how many times worse.
 
     Args:
         held: held-out residual of each log [N m], shape (n,) each.
@@ -112,7 +113,7 @@ def outlier(held: Sequence[Array], least: float = OUTLYING) -> tuple[int, float]
 
 
 def check_loads(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording]) -> None:
-    """Refuse a load that was given and that the torques of its log do not show.
+    """Refuse a given load that the torques of its log do not show.
 
     Args:
         arm: nominal numbers, and gains whose scale holds.

@@ -1,4 +1,4 @@
-"""Whether logs can be those of the arm: the sign of each current, and the arm's own weight."""
+"""Whether logs can come from the arm: the sign of each current, and the arm's weight."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals, low_pass
 from tauguard.traces.trace import Trace
 
-#: A joint is judged where it is faster than this [rad/s], and changes direction over that.
+#: A joint is judged if it is faster than the first speed; its direction changes over the second
+#: [rad/s].
 FAST, REVERSAL = 0.05, 0.05
 
-#: Drag below this many deviations of what is left: of another sign. Three real arms have 0.6 at
-#: least in every log and 2 to 8 as a rule; a current of the other sign has the negative of that.
+#: A joint's current has the wrong sign if its drag is below this number of deviations of the
+#: unexplained current. Three real arms have at least 0.6 in every log and 2 to 8 in most. A current
+#: with the other sign has the negative of that.
 AGAINST = -1.0
 
-#: Seconds of motion of a joint that say something.
+#: Least motion of a joint by which it is judged [s].
 ENOUGH = 3.0
 
 #: Gravity torque of the calibrated arm over the robot file's. The right files of three real arms
@@ -54,10 +56,10 @@ def check_signs(arm: ArmModel, name: str, trace: Trace) -> None:
 
 
 def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> Array:
-    """What of each joint's current follows the direction of motion, shape (n,).
+    """The part of each joint's current that follows the direction of motion, shape (n,).
 
-    In deviations of what neither that nor the rigid-body torque explains; above 0 for friction;
-    NaN for a joint that moves for less than :data:`ENOUGH`.
+    The unit is the deviation of the current that neither this nor the rigid-body torque explains.
+    Friction gives a value above 0. NaN for a joint that moves for less than :data:`ENOUGH`.
     """
     n, dt = robot.joints, intervals(trace.t, len(trace.t))
     rates, nothing = np.full(n, rate), np.zeros_like(trace.q)
@@ -78,10 +80,11 @@ def drag(robot: RobotNumbers, trace: Trace, sign: Array, rate: float = 20.0) -> 
 
 
 def torque_per_ampere(arm: ArmModel, traces: Sequence[Trace]) -> float:
-    """What the drives give over what the columns hold, root mean square [N m/A].
+    """Root mean square of the drives' torque divided by that of the log's columns [N m/A].
 
-    Over all joints and samples, so the joints that carry the arm count, not a wrist joint whose
-    gain nothing fixes. 0.9 to 1.1 for joint torques given as currents, 4 to 16 for currents.
+    It is taken over all joints and samples, so the joints that carry the arm dominate, not a wrist
+    joint whose gain nothing fixes. Joint torques given as currents have 0.9 to 1.1, currents 4 to
+    16.
     """
     current = np.concatenate([trace.current for trace in traces])
     torque = current * arm.drive_gain
@@ -89,7 +92,7 @@ def torque_per_ampere(arm: ArmModel, traces: Sequence[Trace]) -> float:
 
 
 def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace]) -> None:
-    """Refuse a robot file whose arm needs other torques against gravity than the logs show.
+    """Refuse a robot file whose gravity torques differ from those of the logs.
 
     Args:
         file: the numbers of the robot file.
@@ -110,18 +113,18 @@ def check_weight(file: RobotNumbers, found: RobotNumbers, traces: Sequence[Trace
     )
 
 
-#: Fraction of the torque left over that is refused, and from which on it is said. A UR10e with
-#: published gains and friction leaves 0.1 to 0.2, with gains alone up to 0.53, with two joints
-#: exchanged 0.5 to 1.4, with another sign 1 to 1.9, in milliamperes 1.
+#: Fraction of unexplained torque above which a log is refused, and above which a note says so. A
+#: UR10e with published gains and friction leaves 0.1 to 0.2, with gains alone up to 0.53, with two
+#: joints exchanged 0.5 to 1.4, with another sign 1 to 1.9, in milliamperes 1.
 REFUSED, DOUBTED = 0.7, 0.4
 
-#: Torques are weighed against this fraction of what gravity can ask of the arm at least: in a pose
-#: where it asks for nothing, friction is all there is.
+#: Torques are compared with at least this fraction of the arm's largest gravity torque. In a pose
+#: without gravity torque only friction is left.
 STRENGTH = 0.4
 
 
 def drive_torque(arm: ArmModel, trace: Trace) -> Array:
-    """What the drives give to the joints, less the arm's friction [N m], shape (T, n)."""
+    """Torque of the drives at the joints without friction [N m], shape (T, n)."""
     tau: Array = trace.current * arm.drive_gain
     if arm.friction is None:
         return tau
@@ -138,7 +141,7 @@ def check_torques(
     rate: float,
     touched: bool = False,
 ) -> tuple[str, ...]:
-    """Notes on torques that the motion hardly explains.
+    """Notes on torques that the motion does not explain well.
 
     Args:
         robot: the arm.
@@ -161,7 +164,7 @@ def check_torques(
     poses = np.random.default_rng(0).uniform(-np.pi, np.pi, (200, n))
     most = STRENGTH * float(np.linalg.norm(np.abs(gravity_torque(robot, poses)).max(axis=0)))
     if most < 1e-6:
-        return ()  # gravity asks for nothing: friction may be all there is
+        return ()  # no gravity torque: the torque may be friction alone
     sizes = [float(np.sqrt((x[rows] ** 2).sum(axis=1).mean())) for x in (residual, needed, given)]
     fraction = sizes[0] / max(*sizes[1:], most)
     where = "contacts included" if touched else "where nothing touches the arm"

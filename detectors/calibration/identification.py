@@ -6,10 +6,10 @@ and in the payloads. All pass through the detector's own causal filter, so no ac
 needed. The solution is restricted to bodies that can exist
 (:mod:`~tauguard.detectors.dynamics.physical_consistency`).
 
-Currents alone tell torques only up to a factor a joint: if every gain, mass and friction shrinks
-together, every current is explained as well. Something from outside has to fix the scale, and
-the regression has to predict currents from torques, not torques from currents, or a small scale
-looks like a good fit.
+Currents alone fix torques only up to a factor for each joint: if every gain, mass and friction
+shrinks by the same factor, every current is explained as well. So other information has to fix
+the scale. The regression predicts currents from torques; the other direction would favour a
+small scale.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from tauguard.detectors.estimation.estimator import ArmModel
 
 #: Columns that a real geared joint needs: presliding of several lengths, Stribeck, viscous friction
 #: that flattens at speed, and load-dependent friction. A torque per ampere that changes with the
-#: current would explain the torque by itself: on a UR5 and a UR3 it took half of it or more.
+#: current is left out. It would explain the torque by itself: half of it or more on a UR5 and a
+#: UR3.
 REAL_FRICTION = FrictionModel(
     bristles=(),
     stops=(1e-3, 3e-3, 1e-2, 3e-2),
@@ -45,19 +46,20 @@ REAL_FRICTION = FrictionModel(
 
 @dataclass(frozen=True)
 class Beliefs:
-    """Standard deviations of what is identified around what is believed."""
+    """Standard deviations of the identified numbers around the assumed ones."""
 
     mass: float = 0.1  #: relative
     centre: float = 0.02  #: of the centre of mass, each axis [m]
     inertia: float = 0.1  #: relative to the link's largest entry
     armature: float = 1.0
     """Relative to the joint's largest entry of the mass matrix, or to a twentieth of the arm's
-    largest: the rotor of a wrist weighs more, through its gear, than all that it turns."""
+    largest. Behind its gear, the rotor of a wrist has more inertia than everything that it
+    turns."""
     gain: float = 0.5  #: relative, where gains are identified
     friction: float = 0.3
-    """Of a friction weight, per median torque of the joint in the log that asks most of it, but for
-    the following: columns that are alike at the logged speeds split what they explain, and do not
-    cancel each other beyond."""
+    """Of a friction weight, except those below. The unit is the joint's median torque in the log
+    where it is largest. With this prior, columns that are alike at the logged speeds share what
+    they explain and do not cancel each other at other speeds."""
     loaded: float = 0.3  #: of friction per load [1]
     saturation: float = 0.2  #: change of the torque per ampere at the largest torque, relative
     payload: float = 5.0  #: of a load that is not given [kg]
@@ -141,7 +143,7 @@ def identify(
     rate: float = 20.0,
     data: Sequence[Filtered] | None = None,
 ) -> Identified:
-    """Identify inertia, friction, and where something fixes their scale the drive gains.
+    """Identify inertia, friction and, if something fixes their scale, the drive gains.
 
     Args:
         arm: what is believed; the gains are a start, or hold (``scale="gains"``).
@@ -149,7 +151,7 @@ def identify(
         scale: what fixes the scale of the torques: "gains" (those of ``arm`` hold), "payload" (a
             recording with a known load above 0 does) or "masses" (those of ``arm`` do).
         friction: its columns.
-        beliefs: how far to trust what is believed.
+        beliefs: standard deviations of the assumed numbers.
         rate: of the filter that everything passes through [1/s].
         data: of each recording, from :func:`filtered` (default: made here); only for "gains".
 
@@ -158,7 +160,7 @@ def identify(
     """
     beliefs = beliefs or Beliefs()
     _check(recordings, arm.robot, scale)
-    # A hundred unknowns: threads of the linear algebra cost more time than they save.
+    # With a hundred unknowns, threads of the linear algebra cost more time than they save.
     with threadpool_limits(1, "blas"):
         if scale == "gains":
             return _fit(arm, recordings, scale, friction, beliefs, rate, data, 2)[0]
@@ -174,7 +176,7 @@ def _identify_scale(
     rate: float,
 ) -> Identified:
     """As :func:`identify`, where gains are found, too."""
-    # A torque per ampere that may change with the current takes up what a load does: it stays out
+    # A torque per ampere that changes with the current would explain a load, so it is left out
     # while the scale is sought.
     constant = replace(friction, saturation=False, weights=np.empty((0, 0)))
     sought, error = _fit(arm, recordings, scale, constant, beliefs, rate, None, 6)
@@ -199,13 +201,14 @@ def _fit(
     data: Sequence[Filtered] | None,
     rounds: int,
 ) -> tuple[Identified, Array]:
-    """Rounds of least squares, each weighing joints by what the last left; gains' deviations."""
+    """Iterate least squares with joints weighted by the last residual; also gains' deviations."""
     robot, held = arm.robot, scale == "gains"
     gain, error = arm.drive_gain.copy(), np.zeros(robot.joints)
     level: Array = np.ones(robot.joints)
     known = [known_load(recording) for recording in recordings]
     loads = np.array(known)
-    # Friction whose load is the model's own does not see the gains: they scale the currents alone.
+    # Friction that depends on the model's own load is independent of the gains, which scale the
+    # currents only.
     rescaled = friction.modelled and not friction.saturation
     first: Sequence[Filtered] = ()
     for turn in range(rounds):

@@ -1,4 +1,4 @@
-"""The nominal arm: what a detector believes before its training."""
+"""The nominal arm: the model that a detector has before its training."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ STANDSTILL = 0.05
 
 
 def nominal_arm(traces: Sequence[Trace]) -> ArmModel:
-    """What is believed of the recordings' arm before training.
+    """The arm model of recordings before training.
 
-    It comes from what is attached to them, never from a robot's file.
+    It comes from the attachments of the recordings, never from a robot file.
 
     Raises:
         ValueError: no nominal arm is attached to the recordings.
@@ -104,7 +104,7 @@ def residual(trace: Trace, robot: str | Robot | None = None, gain: ArrayLike = P
 
 
 def _believed(xml: str, drive: Drive) -> ArmModel:
-    # The ripple's frequencies follow from the gear; its heights and phases are identified.
+    # The ripple's frequencies follow from the gear; its amplitudes and phases are identified.
     cycles = np.outer(drive.gear, drive.ripple.cycles) if drive.ripple else np.empty((0, 0))
     model = compiled(xml)
     robot = RobotNumbers.from_pin(pin_model(model))

@@ -1,4 +1,4 @@
-"""Collision-free logs of a real arm, and what it carried in them."""
+"""Collision-free logs of a real arm with the loads that it carried."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from tauguard.traces.trace import Trace
 
 #: An axis slower than this in every sample of a log does not move in it [rad/s].
 MOVING = 0.01
-#: No part of a log that is cut is shorter [s].
+#: Shortest part of a log that is cut [s].
 SHORTEST = 8.0
 
 
 @dataclass(frozen=True)
 class Load:
-    """What the arm carried, as far as it is known."""
+    """The load that the arm carried, as far as it is known."""
 
     mass: float = 0.0  #: [kg]
     centre: tuple[float, float, float] | None = None
-    """In the last link's frame [m]; None: not known, identified with the rest."""
+    """In the last link's frame [m]; None: unknown, identified with the other numbers."""
 
     def __post_init__(self) -> None:
         """``ValueError`` for a mass below 0 or numbers that are not finite."""
@@ -91,7 +91,7 @@ def known_load(recording: Recording) -> Array:
 
 
 def pieces(recordings: Sequence[Recording], count: int) -> list[Recording]:
-    """Recordings, cut so that there are ``count`` of them or more.
+    """Cut recordings until there are at least ``count``.
 
     The longest are halved first, none below 8 s.
     """

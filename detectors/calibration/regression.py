@@ -23,10 +23,10 @@ from tauguard.traces.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """Everything that the regression needs of one recording, behind the observer's filter.
+    """Everything that the regression needs of one recording, after the observer's filter.
 
-    The normal equations of each joint are kept once they are made: rounds of least squares, and
-    calibrations that leave one recording out, differ in how they weigh the joints only.
+    The normal equations of each joint are stored: rounds of least squares, and calibrations that
+    leave one recording out, differ only in the weights of the joints.
     """
 
     torque: Array  #: nominal rigid-body torque less payload [N m], (R, n)
@@ -57,7 +57,7 @@ class Filtered:
         )
 
     def target(self, joint: int) -> Array:
-        """What the unknowns are to explain [N m], shape (R,)."""
+        """The torque that the unknowns have to explain [N m], shape (R,)."""
         out: Array = self.current[:, joint] - self.torque[:, joint]
         return out
 
@@ -121,7 +121,7 @@ def filtered_columns(
     rows = count * stride
 
     def mean(x: Array) -> Array:
-        """Over the samples that a thinned interval holds: the drive torque acts throughout."""
+        """Sum over the samples of a thinned interval, in which the drive torque acts throughout."""
         out: Array = x[:rows].reshape(count, stride, *x.shape[1:]).mean(axis=1)
         return out
 
@@ -176,7 +176,7 @@ def body_deviations(robot: RobotNumbers, mass: float, centre: float, inertia: fl
 
 
 def _carried(trace: Trace, robot: RobotNumbers, load: Array) -> Array:
-    """What load-dependent friction grows with [N m], shape (T, n)."""
+    """The load that load-dependent friction is proportional to [N m], shape (T, n)."""
     carrying = robot.inertial.copy()
     carrying[-1] += load
     return momentum_terms(robot.with_inertial(carrying), trace.q, trace.qd)[1]
@@ -186,9 +186,9 @@ class System:
     """Normal equations over errors of inertia and armature, friction, gains and payloads.
 
     ``current = torque (1 + s) - inertial dphi - armature da + friction w + load``, and the gain of
-    a joint is that of the round divided by 1 + s. Gains that priors hold within percents may as
-    well scale what is measured, ``current (1 + s) = torque - ...``, and are then multiplied by
-    1 + s; free ones may not: all of them small would look like a good fit.
+    a joint is that of the round divided by 1 + s. Gains with priors of a few percent may instead
+    scale the measured current, ``current (1 + s) = torque - ...``, and are then multiplied by 1
+    + s. Free gains may not: if all of them were small, the fit would seem good.
     """
 
     def __init__(
@@ -223,14 +223,14 @@ class System:
             self.vector[at] += weight[joint] ** 2 * vector
 
     def solve(self, deviations: Array) -> Array:
-        """The unknowns around 0, shape (size,); those with a deviation of 0 are held there."""
+        """The unknowns, shape (size,); those with a prior deviation of 0 stay 0."""
         out, free = np.zeros(self.size), np.flatnonzero(deviations > 0)
         matrix = self.matrix[np.ix_(free, free)] + np.diag(deviations[free] ** -2.0)
         out[free] = np.linalg.solve(matrix, self.vector[free])
         return out
 
     def residual(self, data: Filtered, recording: int, solution: Array, known: Array) -> Array:
-        """What the solution does not explain [N m], shape (R, n)."""
+        """The residual of the solution [N m], shape (R, n)."""
         out = np.empty_like(data.current)
         for joint in range(self.n):
             x = data.design(joint, known, self.measured)

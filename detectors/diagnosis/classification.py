@@ -2,13 +2,14 @@
 
 Three questions, each with a measure that has a physical meaning:
 
-* Does it last? An impact is over while a clamping, a push and a payload are still there: what the
-  residual keeps at the end of the look, in the direction of its peak.
+* Does it last? An impact is over when a clamping, a push or a payload is still there. The measure
+is the part of the residual that is left at the end of the window, in the direction of its peak.
 * Is it a load? An unknown payload pulls down at the flange: the fraction of the residual
   that one constant mass and first moment at the last link explain, over all joints and samples.
-* Does somebody mean it? A hand pushes more slowly than an arm runs into things (Golz et al. 2015,
-  Kouris et al. 2018 use the spectrum), and a clamping always works against the arm's motion: the
-  rate at which the force rises, and the cosine between force and velocity of the touched point.
+* Is it intended? A hand pushes more slowly than an arm runs into things (Golz et al. 2015,
+Kouris et al. 2018 use the spectrum), and a clamping always acts against the arm's motion. The
+measures are the rate at which the force rises, and the cosine between force and velocity of the
+touched point.
 """
 
 from __future__ import annotations
@@ -20,23 +21,23 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors.diagnosis.post_alarm import PostAlarmWindow
 
-#: What there is; a payload change is no collision, a push is one that somebody intends.
+#: The kinds of events. A payload change is no collision; a push is an intended contact.
 KINDS = ("impact", "clamp", "push", "payload")
-#: An event lasts where it keeps this fraction of its level, and how sharply that is decided.
+#: An event lasts if this fraction of its level remains; width of the decision.
 LASTS, LASTS_WIDTH = 0.5, 0.05
-#: A load explains this fraction of the residual, and how sharply that is decided.
+#: An event is a load if a load explains this fraction of the residual; width of the decision.
 LOAD, LOAD_WIDTH = 0.9, 0.01
 #: A payload is within this reach of the last joint [m] and no heavier than this [kg].
 REACH, HEAVIEST = 0.5, 7.0
-#: The end of the look that tells whether it lasts [s].
+#: Length of the end of the window that decides whether an event lasts [s].
 END = 0.03
-#: Samples this soon after the alarm [s], and so many lags of the observer, are still in motion: the
-#: load's fraction looks at later ones.
+#: The fraction of a load is computed from samples that are later than this after the alarm [s], and
+#: than this number of lags of the observer, since the arm still moves before.
 SETTLING, SETTLING_LAGS = 0.025, 3.0
 #: Log odds of an intended push: constant, per decade of N/s, per unit of the cosine. Fitted by
-#: logistic regression to simulated clampings and pushes, on arms and seeds that no study judges.
+#: logistic regression to simulated clampings and pushes, on arms and seeds that no study uses.
 INTENT = (4.2, -1.2, 3.6)
-#: No rise counts as shorter than this, or one sample of a faster trace [s].
+#: Shortest rise that is counted [s].
 SHORTEST = 1e-3
 #: Levels between which the rise is measured, fractions of the highest.
 RISE = (0.25, 0.75)
@@ -46,7 +47,7 @@ RISE = (0.25, 0.75)
 class Signs:
     """The measures that decide."""
 
-    lasting: float  #: residual at the end of the look along its peak, as a fraction of the peak
+    lasting: float  #: residual at the end of the window along its peak, as a fraction of the peak
     load: float  #: fraction of the residual that a constant payload explains, 0 to 1
     mass: float  #: that payload [kg]; negative: put down
     reach: float  #: its distance from the last joint [m]

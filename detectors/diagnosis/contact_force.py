@@ -1,12 +1,13 @@
-"""From a residual to a contact: how likely is every point of the arm's surface, and which force.
+"""From a residual to a contact: probability and force at every point of the arm's surface.
 
 A force f on a link at point p gives the joint torques J_p^T f. Fewer than six joints carry most
-links, so a residual alone does not fix f and p (Haddadin, De Luca, Albu-Schaeffer 2017, IV-C). What
-is known besides: a contact is on the surface, and it pushes. Every sampled surface point is
-therefore a hypothesis, as in the contact particle filter (Manuelli & Tedrake 2016), but with a
-Gaussian prior on the force instead of a friction cone. Then the evidence of a point and the mean
-of its force have closed forms, and an evidence can be compared between points and between links:
-a point that needs an unlikely force, or could have explained any residual, counts less.
+links, so a residual alone does not fix f and p (Haddadin, De Luca, Albu-Schaeffer 2017, IV-C).
+Besides,
+a contact is on the surface, and it pushes. Every sampled surface point is therefore a hypothesis,
+as in the contact particle filter (Manuelli & Tedrake 2016), but with a Gaussian prior on the force
+instead of a friction cone. Then the evidence of a point and the mean of its force have closed
+forms, and evidences can be compared between points and links. A point that needs an unlikely
+force counts less, and so does one that could have explained any residual.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from tauguard.arrays import Array
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 
-#: Forces expected before anything is known: standard deviations along the normal [N], all alike.
+#: Prior of the force: standard deviations along the normal [N], all equally likely.
 SCALES = (10.0, 30.0, 100.0, 300.0)
 #: Expected tangential force over the normal one: friction, and pushes at an angle.
 FRICTION = 0.5
@@ -92,7 +93,7 @@ def point_jacobians(
 
 @dataclass(frozen=True, eq=False)
 class ContactBelief:
-    """What a residual says about every sampled point of the surface; rows are points."""
+    """Probability and force of a contact at every sampled point of the surface; a row a point."""
 
     link: NDArray[np.int64]  #: 0-based, shape (K,)
     point: Array  #: world frame [m], shape (K, 3)
@@ -101,7 +102,7 @@ class ContactBelief:
     prior: Array  #: probability before the residual was seen, shape (K,)
 
     def weighted(self, probability: Array) -> ContactBelief:
-        """The same points and forces, with what is known of the point from elsewhere."""
+        """The same points and forces, with other knowledge of the point."""
         return replace(self, probability=probability)
 
     def links(self, count: int) -> Array:
@@ -137,7 +138,8 @@ def contact_belief(
 ) -> ContactBelief:
     """Judge every surface point by how well a push there explains a residual.
 
-    Links are equally likely before, and so are the points of a link and the scales of the force.
+    A priori all links are equally likely, and so are the points of a link and the scales of the
+    force.
 
     Args:
         robot: the arm.
@@ -163,7 +165,7 @@ def contact_belief(
     inward = -np.einsum("kij,kj->ki", turn, surface.normal).T
     jacobian = point_jacobians(robot, poses, surface.link, point)
     torque = np.ascontiguousarray(jacobian.transpose(2, 1, 0)) / sigma[:, None, None]  # (n, 3, K)
-    # A standardised force is the same length in all likely directions.
+    # Standardised forces have the same deviation in all directions.
     normal = np.einsum("nik,ik->nk", torque, inward)
     torque = friction * torque + (1 - friction) * normal[:, None] * inward
     log, force = _explain(torque, y / sigma, inward, np.array(scales))

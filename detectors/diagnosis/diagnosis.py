@@ -1,4 +1,4 @@
-"""After the alarm: which link, where, which force, and what kind of event it was."""
+"""After the alarm: the link, point, force and kind of the event."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.traces.trace import Alarm, Detection, Trace
 
-#: Link and point are found from the samples up to this long after the alarm, and from those this
-#: long before it [s]; longer after it, by so many lags, where the observer is slow.
+#: Link and point are found from samples in this time after and before the alarm [s]. With a slow
+#: observer, the time after it is this number of lags.
 ISOLATE, EARLY, ISOLATE_LAGS = 0.1, 0.01, 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is said about one alarm."""
+    """The diagnosis of one alarm."""
 
     alarm: Alarm
     link: int  #: the most likely link, 1-based: link i moves with joint i
     links: Array  #: probability of each link, shape (n,)
-    last_joint: int  #: what the usual rule says: the last joint with a significant residual
+    last_joint: int  #: link by the usual rule: the last joint with a significant residual
     time: float  #: of the force [s]: its peak within the look
     force: Array  #: on the arm at that time, world frame [N], shape (3,)
     point: Array  #: where, at that time, world frame [m], shape (3,)
     kind: str  #: the most likely of :data:`~tauguard.detectors.diagnosis.classification.KINDS`
     kinds: dict[str, float]  #: probability of each kind
-    signs: Signs  #: what the kind was decided by
+    signs: Signs  #: the measures that decided the kind
     severity: Severity  #: impulse and peak force, each with an interval
-    until: float  #: end of the look at it [s]
+    until: float  #: end of the observed window [s]
     joints: tuple[str, ...]  #: their names
 
     @property
@@ -72,7 +72,7 @@ def diagnose(
         detection: the alarms of the trace, where they are known already.
         robot: MJCF or URDF of the arm with its collision shapes, or its sampled surface (default:
             the ``arm.xml`` that simulated traces carry).
-        after: how long an alarm is looked at [s].
+        after: length of the observed window [s].
 
     Returns:
         A diagnosis for each alarm, in order.
@@ -100,10 +100,10 @@ class Diagnoser:
 
     @classmethod
     def of(cls, arm: ArmModel, surface: LinkSurface) -> Diagnoser:
-        """With the noise model that the arm's detector has learned, if it has.
+        """With the noise model that the arm's detector has learned, if there is one.
 
-        Where a detector reduces the residual of joints that carry an uncertain payload, its
-        deviation is less than what the residual itself does: the noise is the least.
+        A detector that reduces the residual of joints with an uncertain payload has a smaller
+        deviation than the residual itself, so the sensors' noise is a lower bound.
         """
         known = arm.noise_model
         least = None if known is None or arm.noise is None else known.at_least(arm.noise)

@@ -12,19 +12,20 @@ from tauguard.detectors.diagnosis.contact_force import ContactBelief, contact_be
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 
-#: The usual rule counts torques above this many deviations and this fraction of the largest torque:
-#: its best values on simulated arms that no study judges.
+#: The usual rule counts torques above this number of deviations and this fraction of the largest
+#: torque. These values were best on simulated arms that no study uses.
 SIGNIFICANT, NOTICED = 6.0, 0.05
-#: Moments looked at besides the strongest one, and the fraction of its level that they need.
+#: Number of moments that are used besides the strongest one, and the fraction of its level that
+#: they need.
 MOMENTS, FRACTION = 3, 0.4
 
 
 @dataclass(frozen=True)
 class Trust:
-    """How far a residual is believed while something touches the arm.
+    """Uncertainty of a residual while something touches the arm.
 
-    The noise of free motion is one part; a contact adds errors that grow with it: friction that
-    changes sign, a gain that is some percent off, links that have moved on.
+    The noise of free motion is one part. A contact adds errors that grow with it: friction that
+    changes sign, errors of the gain, and motion of the links.
     """
 
     free: float = 3.0  #: deviations of free motion
@@ -48,10 +49,10 @@ def isolate(
     residual: Array,
     noise: Array,
 ) -> ContactBelief:
-    """The belief after several moments of one contact.
+    """Combine several moments of one contact.
 
-    The point stays the same on its link while the force may change from moment to moment, so the
-    evidences of a point multiply. A moment that says little changes little.
+    The point stays the same on its link while the force may change, so the evidences of a point
+    multiply. A moment with little information changes little.
 
     Args:
         robot: the arm.
@@ -79,7 +80,7 @@ def isolate(
 
 
 def moments(level: Array, most: int = MOMENTS, fraction: float = FRACTION) -> NDArray[np.int64]:
-    """Samples to look at: spread over those near the highest level, which comes last.
+    """Choose samples: spread over those near the highest level, which comes last.
 
     Args:
         level: strength of the residual, shape (M,).

@@ -1,8 +1,8 @@
-"""Draws from what a residual says about a contact's force: how sure its size is.
+"""Draws from the distribution of a contact's force given a residual: how certain its size is.
 
-The mean force of :mod:`~tauguard.detectors.diagnosis.contact_force` hides how little a residual may
-say: a force through the joints' axes turns none of them. Draws over points, scales and forces keep
-that: where the size is not identifiable, theirs spread as far as the prior.
+The mean force of :mod:`~tauguard.detectors.diagnosis.contact_force` hides how uncertain it may
+be: a force through the joints' axes turns no joint. Draws over points, scales and forces show
+this: if the size is not identifiable, they spread as far as the prior.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.models.link_surface import LinkSurface
 from tauguard.report import two_digits
 
-#: Draws, and their seed: the same residual has the same answer.
+#: Number of draws, and their seed: the same residual gives the same answer.
 DRAWS, SEED = 600, 5
 
 
@@ -107,20 +107,20 @@ def _drawn(columns: Array, y: Array, inward: Array, rng: np.random.Generator) ->
 #: Fraction of the true values that the intervals are to hold.
 COVERAGE = 0.9
 
-#: The torque is averaged over so many lags to either side before its peak is taken.
+#: The torque is averaged over this number of lags to both sides before its peak is taken.
 SMOOTHED = 0.3
 
 #: The contact lasts while the torque is above this fraction of its peak.
 CONTACT_FRACTION = 0.15
 
-#: Relative error besides noise and place (log): directions that turn, gains. Chosen on simulated
-#: arms and seeds that no study judges.
+#: Relative error (log) besides those of noise and point: changing directions, gains. Chosen on
+#: simulated arms and seeds that no study uses.
 SPREAD = 0.2
 
-#: An interval whose ends differ by more than this factor says nothing of the size.
+#: If the ends of an interval differ by more than this factor, the size is not identifiable.
 IDENTIFIABLE = 6.0
 
-#: What the samples do not resolve is no more than this fraction of a contact's time.
+#: Largest fraction of a contact's time that the samples may fail to resolve.
 UNRESOLVED = 0.9
 
 
@@ -140,18 +140,18 @@ class Interval90:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the interval says something of the size."""
+        """Whether the size is identifiable."""
         return self.high <= IDENTIFIABLE * self.low
 
     def text(self, unit: str) -> str:
-        """``120 N [90, 180]``; without the median where that says nothing."""
+        """``120 N [90, 180]``; without the median if the size is not identifiable."""
         ends = f"[{two_digits(self.low)}, {two_digits(self.high)}]"
         return f"{two_digits(self.value)} {unit} {ends}" if self.identifiable else f"{ends} {unit}"
 
 
 @dataclass(frozen=True, eq=False)
 class ContactTorque:
-    """What a contact did at the joints, from its beginning to the end of the look at it."""
+    """Torques of a contact at the joints, from its beginning to the end of the window."""
 
     row: int  #: of the peak, among the look's samples
     seconds: float  #: that it touched, of the 0.4 s or so that are looked at [s]
@@ -159,7 +159,7 @@ class ContactTorque:
     peak: Array  #: tau_ext at its peak [N m], shape (n,)
     shape: float  #: peak over mean
     hidden: float  #: fraction of its time that the samples do not resolve
-    goes_on: bool = False  #: it still touched when the look ended
+    goes_on: bool = False  #: the contact lasted at the end of the window
 
     @property
     def mean(self) -> Array:
@@ -168,7 +168,7 @@ class ContactTorque:
         return value
 
     def text(self, names: Sequence[str]) -> str:
-        """The joint that felt it most, in a few words."""
+        """The joint with the largest torque, in a few words."""
         joint = int(np.abs(self.peak).argmax())
         return f"{two_digits(abs(float(self.peak[joint])))} N m at {names[joint]}"
 

@@ -33,9 +33,9 @@ class FrictionModel:
     loaded: tuple[float, ...] = ()  #: slopes of load-dependent friction [rad/s]
     saturation: bool = False  #: the torque per ampere changes with the current
     modelled: bool = False
-    """The load is what the arm's model says that gravity and speed ask of the joint, not the torque
-    of its drive: where that is mostly friction, friction would be predicted from itself, and the
-    torque of a contact would vanish in it."""
+    """The load is the torque of gravity and inertia by the arm's model, not the torque of the
+    drive. If the drive's torque is mostly friction, friction would be predicted from itself, and
+    the torque of a contact would vanish in it."""
     cycles: Array = field(default_factory=lambda: np.empty((0, 0)))
     """Ripple frequencies [1/rad at the joint], shape (n, h); empty: none."""
     play: float = 5e-6  #: dead zone of the bristles' position, a few quanta of the sensor [rad]
@@ -130,7 +130,7 @@ class FrictionModel:
 
         Args:
             speed: [rad/s].
-            load: what the joints carry besides their friction [N m], shape (n,) or a number.
+            load: torque of the joints besides their friction [N m], shape (n,) or a number.
         """
         n = len(self.weights)
         q = np.linspace(0.0, 0.5, 500)[:, None].repeat(n, axis=1)

@@ -73,8 +73,8 @@ def is_physically_consistent(inertial: Array) -> bool:
 def coordinates(inertial: Array, floor: float = 1e-4) -> Array:
     """Log-Cholesky coordinates of ten numbers, shape (10,).
 
-    Numbers that no body has are moved: eigenvalues of the pseudo-inertia below ``floor`` times
-    their block's scale are raised to it.
+    Impossible numbers are changed: eigenvalues of the pseudo-inertia below ``floor`` times their
+    block's scale are raised to it.
     """
     pseudo = pseudo_inertia(inertial)
     mass = max(float(pseudo[3, 3]), 1e-3)
@@ -115,10 +115,9 @@ def solve_physically_consistent(
 ) -> Array:
     """Minimise ``x @ matrix @ x / 2 - vector @ x - sum(log det)`` over bodies that can exist.
 
-    The logarithm of each pseudo-inertia's determinant, a sum of coordinates, keeps flat bodies
-    away: where the data do not care, a body has some thickness. The unknowns x are errors of what
-    is believed (believed less true) of all links' inertial numbers, then of the armatures, then
-    whatever else, which stays free.
+    The logarithm of each pseudo-inertia's determinant, a sum of coordinates, keeps bodies from
+    becoming flat if the data allow other shapes. The unknowns x are errors (assumed less true) of
+    all links' inertial numbers, then of the armatures, then of other quantities, which stay free.
 
     Args:
         matrix: positive definite, priors included, shape (N, N), N >= 11 n.
@@ -132,7 +131,7 @@ def solve_physically_consistent(
     """
     n = len(inertial)
     body = 11 * n
-    # What stays free is eliminated: the minimum over it is linear in the rest.
+    # The free unknowns are eliminated: their minimum is linear in the others.
     own = matrix[body:, body:]
     coupled = matrix[body:, :body]
     follows: NDArray[Any] = np.linalg.solve(own, np.column_stack([coupled, vector[body:]]))

@@ -1,7 +1,7 @@
 """The rate of the momentum observer [1/s], for every use of it.
 
 A faster observer follows an impact sooner and passes more noise; a rate far above a fifth of the
-sampling rate brings no more. Whoever differs from another does so on purpose, and says why here.
+sampling rate brings no more. Each use states its reason here.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class MomentumObserver:
         self._native = _observer.Observer(robot.chain, self.gain)
 
     def reset(self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike | None = None) -> None:
-        """Forget; the sample ``(q, qd, tau)`` comes before the next step's. The residual is zero.
+        """Start again from the sample ``(q, qd, tau)`` before the next step. The residual is zero.
 
         Args:
             q: positions [rad], shape (n,).
@@ -146,7 +146,7 @@ class MomentumObserver:
         self._native.reset(at[0], speed[0], rows("tau", np.atleast_2d(tau), n)[0])
 
     def get_state(self) -> Array:
-        """What it remembers between two steps, for :meth:`set_state`, shape (1 + 4 n,)."""
+        """Its state between two steps, for :meth:`set_state`, shape (1 + 4 n,)."""
         return np.array(self._native.state())
 
     def set_state(self, state: Array) -> None:

@@ -1,9 +1,8 @@
-"""How well positions and velocities are measured, and the joint velocity that both give together.
+"""The noise of positions and velocities, and the joint velocity estimated from both.
 
-At a kilohertz the noise of the velocity, times the inertia and the observer's rate, is most of what
-a residual shows without a collision. Positions are measured far better than velocities: fused by a
-Kalman filter they give a velocity with a fraction of the noise and, for a steady acceleration, no
-lag.
+At a kilohertz most of a residual without a collision is the noise of the velocity, times the
+inertia and the observer's rate. Positions are measured far better than velocities. A Kalman filter
+of both gives a velocity with a fraction of the noise and, for a steady acceleration, no lag.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from tauguard.traces.trace import Trace
 #: How fast an acceleration may wander: (rad/s^2) per root second. Higher follows an impact sooner,
 #: lower passes less noise.
 AGILITY = 4.0
-#: Slower sampled velocities are taken as they are [s].
+#: At longer sample intervals the measured velocity is used [s].
 SLOWEST = 2.5e-3
 
 

@@ -1,1 +1,1 @@
-"""Alarms matched with the truth, and the figures that follow."""
+"""Alarms matched with the truth, and the metrics that follow."""

@@ -13,13 +13,14 @@ if TYPE_CHECKING:
     from tauguard.detectors.evaluation.cross_validation import CrossValidatedLog
     from tauguard.detectors.evaluation.threshold_card import ThresholdCard
 
-#: Logs shorter than this say nothing of alarms per hour, logs shorter than that hardly [s].
+#: Logs shorter than the first time allow no rate of alarms, logs shorter than the second only a
+#: rough one [s].
 SHORTEST, SHORT = 300.0, 1800.0
-#: A log that begins later than this has the time of a clock [s].
+#: A log that begins later than this was stamped by a clock [s].
 CLOCK = 1e6
 #: Alarms of a log whose seconds are listed.
 LISTED = 6
-#: What each force at the tool holds for.
+#: The condition under which each force at the tool holds.
 TOOL = {
     "standing": "standing for some seconds, pushed within 0.1 s",
     "slowly": "standing for some seconds, pushed over 1 s",
@@ -51,16 +52,16 @@ def _levels(card: ThresholdCard) -> dict[str, Array]:
 
 
 def printed_from(begin: float) -> float:
-    """What is subtracted from the times of a log that begins at ``begin`` [s], to print them.
+    """The offset that is subtracted from a log's times for printing.
 
-    The beginning itself if a clock stamped the log, as ROS does; else 0. Files keep the log's
-    times.
+    It is the beginning ``begin`` [s] if a clock stamped the log, as ROS does, and otherwise 0.
+    Files keep the log's times.
     """
     return begin if begin > CLOCK else 0.0
 
 
 def rate_text(high: float, seconds: float, said: str) -> str:
-    """An upper bound of alarms per hour in the words ``said``, where a log is long enough for one.
+    """An upper bound of alarms per hour in the text ``said``, if the log is long enough.
 
     Args:
         high: the bound.

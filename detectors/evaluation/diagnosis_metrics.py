@@ -15,7 +15,7 @@ from tauguard.detectors.events import detection_window
 from tauguard.report import rate as wilson
 from tauguard.traces.trace import Collision, Trace
 
-#: An estimate lags: it is compared with the largest true force of so many seconds before it.
+#: An estimate lags, so it is compared with the largest true force in this time before it [s].
 LAG = 0.015
 
 
@@ -39,7 +39,7 @@ def contact_at(trace: Trace, collision: Collision, time: float) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class ContactErrors:
-    """How far an estimated contact is from the true one."""
+    """Errors of an estimated contact."""
 
     true_force: float  #: [N]
     force: float  #: norm of the difference [N]
@@ -62,7 +62,7 @@ class ContactErrors:
 
 @dataclass(frozen=True)
 class TrueSeverity:
-    """What a contact was until the end of the look at it."""
+    """Truth of a contact up to the end of the window."""
 
     impulse: float  #: norm of the force's integral [N s]
     peak: float  #: largest force [N]
@@ -120,7 +120,7 @@ def match_diagnoses(diagnoses: Sequence[Diagnosis], trace: Trace) -> list[Matche
 
 
 def diagnosis_metrics(matched: Iterable[MatchedDiagnosis]) -> dict[str, Any]:
-    """All figures over the given diagnoses.
+    """All metrics over the given diagnoses.
 
     Returns:
         ``link_right``, ``link_or_neighbour``, ``last_joint_right`` (the usual rule), each a rate

@@ -18,7 +18,7 @@ from tauguard.traces.trace import Alarm, Collision, Detection, Trace
 
 @dataclass(frozen=True)
 class Matching:
-    """What the alarms of one trace were worth."""
+    """The matches of one trace."""
 
     collisions: tuple[Collision, ...]
     delays: tuple[float | None, ...]  #: alarm start less onset [s], None for a missed collision

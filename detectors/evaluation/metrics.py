@@ -1,4 +1,4 @@
-"""Figures of a detector over many traces, each with its 95 % interval."""
+"""Metrics of a detector over many traces, each with its 95 % interval."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _severity(pairs: Sequence[tuple[float, float | None]]) -> dict[str, Any]:
 
 
 def detection_metrics(matchings: Iterable[Matching]) -> dict[str, Any]:
-    """All figures over the given traces.
+    """All metrics over the given traces.
 
     Returns:
         ``confusion`` (tp, fn over collisions; fp, tn over non-collision cases), ``sensitivity``,

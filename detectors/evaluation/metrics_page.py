@@ -1,4 +1,4 @@
-"""What a judged detector looks like: a page of text and a page of charts."""
+"""The metrics of a detector: a page of text and a page of charts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tauguard.detectors.evaluation.matching import Matching
 
 
-#: What the words above the legend mean.
+#: Meaning of the words in the charts.
 LEGEND = (
     "  sensitivity: collisions that raise an alarm within 0.5 s (a clamp: while it lasts)",
     "  specificity: pieces of 2 s without a collision that raise none; ppv: tp / (tp + fp)",
@@ -31,7 +31,7 @@ def rate(figure: Mapping[str, Any]) -> str:
 
 
 def text(summary: Mapping[str, Any]) -> str:
-    """The figures of ``summary`` as aligned lines."""
+    """The metrics of ``summary`` as aligned lines."""
     confusion, delay = summary["confusion"], summary["delay_ms"]
     alarms, head = summary["false_alarms_per_hour"], summary["headline"]
     lines = [
@@ -74,7 +74,7 @@ def text(summary: Mapping[str, Any]) -> str:
 
 
 def diagnosis_text(found: Mapping[str, Any]) -> str:
-    """What was said after the alarms, as aligned lines."""
+    """The metrics of the diagnoses, as aligned lines."""
     if not found["link_right"]["n"]:
         return ""
     lines = [

@@ -1,4 +1,4 @@
-"""Recordings with truth, judged one by one: one is in memory at a time."""
+"""Recordings with truth, judged one by one, with one in memory at a time."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from tauguard.traces.trace import Detection, Trace
 
 
 class JudgedRecording(NamedTuple):
-    """What a detector said of a recording, and what that was worth."""
+    """The detection of a recording, matched with its truth."""
 
     trace: Trace
     detection: Detection
     matching: Matching
 
     def diagnoses(self, alarm: CollisionAlarm) -> list[MatchedDiagnosis]:
-        """What is said after the alarms, against the truth; nothing without the arm's file."""
+        """Compare the diagnoses with the truth; none without the arm's file."""
         arm = self.trace.attachments.get("arm.xml")
         if arm is None:
             return []

@@ -1,9 +1,9 @@
 """Semi-real collisions: torques of known shape added to collision-free logs of a real arm.
 
-The motion stays as it was recorded; the drive is taken to have supplied what the contact took, so
-that the current changes by ``-tau_ext / gain`` at once. A real controller also yields a little and
-its current follows the contact some milliseconds later: figures from such collisions compare
-detectors, they do not replace real pushes.
+The motion stays as it was recorded. The drive is assumed to balance the contact at once, so the
+current changes by ``-tau_ext / gain``. A real controller also yields a little, and its current
+follows the contact some milliseconds later. So such collisions are good for comparing detectors;
+they do not replace real pushes.
 """
 
 from __future__ import annotations

@@ -15,10 +15,11 @@ from tauguard.detectors.evaluation.metrics import poisson_rate
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Trace
 
-#: A regime that all logs together show for less is not known [s].
+#: A regime that all logs together show for less than this is unknown [s].
 SEEN = 3.0
-#: Of a torque on a standing joint that rises within 0.1 s, what counts for long enough: the
-#: observer (30/s) lets it in while the baseline (0.15 s) takes it up. And of one that takes 1 s.
+#: Fraction of a torque on a standing joint that the detector sees for long enough, if the torque
+#: rises within 0.1 s, and if it takes 1 s. The observer (30/s) follows it while the baseline (0.15
+#: s) absorbs it.
 COUNTS, COUNTS_SLOWLY = 0.6, 0.15
 #: An upper threshold, from which on a robot is to stop, over the lower one of contact.
 UPPER = 1.5
@@ -30,7 +31,7 @@ POSES, DIRECTIONS = 24, 100
 
 @dataclass(frozen=True, eq=False)
 class ThresholdCard:
-    """Estimates; they replace no safety function."""
+    """Estimates of what a detector finds; they replace no safety function."""
 
     joints: tuple[str, ...]
     standing: Array  #: torque that is found on a joint that has long been at rest [N m], (n,)
@@ -46,13 +47,14 @@ class ThresholdCard:
     alarms: int  #: in left-out logs, under bounds from the others
     false_alarms_per_hour: dict[str, float]  #: value, low, high (95 %), if all of them are false
     logs: tuple[CrossValidatedLog, ...]  #: each judged by the others; empty: not known one by one
-    left_out: tuple[CrossValidatedLog, ...]  #: that stood out, and were not learned from
+    left_out: tuple[CrossValidatedLog, ...]  #: logs that stood out and were left out of training
     unseen: dict[str, tuple[str, ...]]  #: joints by regime that the logs do not show
 
     @property
     def franka(self) -> dict[str, list[float]]:
         """What ``setCollisionBehavior`` takes: torques of 7 joints [N m], forces and moments
-        along and about three axes [N, N m]; empty for an arm with other joints."""
+        along and about three axes [N, N m]; empty for an arm with other joints.
+        """
         if len(self.joints) != FRANKA_JOINTS:
             return {}
         tool = np.repeat([self.tool["moving"][0], self.moment], 3)
@@ -80,7 +82,7 @@ def threshold_card(
     Args:
         detector: fitted.
         traces: its training logs, for poses, regimes and bounds in motion.
-        sifted: these logs judged one by one (default: only their alarms' number is known).
+        sifted: the cross-validation of these logs (default: only their alarms' number is known).
     """
     bound, robot = detector.bound, detector.arm.robot
     judged = [detector.judge(trace) for trace in traces]
@@ -172,7 +174,7 @@ def _unseen(traces: Sequence[Trace], names: tuple[str, ...]) -> dict[str, tuple[
 
 
 def _lasting(on: NDArray[np.bool_], dt: float) -> Array:
-    """For how long each column has been on [s], 0 where it is off, shape of ``on``."""
+    """How long each column has been on [s]; 0 while it is off. Shape of ``on``."""
     rows = np.arange(1, len(on) + 1)[:, None]
     off = np.maximum.accumulate(np.where(on, 0, rows), axis=0)
     return np.asarray(np.where(on, (rows - off) * dt, 0.0))

@@ -1,1 +1,1 @@
-"""Whether a sample can be believed."""
+"""Faults of samples."""

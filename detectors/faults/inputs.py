@@ -1,7 +1,7 @@
-"""Whether a sample can be believed: what is usual of an arm's samples, and what is not.
+"""Faults of samples: what is usual of an arm's samples, and what is not.
 
-Nothing here asks for a model of the arm. A frozen bus, a stuck encoder or a missing packet shows in
-the samples; a wrong gain or a swapped pair of currents does not, and looks like a contact.
+No model of the arm is needed. A frozen bus, a stuck encoder or a missing packet shows in the
+samples. A wrong gain or a swapped pair of currents does not; it looks like a contact.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ Counts = NDArray[np.int64]
 
 #: No arm's joint turns faster [rad/s]; degrees per second do.
 FASTEST = 20.0
-#: Seconds over which velocities are summed to be held against the change of position.
+#: Time over which summed velocities are compared with the change of position [s].
 SPAN = 20e-3
 #: Fraction of a joint's travel that position and velocity may differ by: filters lag, time jitters.
 FRACTION = 0.2
 #: The same over one sample: a time stamp may be half an interval late.
 STEP_FRACTION = 0.5
-#: What is allowed beyond that fraction, over the most that training shows.
+#: Allowance beyond that fraction, as a multiple of the most that training shows.
 MARGIN = 3.0
-#: Resolution that any encoder is allowed [rad]: training at rest may show none.
+#: Resolution that every encoder is allowed [rad], since training at rest may show none.
 RESOLUTION = 2e-4
 
 #: Samples in a row that may be missing before it is a gap; they are interpolated.
@@ -38,7 +38,7 @@ LATE = 2
 #: Intervals in a row that may be unlike training's, at least: this, or what SPAN holds of twice dt.
 ODD = 3
 
-#: By the number that the native check answers: a name, and a text with the joint and the value.
+#: By the number of the native check's answer: a name, and a text with the joint and the value.
 FAULTS: dict[int, tuple[str, str]] = {
     1: ("not-finite", "the position of {joint} is {value:g}"),
     2: ("not-finite", "the velocity of {joint} is {value:g}"),
@@ -58,7 +58,7 @@ FAULTS: dict[int, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class UsualInput:
-    """What is usual of one arm's samples, from motion with and without collisions alike."""
+    """What is usual of one arm's samples, from motion with and without collisions."""
 
     joint_names: tuple[str, ...]
     dt: float  #: sample interval [s]
@@ -66,7 +66,7 @@ class UsualInput:
     odd: int  #: intervals in a row that may be other than ``dt`` by a quarter
     repeats: int  #: samples in a row in which no signal changes
     window: int  #: samples over which velocities are summed
-    current: Array  #: largest believable ``|current|`` [A], shape (n,)
+    current: Array  #: largest possible ``|current|`` [A], shape (n,)
     step: Array  #: ``|change of q less qd dt|`` over one sample beyond FRACTION [rad], shape (n,)
     drift: Array  #: the same over ``window`` samples [rad], shape (n,)
     stuck: Counts  #: samples in a row with one joint's current unchanged, shape (n,)
@@ -74,7 +74,7 @@ class UsualInput:
 
     @classmethod
     def of(cls, traces: Sequence[Trace], arm: ArmModel | None = None) -> UsualInput:
-        """What the samples of these traces show.
+        """Learn what is usual from these traces.
 
         Args:
             traces: of training.
@@ -96,7 +96,7 @@ class UsualInput:
                 round(SPAN / dt / 2) - 2,
                 *(2 * _longest_run(_odd(trace, dt)) + 3 for trace in traces),
             ),
-            # At least two, so that one packet that comes twice is not called frozen.
+            # At least two, so that a packet that comes twice is not taken for a frozen bus.
             2 + max(_longest_run(np.asarray(_same(trace).all(axis=1))) for trace in traces),
             window,
             _believable(traces, arm),
@@ -110,8 +110,9 @@ class UsualInput:
 def _believable(traces: Sequence[Trace], arm: ArmModel | None) -> Array:
     """Largest current that is not a fault [A], shape (n,).
 
-    Three times the joint's own, or what gives three times the torque of the arm's strongest joint:
-    a joint that needs little, such as one about a vertical axis, feels a hard contact as much.
+    Three times the joint's largest current, or the current that gives three times the torque of
+    the arm's strongest joint. A joint that needs little torque, such as one about a vertical
+    axis, still feels a hard contact fully.
     """
     own = np.max([np.abs(trace.current).max(axis=0) for trace in traces], axis=0)
     gain = np.ones(len(own)) if arm is None else np.abs(arm.drive_gain)
@@ -141,7 +142,7 @@ def _odd(trace: Trace, dt: float) -> NDArray[np.bool_]:
 
 
 def _sums(values: Array, window: int) -> Array:
-    """Sums over ``window`` rows, and over what there is at the beginning, shape (T - 1, n)."""
+    """Sums over ``window`` rows, at the beginning over those that exist, shape (T - 1, n)."""
     total = np.cumsum(values, axis=0)
     total[window:] -= total[:-window].copy()
     return np.asarray(total)
@@ -166,7 +167,7 @@ def _longest_run(mask: NDArray[np.bool_]) -> int:
 
 
 def input_fault(usual: UsualInput, number: int, joint: int, value: float) -> str:
-    """What the native check says of a sample, in words: ``"frozen: no signal has changed ..."``."""
+    """The native check's answer as text: ``"frozen: no signal has changed ..."``."""
     name, text = FAULTS[number]
     who = usual.joint_names[joint] if joint >= 0 else ""
     ms, dt = 1e3 * value, 1e3 * usual.dt
@@ -174,7 +175,7 @@ def input_fault(usual: UsualInput, number: int, joint: int, value: float) -> str
 
 
 class FaultCheck:
-    """Asks of one sample after another whether it can be believed."""
+    """Checks samples one by one for faults."""
 
     def __init__(self, usual: UsualInput) -> None:
         """Begin before the first sample."""

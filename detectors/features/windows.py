@@ -27,7 +27,7 @@ class WindowShape:
 
     lag: int  #: samples between two numbers of a window
     count: int = 11  #: numbers of a window per joint
-    note: str = ""  #: what the sample rate could not carry; empty if nothing
+    note: str = ""  #: what the sample rate could not represent; empty if nothing
 
     @classmethod
     def at(
@@ -64,7 +64,7 @@ class WindowShape:
     def of(self, signal: Array, ends: ArrayLike) -> Array:
         """The windows that end at rows ``ends``, shape (N, m count): joint by joint, oldest first.
 
-        Rows before the first count as the first.
+        Rows before the beginning repeat the first row.
 
         Args:
             signal: shape (T, m).
@@ -91,13 +91,13 @@ class Prepared:
     """One training trace after the estimator."""
 
     signal: Array  #: scaled residual, shape (T, joints of the features)
-    target: Array  #: what the regressor should say, shape (T,)
-    free: Bools  #: rows that are surely collision-free, shape (T,)
+    target: Array  #: target of the regressor, shape (T,)
+    free: Bools  #: rows that are certainly collision-free, shape (T,)
     collision: Bools  #: rows with a collision that can be felt, shape (T,)
 
 
-#: Torques of joints 1, 2, ... that count alike in the training target; the last is repeated. Only
-#: their ratios matter.
+#: Torques of joints 1, 2, ... that have equal weight in the training target; the last is repeated.
+#: Only their ratios matter.
 ALIKE = (20.0, 20.0, 15.0, 6.0)
 
 #: The sum of torques, in its unit, that half of the training collisions exceed.
@@ -113,10 +113,10 @@ HIGHEST = 0.98
 def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float) -> list[Array]:
     """The training target: x / (1 + x) of x = sum over ``joints`` of |tau_ext|, in a unit.
 
-    The torques are lagged as the observer is, and weighted by :data:`ALIKE`. The unit is such that
-    the peaks of x of the collisions have the median :data:`MEDIAN_SEVERITY`: arms of all sizes have
-    the same targets. Labels 0/1 do not grow with torque and fail as a ranking. x / (1 + x) keeps
-    the target within [0, 1), so that hard impacts do not spend the regressor's bounded weights.
+    The torques are lagged as the observer is, and weighted by :data:`ALIKE`. The unit is chosen so
+    that the collisions' peaks of x have the median :data:`MEDIAN_SEVERITY`, so arms of all sizes
+    have the same targets. Labels 0/1 do not grow with torque and give no ranking. x / (1 + x) keeps
+    the target within [0, 1), so hard impacts do not use up the regressor's bounded weights.
 
     Args:
         traces: without truth the target is 0.
@@ -141,8 +141,9 @@ def severity_targets(traces: Sequence[Trace], joints: Sequence[int], gain: float
 def severity(target: Array) -> Array:
     """x of a target x / (1 + x), no more than that of :data:`HIGHEST`.
 
-    A regressor's output cannot exceed 1 by much however hard the impact. Peaks of x have a tail
-    that can be extrapolated, and at any speed an impact can exceed what free motion leaves.
+    A regressor's output cannot exceed 1 by much, however hard the impact is. Peaks of x have a
+    tail that can be extrapolated, and at any speed an impact can exceed the residual of free
+    motion.
     """
     bounded = np.minimum(target, HIGHEST)
     found: Array = bounded / (1 - bounded)

@@ -27,11 +27,11 @@ from tauguard.traces.trace import Trace
 
 @dataclass(frozen=True, eq=False)
 class FittedPerJoint(OnFrontEnd, ABC):
-    """What fitted methods share; with scores they are a ``FittedDetector``."""
+    """The common part of fitted methods; with scores they are a ``FittedDetector``."""
 
     front: FrontEnd
     scaling: Scaling
-    limits: Array  #: scaled residual that counts one, shape (joints,)
+    limits: Array  #: scaled residual whose score is one, shape (joints,)
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
@@ -58,7 +58,7 @@ class PerJoint(ABC, Generic[Fitted]):
         """The fitted method."""
 
     def scaling(self, front: FrontEnd) -> Scaling:
-        """What is compared with the limits."""
+        """The signal that is compared with the limits."""
         return front.scaling()
 
     def fit(self, traces: Sequence[Trace], arm: ArmModel) -> Fitted:
@@ -79,8 +79,8 @@ class PerJoint(ABC, Generic[Fitted]):
 class ResidualThresholds(PerJoint["FittedThresholds"]):
     """The classical detector: the calibrated momentum observer, one constant threshold a joint.
 
-    The score is the largest ratio of |residual| to its joint's limit [N m], so a threshold of 1 on
-    the score is what collision-free motion exceeds in one training sample of a thousand.
+    The score is the largest ratio of |residual| to its joint's limit [N m]. Collision-free
+    motion exceeds a score of 1 in one training sample of a thousand.
     """
 
     front: FrontEndSettings = field(
@@ -132,8 +132,8 @@ class FittedThresholds(FittedPerJoint):
         return NativeStream(scores, self.dt)
 
 
-#: Once the statistic falls, it is at most what this much time without a residual takes away [s]: a
-#: long contact would otherwise leave an alarm that lasts longer than the contact.
+#: When the statistic falls, it is limited so that it reaches 0 after this time without a residual
+#: [s]. Otherwise the alarm of a long contact would last longer than the contact.
 RECOVERY = 0.1
 
 
@@ -156,11 +156,11 @@ def bounded_cusum(increments: ArrayLike, cap: ArrayLike, state: Array | None = N
 class Cusum(PerJoint["FittedCusum"]):
     """Two-sided CUSUM of every joint's residual in standard deviations; the largest counts.
 
-    The statistic grows by (|ratio| - drift) dt while the ratio keeps its sign. Otherwise it falls,
-    from a bound at most, down to 0; the score is in seconds times the drift. The residual of
-    collision-free motion is not white (friction errors last), so the drift is the limit that such
-    motion exceeds in one sample of a hundred, not the half of a shift that white noise would ask
-    for.
+    The statistic grows by (|ratio| - drift) dt while the ratio keeps its sign. Otherwise it
+    falls to 0, from a limited value. The score is in seconds times the drift. The residual of
+    collision-free motion is not white, because friction errors last. So the drift is the limit
+    that such motion exceeds in one sample of a hundred; half of a shift would be right for white
+    noise.
     """
 
     fraction: float = 0.99

@@ -46,7 +46,7 @@ class LowPass:
 
 @dataclass(frozen=True)
 class CurrentThreshold:
-    """The fast part of each current, against a threshold that follows how large it has been.
+    """The fast part of each current, compared with a threshold that follows its recent size.
 
     The fast part is the current less its low-pass at ``slow``; the threshold of a joint is
     a + b level + c total, with the low-pass of its own |fast part| and of the sum over all joints
@@ -86,7 +86,7 @@ class CurrentThreshold:
 
 
 def _parts(current: Array, slow: float, follow: float, dt: float) -> tuple[Array, Array]:
-    """The fast part, and how large it was up to the sample before, shape (T, n) each."""
+    """The fast part, and its recent size up to the sample before, shape (T, n) each."""
     fast = current - smoothed(current, slow, dt)
     # One sample late: an impact must not raise the threshold that it is compared with.
     size = np.abs(np.concatenate([fast[:1], fast[:-1]]))
@@ -151,7 +151,8 @@ DERIVATIVE = 100.0
 #: Friction changes its sign within about this velocity [rad/s].
 REVERSAL = 0.02
 
-#: Added to the sum of |acceleration| when samples are drawn, so that rest is drawn too [rad/s^2].
+#: Added to the sum of |acceleration| when samples are drawn, so that samples at rest are drawn, too
+#: [rad/s^2].
 STILL = 0.5
 
 
@@ -166,7 +167,7 @@ class Sample(NamedTuple):
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the network sees."""
+    """The inputs of the network."""
 
     lags: tuple[float, ...]  #: ages of the window's samples [s]
     memory: float  #: age of the past sample that is fed back [s]; 0: none
@@ -197,7 +198,7 @@ class Inputs:
         return np.concatenate(parts, axis=1)
 
     def base(self, now: Sample, past: Sequence[Sample]) -> Array:
-        """What the network's output is added to [A], shape (N, n)."""
+        """The currents to which the network's output is added [A], shape (N, n)."""
         return past[-1].current if self.memory > 0 else np.zeros_like(now.current)
 
     def rows(self, trace: Trace, rows: NDArray[np.intp]) -> tuple[Sample, list[Sample]]:

@@ -1,8 +1,8 @@
 """The protocol of a detection method: fit on traces, then one score a sample, in batch or online.
 
-A method ranks samples. What counts as an alarm is decided outside of it, in the same way for all
-methods: :class:`~tauguard.detectors.alarms.alarm.CollisionAlarm` adds a threshold and a
-confirmation time.
+A method ranks samples. The definition of an alarm is the same for all methods:
+:class:`~tauguard.detectors.alarms.alarm.CollisionAlarm` adds a threshold and a confirmation
+time.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class FittedDetector(Protocol):
 
     @property
     def settle(self) -> float:
-        """Seconds at the beginning of a trace whose scores mean nothing."""
+        """Time at the beginning of a trace in which scores are not valid [s]."""
 
     def scores(self, trace: Trace) -> Array:
         """One score a sample, shape (T,): higher is more like a collision.

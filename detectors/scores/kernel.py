@@ -46,7 +46,7 @@ class KernelMachine(Frozen):
         return out
 
     def reduced(self, count: int) -> KernelMachine:
-        """Nearly the same function with at most ``count`` vectors.
+        """An approximation of the function with at most ``count`` vectors.
 
         See :func:`reduced_set`.
 
@@ -116,8 +116,8 @@ class SrqRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return self.machine_(rows)
 
 
-#: A vector whose squared distance from the span of the picked ones is below this is not
-#: picked: it would add nothing but rounding. Its norm is 1 in the SRQ kernel.
+#: A vector whose squared distance from the span of the chosen ones is below this is not chosen: it
+#: would add only rounding errors. The norm of a vector is 1 in the SRQ kernel.
 DEPENDENT = 1e-8
 
 

@@ -23,7 +23,7 @@ class Forest:
     """Trees of all nodes in one table; a leaf is its own left and right child."""
 
     roots: Ids  #: first node of each tree, shape (trees,)
-    feature: Ids  #: column that a node looks at, shape (nodes,)
+    feature: Ids  #: column that a node compares, shape (nodes,)
     threshold: Array  #: at or below goes left, shape (nodes,)
     left: Ids  #: shape (nodes,)
     right: Ids  #: shape (nodes,)

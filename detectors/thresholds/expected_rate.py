@@ -1,15 +1,14 @@
-"""How many false alarms an hour a threshold gives, as far as recorded motion can tell.
+"""The rate of false alarms of a threshold, estimated from recorded motion.
 
 Alarms are blocks of the merge gap whose peak exceeds the threshold. Rates that are rarer than the
 motion shows follow a generalised Pareto tail of the blocks' peaks. Episodes are drawn again with
-replacement, since the moments of one are alike, and every draw has a tail of its own. Tails that
-the same motion allows differ most in rare alarms, and a few of them give many: the expected rate is
-the mean over the draws. That a tail ends is believed only as far as the peaks show it beyond
-chance.
+replacement, since the moments of one episode are alike. Every draw has its own tail. The tails
+differ most in rare alarms, and a few of them give many alarms; the expected rate is the mean over
+the draws. A tail has an end only if the peaks show this beyond chance.
 
-No tail knows of moments that no episode shows, nor where it ends. An interval therefore holds the
-exact Poisson interval of the episodes that exceed the threshold: 45 minutes without an alarm do not
-exclude two an hour with 80 % confidence, whatever the threshold, nor none.
+No tail contains moments that no episode shows. Therefore an interval always contains the exact
+Poisson interval of the episodes that exceed the threshold. For example, 45 minutes without an
+alarm do not exclude two alarms an hour with 80 % confidence, whatever the threshold.
 """
 
 from __future__ import annotations
@@ -26,9 +25,10 @@ from tauguard.detectors.thresholds.tail_model import BEYOND_CHANCE, Tail, shape_
 
 #: Fraction of the blocks whose peaks are the tail that is extrapolated to rarer alarms.
 TAIL = 0.05
-#: Bounds of the tail's shape where the peaks do not show that it ends, and the lowest if they do.
+#: Bounds of the tail's shape if the peaks do not show that it ends, and the lowest shape if they
+#: do.
 SHAPES, LOWEST = (0.0, 0.5), -0.5
-#: How often episodes are drawn again to see how far a rate can be trusted.
+#: Number of draws of the episodes, for the uncertainty of a rate.
 DRAWS = 200
 
 
@@ -99,8 +99,8 @@ class ExpectedRate:
 
         Args:
             per_hour: false alarms to accept, above 0.
-            confidence: take the threshold that is enough for this fraction of the draws; ``None``:
-                the one expected.
+            confidence: take the threshold that suffices for this fraction of the draws; ``None``:
+                the expected one.
 
         Raises:
             ValueError: a rate that is not above 0.

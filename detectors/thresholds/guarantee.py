@@ -1,11 +1,12 @@
-"""A threshold with a guarantee: at most so many false alarms per hour of motion like this.
+"""A threshold with a guarantee of the rate of false alarms, for motion like the calibration's.
 
-Split-conformal calibration whose unit is a motion episode. Samples in time are not exchangeable (a
-stick-slip lasts, a payload stays), episodes that are drawn alike are: the rank of a fresh episode's
-peak among the peaks of n calibration episodes is uniform. With the (k + 1)-th largest peak as the
-threshold, the probability p that a fresh episode alarms follows Beta(k + 1, n - k) whatever the
-detector and the motion (Vovk 2012), so P(p > alpha) = P(Binomial(n, alpha) <= k). The largest k
-that makes this at most 1 - confidence is taken.
+The method is split-conformal calibration whose unit is a motion episode. Samples in time are not
+exchangeable (a stick-slip lasts, a payload stays). Episodes that are drawn in the same way are
+exchangeable: the rank of a new episode's peak among the peaks of n calibration episodes is uniform.
+With the (k + 1)-th largest peak as the threshold, the probability p that a fresh episode alarms
+follows Beta(k + 1, n - k) whatever the detector and the motion (Vovk 2012), so P(p > alpha) =
+P(Binomial(n, alpha) <= k). The threshold uses the largest k for which this is at most 1 -
+confidence.
 
 An episode may alarm more than once. The guarantee is about alarms, so alpha is the rate asked for
 times the hours of an episode over the alarms of an alarmed episode, counted at a lower threshold
@@ -21,8 +22,8 @@ import numpy as np
 
 from tauguard.detectors.thresholds.free_scores import FreeScores
 
-#: Alarms of an alarmed episode are counted at the threshold that so many episodes exceed, or this
-#: fraction of all if that is fewer.
+#: Alarms of an alarmed episode are counted at the threshold that this number of episodes exceed, or
+#: this fraction of all if that is fewer.
 COUNTED, FRACTION = 30, 0.25
 
 
@@ -58,7 +59,8 @@ def guaranteed_threshold(
     hours = sum(e.seconds for e in episodes) / 3600
     peaks = np.sort([e.peak for e in episodes])[::-1]
     several, counted = 0.0, min(COUNTED, int(FRACTION * count))
-    # Counted where at least as many episodes alarm as will: alarms an episode only grow from there.
+    # Counted at a threshold that at least as many episodes exceed: alarms of an episode become
+    # fewer above it.
     while (now := _alarms_an_episode(episodes, float(peaks[counted]))) > several:
         several = now
         alpha = min(1.0, per_hour * hours / count / several)

@@ -1,9 +1,9 @@
-"""Scores normalised over the speed, so that one threshold gives one rate of false alarms at all.
+"""Scores normalised over the speed: one threshold gives one rate of false alarms at all speeds.
 
-Collision-free motion leaves more of a residual the faster the arm moves, in every method. One
-threshold on the score is then set by the fastest motion and is far too high for the slow. A
-normalised score is counted from what the peaks of collision-free motion at this speed seldom
-exceed, in units of their mean excess beyond that.
+The faster the arm moves without a collision, the larger is the residual. A single threshold on the
+score would be set by the fastest motion and be far too high for slow motion. A normalised score is
+0 at a level that the peaks of collision-free motion at this speed seldom exceed. Its unit is their
+mean excess over that level.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
 
-#: A motion counts for this long after it [s]: what stiction causes comes after a stop.
+#: A motion counts for this time after it [s], because stiction acts after a stop.
 MEMORY = 0.5
 
-#: Speeds with levels of their own, and blocks that each of them needs at least.
+#: Number of speeds with own levels, and the least number of blocks for each.
 BINS, FEWEST = 10, 40
 
 #: Fraction of a speed's blocks whose peaks are its tail.
@@ -54,13 +54,13 @@ def memory_samples(dt: float, memory: float = MEMORY) -> int:
 
 @dataclass(frozen=True, eq=False)
 class SpeedNormalisation:
-    """What the peaks of collision-free scores reach, as functions of the recent speed.
+    """Levels of the peaks of collision-free scores, as functions of the recent speed.
 
     Both grow with the speed, are linear between the speeds given and constant beyond them.
     """
 
     speed: Array  #: rising [rad/s], shape (K,)
-    base: Array  #: of the score: seldom exceeded by a block's peak, shape (K,)
+    base: Array  #: score that the peak of a block seldom exceeds, shape (K,)
     unit: Array  #: of the score, above 0: mean excess of those that do exceed it, shape (K,)
 
     def __post_init__(self) -> None:
