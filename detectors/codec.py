@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -43,7 +42,6 @@ def encode(value: object) -> Any:
 def decode(
     content: Any,
     known: Callable[[str], type],
-    former: Mapping[str, str] = MappingProxyType({}),
     depth: int = 0,
 ) -> Any:
     """What :func:`encode` took apart.
@@ -51,7 +49,6 @@ def decode(
     Args:
         content: of a file.
         known: the class of a name that :func:`type_name` gave; raises where it is not known.
-        former: names that fields had in earlier versions, and those that they have now.
         depth: how deep in the file's content this is.
 
     Raises:
@@ -61,18 +58,15 @@ def decode(
     if depth > DEEPEST:
         raise ValueError("nested too deeply")
     if isinstance(content, dict) and set(content) == {_TUPLE}:
-        return tuple(decode(item, known, former, depth + 1) for item in content[_TUPLE])
+        return tuple(decode(item, known, depth + 1) for item in content[_TUPLE])
     if isinstance(content, dict):
         kind = known(str(content.get(_TYPE)))
         expected = {field.name for field in fields(kind)}
-        given = {
-            name if name in expected else former.get(name, name): own
-            for name, own in content.get(_FIELDS, {}).items()
-        }
+        given = content.get(_FIELDS, {})
         if set(given) != expected:
             different = ", ".join(sorted(set(given) ^ expected))
             raise ValueError(f"{kind.__name__} with a part missing or added: {different}")
-        return kind(**{name: decode(own, known, former, depth + 1) for name, own in given.items()})
+        return kind(**{name: decode(own, known, depth + 1) for name, own in given.items()})
     if isinstance(content, np.ndarray):
         if content.dtype.kind not in "fiub" or not (np.abs(content) <= LARGEST).all():
             raise ValueError(f"an array with numbers that are not finite, or beyond {LARGEST:g}")

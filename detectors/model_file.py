@@ -20,15 +20,16 @@ import numpy as np
 from tauguard.atomic_write import write_atomic
 from tauguard.detectors.alarms.alarm import CollisionAlarm
 from tauguard.detectors.codec import checksum, decode, encode
-from tauguard.detectors.registry import FORMER_FIELDS, file_type
+from tauguard.detectors.registry import file_type
 from tauguard.detectors.self_check import check_alarms, check_ranges
 from tauguard.detectors.signature import check_signature, key_of_user, signed
 from tauguard.untrusted_input import reading
 
 #: The version changes with what a detector computes from the same content, too: a threshold of
 #: one version means something else in another. 2: the filter of `Unknowns.for_detection`; 3: scores
-#: of regressors are severities; 4: that filter learns less of a held contact.
-FORMAT, VERSION = "tauguard model", 4
+#: of regressors are severities; 4: that filter learns less of a held contact; 5: the noise model
+#: knows inertia, payload and changes of friction.
+FORMAT, VERSION = "tauguard model", 5
 #: The kind of file that holds a trained detector with its threshold.
 ALARM = "collision-alarm"
 #: Versions that are written into a file.
@@ -41,9 +42,7 @@ ANEW = "train the detector anew by `tauguard train`"
 EARLIER = ("tauguard detector", "tauguard ranking detector", "tauguard free-motion detector")
 
 #: What builds the value of a file from its content, by kind.
-READERS: dict[str, Callable[[Any], Any]] = {
-    ALARM: lambda content: decode(content, file_type, FORMER_FIELDS)
-}
+READERS: dict[str, Callable[[Any], Any]] = {ALARM: lambda content: decode(content, file_type)}
 
 
 def save_model(alarm: CollisionAlarm, path: str | os.PathLike[str]) -> None:

@@ -95,10 +95,6 @@ FILE_TYPES: dict[str, type] = {
     )
 }
 
-#: What earlier versions called classes and fields of model files: files of theirs still load.
-FORMER_TYPES = {"Envelope": "NoiseModel", "SpeedLevels": "SpeedNormalisation"}
-FORMER_FIELDS = {"envelope": "noise_model", "levels": "normalisation"}
-
 #: Modules of others that the user has named in this process.
 _NAMED: set[str] = set()
 
@@ -157,7 +153,6 @@ def file_type(name: str) -> type:
     Raises:
         ValueError: not one of ours, nor of a module that was named in this process.
     """
-    name = FORMER_TYPES.get(name, name)
     if name in FILE_TYPES:
         return FILE_TYPES[name]
     module, _, own = name.partition(":")

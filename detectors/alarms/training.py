@@ -25,8 +25,11 @@ from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_thresh
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 from tauguard.traces.trace import Trace
 
-#: Fraction of the collision-free training traces that the threshold comes from.
+#: Fraction of the collision-free training traces that the threshold comes from without folds.
 HELD_OUT = 0.34
+
+#: Parts of the training motion that are left out in turn.
+FOLDS = 3
 
 
 def held_out(
@@ -38,7 +41,7 @@ def held_out(
         The two lists; with fewer than two collision-free traces each holds all traces, and the
         threshold then comes from motion that the detector was trained on.
     """
-    free = [i for i, t in enumerate(traces) if not (t.truth and t.truth.collisions)]
+    free = [i for i, t in enumerate(traces) if not _collisions(t)]
     count = min(len(free) - 1, max(1, round(fraction * len(free)))) if len(free) > 1 else 0
     if count == 0:
         return list(traces), list(traces)
@@ -48,7 +51,11 @@ def held_out(
 
 
 def train(
-    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float, folds: int = 1
+    detector: Detector,
+    traces: Sequence[Trace],
+    arm: ArmModel,
+    per_hour: float,
+    folds: int = FOLDS,
 ) -> CollisionAlarm:
     """Fit a detector and choose its threshold by motion that it was not trained on.
 
@@ -57,48 +64,79 @@ def train(
         traces: with truth, of one arm at one sample rate.
         arm: the model before training.
         per_hour: false alarms to accept in an hour of motion like the training's.
-        folds: 1 keeps a third of the collision-free traces for the threshold. With more, the
-            detector is trained on all traces, and the threshold comes from all collision-free
-            ones: each is scored by a detector that was trained without its fold. That takes
-            ``folds`` more fits; the threshold knows more motions and loads.
+        folds: parts of the traces that are left out in turn (fewer where there are fewer
+            collision-free traces). The detector is trained on all traces, and the threshold comes
+            from all collision-free ones: each is scored by a detector that was trained without its
+            load, or without this trace where there are fewer loads than folds. That takes
+            ``folds`` more fits. 1 is quicker: a third of the collision-free traces is kept for the
+            threshold.
 
     Raises:
-        ValueError: traces that do not fit or lack what the method needs, or too few for the folds.
+        ValueError: traces that do not fit or lack what the method needs, or ``folds`` below 1.
     """
     return train_and_score(detector, traces, arm, per_hour, folds)[0]
 
 
 def train_and_score(
-    detector: Detector, traces: Sequence[Trace], arm: ArmModel, per_hour: float, folds: int = 1
+    detector: Detector,
+    traces: Sequence[Trace],
+    arm: ArmModel,
+    per_hour: float,
+    folds: int = FOLDS,
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """As :func:`train`, with the normalised scores that the threshold comes from."""
-    if not per_hour > 0:
-        raise ValueError(f"per_hour: {per_hour}, expected above 0")
-    if folds == 1:
+    if not (per_hour > 0 and folds >= 1):
+        raise ValueError(f"per_hour {per_hour}, folds {folds}: expected above 0, and 1 or more")
+    free = sum(not _collisions(trace) for trace in traces)
+    if min(folds, free) < 2:
         own, rest = held_out(traces)
         fitted = detector.fit(own, arm)
         found = _free_scores(fitted, rest, CONFIRMATION)
     else:
-        found = _cross_fitted(detector, traces, arm, folds)
+        found = _cross_fitted(detector, traces, arm, left_out(traces, min(folds, free)))
         fitted = detector.fit(traces, arm)
     alarm, scores = _with_rate(fitted, found, per_hour, CONFIRMATION)
     return replace(alarm, inputs=UsualInput.of(traces, alarm.detector.arm)), scores
 
 
+def left_out(traces: Sequence[Trace], folds: int) -> list[set[int]]:
+    """Which traces are left out together: all of some loads, so that the threshold bounds motion
+    with loads that a detector has not seen.
+
+    With fewer loads than folds it is collision-free traces one by one. Collisions are left out with
+    their load, unless no other load has any.
+
+    Args:
+        traces: at least ``folds`` of them collision-free.
+        folds: number of parts.
+    """
+    free = [i for i, t in enumerate(traces) if not _collisions(t)]
+    struck = set(range(len(traces))) - set(free)
+    loads = sorted({_load(traces[i]) for i in free})
+    if len(loads) < folds:
+        return [set(free[k::folds]) for k in range(folds)]
+    parts = [{i for i, t in enumerate(traces) if _load(t) in loads[k::folds]} for k in range(folds)]
+    return [part - struck if struck <= part else part for part in parts]
+
+
+def _load(trace: Trace) -> float:
+    """The heaviest load that it carries [kg]; 0 where none is known."""
+    return float(trace.truth.payload.max(initial=0.0)) if trace.truth else 0.0
+
+
+def _collisions(trace: Trace) -> int:
+    return len(trace.truth.collisions) if trace.truth else 0
+
+
 def _cross_fitted(
-    detector: Detector, traces: Sequence[Trace], arm: ArmModel, folds: int
+    detector: Detector, traces: Sequence[Trace], arm: ArmModel, parts: Sequence[set[int]]
 ) -> list[FreeScores]:
-    """Scores of every collision-free trace, by detectors that were trained without it."""
-    free = [i for i, t in enumerate(traces) if not (t.truth and t.truth.collisions)]
-    if not 1 < folds <= len(free):
-        raise ValueError(
-            f"folds: {folds}, expected 1, or 2 to the number of collision-free traces, {len(free)}"
-        )
+    """Scores of every collision-free trace, by detectors that were trained without its part."""
     found: list[FreeScores] = []
-    for k in range(folds):
-        fold = set(free[k::folds])
-        fitted = detector.fit([t for i, t in enumerate(traces) if i not in fold], arm)
-        found += _free_scores(fitted, [traces[i] for i in sorted(fold)], CONFIRMATION)
+    for part in parts:
+        own = [t for i, t in enumerate(traces) if i not in part]
+        left = [traces[i] for i in sorted(part) if not _collisions(traces[i])]
+        found += _free_scores(detector.fit(own, arm), left, CONFIRMATION)
     return found
 
 
@@ -156,10 +194,9 @@ def with_guarantee(
         ValueError: an episode with collisions, or too few for the guarantee.
     """
     for trace in traces:
-        if trace.truth is not None and trace.truth.collisions:
+        if count := _collisions(trace):
             raise ValueError(
-                f"an episode with {len(trace.truth.collisions)} collisions: calibration takes "
-                "collision-free motion"
+                f"an episode with {count} collisions: calibration takes collision-free motion"
             )
     scores = [alarm.free_scores(trace) for trace in traces]
     guarantee = guaranteed_threshold(scores, per_hour, confidence)

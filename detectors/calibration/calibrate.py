@@ -9,6 +9,7 @@ fit of the gains collapses to zero, so the priors count as strong as thousands o
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -27,6 +28,9 @@ from tauguard.detectors.estimation.estimator import PAYLOAD, ArmModel
 from tauguard.detectors.estimation.velocity import SLOWEST, SensorNoise
 from tauguard.detectors.events import free_rows
 from tauguard.traces.trace import Trace
+
+#: The columns of friction where none are named.
+DEFAULT = FrictionModel()
 
 
 @dataclass(frozen=True)
@@ -92,16 +96,13 @@ def calibrate(
         ValueError: no collision-free rows, or a trace of another arm.
     """
     priors = priors or Priors()
-    model = friction or arm.friction or FrictionModel()
+    model = friction or arm.friction or DEFAULT
     robot = arm.robot
     kept = list(traces)
     for trace in kept:
         if len(trace.joint_names) != robot.joints:
             raise ValueError(f"a trace of {len(trace.joint_names)} joints, arm of {robot.joints}")
-    data = [
-        filtered_columns(trace, robot, arm.drive_gain, model, rate, free_rows(trace))
-        for trace in kept
-    ]
+    data = [_columns(trace, arm, model, rate) for trace in kept]
     if sum(len(one.current) for one in data) < 200:
         raise ValueError("calibrate: fewer than 200 collision-free rows; give 20 s of motion")
     system, solution, level = _solved(data, robot, model, priors, rounds)
@@ -117,6 +118,23 @@ def calibrate(
     )
     payloads: Array = solution[system.load :].reshape(-1, INERTIAL)[:, :PAYLOAD]
     return Calibration(found, payloads, level)
+
+
+_COLUMNS: dict[int, tuple[tuple[ArmModel, FrictionModel, float], Filtered]] = {}
+
+
+def _columns(trace: Trace, arm: ArmModel, model: FrictionModel, rate: float) -> Filtered:
+    """The columns of the trace's free rows; kept while it lives, until others are asked for.
+
+    Calibrations that leave some traces out, as folds do, ask for the same ones again.
+    """
+    key, found = _COLUMNS.get(id(trace), (None, None))
+    if found is None or key is None or key[0] is not arm or key[1:] != (model, rate):
+        found = filtered_columns(trace, arm.robot, arm.drive_gain, model, rate, free_rows(trace))
+        if id(trace) not in _COLUMNS:
+            weakref.finalize(trace, _COLUMNS.pop, id(trace), None)
+        _COLUMNS[id(trace)] = (arm, model, rate), found
+    return found
 
 
 def _solved(

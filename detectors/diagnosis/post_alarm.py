@@ -96,7 +96,7 @@ class PostAlarmWindows:
             trace.q[rows],
             trace.qd[rows],
             known.residual[rows] - taken - carried,
-            self._noise_model.scale(trace.qd[rows], known.acceleration[rows]),
+            self._noise_model.scale(trace.qd[rows], known.motion[rows]),
             columns,
             lag,
         )

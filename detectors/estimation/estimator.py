@@ -8,7 +8,6 @@ columns that pass through the observer's own filter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,6 +23,8 @@ from tauguard.detectors.estimation.velocity import SensorNoise
 
 #: Unknowns of a joint's own: torque offset [N m], relative viscous and Coulomb error.
 PER_JOINT = 3
+#: Rows of :attr:`Estimate.motion`.
+MOTION = 3
 #: Unknowns of the payload: mass [kg] and first moment in the last link's frame [kg m].
 PAYLOAD = 4
 
@@ -121,7 +122,11 @@ class Estimate:
 
     residual: Array  #: the observer's estimate of tau_ext [N m], shape (T, n)
     unexplained: Array  #: what the unknowns do not explain of it [N m], shape (T, n)
-    acceleration: Array  #: velocity differentiated at 30/s [rad/s^2], shape (T, n)
+    motion: Array
+    """What the noise grows with, shape (T, 3, n); 0 without unknowns. With the mass matrix M of arm
+    and tracked payload: the torque of accelerations, sum_k |M_jk qdd_k| (velocities differentiated
+    at 30/s) [N m]; the norm of row j of M [kg m^2]; and the largest change of the joint's friction
+    of late (forgotten with 0.3 s) [N m]."""
     plain: Array  #: residual of the plain observer, with no unknowns [N m], shape (T, n)
     unknowns: Array | None = field(default=None)  #: payload (4), then 3 a joint, shape (T, 4 + 3 n)
 
@@ -182,10 +187,11 @@ class Estimator:
         """
         joints = self.arm.robot.joints
         q, qd, current = same_rows(joints, q=q, qd=qd, current=current)
-        residual, unexplained, acceleration, plain = (np.empty_like(q) for _ in range(4))
+        residual, unexplained, plain = (np.empty_like(q) for _ in range(3))
+        motion = np.empty((len(q), MOTION, joints))
         tracked = np.empty((len(q) if keep else 0, PAYLOAD + PER_JOINT * joints))
         dt = intervals(t, len(q))
-        out = residual, unexplained, acceleration, plain
+        out = residual, unexplained, motion, plain
         self.native.run(dt, q, qd, current, *out, tracked)
         return Estimate(*out, tracked if keep else None)
 
@@ -198,17 +204,17 @@ class Estimator:
         q: Array,
         qd: Array,
         current: Array,
-        out: Array | Sequence[Array],
+        out: Array,
         dt: float | None = None,
     ) -> None:
-        """One sample into ``out``, three rows of shape (n,): residual, unexplained, acceleration.
+        """One sample into ``out``, shape (5, n): residual, unexplained and three rows of motion.
 
         Raises:
             ValueError: wrong shapes or numbers that are not finite; the state is as before.
         """
         try:
             step = self.dt if dt is None else dt
-            self.native.step(q, qd, current, step, out[0], out[1], out[2])
+            self.native.step(q, qd, current, step, out[0], out[1], out[2:])
         except TypeError:
             joints = self.arm.robot.joints
             raise ValueError(

@@ -9,29 +9,35 @@ from numpy.typing import ArrayLike
 
 from tauguard.arrays import Array
 
+#: Weights of a joint.
+TERMS = 5
+
 
 @dataclass(frozen=True, eq=False)
 class NoiseModel:
-    """What free motion leaves of the residual: per joint a + b |qd_j| + c sum |qd| + d sum |qdd|.
+    """What free motion leaves of the residual: per joint a + b |qd_j| + c T_j + d |M_j| + e C_j.
 
-    The sums run over all joints; the acceleration is the estimator's.
+    T_j is the torque that accelerations take (inertia is known to some percent), |M_j| the norm of
+    the joint's row of the mass matrix with the payload that it carries (the noise of velocities,
+    times inertia), and C_j how far the joint's friction has lately changed (it starts, stops or
+    turns): the rows of :attr:`~tauguard.detectors.Estimate.motion`.
     """
 
-    weights: Array  #: shape (n, 4), not negative [N m per unit]
+    weights: Array  #: shape (n, 5), not negative [N m per unit]
 
     @classmethod
-    def fit(cls, residual: Array, qd: Array, acceleration: Array) -> NoiseModel:
+    def fit(cls, residual: Array, qd: Array, motion: Array) -> NoiseModel:
         """Non-negative least squares of ``|residual|``, scaled to its standard deviation.
 
         Args:
             residual: residual of free motion [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
-            acceleration: [rad/s^2], shape (T, n).
+            motion: of the estimate, shape (T, 3, n).
         """
         from scipy.optimize import nnls
 
-        columns = cls._columns(qd, acceleration)
-        weights = np.zeros((residual.shape[1], 4))
+        columns = cls._columns(qd, motion)
+        weights = np.zeros((residual.shape[1], TERMS))
         for j in range(residual.shape[1]):
             weights[j] = nnls(columns[:, j], np.abs(residual[:, j]))[0]
             weights[j, 0] = max(weights[j, 0], 1e-3 * float(np.abs(residual[:, j]).mean()), 1e-9)
@@ -41,7 +47,7 @@ class NoiseModel:
     def constant(cls, scale: ArrayLike) -> NoiseModel:
         """The same at every speed, shape (n,) [N m]."""
         level = np.asarray(scale, dtype=np.float64)
-        return cls(np.column_stack([level, np.zeros((len(level), 3))]))
+        return cls(np.column_stack([level, np.zeros((len(level), TERMS - 1))]))
 
     def at_least(self, scale: ArrayLike) -> NoiseModel:
         """At rest no less than ``scale``, shape (n,) [N m]; what motion adds is as before."""
@@ -50,23 +56,11 @@ class NoiseModel:
         return NoiseModel(weights)
 
     @staticmethod
-    def _columns(qd: Array, acceleration: Array) -> Array:
-        speed, total = np.abs(qd), np.abs(acceleration).sum(axis=-1, keepdims=True)
-        return np.stack(
-            [
-                np.ones_like(qd),
-                speed,
-                np.broadcast_to(speed.sum(axis=-1, keepdims=True), qd.shape),
-                np.broadcast_to(total, qd.shape),
-            ],
-            axis=-1,
-        )
+    def _columns(qd: Array, motion: Array) -> Array:
+        rows = [np.ones_like(qd), np.abs(qd), *np.moveaxis(motion, -2, 0)]
+        return np.stack(rows, axis=-1)
 
-    def scale(self, qd: Array, acceleration: Array) -> Array:
+    def scale(self, qd: Array, motion: Array) -> Array:
         """The standard deviation [N m] at every sample, shape (..., n)."""
-        w = self.weights
-        speed = np.abs(qd)
-        total = speed.sum(axis=-1, keepdims=True)
-        shaken = np.abs(acceleration).sum(axis=-1, keepdims=True)
-        value: Array = w[:, 0] + w[:, 1] * speed + w[:, 2] * total + w[:, 3] * shaken
+        value: Array = (self._columns(qd, motion) * self.weights).sum(axis=-1)
         return value

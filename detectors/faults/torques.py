@@ -8,7 +8,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.detectors import _observer
-from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
+from tauguard.detectors.estimation.estimator import MOTION, ArmModel, Estimator, Unknowns
 from tauguard.traces.trace import Trace
 
 #: Rate of the observer whose residual is looked at [1/s].
@@ -60,7 +60,7 @@ class TorqueCheck:
         self.observer = Estimator(arm, RATE, dt, Unknowns.none())
         gain = np.ascontiguousarray(arm.drive_gain, dtype=np.float64)
         self.native = _observer.TorqueCheck(gain, floor, RATE, *bounds)
-        self._out = tuple(np.zeros((3, len(noise))))
+        self._out = np.zeros((2 + MOTION, len(noise)))
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> str:
         """What is wrong with the torques at this sample, "" for nothing.

@@ -18,8 +18,8 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.detectors import _kernel, _observer
 from tauguard.detectors.calibration.calibrate import calibrate
-from tauguard.detectors.estimation.estimator import ArmModel, Estimate, Estimator, Unknowns
-from tauguard.detectors.estimation.noise_model import NoiseModel
+from tauguard.detectors.estimation.estimator import MOTION, ArmModel, Estimate, Estimator, Unknowns
+from tauguard.detectors.estimation.noise_model import TERMS, NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, PLAIN_GAIN
 from tauguard.detectors.events import undisturbed_rows
 from tauguard.detectors.frozen import Frozen
@@ -50,23 +50,21 @@ class Scaling(Frozen):
 
     @cached_property
     def _native(self) -> _kernel.Scaling:
-        weights = np.empty((0, 4)) if self.noise_model is None else self.noise_model.weights
+        weights = np.empty((0, TERMS)) if self.noise_model is None else self.noise_model.weights
         joints = np.array(self.joints, dtype=np.int64)
         return _kernel.Scaling(joints, weights, self.units, self.factor, self.compress)
 
-    def rows(
-        self, residual: Array, qd: Array, acceleration: Array, out: Array | None = None
-    ) -> Array:
+    def rows(self, residual: Array, qd: Array, motion: Array, out: Array | None = None) -> Array:
         """The scaled residual, shape (T, len(joints)).
 
         Args:
             residual: [N m], shape (T, n).
             qd: [rad/s], shape (T, n).
-            acceleration: [rad/s^2], shape (T, n).
+            motion: of the estimate, shape (T, 3, n).
             out: where to write it (default: a new array).
         """
         found = np.empty((len(residual), len(self.joints))) if out is None else out
-        self._native.rows(residual, qd, acceleration, found)
+        self._native.rows(residual, qd, motion, found)
         return found
 
 
@@ -152,7 +150,7 @@ class FrontEndSettings:
         tables = (
             [e.unexplained for e in estimates],
             [t.qd for t in traces],
-            [e.acceleration for e in estimates],
+            [e.motion for e in estimates],
         )
         noise_model = NoiseModel.fit(
             *(
@@ -214,7 +212,7 @@ class FrontEnd(Frozen):
     def scaled(self, trace: Trace, scaling: Scaling) -> Array:
         """The scaled residual of a trace, shape (T, joints)."""
         estimate = self.estimate(trace)
-        return scaling.rows(estimate.unexplained, trace.qd, estimate.acceleration)
+        return scaling.rows(estimate.unexplained, trace.qd, estimate.motion)
 
     def stream(self, scaling: Scaling) -> ResidualStream:
         """The scaled residual sample by sample."""
@@ -227,14 +225,14 @@ class ResidualStream:
     def __init__(self, front: FrontEnd, scaling: Scaling) -> None:
         """Begin anew."""
         self._estimator, self._scaling = front.estimator(), scaling
-        rows = np.zeros((3, 1, front.arm.robot.joints))
-        self._out, (_, self._unexplained, self._acceleration) = tuple(rows[:, 0]), rows
+        self._out = np.zeros((2 + MOTION, front.arm.robot.joints))
         self._row = np.zeros((1, len(scaling.joints)))
 
     def step(self, q: Array, qd: Array, current: Array, dt: float | None = None) -> Array:
         """The scaled residual of this sample, shape (1, joints); valid until the next step."""
         self._estimator.step(q, qd, current, self._out, dt)
-        return self._scaling.rows(self._unexplained, qd[None], self._acceleration, self._row)
+        out = self._out
+        return self._scaling.rows(out[1:2], qd[None], out[None, 2:], self._row)
 
 
 _FITTED: dict[FrontEndSettings, tuple[tuple[weakref.ref[object], ...], FrontEnd]] = {}

@@ -24,9 +24,16 @@
 // it is divided by the deviation of noise, payload and change of friction together, in units of the
 // noise's.
 //
+// What the noise of the residual grows with, beside the speed (`motion_numbers` a joint), if there
+// are unknowns: the torque of accelerations, sum_k |M_jk qdd_k|, since inertia is known to some
+// percent; the norm of the joint's row of the mass matrix M, since the noise of velocities, times
+// inertia, is most of what a joint at rest shows; and how far friction was of late from its usual
+// value: a joint breaks away, stops or turns. M is that of arm and tracked payload.
+//
 // The plain residual is that of an observer of rate `plain_gain` that tracks nothing.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -41,6 +48,8 @@ constexpr int payload_numbers = 4;  // mass and first moment
 constexpr int per_joint = 3;        // offset, viscous, Coulomb
 constexpr int coulomb_at = 2;
 constexpr double acceleration_rate = 30.0;  // [1/s]
+constexpr int motion_numbers = 3;           // torque of accelerations, inertia, change
+constexpr double change_lasts = 0.3;        // time constant with which a change is forgotten [s]
 
 struct EstimatorSettings {
   std::vector<double> drive_gain;   // N m/A, n
@@ -73,9 +82,12 @@ class Estimator {
         theta_(m_),
         covariance_(m_ * m_),
         gathered_(m_),
-        row_(m_) {
+        row_(m_),
+        carrying_(chain_),
+        mass_(n_ * n_) {
     for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_,
-                    &decay_, &plain_, &plain_tau_, &plain_tau_before_, &smooth_, &usual_})
+                    &decay_, &plain_, &plain_tau_, &plain_tau_before_, &smooth_, &usual_, &inertia_,
+                    &change_, &acceleration_, &one_, &moved_, &unused_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
       v->resize(payload_numbers * n_);
@@ -95,10 +107,11 @@ class Estimator {
     decay_dt_ = -1.0;
   }
 
-  // One sample: residual r of the observer, what the unknowns do not explain of it, and an
-  // acceleration (velocity differentiated at the rate acceleration_rate).
+  // One sample: residual r of the observer, what the unknowns do not explain of it, and what its
+  // noise grows with, motion_numbers rows of n. Accelerations are velocities differentiated at the
+  // rate acceleration_rate.
   void step(const double* q, const double* qd, const double* current, double dt, double* residual,
-            double* unexplained, double* acceleration) {
+            double* unexplained, double* motion) {
     if (!started_) begin(q, qd);
     if (fusion_.active()) qd = started_ ? fusion_.step(q, qd, dt) : fusion_.last();
     chain_.momentum(q, qd, p_.data(), beta_.data(), work_);
@@ -110,12 +123,21 @@ class Estimator {
     for (std::size_t j = 0; j < n_; ++j) {
       residual[j] = unexplained[j] = residual_[j];
       if (started_) smooth_[j] += smooth_decay_ * (qd[j] - smooth_[j]);
-      acceleration[j] = acceleration_rate * (qd[j] - smooth_[j]);
+      acceleration_[j] = std::fabs(acceleration_rate * (qd[j] - smooth_[j]));
+      motion[n_ + j] = inertia_[j];
+      motion[2 * n_ + j] = change_[j];
+    }
+    for (std::size_t j = 0; j < n_; ++j) {
+      motion[j] = 0.0;
+      for (std::size_t k = 0; k < n_; ++k) motion[j] += mass_[j * n_ + k] * acceleration_[k];
     }
     if (adapts_) {
       for (std::size_t j = 0; j < n_; ++j)
         unexplained[j] = (residual_[j] - expected(j)) * certainty(j);
-      if (started_ && ++since_ >= set_.every) correct(dt * since_);
+      if (started_ && ++since_ >= set_.every) {
+        correct(dt * since_);
+        weigh(q);
+      }
     }
     started_ = true;
   }
@@ -125,11 +147,32 @@ class Estimator {
     std::copy(qd, qd + n_, smooth_.begin());
     fusion_.reset(q, qd);
     for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
-    for (auto* v : {&residual_, &plain_, &load_, &own_, &usual_, &theta_, &covariance_})
+    for (auto* v : {&residual_, &plain_, &load_, &own_, &usual_, &mass_, &inertia_, &change_,
+                    &theta_, &covariance_})
       std::fill(v->begin(), v->end(), 0.0);
     for (std::size_t a = 0; a < m_; ++a)
       covariance_[a * m_ + a] = set_.deviation[a] * set_.deviation[a];
     since_ = 0;
+    if (adapts_) weigh(q);
+  }
+
+  // The mass matrix of arm and tracked payload, its entries' sizes, and the norms of its rows.
+  void weigh(const double* q) {
+    Inertial& held = carrying_.joints.back().inertial;
+    const Inertial& empty = chain_.joints.back().inertial;
+    held.mass = empty.mass - theta_[0];
+    held.moment = empty.moment - Vec3{theta_[1], theta_[2], theta_[3]};
+    std::fill(inertia_.begin(), inertia_.end(), 0.0);
+    for (std::size_t k = 0; k < n_; ++k) {
+      one_[k] = 1.0;
+      carrying_.momentum(q, one_.data(), moved_.data(), unused_.data(), work_);
+      one_[k] = 0.0;
+      for (std::size_t j = 0; j < n_; ++j) {
+        mass_[j * n_ + k] = std::fabs(moved_[j]);
+        inertia_[j] += moved_[j] * moved_[j];
+      }
+    }
+    for (double& x : inertia_) x = std::sqrt(x);
   }
 
   // Drive torques less friction, and what each unknown of a joint's own would add to them.
@@ -172,6 +215,7 @@ class Estimator {
       for (std::size_t j = 0; j < n_; ++j) decay_[j] = observer_decay(set_.gain[j], dt);
       smooth_decay_ = observer_decay(acceleration_rate, dt);
       plain_decay_ = observer_decay(set_.plain_gain, dt);
+      change_decay_ = std::exp(-dt / change_lasts);
       decay_dt_ = dt;
     }
     for (std::size_t j = 0; j < n_; ++j) {
@@ -186,6 +230,8 @@ class Estimator {
       for (std::size_t a = j * per_joint; a < (j + 1) * per_joint; ++a)
         own_[a] += decay_[j] * (-own_before_[a] - own_[a]);
       usual_[j] += smooth_decay_ * (own_[per_joint * j + coulomb_at] - usual_[j]);
+      const double off = std::fabs(own_[per_joint * j + coulomb_at] - usual_[j]);
+      change_[j] = std::max(off, change_[j] * change_decay_);
     }
   }
 
@@ -275,7 +321,9 @@ class Estimator {
   std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_;
   std::vector<double> own_now_, own_before_, own_, smooth_, usual_;
   std::vector<double> plain_, plain_tau_, plain_tau_before_;
-  double decay_dt_ = -1.0, smooth_decay_ = 0.0, plain_decay_ = 0.0;
+  Chain carrying_;  // the arm with the tracked payload
+  std::vector<double> mass_, inertia_, change_, acceleration_, one_, moved_, unused_;
+  double decay_dt_ = -1.0, smooth_decay_ = 0.0, plain_decay_ = 0.0, change_decay_ = 0.0;
   int since_ = 0;
   bool started_ = false, adapts_ = false;
 };

@@ -53,11 +53,13 @@ void friction_columns(const FrictionBasis& basis, In2 q, In2 qd, In2 tau, In2 lo
 }
 
 void run(Estimator& estimator, In1 dt, In2 q, In2 qd, In2 current, Out2 residual, Out2 unexplained,
-         Out2 acceleration, Out2 plain, Out2 theta) {
+         Out3 motion, Out2 plain, Out2 theta) {
   const std::size_t rows = q.shape(0), n = estimator.joints(), m = estimator.unknowns();
   for (const auto& a : {q, qd, current})
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
-  for (const auto& a : {residual, unexplained, acceleration, plain})
+  require(motion.shape(0) == rows && motion.shape(1) == motion_numbers && motion.shape(2) == n,
+          "run: arrays differ in shape");
+  for (const auto& a : {residual, unexplained, plain})
     require(a.shape(0) == rows && a.shape(1) == n, "run: arrays differ in shape");
   const bool wanted = theta.shape(0) > 0;
   require(dt.shape(0) + 1 >= rows && (!wanted || (theta.shape(0) == rows && theta.shape(1) == m)),
@@ -68,7 +70,7 @@ void run(Estimator& estimator, In1 dt, In2 q, In2 qd, In2 current, Out2 residual
     const double step = t ? dt.data()[t - 1] : 0.0;
     estimator.step(q.data() + n * t, qd.data() + n * t, current.data() + n * t, step,
                    residual.data() + n * t, unexplained.data() + n * t,
-                   acceleration.data() + n * t);
+                   motion.data() + motion_numbers * n * t);
     std::copy(estimator.plain().begin(), estimator.plain().end(), plain.data() + n * t);
     if (wanted) std::copy(estimator.theta().begin(), estimator.theta().end(), theta.data() + m * t);
   }
@@ -121,21 +123,23 @@ void bind_estimator(nb::module_& m) {
           "out"_a.noconvert())
       .def("reset", &Estimator::reset)
       .def("run", &run, "dt"_a, "q"_a, "qd"_a, "current"_a, "residual"_a.noconvert(),
-           "unexplained"_a.noconvert(), "acceleration"_a.noconvert(), "plain"_a.noconvert(),
+           "unexplained"_a.noconvert(), "motion"_a.noconvert(), "plain"_a.noconvert(),
            "theta"_a.noconvert())
       .def(
           "step",
           [](Estimator& estimator, In1 q, In1 qd, In1 current, double dt, Out1 residual,
-             Out1 unexplained, Out1 acceleration) {
+             Out1 unexplained, Out2 motion) {
             check_sample(estimator.joints(), q, qd, current, "current");
-            for (const auto& a : {residual, unexplained, acceleration})
-              require(a.shape(0) == estimator.joints(), "outputs: one entry a joint");
+            const std::size_t n = estimator.joints();
+            require(residual.shape(0) == n && unexplained.shape(0) == n &&
+                        motion.shape(0) == motion_numbers && motion.shape(1) == n,
+                    "outputs: one entry a joint");
             require(!estimator.started() || (dt > 0 && std::isfinite(dt)), "dt: must be above 0");
             estimator.step(q.data(), qd.data(), current.data(), dt, residual.data(),
-                           unexplained.data(), acceleration.data());
+                           unexplained.data(), motion.data());
           },
           "q"_a, "qd"_a, "current"_a, "dt"_a, "residual"_a.noconvert(), "unexplained"_a.noconvert(),
-          "acceleration"_a.noconvert());
+          "motion"_a.noconvert());
 }
 
 }  // namespace tauguard::detectors

@@ -64,10 +64,15 @@ class KernelSum {
   std::vector<double> vectors_, coef_;
 };
 
-// Residuals of the chosen joints in units of their envelope, row by row.
+// Terms of the noise model: 1, own speed, and what the estimator says of the motion, a row of n
+// each.
+constexpr std::size_t motion_rows = 3, noise_terms = 2 + motion_rows;
+
+// Residuals of the chosen joints in units of their noise, row by row.
 class Scaling {
  public:
-  // weights: of the envelope, a row of four a joint; none: the residual in N m times `factor`.
+  // weights: of the noise model, a row of noise_terms a joint; none: the residual in N m times
+  // `factor`.
   Scaling(std::vector<std::int64_t> joints, std::vector<double> weights, double units,
           double factor, bool compress)
       : joints_(std::move(joints)),
@@ -81,30 +86,27 @@ class Scaling {
   bool fits(std::size_t n) const {
     for (const auto j : joints_)
       if (j < 0 || static_cast<std::size_t>(j) >= n) return false;
-    return weights_.empty() || weights_.size() == 4 * n;
+    return weights_.empty() || weights_.size() == noise_terms * n;
   }
 
-  void row(const double* left, const double* qd, const double* acceleration, std::size_t n,
+  // motion: motion_rows x n.
+  void row(const double* left, const double* qd, const double* motion, std::size_t n,
            double* out) const {
-    double speed = 0.0, shaken = 0.0;
-    for (std::size_t j = 0; j < n; ++j) {
-      speed += std::abs(qd[j]);
-      shaken += std::abs(acceleration[j]);
-    }
     for (std::size_t k = 0; k < joints_.size(); ++k) {
       const auto j = static_cast<std::size_t>(joints_[k]);
-      out[k] = scaled(left[j], j, std::abs(qd[j]), speed, shaken);
+      if (weights_.empty()) {
+        out[k] = left[j] * factor_;
+        continue;
+      }
+      const double* w = weights_.data() + noise_terms * j;
+      double noise = w[0] + w[1] * std::abs(qd[j]);
+      for (std::size_t r = 0; r < motion_rows; ++r) noise += w[2 + r] * motion[r * n + j];
+      const double ratio = left[j] / (units_ * noise);
+      out[k] = factor_ * (compress_ ? std::asinh(ratio) : ratio);
     }
   }
 
  private:
-  double scaled(double left, std::size_t j, double own, double speed, double shaken) const {
-    if (weights_.empty()) return left * factor_;
-    const double* w = weights_.data() + 4 * j;
-    const double ratio = left / (units_ * (w[0] + w[1] * own + w[2] * speed + w[3] * shaken));
-    return factor_ * (compress_ ? std::asinh(ratio) : ratio);
-  }
-
   std::vector<std::int64_t> joints_;
   std::vector<double> weights_;
   double units_, factor_;

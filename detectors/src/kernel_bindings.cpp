@@ -63,21 +63,22 @@ KernelSum* make_kernel(In2 vectors, In1 coef, double intercept, double sigma) {
 }
 
 Scaling* make_scaling(Ids joints, In2 weights, double units, double factor, bool compress) {
-  require(weights.shape(0) == 0 || weights.shape(1) == 4, "Scaling: four weights a joint");
+  require(weights.shape(0) == 0 || weights.shape(1) == noise_terms,
+          "Scaling: a weight for each term of the noise, a joint");
   return new Scaling({joints.data(), joints.data() + joints.shape(0)},
                      {weights.data(), weights.data() + weights.shape(0) * weights.shape(1)}, units,
                      factor, compress);
 }
 
-void scale(const Scaling& scaling, In2 left, In2 qd, In2 acceleration, Out2 out) {
+void scale(const Scaling& scaling, In2 left, In2 qd, In3 motion, Out2 out) {
   const std::size_t n = left.shape(1), m = scaling.columns();
-  require(qd.shape(0) == left.shape(0) && acceleration.shape(0) == left.shape(0) &&
+  require(qd.shape(0) == left.shape(0) && motion.shape(0) == left.shape(0) &&
               out.shape(0) == left.shape(0) && out.shape(1) == m && qd.shape(1) == n &&
-              acceleration.shape(1) == n && scaling.fits(n),
+              motion.shape(1) == motion_rows && motion.shape(2) == n && scaling.fits(n),
           "Scaling: expected one number a joint");
   nb::gil_scoped_release release;
   for (std::size_t t = 0; t < left.shape(0); ++t)
-    scaling.row(left.data() + t * n, qd.data() + t * n, acceleration.data() + t * n, n,
+    scaling.row(left.data() + t * n, qd.data() + t * n, motion.data() + t * motion_rows * n, n,
                 out.data() + t * m);
 }
 
@@ -124,7 +125,7 @@ NB_MODULE(_kernel, m) {
       .def("series", &series, "signal"_a, "lag"_a, "count"_a, "out"_a.noconvert(), "threads"_a);
   nb::class_<Scaling>(m, "Scaling")
       .def(nb::new_(&make_scaling), "joints"_a, "weights"_a, "units"_a, "factor"_a, "compress"_a)
-      .def("rows", &scale, "left"_a, "qd"_a, "acceleration"_a, "out"_a.noconvert());
+      .def("rows", &scale, "left"_a, "qd"_a, "motion"_a, "out"_a.noconvert());
   nb::class_<Window>(m, "Window")
       .def(nb::new_(&make_window), "columns"_a, "lag"_a, "count"_a)
       .def("step", &step, "row"_a, "out"_a.noconvert());

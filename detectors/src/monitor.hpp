@@ -44,7 +44,7 @@ class Monitor {
         n_(observer_.joints()),
         last_(3 * n_),
         between_(3 * n_),
-        out_(3 * n_) {}
+        out_((2 + motion_numbers) * n_) {}
 
   std::size_t joints() const { return n_; }
   bool settled() const { return time_ >= ready_; }

@@ -39,7 +39,7 @@ ScaledResidual residual_of(const Estimator& estimator, const std::vector<std::in
                            const Numbers& weights, double units, double factor, bool compress) {
   Scaling scaling(joints, weights, units, factor, compress);
   require(!joints.empty() && scaling.fits(estimator.joints()),
-          "scaling: expected joints of the arm, and four weights a joint or none");
+          "scaling: expected joints of the arm, and a weight a joint and term or none");
   return {estimator, std::move(scaling)};
 }
 

@@ -43,7 +43,7 @@ class FreeScores final : public Scores {
   FreeMotion stream_;
 };
 
-// What the estimator cannot explain, in units of its envelope.
+// What the estimator cannot explain, in units of its noise.
 class ScaledResidual {
  public:
   ScaledResidual(Estimator estimator, Scaling scaling)
@@ -51,23 +51,22 @@ class ScaledResidual {
         scaling_(std::move(scaling)),
         residual_(estimator_.joints()),
         unexplained_(residual_.size()),
-        acceleration_(residual_.size()),
+        motion_(motion_rows * residual_.size()),
         row_(scaling_.columns()) {}
 
   std::size_t joints() const { return estimator_.joints(); }
   std::size_t columns() const { return row_.size(); }
   void reset() { estimator_.reset(); }
   const double* step(const double* q, const double* qd, const double* current, double dt) {
-    estimator_.step(q, qd, current, dt, residual_.data(), unexplained_.data(),
-                    acceleration_.data());
-    scaling_.row(unexplained_.data(), qd, acceleration_.data(), joints(), row_.data());
+    estimator_.step(q, qd, current, dt, residual_.data(), unexplained_.data(), motion_.data());
+    scaling_.row(unexplained_.data(), qd, motion_.data(), joints(), row_.data());
     return row_.data();
   }
 
  private:
   Estimator estimator_;
   Scaling scaling_;
-  std::vector<double> residual_, unexplained_, acceleration_, row_;
+  std::vector<double> residual_, unexplained_, motion_, row_;
 };
 
 // The largest ratio of scaled residual to limit.

@@ -19,6 +19,7 @@ from tauguard.detectors import (
     Unknowns,
 )
 from tauguard.detectors.alarms.monitor import Monitor
+from tauguard.detectors.estimation.estimator import MOTION
 from tauguard.detectors.estimation.observer import ENVIRONMENT_GAIN, PLAIN_GAIN
 from tauguard.detectors.samples import same_rate
 from tauguard.envs.gym.actions import observation_table
@@ -188,14 +189,15 @@ class AlarmListener:
     def steps(self, q: Array, qd: Array, current: Array) -> tuple[Array, Bools]:
         """See :class:`Listener`; a residual stays where a sample is not finite."""
         residuals, alarms = np.empty_like(q), np.zeros(len(q), dtype=np.bool_)
-        spare, faults = np.empty((2, q.shape[1])), ""
+        out, faults = np.empty((2 + MOTION, q.shape[1])), ""
         for row in range(len(q)):
             sample = (q[row], qd[row], current[row])
             alarms[row] = self._step(*sample)
             faults = faults or self.fault
             residuals[row] = self._last
             if not self.fault or np.isfinite(sample).all():
-                self._observer.step(*sample, (residuals[row], *spare))
+                self._observer.step(*sample, out)
+                residuals[row] = out[0]
             self._last = residuals[row]
         self.fault = faults
         return residuals, alarms

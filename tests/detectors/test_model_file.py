@@ -68,7 +68,7 @@ def test_the_file_says_what_it_is_and_was_made_with_and_holds_nothing_to_trust(a
     assert (container["format"], container["kind"], container["version"]) == (
         "tauguard model",
         "collision-alarm",
-        4,
+        5,
     )
     assert set(container["made_with"]) == {"tauguard", "mujoco", "numpy", "scikit-learn"}
 
@@ -114,9 +114,9 @@ def test_damaged_files_are_one_line(alarm, tmp_path):
         ([1], "not a model file of tauguard"),
         ({"format": "tauguard detector 1"}, "earlier format 'tauguard detector 1'; train"),
         ({"format": "tauguard ranking detector 2"}, "earlier format"),
-        ({"format": "tauguard model", "version": 9}, "version 9 of the format, expected 4"),
+        ({"format": "tauguard model", "version": 9}, "version 9 of the format, expected 5"),
         ({"format": "tauguard model", "version": 1}, "version 1 of the format, .* train the"),
-        ({"format": "tauguard model", "version": 4, "kind": "robot"}, "of the kind 'robot'"),
+        ({"format": "tauguard model", "version": 5, "kind": "robot"}, "of the kind 'robot'"),
     ],
 )
 def test_foreign_and_earlier_files_are_named(content, says, tmp_path):
@@ -248,28 +248,3 @@ def test_a_key_signs_and_nothing_else_is_read_with_it(small, named, tmp_path, mo
         load_model(unsigned)
     monkeypatch.delenv("TAUGUARD_MODEL_KEY")
     assert load_model(unsigned).threshold == small.threshold  # without a key nothing is asked
-
-
-FORMER = {
-    "NoiseModel": "Envelope",
-    "SpeedNormalisation": "SpeedLevels",
-    "noise_model": "envelope",
-    "normalisation": "levels",
-}
-
-
-def with_former_names(fields):
-    """The fields of a class, renamed to what earlier versions called them."""
-    for name, own in list(fields.items()):
-        if isinstance(own, dict) and "type" in own:
-            own["type"] = FORMER.get(own["type"], own["type"])
-            with_former_names(own["fields"])
-        fields[FORMER.get(name, name)] = fields.pop(name)
-
-
-def test_a_file_with_the_names_of_earlier_versions_still_loads(alarm, unseen, tmp_path):
-    path = tmp_path / "model.skops"
-    save_model(alarm, path)
-    rewritten(path, with_former_names)
-    again = load_model(path)
-    assert again.scores(unseen[0]).tobytes() == alarm.scores(unseen[0]).tobytes()

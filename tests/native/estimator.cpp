@@ -60,7 +60,8 @@ int estimators(Random& random, int rounds) {
     Estimator estimator(chain, basis, set);
     Observer observer(chain, set.gain);
     const Motion m(random, n, samples, hard);
-    Numbers residual(n), unexplained(n), acceleration(n), first, tau(n), column(basis.columns());
+    Numbers residual(n), unexplained(n), motion(motion_numbers * n), first, tau(n),
+        column(basis.columns());
     Numbers memory(n * basis.memory()), p(n), beta(n);
     Workspace work(n);
     for (int turn = 0; turn < 2; ++turn) {
@@ -68,8 +69,7 @@ int estimators(Random& random, int rounds) {
       estimator.reset();
       for (std::size_t k = 0; k < samples; ++k) {
         const double *q = &m.q[k * n], *qd = &m.qd[k * n], *current = &m.current[k * n];
-        estimator.step(q, qd, current, m.dt[k], residual.data(), unexplained.data(),
-                       acceleration.data());
+        estimator.step(q, qd, current, m.dt[k], residual.data(), unexplained.data(), motion.data());
         all.insert(all.end(), unexplained.begin(), unexplained.end());
         if (turn || adapts || hard) continue;
         chain.momentum(q, qd, p.data(), beta.data(), work);

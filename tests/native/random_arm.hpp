@@ -99,7 +99,7 @@ inline std::shared_ptr<Scores> scores_of(Random& random, int kind, const Chain& 
         FreeMotion(chain, basis, free_settings(random, n, basis.columns())));
   std::vector<std::int64_t> joints;
   for (std::size_t j = 0; j < n; ++j) joints.push_back(static_cast<std::int64_t>(n - 1 - j));
-  const Numbers weights = random() % 2 ? Numbers{} : uniforms(random, 4 * n, 0.1, 1);
+  const Numbers weights = random() % 2 ? Numbers{} : uniforms(random, noise_terms * n, 0.1, 1);
   Estimator estimator(chain, basis, settings_of(random, n, basis.columns(), true));
   ScaledResidual residual(std::move(estimator), Scaling(joints, weights, 1, 0.5, random() % 2));
   if (kind == 1)

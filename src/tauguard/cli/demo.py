@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 #: robot: somebody who works beside it accepts one an hour, hardly ten.
 FALSE_ALARMS_PER_HOUR = 1.0
 
-#: The threshold comes from all collision-free training motion, in so many folds.
-FOLDS = 3
-
 
 def command(
     out: Path = Path("demo"),
@@ -64,7 +61,7 @@ def command(
     judged = list(simulate_all([*plan.judge_struck, *plan.judge_free], workers, "simulate test"))
     simulated = time.perf_counter()
     arm = nominal_arm(training)
-    detector, scores = train_and_score(SrqSvr(), training, arm, FALSE_ALARMS_PER_HOUR, FOLDS)
+    detector, scores = train_and_score(SrqSvr(), training, arm, FALSE_ALARMS_PER_HOUR)
     fitted = time.perf_counter()
     detections = [detector.detect(trace) for trace in judged]
     detected = time.perf_counter()

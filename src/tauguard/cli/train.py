@@ -31,7 +31,7 @@ def command(
     card: Path | None = None,
     accept: tuple[str, ...] = (),
     arm: str | None = None,
-    folds: int = 3,
+    folds: int | None = None,
 ) -> None:
     """Train a detector and write its model file.
 
@@ -64,10 +64,11 @@ def command(
         card: with --free, draw the card here (PNG).
         accept: with --free, logs to learn from even if they stand out.
         arm: of a dataset with several arms, the one that the detector is for.
-        folds: with --traces, parts of the collision-free recordings that are left out in turn, and
-            so many more fits; 1 is quicker and keeps a third of them for the threshold.
+        folds: with --traces, parts of the recordings that are left out in turn, load by load, and
+            so many more fits (default: 3); 1 is quicker and keeps a third of them for the
+            threshold.
     """
-    if folds < 1:
+    if folds is not None and folds < 1:
         raise ValueError(f"--folds {folds}: expected 1 or more")
     if (traces is None) == (not free):
         raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
@@ -122,12 +123,12 @@ def labelled_motion(
     rate: float,
     confidence: float,
     arm: str | None = None,
-    folds: int = 1,
+    folds: int | None = None,
 ) -> None:
     """Train on labelled recordings."""
     from tauguard.datasets.recordings import labelled
     from tauguard.detectors import make_detector, save_model, with_guarantee
-    from tauguard.detectors.alarms.training import train_and_score
+    from tauguard.detectors.alarms.training import FOLDS, train_and_score
     from tauguard.detectors.calibration.nominal import nominal_arm
     from tauguard.detectors.thresholds.guarantee import check_guarantee
     from tauguard.report import two_digits
@@ -140,8 +141,7 @@ def labelled_motion(
     if free:
         check_guarantee([float(t.t[-1] - t.t[0]) for t in free], rate, confidence)
     recordings = labelled(traces, arm)
-    motion = sum(not (t.truth and t.truth.collisions) for t in recordings)
-    parts = 1 if free else max(1, min(folds, motion))  # --calibration replaces the threshold
+    parts = 1 if free else folds or FOLDS  # --calibration replaces the threshold
     alarm, scores = train_and_score(method, recordings, nominal_arm(recordings), rate, parts)
     guarantee = None
     if free:

@@ -13,7 +13,7 @@ from tauguard.detectors import (
     match_detection,
     train,
 )
-from tauguard.detectors.alarms.training import train_and_score
+from tauguard.detectors.alarms.training import left_out, train_and_score
 from tauguard.detectors.features.front_end import FrontEndSettings
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
 
@@ -58,7 +58,7 @@ def test_the_plain_form_is_the_dissertations(training, arm):
 
 def test_same_seed_same_detector(training, arm, unseen):
     settings, some = SrqSvr(windows=300, mined=0), [*training[:3], *training[9:11]]
-    two = [train(settings, list(some), arm, 10.0) for _ in range(2)]
+    two = [train(settings, list(some), arm, 10.0, folds=1) for _ in range(2)]
     assert two[0].threshold == two[1].threshold
     assert two[0].detect(unseen[0]).score.tobytes() == two[1].detect(unseen[0]).score.tobytes()
 
@@ -84,24 +84,39 @@ def test_held_out_traces_are_collision_free_and_not_trained_on(training):
     assert held_out(struck) == (struck, struck)
 
 
-def test_folds_score_every_free_trace_by_a_detector_that_has_not_seen_it(training, arm):
+def test_folds_score_every_free_trace_by_a_detector_that_has_not_seen_its_load(training, arm):
     free = [t for t in training if not t.truth.collisions]
-    seen: list[set[int]] = []
+    seen: list[list] = []
 
     class Noted(SrqSvr):
         def fit(self, traces, arm):
-            seen.append({id(t) for t in traces})
+            seen.append(traces)
             return super().fit(traces, arm)
 
-    alarm, scores = train_and_score(Noted(windows=300, mined=0), training, arm, 10.0, folds=2)
+    alarm, scores = train_and_score(Noted(windows=300, mined=0), training, arm, 10.0)
     assert len(scores) == len(free)
-    assert seen[-1] == {id(t) for t in training}
-    left_out = [{id(t) for t in training} - one for one in seen[:-1]]
-    assert sorted(i for one in left_out for i in one) == sorted(id(t) for t in free)
     assert alarm.threshold == threshold_for_rate(scores, 10.0)
-    for folds in (0, len(free) + 1):
-        with pytest.raises(ValueError, match="number of collision-free traces"):
-            train_and_score(SrqSvr(), training, arm, 10.0, folds=folds)
+    loads = [{float(t.truth.payload.max()) for t in traces} for traces in seen]
+    assert loads[-1] == {0.0, 2.0, 2.5, 4.0}
+    # 2.5 kg is carried in collisions only; 0 kg and it hold all collisions.
+    assert loads[:-1] == [{2.0, 2.5, 4.0}, {0.0, 2.5, 4.0}, {0.0, 2.0, 2.5}]
+    assert all(any(t.truth.collisions for t in traces) for traces in seen)
+
+
+def test_with_fewer_loads_than_folds_traces_are_left_out_one_by_one(training):
+    free = [i for i, t in enumerate(training) if not t.truth.collisions]
+    alike = [i for i in free if training[i].truth.payload.max() == 2.0]
+    struck = [t for t in training if t.truth.collisions]
+    parts = left_out([*struck, *(training[i] for i in alike)], 3)
+    assert parts == [{len(struck) + k} for k in range(3)]
+
+
+def test_collisions_of_the_only_load_that_has_some_stay(training):
+    empty = [t for t in training if t.truth.payload.max() == 0.0]
+    heavy = [t for t in training if t.truth.payload.max() == 4.0]
+    parts = left_out([*empty, *heavy], 2)
+    assert parts[0] == {i for i, t in enumerate(empty) if not t.truth.collisions}
+    assert parts[1] == set(range(len(empty), len(empty) + len(heavy)))
 
 
 def test_bad_input(alarm, training, robot, arm, unseen):
@@ -117,8 +132,10 @@ def test_bad_input(alarm, training, robot, arm, unseen):
         ArmModel(robot, arm.drive_gain[:2])
     with pytest.raises(ValueError, match="float64 arrays"):
         alarm.stream().step(unseen[0].q[:1], unseen[0].qd[0], unseen[0].current[0])
-    with pytest.raises(ValueError, match="per_hour: 0"):
+    with pytest.raises(ValueError, match="per_hour 0, folds 3"):
         train(SrqSvr(windows=300, mined=0), training, arm, 0)
+    with pytest.raises(ValueError, match="folds 0: expected"):
+        train(SrqSvr(), training, arm, 1.0, folds=0)
 
 
 def test_absurd_samples_are_named_and_not_taken_for_silence(alarm, unseen):

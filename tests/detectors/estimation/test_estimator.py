@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tauguard.detectors import ArmModel, Estimator, FrictionModel, Unknowns, observe
+from tauguard.detectors import (
+    ArmModel,
+    Estimator,
+    FrictionModel,
+    Unknowns,
+    mass_matrix,
+    observe,
+)
 
 
 def test_without_unknowns_and_friction_it_is_the_momentum_observer(training, robot, drive_gain):
@@ -35,13 +42,13 @@ def test_online_equals_batch_bitwise(training, alarm):
     estimator = Estimator(alarm.detector.arm)
     batch = estimator.run(trace.t, trace.q, trace.qd, trace.current, keep=True)
     estimator.reset()
-    out = np.empty((3, 6))
+    out = np.empty((5, 6))
     for k in range(2000):
         dt = trace.t[k] - trace.t[k - 1] if k else None
         estimator.step(trace.q[k], trace.qd[k], trace.current[k], out, dt)
         assert out[0].tobytes() == batch.residual[k].tobytes()
         assert out[1].tobytes() == batch.unexplained[k].tobytes()
-        assert out[2].tobytes() == batch.acceleration[k].tobytes()
+        assert out[2:].tobytes() == batch.motion[k].tobytes()
     np.testing.assert_array_equal(estimator.tracked(), batch.unknowns[1999])
 
 
@@ -139,7 +146,7 @@ def test_what_unknowns_may_be(wrong):
 def test_bad_samples_leave_the_state_alone(training, alarm):
     trace = training[0]
     good, bad = Estimator(alarm.detector.arm), Estimator(alarm.detector.arm)
-    a, b = np.empty((3, 6)), np.empty((3, 6))
+    a, b = np.zeros((2, 5, 6))
     for k in range(30):
         sample = trace.q[k], trace.qd[k], trace.current[k]
         good.step(*sample, a)
@@ -149,3 +156,21 @@ def test_bad_samples_leave_the_state_alone(training, alarm):
             bad.step(sample[0][:5], sample[1], sample[2], b)
         bad.step(*sample, b)
         assert a.tobytes() == b.tobytes()
+
+
+def test_motion_tells_inertia_and_its_torque_with_the_tracked_payload(training, alarm):
+    trace, robot = training[1], alarm.detector.arm.robot
+    arm = replace(alarm.detector.arm, sensors=None)  # velocities as measured
+    run = Estimator(arm).run(trace.t, trace.q, trace.qd, trace.current, keep=True)
+    smooth, keep = trace.qd[0].copy(), np.exp(-30.0 * np.diff(trace.t))
+    for k in range(1, 15002):
+        smooth = trace.qd[k] - (trace.qd[k] - smooth) * keep[k - 1]
+        if k not in (1, 5001, 15001):
+            continue
+        # It is weighed with every tenth sample, and holds for those that follow.
+        inertial = robot.inertial.copy()
+        inertial[-1, :4] -= run.unknowns[k - 1, :4]
+        inertia = np.abs(mass_matrix(robot.with_inertial(inertial), trace.q[k - 1, None])[0])
+        acceleration = np.abs(30.0 * (trace.qd[k] - smooth))
+        np.testing.assert_allclose(run.motion[k, 0], inertia @ acceleration, rtol=1e-9)
+        np.testing.assert_allclose(run.motion[k, 1], np.linalg.norm(inertia, axis=1), rtol=1e-9)

@@ -57,17 +57,18 @@ def test_windows_are_causal_and_equal_to_a_plain_gather(seed, lag, count):
 @given(seed=st.integers(0, 2**31), joints=st.integers(1, 12), envelope=st.booleans())
 def test_scaling_is_its_formula_row_by_row(seed, joints, envelope):
     rng = np.random.default_rng(seed)
-    left, qd, acceleration = rng.normal(size=(3, 50, joints)) * 3
-    known = NoiseModel(rng.uniform(0.1, 1, (joints, 4))) if envelope else None
+    left, qd = rng.normal(size=(2, 50, joints)) * 3
+    motion = np.abs(rng.normal(size=(50, 3, joints)))
+    known = NoiseModel(rng.uniform(0.1, 1, (joints, 5))) if envelope else None
     chosen = (0, joints - 1)
     scaling = Scaling(chosen, known, 5.0, 0.7, compress=True)
     truth = 0.7 * left[:, chosen]
     if known:
-        truth = 0.7 * np.arcsinh(left / (5.0 * known.scale(qd, acceleration)))[:, chosen]
-    whole = scaling.rows(left, qd, acceleration)
+        truth = 0.7 * np.arcsinh(left / (5.0 * known.scale(qd, motion)))[:, chosen]
+    whole = scaling.rows(left, qd, motion)
     np.testing.assert_allclose(whole, truth, rtol=1e-14)
     for t in range(50):
-        one = scaling.rows(*(x[t : t + 1] for x in (left, qd, acceleration)))
+        one = scaling.rows(*(x[t : t + 1] for x in (left, qd, motion)))
         assert one.tobytes() == whole[t].tobytes()
 
 
@@ -75,27 +76,27 @@ def test_scaling_refuses_joints_that_are_not_there():
     for joints, size in (((0, 5), 4), ((0, -1), 4)):
         scaling = Scaling(joints, None)
         with pytest.raises(ValueError, match="one number a joint"):
-            scaling.rows(*np.zeros((3, 1, size)))
+            scaling.rows(*np.zeros((2, 1, size)), np.zeros((1, 3, size)))
     with pytest.raises(ValueError, match="one number a joint"):
-        Scaling((0,)).rows(np.zeros((1, 6)), np.zeros((1, 5)), np.zeros((1, 6)))
+        Scaling((0,)).rows(np.zeros((1, 6)), np.zeros((1, 5)), np.zeros((1, 3, 6)))
     with pytest.raises(ValueError, match="expected some joints"):
         Scaling(())
 
 
 def test_envelope_finds_what_the_noise_grows_with():
     rng = np.random.default_rng(0)
-    qd, acceleration = rng.normal(size=(2, 20000, 2))
-    truth = np.array([[1.0, 0.5, 0.0, 0.0], [0.2, 0.0, 0.3, 0.1]])
-    scale = NoiseModel(truth).scale(qd, acceleration)
+    qd, motion = rng.normal(size=(20000, 2)), np.exp(rng.normal(size=(20000, 3, 2)))
+    truth = np.array([[1.0, 0.5, 0.0, 0.3, 0.0], [0.2, 0.0, 0.3, 0.0, 0.2]])
+    scale = NoiseModel(truth).scale(qd, motion)
     left = scale * rng.normal(size=qd.shape)
-    fitted = NoiseModel.fit(left, qd, acceleration)
+    fitted = NoiseModel.fit(left, qd, motion)
     np.testing.assert_allclose(fitted.weights, truth, atol=0.06)
-    assert np.std(left / fitted.scale(qd, acceleration), axis=0) == pytest.approx([1, 1], abs=0.03)
+    assert np.std(left / fitted.scale(qd, motion), axis=0) == pytest.approx([1, 1], abs=0.03)
 
 
 def test_a_joint_without_any_residual_keeps_a_scale_above_zero():
-    silent = NoiseModel.fit(np.zeros((100, 1)), np.ones((100, 1)), np.ones((100, 1)))
-    assert (silent.scale(np.zeros(1), np.zeros(1)) > 0).all()
+    silent = NoiseModel.fit(np.zeros((100, 1)), np.ones((100, 1)), np.ones((100, 3, 1)))
+    assert (silent.scale(np.zeros(1), np.zeros((3, 1))) > 0).all()
 
 
 def test_scaling_brings_the_median_distance_to_what_was_asked(alarm, training):
@@ -110,7 +111,7 @@ def test_scaling_brings_the_median_distance_to_what_was_asked(alarm, training):
 
     assert 0.5 < distance(own.front.scaled(trace, own.scaling)) / 2.0 < 2  # one trace out of two
     raw = Scaling(own.front.joints)
-    plain = raw.rows(estimate.residual, trace.qd, estimate.acceleration)
+    plain = raw.rows(estimate.residual, trace.qd, estimate.motion)
     np.testing.assert_array_equal(plain, estimate.residual[:, :4])
     assert distance(plain) > 20  # raw N m, for a kernel of length 3
 
