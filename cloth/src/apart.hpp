@@ -1,6 +1,6 @@
-// The first filter of single queries: which are apart on an axis, on the same side at both ends of
-// the step and so in between. By comparing x, y and z, which is exact; or, where many queries share
-// positions, by the seven axes of a 14-DOP in float32, beyond rounding.
+// The first filter of single queries: it finds those that are apart on an axis, on the same side at
+// both ends of the step and so in between. It compares x, y and z, which is exact. If many queries
+// share positions, it uses the seven axes of a 14-DOP in float32, with a margin for rounding.
 #pragma once
 
 #include <algorithm>

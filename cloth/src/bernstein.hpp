@@ -1,6 +1,6 @@
 // Bernstein polynomials on [0, 1] with integer coefficients of fixed width: their roots, and signs
-// of one at a root of another. exact_polynomial.hpp does the same with integers of any length; here
-// are the many queries whose coefficients are short and whose roots are simple.
+// of one at a root of another. exact_polynomial.hpp does the same with integers of any length; this
+// file is for the many queries with short coefficients and simple roots.
 //
 // A polynomial of degree n is the sum of c_i (1 - t)^(n - i) t^i: the Bernstein basis without its
 // binomial factors. A product is a convolution, the sign variations of the c_i bound the number of

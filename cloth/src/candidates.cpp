@@ -12,7 +12,7 @@ void emit(const std::int32_t* ids_a, const std::int32_t* va, int i, const std::i
   std::int32_t a[ArityA];
   for (int j = 0; j < ArityA; ++j) a[j] = va[j * lanes + i];
   std::int32_t *row = out.rows.data() + 4 * out.size, *pair = out.pairs.data() + 2 * out.size;
-  // Every hit is written; the place is taken only by those that count (no branch to mispredict).
+  // Every pair is written, but the position advances only for hits (no branch to mispredict).
   for (; hits; hits &= hits - 1) {
     const int lane = __builtin_ctz(hits);
     // A vertex goes by its own number, not by its place among the vertices in use.

@@ -3,7 +3,7 @@
 // collisions and report false ones, as the originals do. The product does not call them; they share
 // its candidates, differences and cubics, so that a comparison measures the narrow phase alone.
 //
-// Written from the published descriptions; what those leave open was inferred:
+// They follow the published descriptions; details that these leave open were inferred:
 //   naive  Provot 1997, Bridson et al. 2002: no filter, all roots.
 //   iccd   Tang et al. 2009: the same for each pair. Its own part is the broad phase: 18-DOPs and
 //          testing each pair once are here, normal cones are not.

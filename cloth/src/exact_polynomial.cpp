@@ -52,7 +52,7 @@ int variations(const std::vector<Polynomial>& sequence, const Dyadic& x) {
   return count;
 }
 
-// p without what it shares with its derivative: the same roots, all simple.
+// p without the factors that it shares with its derivative: the same roots, all simple.
 Polynomial square_free(const Polynomial& p) {
   const auto all = sequence(p, derivative(p));
   if (all.back().size() == 1) return p;

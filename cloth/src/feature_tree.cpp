@@ -151,7 +151,7 @@ struct Row {
   }
 };
 
-// The ends of the step changed round.
+// Both ends of the step, exchanged.
 template <int slots>
 Row<slots> other_end(const Row<slots>& row) {
   Row<slots> other;
@@ -188,7 +188,7 @@ void write_lanes(const Row<slots>* rows, int axes, int times, float* block) {
 template <int slots>
 void FeatureTree::fit_leaf(std::int32_t leaf, const Projection& points) {
   const std::int32_t* v = vertices(leaf);
-  // Vertices lie anywhere in memory: the next leaf's are asked for before they are used.
+  // Vertices are scattered in memory, so those of the next leaf are prefetched.
   if (leaf + 1 < leaves_)
     for (int i = 0; i < lanes * arity_; ++i)
       __builtin_prefetch(points.of(std::max(v[lanes * arity_ + i], 0)));

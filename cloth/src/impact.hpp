@@ -1,4 +1,4 @@
-// What is reported of a collision whose time is known: point, normal, weights.
+// Point, normal and weights of a collision whose time is known.
 #pragma once
 
 #include <algorithm>

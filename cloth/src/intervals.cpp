@@ -1,10 +1,10 @@
 // A query is answered by cutting [0, 1] into intervals of time and clearing them, earliest first.
 // An interval is clear where the coplanarity cubic has Bernstein coefficients of one sign on it, or
 // where one direction separates the features at both of its ends (and so in between: the
-// differences are linear in time). Where the cubic changes sign its root is cut out into an
-// interval too small to matter. What cannot be cleared down to a width of 2^-34 is a hit, at the
-// interval's start, where the signs prove it beyond rounding; where they do not, exact arithmetic
-// decides. Never late, never missed, never false.
+// differences are linear in time). If the cubic changes sign, its root is enclosed in a tiny
+// interval. An interval that cannot be cleared down to a width of 2^-34 is a hit at its start, if
+// the signs prove it beyond rounding; if they do not, exact arithmetic decides. Never late, never
+// missed, never false.
 #include "intervals.hpp"
 
 #include <algorithm>
@@ -101,8 +101,8 @@ double first_contact(const Query& k, bool vf, Stats& stats) {
   const double* c = stack[0].c.b;
   const bool flat =
       std::max({std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2]), std::fabs(c[3])}) < error;
-  // What is flat is left to exact arithmetic at once, unless the face is an edge or a point, which
-  // nearly always stand apart.
+  // Flat features go to exact arithmetic at once, unless the face is an edge or a point: these are
+  // nearly always apart.
   const int most = k.distance > 0 ? 4000 : !flat ? 40 : vf && is_wire(k) ? 12 : 0;
   for (int count = 0; top > 0; ++count) {
     const Piece piece = stack[--top];

@@ -10,10 +10,10 @@ namespace tauguard::cloth {
 
 inline constexpr double undecided = std::numeric_limits<double>::quiet_NaN();
 
-// The start of the first interval that no filter clears; infinity where there is none; undecided
-// where it cannot be told whether that is contact. At most 4001 intervals are cut with a minimum
-// distance, where what is then left counts as contact, and 41 without one: beyond that exact
-// arithmetic is cheaper.
+// The start of the first interval that no filter clears; infinity if there is none; undecided if it
+// is not certain that this is contact. At most 4001 intervals are cut with a minimum distance; what
+// is left then counts as contact. Without one at most 41 are cut, since exact arithmetic is cheaper
+// than more.
 double first_contact(const Query& k, bool vf, Stats& stats);
 
 }  // namespace tauguard::cloth

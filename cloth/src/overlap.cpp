@@ -18,7 +18,7 @@ struct RowStride {
 RowStride in_block(int times) { return {2 * lanes * times, 2 * lanes, lanes}; }
 RowStride in_node(int slots) { return {1, 2 * slots, slots}; }
 
-// What a row looks at: all lanes in use, or of its own leaf those after it.
+// The lanes that a row is compared with: all lanes in use, or those after it in its own leaf.
 TAUGUARD_INLINE Mask lanes_after(bool same, int row, const LeafLanes& b) {
   return same ? b.occupied & ~Mask(0) << row << 1 : b.occupied;
 }
@@ -97,7 +97,7 @@ TAUGUARD_AVX2 TAUGUARD_INLINE __m256 apart8(const float* row, RowStride s, const
                       _mm256_and_ps(above[0], above[times - 1]));
 }
 
-// Every axis is looked at, whatever the others say: no branch to mispredict.
+// Every axis is compared, whatever the result of the others: no branch to mispredict.
 template <int times>
 TAUGUARD_AVX2 TAUGUARD_INLINE Mask overlap_avx2(const float* row, RowStride s, const float* b,
                                                 int axes, Mask wanted) {

@@ -24,7 +24,7 @@ struct LeafLanes {
   int arity;
   Mask occupied;
 };
-// Of lane i of one leaf, for every i in `rows`: the lanes of another that it meets, never none.
+// For every i in `rows`, a lane of one leaf: the lanes of another leaf that it meets, at least one.
 struct Overlaps {
   Mask rows = 0;
   unsigned adjacent = 0;  // lanes left out because a vertex is shared

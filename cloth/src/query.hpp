@@ -1,4 +1,4 @@
-// One query as differences of positions, and its coplanarity cubic. Every method starts from these.
+// A query as differences of positions, and its coplanarity cubic, from which every method starts.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,6 @@
-// Of features apart in a plane a vertex of one reaches an edge of the other first: their line
-// passes through the point at a root of a quadratic, where it lies between the ends or not.
+// Two features are apart in a plane. At first contact a vertex of one reaches an edge of the other.
+// The line of the edge passes through the vertex at a root of a quadratic; then the vertex is
+// between the ends of the edge, or not.
 #include "sliding_contact.hpp"
 
 #include <algorithm>

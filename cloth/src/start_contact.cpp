@@ -1,6 +1,7 @@
 // Contact is the origin in the hull of the features' differences, as in exact.cpp, at one time. In
-// most that touch a coordinate is the same in all four vertices, and two dimensions are left, in
-// which signs of differences tell, or a filtered determinant; the others are decided in integers.
+// most pairs that touch, one coordinate is the same in all four vertices. Then two dimensions are
+// left, in which signs of differences or a filtered determinant decide. Other pairs are decided in
+// integers.
 #include "start_contact.hpp"
 
 #include <array>
@@ -33,7 +34,7 @@ int turn(const double* o, const double* a, const double* b, int i, int j) {
   return geometry::orient2d(flat[0], flat[1], flat[2]);
 }
 
-// Where one coordinate is the same in all: the others, i and j, tell.
+// If one coordinate is the same in all, the other two, i and j, decide.
 AtStart in_plane(bool vf, const double* const* p, int i, int j) {
   const int corners = vf ? 3 : 4;
   bool left = false, right = false;

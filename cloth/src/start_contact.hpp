@@ -1,5 +1,5 @@
-// Do two features touch at the start of the step? Exact. Bodies at rest on one another, and
-// whatever starts in contact, need no more than this.
+// Do two features touch at the start of the step? Exact. This is enough for bodies at rest on each
+// other, and for everything that starts in contact.
 #pragma once
 
 #include <cstdint>

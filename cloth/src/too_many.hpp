@@ -1,4 +1,4 @@
-// An answer that outgrows what the caller allows.
+// Thrown if an answer exceeds the limit of the caller.
 #pragma once
 
 #include <stdexcept>

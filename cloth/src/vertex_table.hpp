@@ -1,5 +1,5 @@
-// Which vertices a list of features uses, and the place of each among them, in memory by how many
-// there are and not by the largest number.
+// The vertices that a list of features uses, and the position of each among them. The memory
+// depends on the number of vertices in use, not on the largest index.
 #pragma once
 
 #include <algorithm>

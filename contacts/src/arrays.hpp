@@ -1,4 +1,4 @@
-// Arrays that cross between Python and the kernels.
+// Types of arrays that pass between Python and the kernels.
 #pragma once
 
 #include <nanobind/nanobind.h>

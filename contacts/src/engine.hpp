@@ -27,7 +27,7 @@ struct Engine {
   using Step = void (*)(const void*, void*);
   const void* model;
   void *data, *end;  // what is stepped; the kinematics of a step's end
-  void* other;       // with mocap bodies: those of the same joints with other mocap poses
+  void* other;       // with mocap bodies: data of the same joints with other mocap poses
 
   Logging logging;
   Call<const void*, void*> step, step1, step2, kinematics, com_pos, com_vel, flex, tendon, make_m,

@@ -140,8 +140,8 @@ bool Mocap::shifted() {
   return true;
 }
 
-// How far a point goes that the carrier of a body takes along; it is where the data's kinematics
-// are: at the start of a sub-step, at the end of a step that jumps.
+// The displacement of a point that moves with the carrier of a body. The point is given in the
+// kinematics of the data: at the start of a sub-step, at the end of a step that jumps.
 Vec Mocap::way(int body, const double* point) const {
   const int m = e_.body_mocapid[e_.body_rootid[body]];
   if (m < 0) return {};

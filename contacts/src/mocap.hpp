@@ -1,8 +1,8 @@
-// Bodies that the user moves by mocap poses, and all that hangs on them.
+// Bodies that the user moves by mocap poses, and everything attached to them.
 //
-// MuJoCo puts them in their new place at the start of a step, by a jump, and knows no velocity of
-// them. Here the step has a way for them: from where they were at the end of the last one to where
-// they are commanded to be, straight and turning at a constant rate.
+// MuJoCo sets their new pose at the start of a step, without a velocity. Here they move during the
+// step: from their pose at the end of the last step to the commanded one, on a straight line and
+// with a constant rotation rate.
 #pragma once
 
 #include "engine.hpp"
@@ -32,7 +32,7 @@ class Mocap {
   bool begin();
   bool moves() const { return moves_; }  // whether the way of this step has a length
 
-  // The next attempt goes from one fraction of the way to another; the data is at its start.
+  // The next attempt goes from one fraction of the motion to another; the data is at its start.
   void sub_step(double from, double to);
   // Poses of a sub-step's start, end, and of the step's end as the user wrote them.
   void depart() { write(from_); }
@@ -54,7 +54,7 @@ class Mocap {
 
   // Whether one of the partners is a geom that hangs on a mocap body, and some mocap body moves.
   bool carries(const Partners& pair) const;
-  // How far both partners part along the contact's normal by what carries them [m].
+  // How far the carriers separate both partners along the contact's normal [m].
   double parting(const Contact& contact) const;
   // What was done on everything else, by contacts and equalities; `velocity` is the mean [J].
   double work(const double* velocity, double length);

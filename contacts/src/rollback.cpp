@@ -9,8 +9,8 @@ namespace {
 // Fractions of its path tried until the sub-step is within its energy budget.
 constexpr double slower[] = {0.7, 0.5, 0.25, 0.1, 0.0};
 
-// Where only an impact zone helps, shorter sub-steps are wasted: each zone makes the shortest
-// sub-step this much longer, up to this fraction of a step.
+// If only an impact zone helps, shorter sub-steps are useless: each zone makes the shortest
+// sub-step longer by this factor, up to this fraction of a step.
 constexpr double longer = 4, longest = 0.25;
 
 }  // namespace
@@ -139,7 +139,8 @@ EnergyChange Stepper::last_resort(double length, const std::vector<PairHit>& hit
     again();
   }
   if (!mocap_.moves()) return change;
-  // A mocap body may pass through what stands still: then too much energy is the lesser error.
+  // A mocap body may pass through a body that stands still; too much energy is then the smaller
+  // error.
   if (passes()) go(1), note_passed(), again();
   return change;
 }

@@ -43,7 +43,8 @@ void Rows::step(double length, const std::vector<Held>& held, double push) {
   const bool discrete = e_.is_discrete();
   Borrowed borrowed(e_);
   *e_.timestep = length;
-  // Others leave stiff rows far from solved within their iterations, and what they leave passes.
+  // Other solvers do not converge on stiff rows within their iterations, and pairs would then pass
+  // through.
   *e_.solver = e_.newton, *e_.iterations = std::max(*e_.iterations, least_iterations);
   std::fill(geoms_.begin(), geoms_.end(), 0), std::fill(flexes_.begin(), flexes_.end(), 0);
   for (const Held& h : held) {
@@ -97,7 +98,7 @@ void Rows::aim_contact(const Contact& contact, double length, double push) {
       contact.distance > 0 ? -contact.distance / length : std::max(-contact.distance * push, 0.0);
   const double speed = apart - mocap_.parting(contact) / length;
   for (int row = first; row < first + count; ++row) {
-    // Friction acts where they touch; across a gap only what goes along the normal is stopped.
+    // Friction acts where bodies touch; across a gap only the motion along the normal is stopped.
     const double aim = speed + (contact.distance > 0 ? now[row] - normal : 0.0);
     if (discrete)
       (*e_.efc_margin)[row] = (*e_.efc_pos)[row] + length * aim;

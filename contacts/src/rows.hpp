@@ -4,12 +4,12 @@
 // place in which they are about to meet. Between mj_step1 and mj_step2 each of their rows gets the
 // velocity that it is to have at the end: for a signed distance d > 0 and a sub-step of length h no
 // faster than d / h towards each other, and in overlap none. The solver then finds the least change
-// of velocity (in the metric of the inertia) that obeys; as all these velocities allow standing
-// still, that change takes energy and never adds any, except for what pushes an overlap out. What
-// mocap bodies carry is taken along by their own velocity, of which MuJoCo's rows know nothing.
-// They push without friction: MuJoCo's friction lets what slides at a speed v part at mu v, so that
-// a ball between a paddle and a table, which must slide on one of them, would leave at many times
-// the paddle's speed.
+// of velocity (in the metric of the inertia) that satisfies these rows. All of them allow standing
+// still, so the change removes energy and adds none, except to push an overlap out. Mocap bodies
+// carry others along by their own velocity, which MuJoCo's rows do not contain. They push without
+// friction: with MuJoCo's friction, bodies that slide at a speed v separate at mu v. A ball between
+// a paddle and a table, which must slide on one of them, would then leave at many times the
+// paddle's speed.
 #pragma once
 
 #include "mocap.hpp"

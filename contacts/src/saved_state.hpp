@@ -1,5 +1,4 @@
-// What a guard knows of earlier steps, as bytes: a copy that reads them continues with the same
-// bits.
+// A guard's memory of earlier steps, as bytes: a copy that reads them continues with the same bits.
 #pragma once
 
 #include <cstring>

@@ -236,7 +236,8 @@ void Stepper::note_lost(const std::vector<PairHit>& hits) {
     if (hit.lost) passed_[hit.pair] = 1;
 }
 
-// Without what is lost, and without pairs that only brushed and whose contact MuJoCo listed.
+// Without pairs that are no longer tracked, and without those that touched only briefly and whose
+// contact MuJoCo listed.
 std::vector<PairHit> Stepper::unseen(std::vector<PairHit> hits) {
   const auto gone = [](const PairHit& hit) { return hit.time == INFINITY; };
   hits.erase(std::remove_if(hits.begin(), hits.end(), gone), hits.end());
@@ -272,7 +273,8 @@ std::vector<int> Stepper::release() {
   if (!guarded_count_) return out;
   const std::vector<char> seen = listed();
   for (std::size_t i = 0; i < guarded_.size(); ++i) {
-    // A stiff contact would throw what a mocap body that goes on sinks into within a whole step.
+    // A moving mocap body sinks into others within a whole step, and a stiff contact would throw
+    // them away.
     if (!guarded_[i] || (seen[i] && !mocap_.carries(pairs_[i]))) continue;
     guarded_[i] = 0, --guarded_count_;
     if (stiffening_.restore(static_cast<int>(i))) out.push_back(static_cast<int>(i));

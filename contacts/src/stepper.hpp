@@ -1,4 +1,5 @@
-// The guarded step: plain where that holds, rolled back in sub-steps with the approach stopped.
+// The guarded step: a plain step if no pair passes through; otherwise it is rolled back and taken
+// in sub-steps that stop the approach.
 #pragma once
 
 #include <cmath>
@@ -83,7 +84,8 @@ class Stepper {
   void close();
   // The state was set from outside: forgets the steps before.
   void reset();
-  // Another cover, as the constructor takes it; what is known of pairs that are in both is kept.
+  // Replaces the covered pairs, as in the constructor; the memory of pairs that are in both is
+  // kept.
   void follow(Verdict verdict, std::vector<Partners> pairs, std::vector<int> last_level,
               std::vector<Sheet> sheets, std::vector<int> spins, std::vector<char> pulled);
   // Whether the model and the data can be stepped at all.

@@ -38,7 +38,7 @@ class Stiffening {
   // Undo that, once no other pair needs it; false if it was not stiff.
   bool restore(int pair);
   bool is_stiff(int pair) const { return stiff_[pair]; }
-  // What somebody else wrote since counts as the pair's own from now on.
+  // Values that others have written since then become the pair's own.
   void follow();
   // Another list of pairs, none of them stiff.
   void resize() { stiff_.assign(pairs_.size(), 0), saved_.clear(); }

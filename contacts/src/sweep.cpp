@@ -102,7 +102,7 @@ void Geoms::update(const Poses& p) {
 
 namespace {
 
-// Polytopes that only have to touch go through the kernel of rigid/, which follows their features.
+// For polytopes without a threshold the kernel of rigid/ is used, which follows their features.
 Touch polytopes_touch(const Geoms& geoms, const GeomPair& pair, const Vec& origin, SupportShape& a,
                       SupportShape& b) {
   auto x = vertices_of(geoms.shape(pair.a), geoms.in_body(pair.a), geoms.motion(pair.a), origin);

@@ -1,4 +1,4 @@
-// A scene's pairs over one step: swept boxes first, then the time of impact of what is left.
+// A scene's pairs over one step: swept boxes first, then the time of impact of the remaining pairs.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,7 @@ namespace tauguard::contacts {
 
 using namespace rigid;  // the convex kernel
 
-// How far apart counts, beside touching: contacts up to `reach` are listed where the surfaces do
-// not touch.
+// The distance up to which contacts are listed: up to `reach`, even if the surfaces do not touch.
 struct GeomPair {
   std::int32_t a, b;
   double reach;

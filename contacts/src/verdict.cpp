@@ -10,8 +10,8 @@ namespace {
 // first_touch takes for a touch, so that a pair that parts from there is no hit.
 constexpr double resting = 1e-5;
 constexpr double touching = 1e-6;
-// In roundings of the positions: what such a distance needs above that, and what a sweep of the
-// last eroded shapes leaves at the least (advance.cpp leaves 128).
+// In roundings of the positions: the margin that such a distance needs above that, and the least
+// distance that a sweep of the last eroded shapes leaves (advance.cpp leaves 128).
 constexpr double rounded = 512, left_over = 64;
 
 bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double roundoffs) {
@@ -26,8 +26,8 @@ bool apart_at(SupportShape& a, SupportShape& b, double t, double share, double r
 // What is known of a pair from earlier steps: nothing, that some eroded shapes were apart, or none.
 enum : char { unknown, apart, sunk };
 
-// `a_at(level)` and `b_at(level)` make the movers of a pair. A deeper core never touches before a
-// shallower one does, so that each sweep goes on where the last one ended.
+// `a_at(level)` and `b_at(level)` make the moving shapes of a pair. A deeper eroded shape never
+// touches before a shallower one, so each sweep continues where the last one ended.
 template <class MakeA, class MakeB>
 bool judged(const MakeA& a_at, const MakeB& b_at, int levels, char* known, Hit* hit) {
   double close = touching;
@@ -109,7 +109,7 @@ SupportShape Verdict::mover(int entry, const Vec& origin) const {
   return SupportShape(e.shape, e.in_body, motions_[e.body], origin);
 }
 
-// How far a point of the shape goes at most against something that goes by `drift`.
+// The largest displacement of a point of the shape relative to a point that moves by `drift`.
 double Verdict::travel(int entry, const Vec& drift) const {
   const Entry& e = entries_[entry];
   const RigidMotion& motion = motions_[e.body];

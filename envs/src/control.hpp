@@ -1,4 +1,4 @@
-// What every drive is told: from an action in [-1, 1] until the next one, or from a table of
+// The command of every drive: from an action in [-1, 1] until the next one, or from a table of
 // references, row by row.
 #pragma once
 
@@ -13,7 +13,7 @@
 namespace tauguard::envs {
 
 enum class Mode { current = 0, torque = 1, velocity = 2, position = 3, cartesian = 4, table = 5 };
-// What a reaction puts in the action's place: follow velocities, no power, no power and brakes on.
+// Replacements of the action by a reaction: follow velocities, no power, no power with brakes on.
 enum class Override { none = 0, velocity = 1, limp = 2, brake = 3 };
 
 // A brake holds like a stiff spring that slips beyond its torque: this many times the servo's
@@ -29,8 +29,8 @@ struct Table {
   std::size_t width = 0;  // joints
 };
 
-// A reference keeps off the ends of a joint's range by this much [rad] and nears them at most at
-// this rate [1/s], so that the arm does not run into its stops.
+// A reference keeps this distance from the ends of a joint's range [rad] and approaches them at
+// most at this rate [1/s], so that the arm does not run into its stops.
 constexpr double end_margin = 0.01, end_rate = 6.0;
 
 struct Command {

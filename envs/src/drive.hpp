@@ -66,7 +66,7 @@ inline double reserve(const Joint& j, double speed) {
   return std::min(std::max(fraction, -1.0), 1.0);
 }
 
-// The current [A] that a drive can give of a wanted one at a joint speed.
+// The current [A] that a drive gives for a wanted one at a joint speed.
 inline double possible(const Joint& j, double current, double qd) {
   double low = -j.current_limit, high = j.current_limit;
   if (j.no_load_speed > 0.0) {

@@ -1,4 +1,4 @@
-// The arms of a scene as MuJoCo's arrays show them, and the few sums over their joints that the
+// Kinematics of a scene's arms from MuJoCo's arrays, and sums over their joints that the
 // environments need: gravity, the torque of a wrench, and the joint step of a Cartesian increment.
 #pragma once
 

@@ -1,6 +1,6 @@
 // MuJoCo as the plant sees it: two of its functions by address and arrays of one model's data.
-// Nothing here depends on MuJoCo's headers, on the layout of its structs or on Python; whoever
-// makes these keeps what they point into alive by the owner that comes with them.
+// Nothing here depends on MuJoCo's headers, on the layout of its structs or on Python; the owner
+// that comes with them keeps the arrays alive.
 #pragma once
 
 #include <array>

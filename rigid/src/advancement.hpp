@@ -5,8 +5,8 @@
 // s(h) = min_b n(h).x_b - max_a n(h).x_a at time t + h, the bodies are apart while s > 0, whatever
 // n and r are. Measured from a's centre c, each projection is its tangent at h = 0 plus at most K
 // h^2 / 2, where K bounds its second derivative |2 r.(x - c)' + n(h).x''|; so s(h) >= G(h) = min_b
-// (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and computable: the step
-// goes to just before its root, and every time passed is certified.
+// (tangent) - max_a (tangent) - (Ka + Kb) h^2 / 2 - rounding. G is concave and can be computed. A
+// step ends just before its root, so the bodies are certainly apart during the step.
 //
 // Bodies grown by balls of radii R in all are apart while s(h) > R |n(h)|, and |n(h)| is at most
 // 1 + (h |r|)^2 / 2 for r across n: R and R |r|^2 join the constant and K.
@@ -71,7 +71,8 @@ inline SupportTangent tangents(const SupportShape& shape, const Vec& n, const Ve
   return SupportTangent(shape, n, rate, centre, drift);
 }
 
-// G and its slope at h, for surfaces `offset` from the cores; the part `radius` of it turns.
+// G and its slope at h, for surfaces at the distance `offset` from the cores; `radius` is the part
+// of it that turns.
 template <class Body>
 class SeparationBound {
  public:
@@ -100,7 +101,7 @@ class SeparationBound {
 
 // The largest step found with G >= 0 on [0, step]; at_zero = G(0) > 0. Newton from the right stays
 // right of the root of a concave function; the chord from (0, G(0)) to a point right of the root
-// crosses zero left of it. Newton ends where G is below zero by less than the share `accuracy`.
+// crosses zero left of it. Newton ends when G is below zero by less than the fraction `accuracy`.
 template <class Bound>
 double safe_step(const Bound& g, double at_zero, double limit, double accuracy) {
   double slope, h = limit, value = g(h, &slope);
@@ -114,9 +115,9 @@ double safe_step(const Bound& g, double at_zero, double limit, double accuracy) 
   return value >= 0 ? h : h * (at_zero / (at_zero - value)) * (1 - 4 * unit_roundoff);
 }
 
-// Moves both bodies on from `start` until `close(t)`, by steps `certified(left)` on which they stay
-// apart. True where they came close, at the time *t, which is never late; false where all of
-// [start, end] is certified.
+// Advances both bodies from `start` until `close(t)`, in steps `certified(left)` during which they
+// stay apart. True if they came close, at the time *t, which is never late; false if they stay
+// apart in all of [start, end].
 template <class Body, class Close, class Certified>
 bool advance(Body& a, Body& b, double start, double end, double most_steps, const Close& close,
              const Certified& certified, double* t) {

@@ -1,7 +1,7 @@
-// For comparison only: the bounding volumes side by side as textbooks use them: fitted in the
-// body's frame, brought to the world under a pose (a ball and an oriented box move, bounds along
-// fixed directions are taken anew over the posed corners), tested against each other there. What
-// each of the three costs is what the study wants to know.
+// For comparison only: single bounding volumes as textbooks use them. A volume is fitted in the
+// body's frame and placed in the world under a pose: a ball and an oriented box move, bounds along
+// fixed directions are computed again from the posed corners. Then volumes are tested against each
+// other. The study measures the cost of each of these three steps.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 

@@ -1,7 +1,7 @@
-// For comparison only: separating axes as the textbooks have them (Ericson 2005, 5.2.1): all face
-// normals of both bodies, then the products of all edge pairs; every vertex is projected; exit at
-// the first axis that separates. Plain arithmetic without error bounds: the comparator of the
-// study, wrong where rounding makes it so.
+// For comparison only: separating axes as in textbooks (Ericson 2005, 5.2.1). It tests all face
+// normals of both bodies, then the products of all edge pairs, projects every vertex, and ends at
+// the first axis that separates. The arithmetic has no error bounds, so rounding can make an answer
+// wrong.
 #pragma once
 
 #include "convex_lanes.hpp"

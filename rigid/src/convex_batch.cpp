@@ -1,5 +1,5 @@
-// The batch path of boxes: eight pairs at a time in single precision with certified bounds; what
-// they leave open (a few rows in a million, or boxes in contact) is decided one by one.
+// The batch path of boxes: eight pairs at a time in single precision with certified bounds. Rows
+// that the bounds do not decide (a few in a million, or boxes in contact) are decided one by one.
 #include <atomic>
 #include <cstring>
 
@@ -20,7 +20,7 @@ struct Batch {
   std::uint8_t* hit;
 };
 
-// Row i, which single precision could not tell; true where exact arithmetic was needed.
+// Decides row i, which single precision could not decide; true if exact arithmetic was needed.
 bool decide_row(const Batch& batch, std::size_t i) {
   Verdict v = box_pair(batch.a.row(i), batch.b.row(i), batch.skew);
   const bool exact = v == undecided;

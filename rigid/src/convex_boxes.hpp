@@ -8,12 +8,12 @@
 // rotations R; using R^T R = I where entries are off by `skew` moves a gap by at most 16 skew w.
 //
 // Overlap needs every facet of the zonotope A - B on the right side. The axis of nearly parallel
-// edges has no certain sign, but may be left out: tilting the shorter edge by the angle makes the
-// facet vanish and moves the body by at most tau h, so a margin of that size at all other axes is
-// enough (a ball of that radius about the offset is inside the tilted body). Edges count as
-// parallel where 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 - C^2 and at most three
-// pairs can be parallel, each edge in one of them, so 2 tau min(sum h_A, sum h_B) is more than they
-// all move.
+// edges has no certain sign, but may be left out. Tilting the shorter edge by the angle between
+// them makes the facet vanish and moves the body by at most tau h. So a margin of that size at all
+// other axes is enough (a ball of that radius about the offset is inside the tilted body). Edges
+// count as parallel where 1 - C^2 < tau^2; tau^2 is far above the rounding of 1 - C^2 and at most
+// three pairs can be parallel, each edge in one of them, so 2 tau min(sum h_A, sum h_B) is more
+// than they all move.
 #pragma once
 
 #include "convex_abfme.hpp"

@@ -1,6 +1,5 @@
-// Overlap of frames that resemble each other: the plane that separated a pair in the last frame is
-// tried first. It answers nearly every pair that is still apart; a wrong or stale plane costs time
-// only.
+// Overlap in successive frames: the plane that separated a pair in the last frame is tried first.
+// It decides nearly every pair that is still apart. A wrong or old plane costs time only.
 #include <atomic>
 
 #include "convex_overlap.hpp"

@@ -31,7 +31,8 @@ class ContactFeature {
     polygon = hull(points);
   }
 
-  // The mean of the corners of the intersection, or of both means where rounding leaves none.
+  // The mean of the corners of the intersection, or of both means if rounding leaves no
+  // intersection.
   static Point2 meet(const ContactFeature& a, const ContactFeature& b, double tolerance) {
     if (a.polygon.size() == 1) return a.polygon[0];
     if (b.polygon.size() == 1) return b.polygon[0];

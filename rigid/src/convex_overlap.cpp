@@ -22,7 +22,7 @@ struct Chunk {
   std::uint8_t* hit;
 };
 
-// A kernel gives the verdict of one row; what it leaves undecided goes to `resolve_exactly`.
+// A kernel decides one row; `resolve_exactly` decides rows that it leaves undecided.
 #define TAUGUARD_KERNEL(Name, expression)                                  \
   struct Name {                                                            \
     TAUGUARD_INLINE static Verdict decide(const Chunk& c, std::size_t i) { \
@@ -64,8 +64,8 @@ TAUGUARD_INLINE std::size_t run_rows(const Chunk& c) {
   for (std::size_t i = c.begin; i < c.end; ++i) {
     Verdict v = Kernel::decide(c, i);
     if (v == undecided) {
-      // Boxes with parallel edges in deep contact have a quicker way; any accepted rotation fits
-      // its skew.
+      // Boxes with parallel edges in deep contact have a faster kernel; its skew covers every
+      // accepted rotation.
       if (c.a.kind == Kind::boxes && c.b.kind == Kind::boxes)
         v = box_pair(c.a.row(i), c.b.row(i), 1.001e-6);
       if (v == undecided) {

@@ -33,8 +33,8 @@ using RowMethod =
     std::function<void(const Bodies& a, const Bodies& b, std::size_t row, std::uint8_t* hit)>;
 RowMethod row_method(Kind a, Kind b);
 
-// As `overlap`, but tries row i's normal (3 numbers, zeros where there is none) first and renews it
-// where it fails and the pair is apart. Returns how many rows the normals answered.
+// As `overlap`, but tries row i's normal (3 numbers, zeros for none) first, and replaces it if it
+// fails and the pair is apart. Returns the number of rows that the normals decided.
 std::size_t overlap_cached(const Bodies& a, const Bodies& b, std::size_t n, int threads,
                            double* normals, std::uint8_t* hit);
 

@@ -91,7 +91,7 @@ double certain_gap(const Points<double>& a, const Points<double>& b, const doubl
   return low - high - 16 * unit * norm1(n) * reach;
 }
 
-// Witness in double precision; false where it is not good to a few roundings.
+// Witness in double precision; false if its error exceeds a few roundings.
 bool find_witness_quickly(const Bodies& bodies_a, const Bodies& bodies_b, std::size_t row,
                           Verdict known, double* out) {
   auto a = vertices_of<double>(bodies_a, row), b = vertices_of<double>(bodies_b, row);

@@ -1,4 +1,4 @@
-// What the filtered kernels could not decide.
+// Decides the rows that the filtered kernels could not decide.
 #pragma once
 
 #include <cstddef>
@@ -21,9 +21,10 @@ Verdict resolve_exactly(const Bodies& a, const Bodies& b, std::size_t row);
 // Does B, moving by t d, meet A for some t in [0, 1]? Exact.
 Verdict resolve_sweep_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row);
 
-// The time of impact of a pair that does meet, by advancing to where the separating plane of exact
-// arithmetic is reached, until exact arithmetic finds contact or no advance is left: never late,
-// and the unit normal of the last plane (NaN where the pair overlaps from the start).
+// The time of impact of a pair that meets, and the unit normal of the last separating plane (NaN if
+// the pair overlaps from the start). Each step finds a separating plane in exact arithmetic and
+// advances until the bodies reach it. It ends when exact arithmetic finds contact or no advance is
+// left, so the time is never late.
 double advance_exactly(const Bodies& a, const Bodies& b, const double* d, std::size_t row,
                        double* normal);
 

@@ -57,8 +57,9 @@ TAUGUARD_INLINE void cross_with(const double (*p)[3], const double* e, Double4* 
   c[2] = x * e[1] - y * e[0];
 }
 
-// E of an edge axis: a product with e is off by 6 u reach a, its dot with f by 10 u reach a b, the
-// difference of two of them by 22 u: 32 u a b reach, and twice that is used.
+// The bound E of an edge axis. A product with e has an error of 6 u reach a, its dot product with f
+// of 10 u reach a b, and the difference of two of them of 22 u reach a b. Their sum is 32 u a b
+// reach; E is twice this bound.
 TAUGUARD_INLINE double edge_error(double a, double b, double reach) {
   return 64 * unit * a * b * reach;
 }

@@ -1,6 +1,6 @@
 // When a moving body meets another, by separating axes: on an axis L the bodies overlap while
 // low <= t s <= high, s = L . d. The latest entry over all axes is the time of impact.
-// Any axis, rounded as it may be, keeps the bodies apart until its own entry, so an entry minus its
+// Any axis, also a rounded one, keeps the bodies apart until its own entry. So an entry minus its
 // error bound is never late.
 #pragma once
 

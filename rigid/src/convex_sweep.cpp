@@ -88,7 +88,7 @@ __attribute__((noinline)) void write_hit(const Chunk& c, std::size_t i, double t
 }
 
 // A hit that exact arithmetic found, and every hit of bodies without edge lists.
-// Contact from the start has the normal of the axis that just closes, where there is one.
+// For a contact from the start the normal is that of the axis that just closes, if there is one.
 __attribute__((noinline)) void write_exact_hit(const Chunk& c, std::size_t i, const Entry& entry) {
   double normal[3];
   const double time = advance_exactly(c.a, c.b, c.d + 3 * i, i, normal);

@@ -1,10 +1,10 @@
-// How deep is the origin at least in a polytope of differences that was grown in doubles?
+// A lower bound of the depth of the origin in a polytope of differences computed in doubles.
 //
-// Between bodies of very different sizes faces have edges that are almost parallel, and rounding
-// turns their normals by any angle. So nothing below asks how exact a normal is: a triangle lies in
-// the half-space n . x >= m for any n, with m the least n . y of its three corners y. Only the
-// rounding of these products counts. With u the unit roundoff and all coordinates of both bodies
-// at most s, |y| <= 2 sqrt(3) s, and a product is off by 3 u |n| |y| <= 11 u |n| s.
+// For bodies of very different sizes, faces have edges that are almost parallel, and rounding turns
+// their normals by any angle. So nothing below depends on the accuracy of a normal. For any n, a
+// triangle lies in the half-space n . x >= m, where m is the least n . y of its three corners y.
+// Only the rounding of these products matters. With u the unit roundoff and all coordinates of both
+// bodies at most s, |y| <= 2 sqrt(3) s, and a product is off by 3 u |n| |y| <= 11 u |n| s.
 //
 // The surface S of all faces is closed, convex or not: a step replaces faces by the cone over their
 // rim. Let c be the centre of the first tetrahedron.

@@ -39,8 +39,8 @@ Simplex<Rows> descend_hulls(const PointList& a, const PointList& b, Watch& watch
   return descend(Corner<Rows>{b[0] - a[0], {0, 0}, 1.0}, support, watch, 0.0);
 }
 
-// Close to contact the nearest point itself is all cancellation, so the normals of the last
-// simplex's triangles are tried as well; the best of them wins.
+// Close to contact cancellation destroys the nearest point. So the normals of the last simplex's
+// triangles are tried as well, and the best one is used.
 struct Separating : ToRounding {
   const PointList &a, &b;
   Vec* n;
@@ -149,7 +149,7 @@ Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec& gu
   const Simplex<SourcePoints> s = descend(first, support, watch, rounding * rounding);
   const double square = dot(s.nearest(), s.nearest());
   out.overlap = s.size() == 4 || square <= rounding * rounding;
-  // Close to contact the nearest point is all cancellation: the face of the last simplex has a
+  // Close to contact cancellation destroys the nearest point: the face of the last simplex has a
   // better normal.
   if (!out.overlap && s.size() == 3) {
     Vec n = cross(s.w(1) - s.w(0), s.w(2) - s.w(0));

@@ -1,8 +1,8 @@
 // The facet of a convex set of differences b - a that is nearest to the origin: the expanding
-// polytope of van den Bergen 2001, without a simplex that holds the origin to start from. Where the
-// origin is inside, that is the least path on which the bodies come free of each other. Signs of
-// polynomials decide alone: with Dyadic every answer is right; with double it is a proposal that
-// least_depth (depth_bound.hpp) certifies, or rounded as for support shapes.
+// polytope of van den Bergen 2001, without a simplex that holds the origin to start from. If the
+// origin is inside, this is the shortest translation that separates the bodies. Only signs of
+// polynomials decide. With Dyadic every answer is right. With double the answer is a proposal that
+// least_depth (depth_bound.hpp) certifies, or a rounded one for support shapes.
 #pragma once
 
 #include <algorithm>
@@ -42,13 +42,13 @@ bool is_zero(const Vector<Number>& x) {
   return x[0] == Number() && x[1] == Number() && x[2] == Number();
 }
 
-// Is x, the square of a volume, nothing but rounding beside `scale`?
+// Is x, the square of a volume, only a rounding error compared with `scale`?
 inline bool negligible(double x, double scale) { return !(x > 1e-20 * scale); }
 inline bool negligible(const Dyadic& x, const Dyadic&) { return x.is_zero(); }
 
-// May rounding alone have put the centre on the inner side of a face, by what `spread` says that
-// the face's corners differ along its normal? depth_bound.hpp derives the share. Beyond the range
-// of the squares nothing is certain.
+// Can rounding alone have put the centre on the inner side of a face? `spread` is the difference of
+// the face's corners along its normal; depth_bound.hpp derives the fraction. Outside the range of
+// the squares the answer is yes.
 inline bool side_is_rounding(double side, double spread, double square, double size) {
   const double scale = square * (size * size), clear = std::fabs(side) - 4 * spread;
   return !(scale > 1e-290 && clear > 0 && clear * clear > 0x1p-88 * scale);
@@ -144,7 +144,7 @@ class PointDifferences {
   std::set<Source> taken_;
 };
 
-// Grows a polytope of differences at its face nearest to the origin until that is final.
+// Expands a polytope of differences at its face nearest to the origin until that face is final.
 template <class Number, class Differences>
 class ExpandingPolytope {
  public:

@@ -1,5 +1,5 @@
-// The least way in which two bodies in each other come apart, over all facets of their difference:
-// the normals of either body's faces and of every pair of edges.
+// The shortest translation that separates two overlapping bodies. It is found over all facets of
+// their difference: the normals of both bodies' faces and of every pair of edges.
 #pragma once
 
 #include <algorithm>
@@ -106,7 +106,7 @@ class FacetDepth {
     return true;
   }
 
-  // How far below the top those lie that are within `slack` of it.
+  // The height below the top of the vertices that are within `slack` of it.
   static double spread(const Points<double>& points, const Vec& n, double slack) {
     const double top = range(points, n).high;
     double most = 0;

@@ -1,8 +1,8 @@
-// First contact of bodies given by vertices. The direction is the best separating axis of time t
-// and r its own rate of turning: then all vertices of the touching features keep one tangent, and
+// First contact of bodies given by vertices. The direction is the best separating axis at time t,
+// and r is its rate of turning. Then all vertices of the touching features have one tangent, and
 // the steps converge quadratically, as Newton's do, but from below. (With r = 0 a turning face
-// tilts away from n and convergence is linear.) The direction of bodies grown by balls is that of
-// the nearest points of the hulls, and r the rate at which the features turn that these lie on.
+// tilts away from n and convergence is linear.) For bodies grown by balls, the direction is that of
+// the nearest points of the hulls, and r is the rate at which the features of these points turn.
 #include "tauguard/rigid/first_contact.hpp"
 
 #include <algorithm>
@@ -14,10 +14,10 @@
 namespace tauguard::rigid {
 namespace {
 
-// A guard against creeping along a resting gap; the time reached is still never late. Bodies that
-// pass close by each other take a few steps a radian, so the turning of both counts.
+// A limit on the number of steps for a resting gap; the time is still never late. Bodies that pass
+// close by each other take a few steps a radian, so the turning of both counts.
 constexpr int most_steps = 20000, steps_a_radian = 64;
-// Over less than this [rad] a whole turn is not worth looking at.
+// For rotations below this [rad] a whole turn is not considered.
 constexpr double little_turn = 4;
 
 struct Axis {
@@ -141,9 +141,9 @@ double certified_step(const MovingBody& a, const MovingBody& b, const Axis& axis
   return safe_step(g, axis.separation - margin, horizon, 1e-6);
 }
 
-// How far the step goes for which the bodies stay apart along one fixed direction whatever their
-// angles are; `axis` becomes that direction. Bodies that turn fast and pass by each other are kept
-// apart by it in a few steps, where their true surfaces would take one for each radian.
+// The longest step during which one fixed direction keeps the bodies apart at any of their angles;
+// `axis` becomes that direction. For bodies that turn fast and pass by each other a few such steps
+// are enough, while their true surfaces need a step for each radian.
 double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* axis) {
   const Vec between = b.centre() - a.centre(), drift = b.linear() - a.linear();
   const auto across = [](const Vec& v, const Vec& n) { return v - dot(v, n) * n; };
@@ -172,9 +172,9 @@ double spun_step(const MovingBody& a, const MovingBody& b, double margin, Axis* 
   return longest;
 }
 
-// The direction of contact: the best axis now, or the last certain one turned by `h` where that
-// separates the bodies as well. It does so to second order in h, and flat bodies in one plane leave
-// no other: a normal of that plane separates them by nothing, too.
+// The direction of contact: the best axis now, or the last certain one turned by `h` if that
+// separates the bodies as well. It does so to second order in h. Flat bodies in one plane leave no
+// other choice, because a normal of that plane separates them by zero, too.
 Vec contact_normal(const MovingBody& a, const MovingBody& b, const Axis& last, double h,
                    const Axis& now) {
   if (last.separation > -INFINITY) {

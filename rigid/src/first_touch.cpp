@@ -8,11 +8,11 @@
 namespace tauguard::rigid {
 namespace {
 
-// Radii below this share of the size: a contact is described to 1e-9 of the size, so that the
-// direction between cores no further apart than that is off by 1e-3 or more.
+// Radii below this fraction of the size are too small for the direction between the cores: a
+// contact is described to 1e-9 of the size, so this direction would be off by 1e-3 or more.
 constexpr double small_radii = 1e-6;
 
-// A point of both where grown bodies overlap: on the way between their cores' nearest points.
+// A common point of overlapping grown bodies: on the segment between their cores' nearest points.
 Vec common_point(const MovingBody& a, const MovingBody& b) {
   const Nearest near = nearest(a.now, b.now);
   const Vec way = near.b - near.a;

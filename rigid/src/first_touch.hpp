@@ -11,8 +11,8 @@ struct FirstTouch {
 };
 inline constexpr FirstTouch no_touch = {INFINITY, {NAN, NAN, NAN}, {NAN, NAN, NAN}};
 
-// Point and normal of an impact. The normal is undefined where the bodies were in each other from
-// the start; the point comes from the features that touch along it, or from the nearest points.
+// Point and normal of an impact. The normal is undefined if the bodies overlap from the start. The
+// point comes from the features that touch along the normal, or from the nearest points.
 FirstTouch first_touch(const Impact& impact, MovingBody& a, MovingBody& b, const Vec& origin);
 
 // Of row `row`, each body grown by a ball of the given radius.

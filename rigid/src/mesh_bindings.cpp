@@ -19,13 +19,6 @@ using Pairs = nb::ndarray<std::int32_t, nb::shape<-1, 2>, nb::c_contig, nb::devi
 
 namespace {
 
-VolumeKind kind_of(const std::string& name) {
-  if (name == "aabb") return VolumeKind::aabb;
-  if (name == "obb") return VolumeKind::obb;
-  if (name == "k_dop") return VolumeKind::k_dop;
-  return VolumeKind::sphere;
-}
-
 template <class T, std::size_t N>
 auto owned(std::vector<T>&& values, std::array<std::size_t, N> shape) {
   auto* held = new std::vector<T>(std::move(values));

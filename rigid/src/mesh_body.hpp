@@ -29,8 +29,8 @@ class RoundedBody {
 // Some triangle that shares a point with the body (touching counts), a row of the faces; -1: none.
 std::int32_t first_overlap(const Mesh& mesh, const RoundedBody& body);
 
-// The least signed distance of a triangle of the mesh (a) to the body (b), and that triangle, the
-// first of several: where they meet it is that of the triangle that is deepest in the body.
+// The least signed distance of a triangle of the mesh (a) to the body (b), and the first triangle
+// that has it. If they meet, it is that of the triangle deepest in the body.
 struct FaceDistance {
   SignedDistance at;
   std::int32_t face;

@@ -8,8 +8,9 @@
 namespace tauguard::rigid {
 namespace {
 
-// Surface moments about the tree's centre: twice the area, and the integrals of x and x x^T times
-// the same constants for every triangle, so that sums of them are the moments of the union.
+// Surface moments about the tree's centre: twice the area, and the integrals of x and x x^T with
+// constant factors. The factors are the same for every triangle, so sums of moments are those of
+// the union.
 struct Moments {
   double weight = 0, first[3] = {}, second[6] = {};  // second: xx, xy, xz, yy, yz, zz
   void add(const Moments& o) {

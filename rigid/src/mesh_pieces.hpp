@@ -36,8 +36,8 @@ class Pieces {
     shift_ = 0x1p-44 * (largest + (ma.speed * arm_a + mb.speed * arm_b)) + 0x1p-140;
   }
 
-  // open() for every piece in which they may meet, until one begins after `until`, which open() may
-  // lower: so the first hit's piece is the last one opened.
+  // Calls open() for every piece in which they may meet, until a piece begins after `until`. open()
+  // may lower `until`, so the piece of the first hit is the last one opened.
   template <class Open>
   void each(const double& until, Open open) {
     piece(0, 1, until, open);
@@ -49,7 +49,7 @@ class Pieces {
   double length() const { return length_; }
   const Chord& in_a() const { return in_a_; }
   const Chord& in_b() const { return in_b_; }
-  // The share of the piece after which nothing is sought, rounded up.
+  // The fraction of the piece after which no contact is sought, rounded up.
   float left(double until) const {
     if (until >= end()) return 1.0f;
     return std::nextafter(static_cast<float>((until - begin_) / length_), 2.0f);
@@ -62,8 +62,8 @@ class Pieces {
 
  private:
   static constexpr double more = 1 + 0x1p-40;
-  // A piece turns by at most this much [rad] and moves by at most this share of the bodies' size,
-  // or is split where the balls around them do not already keep them apart.
+  // A piece turns by at most this angle [rad] and moves by at most this fraction of the bodies'
+  // size. Longer ones are split, unless the balls around the bodies stay apart.
   static constexpr double most_turn = 1.0 / 16, most_move = 0.5;
 
   static double skewness(const RigidMotion& m) {

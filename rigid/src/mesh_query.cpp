@@ -4,13 +4,6 @@
 
 namespace tauguard::rigid {
 
-Mesh::Mesh(const double* vertices, const std::int32_t* faces, std::size_t n_faces, VolumeKind k)
-    : tree(vertices, faces, n_faces), kind(k) {
-  if (kind == VolumeKind::obb) obbs = fit_obbs(tree);
-  if (kind == VolumeKind::k_dop) k_dops = fit_all<KDop>(tree);
-  if (kind == VolumeKind::sphere) balls = fit_all<Ball>(tree);
-}
-
 FacePair first_overlap(const Mesh& a, const Mesh& b, const Pose& pose, Scratch& scratch) {
   FacePair found = {-1, -1};
   each_overlap(a, b, pose, scratch, [&](int i, int j, const Triangle&) {
@@ -56,9 +49,9 @@ void separate(const Triangle& a, const Triangle& b, const double* axis, double s
   for (int k = 0; k < 3; ++k) c.normal[k] = sign * axis[k] / length;
 }
 
-// The mean of the points where edges of one triangle pierce the other: the middle of the common
-// segment in general position; where nothing is pierced (coplanar or degenerate) the corners
-// nearest to the middle of both triangles stand in.
+// The mean of the points where edges of one triangle pierce the other, which is the middle of the
+// common segment in general position. If no edge pierces (coplanar or degenerate triangles), the
+// corners nearest to the middle of both triangles are used.
 void common_point(const Triangle& a, const Triangle& b, double* point) {
   double sum[3] = {}, lo[3] = {}, n = 0;
   for (int side = 0; side < 2; ++side) {
@@ -98,8 +91,8 @@ Contact describe(const Triangle& a, const Triangle& b) {
     edge(a, i, ea[i]), edge(b, i, eb[i]);
     longest = std::max({longest, dot(ea[i], ea[i]), dot(eb[i], eb[i])});
   }
-  // Cross products this small carry no direction: their rounding error is about 2^-52 of the edges'
-  // product.
+  // Such a small cross product has no reliable direction: its rounding error is about 2^-52 of the
+  // edges' product.
   const double size = 0x1p-40 * longest;
   cross(ea[0], ea[1], na), cross(eb[0], eb[1], nb);
   separate(a, b, na, size, c);

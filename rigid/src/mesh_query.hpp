@@ -13,8 +13,20 @@ namespace tauguard::rigid {
 
 enum class VolumeKind { aabb, obb, k_dop, sphere };
 
+inline VolumeKind kind_of(const std::string& name) {
+  if (name == "aabb") return VolumeKind::aabb;
+  if (name == "obb") return VolumeKind::obb;
+  if (name == "k_dop") return VolumeKind::k_dop;
+  return VolumeKind::sphere;
+}
+
 struct Mesh {
-  Mesh(const double* vertices, const std::int32_t* faces, std::size_t n_faces, VolumeKind kind);
+  Mesh(const double* vertices, const std::int32_t* faces, std::size_t n_faces, VolumeKind k)
+      : tree(vertices, faces, n_faces), kind(k) {
+    if (kind == VolumeKind::obb) obbs = fit_obbs(tree);
+    if (kind == VolumeKind::k_dop) k_dops = fit_all<KDop>(tree);
+    if (kind == VolumeKind::sphere) balls = fit_all<Ball>(tree);
+  }
   Tree tree;
   VolumeKind kind;
   ObbTree obbs;
@@ -67,7 +79,7 @@ struct Contact {
   std::int32_t a, b;  // rows of the faces
   double point[3], normal[3], depth;
 };
-// What all threads of a query may list together; beyond it `std::length_error`.
+// The number of rows that all threads of a query may list together; more are a `std::length_error`.
 class ContactBudget {
  public:
   explicit ContactBudget(std::size_t most) : most_(most) {}

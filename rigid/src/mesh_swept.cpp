@@ -37,8 +37,8 @@ MovingObb moving(const FloatObb& box, const Chord& chord) {
 }
 
 // As overlap_mask in mesh_obb.cpp, with the time at which each axis stops separating. A motion of
-// less than the pad along an axis is taken as the pad, so that no quotient is without bound; the
-// second pad pays for it.
+// less than the pad along an axis is set to the pad, so that quotients are bounded; a second pad
+// covers this change.
 TAUGUARD_CLONES unsigned swept_mask(const ObbNode& node, const MovingObb& m, float leave,
                                     float* enter) {
   const FloatObb& box = m.box;

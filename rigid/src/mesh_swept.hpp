@@ -1,6 +1,6 @@
 // Boxes and triangles of two meshes during a piece of the step so short that they hardly turn: how
-// long are they certainly apart? Positions are seen from one of the meshes; a point of the other
-// moves on its chord, give or take the sagitta of its path.
+// long are they certainly apart? Positions are relative to one of the meshes. A point of the other
+// moves on its chord, with an error of at most the sagitta of its path.
 #pragma once
 
 #include "mesh_query.hpp"

@@ -2,8 +2,8 @@
 // included (a collinear triangle is a segment, three equal corners are a point).
 //
 // General position is answered by the interval test of Guigue and Devillers ("Fast and robust
-// triangle-triangle overlap test using orientation predicates", 2003); as soon as one orientation
-// is zero the answer comes from edge-against-triangle tests that assume nothing.
+// triangle-triangle overlap test using orientation predicates", 2003); if one orientation is zero,
+// the answer comes from tests of edges against triangles that hold for any position.
 #pragma once
 
 #include <algorithm>

@@ -105,7 +105,7 @@ void penetration(const SupportShape& a, const SupportShape& b, Distance* d) {
   d->lower = -std::max(0.0, polytope.nearest.offset / length);
   const Vec foot = d->lower * d->n;
   Barycentric best = weights(polytope, polytope.nearest, foot);
-  // Triangles of one plane are equally near: the one that has the foot tells the points.
+  // Triangles of one plane are equally near: the one that contains the foot gives the points.
   for (const auto& face : polytope.faces()) {
     if (best.least >= 0) break;
     if (!(dot(face.normal, normal) > (1 - 1e-12) * length * norm(face.normal))) continue;

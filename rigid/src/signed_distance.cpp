@@ -11,12 +11,12 @@
 namespace tauguard::rigid {
 namespace {
 
-// What a certified answer of double precision may be off, as a share of the size; closer to contact
-// than `near` of it the exact way is taken, so that the sign is never in question.
-// The error in all, in unit roundoffs of the size, of which 2^-45 has 256: 128 between the bound
-// from below and that from above, 18 for the corners' rounding, 21 for that of the bound from
-// above; then 18 for the bound from below of bodies apart, or 21 for FacetDepth's and 48 for the
-// facets that it leaves out, or 39 for least_depth.
+// Largest error of a certified answer in double precision, as a fraction of the size. If the
+// distance is below the fraction `near`, exact arithmetic is used, so the sign is always certain.
+// The total error in unit roundoffs of the size, of which 2^-45 has 256: 128 between the bound from
+// below and that from above, 18 for the corners' rounding, 21 for that of the bound from above;
+// then 18 for the bound from below of bodies apart, or 21 for FacetDepth's and 48 for the facets
+// that it leaves out, or 39 for least_depth.
 constexpr double certain = 0x1p-46, near = 1e-10;
 // Beyond these sizes products of four lengths leave the range of a double.
 constexpr double least_size = 1e-40, most_size = 1e40;
@@ -62,7 +62,7 @@ SignedDistance apart(const Vec& point_a, const Vec& point_b) {
   return {distance, point_a, point_b, (1 / distance) * between};
 }
 
-// Bodies in each other come apart by `depth` along n: where they touch then.
+// Where overlapping bodies touch after they were separated by `depth` along n.
 SignedDistance together(const Points<double>& a, const Points<double>& b, const Vec& n,
                         double depth, double size) {
   Points<double> moved = b;
@@ -72,8 +72,9 @@ SignedDistance together(const Points<double>& a, const Points<double>& b, const 
   return {-depth, point, point - depth * n, n};
 }
 
-// The way between close faces is short, and rounding turns it: their normal is the better
-// direction, and the nearest points are the feet of the origin on the triangle of differences.
+// The segment between close faces is short, and rounding turns it. The normal of the faces is a
+// better direction, and the nearest points follow from the foot of the origin on the triangle of
+// differences.
 bool between_faces(const Points<double>& a, const Points<double>& b, const Nearest& ends,
                    double size, SignedDistance* out) {
   Vec w[3], at_a{}, at_b{};
@@ -89,8 +90,8 @@ bool between_faces(const Points<double>& a, const Points<double>& b, const Neare
     all += weight;
     at_a = at_a + weight * a[ends.corner[i][0]], at_b = at_b + weight * b[ends.corner[i][1]];
   }
-  // Points of the bodies, so that no bound from above is too low. In a thin triangle rounding may
-  // bring the sum far from one.
+  // Points must be inside the bodies, so that no upper bound is too low. In a thin triangle
+  // rounding may bring the sum far from one.
   if (!(all > 0.5)) return false;
   at_a = (1 / all) * at_a, at_b = (1 / all) * at_b;
   *out = {norm(at_b - at_a), at_a, at_b, n};

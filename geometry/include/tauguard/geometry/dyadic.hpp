@@ -114,7 +114,7 @@ class Dyadic {
     return exponent_ + 32 * static_cast<std::int64_t>(limbs_.size() - 1) + bits;
   }
 
-  // Truncation towards zero to about 53 bits; +-inf or 0 where the value leaves the range of
+  // Truncation towards zero to about 53 bits; +-inf or 0 if the value is outside the range of
   // double.
   double to_double() const {
     if (is_zero()) return 0.0;

@@ -1,6 +1,6 @@
 // Signed integers of a width known to the compiler, in two's complement: exact signs without
 // allocations and without loops of unknown length. A product is as wide as both factors together,
-// so that it always fits; who adds sees to it that the sum does.
+// so it always fits. The caller of an addition ensures that the sum fits.
 #pragma once
 
 #include <array>
@@ -58,7 +58,7 @@ struct FixedInt {
 
   FixedInt magnitude() const { return negative() ? -*this : *this; }
 
-  // What is wider than the type is lost, here and in the shift below.
+  // Bits beyond the width of the type are lost, here and in the shift below.
   FixedInt times(std::uint64_t k) const {
     FixedInt r;
     std::uint64_t carry = 0;

@@ -14,7 +14,8 @@ struct Interrupted {};
 
 class InterruptScope {
  public:
-  // Set by a binding: asks the interpreter whether a signal is waiting. Called without its lock.
+  // Set by a binding: asks the interpreter whether a signal is pending. It is called without the
+  // interpreter's lock.
   static inline bool (*ask)() = nullptr;
 
   InterruptScope() : outer_(current_) { current_ = this; }

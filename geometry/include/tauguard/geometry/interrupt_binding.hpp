@@ -7,7 +7,7 @@
 
 namespace tauguard::geometry {
 
-// Once in a module. An interrupted call raises what the signal's handler raised.
+// Call this once in a module. An interrupted call raises the exception of the signal's handler.
 inline void bind_interrupts() {
   InterruptScope::ask = [] {
     const nanobind::gil_scoped_acquire hold;

@@ -1,5 +1,5 @@
-// The digits of a big number: a vector of 32-bit limbs that stays inside the object while it is
-// short, for the allocations of std::vector cost more than the arithmetic on a few limbs.
+// The digits of a big number: a vector of 32-bit limbs. A short vector is stored inside the object,
+// because an allocation by std::vector costs more than arithmetic on a few limbs.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// Which process this is: a fork copies memory and locks, but of the threads only the one that
-// forks.
+// Identifies the process: a fork copies memory and locks, but only the thread that forks.
 #pragma once
 
 #if !defined(_WIN32)

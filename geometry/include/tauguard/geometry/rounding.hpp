@@ -1,5 +1,5 @@
-// The derived error bounds assume round-to-nearest. A caller (or a library it loaded) may have left
-// another mode behind; the guard sets ours and puts theirs back, exceptions included.
+// The derived error bounds assume round-to-nearest. A caller, or a library that it loaded, may have
+// set another mode. The guard sets this mode and restores the caller's, also after an exception.
 #pragma once
 
 #include <cfenv>

@@ -1,5 +1,5 @@
-// Room that a thread keeps between calls. A call that begins while another of the same thread is
-// not over (a signal's handler that calls again) gets room of its own.
+// Memory that a thread keeps between calls. A call inside another call of the same thread (from a
+// signal handler) gets separate memory.
 #pragma once
 
 #include <memory>

@@ -18,7 +18,7 @@ inline int sign_of(double x) { return (x > 0) - (x < 0); }
 // and 2 products, their sum of 6 terms at most 5 more roundings: (3 + 2 + 5) u of the permanent,
 // and the permanent is itself computed with the same relative error, so 16 u of the computed one
 // covers both. Underflow in a product adds at most 2^-1074 per operation, scaled by the other
-// factor; the filter is left where the permanent is below 1e-250 or not finite.
+// factor; the filter is not used if the permanent is below 1e-250 or not finite.
 inline int orient3d(const double* a, const double* b, const double* c, const double* d) {
   const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2];
   const double vx = c[0] - a[0], vy = c[1] - a[1], vz = c[2] - a[2];

@@ -2,8 +2,8 @@
 // never on the number of threads: a kernel that writes into slots indexed by item or by chunk gives
 // the same bits for any thread count.
 //
-// Threads do not survive a fork: the child gets a pool of its own at its first call, and neither
-// waits for the parent's threads, at its exit included.
+// Threads do not survive a fork. The child gets its own pool at its first call and never waits for
+// the parent's threads, also not at its exit.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,7 @@ class ThreadPool {
     return *pool;  // another thread was faster
   }
 
-  // The default for `threads=0`: the processors there are.
+  // The default for `threads=0`: the number of processors.
   static int hardware() { return std::max(1u, std::thread::hardware_concurrency()); }
 
   // Calls body(begin, end, chunk) for consecutive chunks of `grain` items covering [0, n), on up to
@@ -50,7 +50,7 @@ class ThreadPool {
     const std::size_t chunks = (n + grain - 1) / grain;
     const RoundToNearest guard;
     const std::size_t wanted = std::min<std::size_t>(threads <= 0 ? hardware() : threads, chunks);
-    // A call from within a call, and one beside another thread's, does without helpers.
+    // A nested call, and a call during another thread's call, run without helpers.
     std::unique_lock<std::mutex> one_caller(caller_, std::defer_lock);
     if (wanted <= 1 || inside_ || !one_caller.try_lock()) {
       for (std::size_t c = 0; c < chunks; ++c) body(c * grain, std::min(n, (c + 1) * grain), c);

@@ -81,9 +81,9 @@ Points<Number> vertices_of(const Bodies& bodies, std::size_t r) {
   return out;
 }
 
-// A centrally symmetric body as the kernels use it: twice the centre is kept apart from the origin
-// so that a far origin costs no accuracy. centre = origin + shift, set = centre + sum u_k g_k,
-// |u_k| <= 1. Relative errors: g and each entry of shift at most 3 u of the edges they come from.
+// A centrally symmetric body as the kernels use it. The centre is stored relative to the origin, so
+// that a far origin costs no accuracy. centre = origin + shift, set = centre + sum u_k g_k, |u_k|
+// <= 1. Relative errors: g and each entry of shift at most 3 u of the edges they come from.
 struct Zonotope {
   double origin[3], shift[3], g[3][3];
 };

@@ -1,5 +1,5 @@
-// How far apart two convex bodies are at one instant, or how deep in each other: to rounding, with
-// bounds from both sides for support shapes.
+// Distance or penetration depth of two convex bodies at one instant: rounded, with lower and upper
+// bounds for support shapes.
 #pragma once
 
 #include "tauguard/rigid/support_shape.hpp"
@@ -9,8 +9,8 @@ namespace tauguard::rigid {
 // Points whose convex hull is meant.
 using PointList = std::vector<Vec>;
 
-// The nearest points of two hulls, or one common point where they meet, and the features that these
-// lie on: rows of a and of b. Four pairs: the hulls meet.
+// The nearest points of two hulls, or a common point if they meet, and the features on which these
+// lie: rows of a and of b. Four pairs mean that the hulls meet.
 struct Nearest {
   Vec a, b;
   int size;
@@ -33,8 +33,9 @@ struct Distance {
   bool overlap = false;      // the cores share a point, to rounding
 };
 
-// Of the cores at the present time of both shapes. `guess` is the first direction tried. The search
-// ends early once `lower` exceeds `needed` and lies within a tenth of what is left above it.
+// Distance of the cores at the present time of both shapes. `guess` is the first direction. The
+// search ends early if `lower` exceeds `needed` and is within a tenth of the true distance above
+// it.
 Distance distance_of(const SupportShape& a, const SupportShape& b, const Vec& guess, double needed);
 
 // Replaces the fields of an overlapping `d`: `lower` is minus the penetration depth of the cores,

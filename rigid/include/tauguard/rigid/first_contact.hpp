@@ -1,4 +1,4 @@
-// First contact of two moving convex bodies, from below.
+// First contact of two moving convex bodies; the time is never late.
 #pragma once
 
 #include "tauguard/rigid/distance.hpp"
@@ -8,14 +8,14 @@ namespace tauguard::rigid {
 struct Impact {
   double t;    // the bodies are certainly apart on [start, t)
   bool hit;    // false: apart on all of [start, end]
-  Vec normal;  // unit, from a to b; zero where the bodies meet at `start` and no axis tells
+  Vec normal;  // unit, from a to b; zero if the bodies meet at `start` and no axis is known
 };
 
-// Advances from `start` as long as the bodies are further apart than rounding; the time it stops at
-// is the time of impact, never late.
+// Advances from `start` while the distance of the bodies exceeds rounding errors. It stops at the
+// time of impact, never later.
 Impact first_contact(MovingBody& a, MovingBody& b, double start, double end);
 
-// Bodies this close count as touching where a contact is described.
+// Bodies at most this far apart are described as touching.
 inline double contact_tolerance(const MovingBody& a, const MovingBody& b) {
   return 1e-9 * (a.radius() + b.radius()) + 0x1p-40 * (a.magnitude() + b.magnitude());
 }
@@ -29,8 +29,8 @@ struct Touch {
 };
 
 // Advances from `start` to 1 while the surfaces are further apart than `threshold` >= 0. Shapes
-// closer than the fraction `touching` of their size touch: a smaller one costs steps, a larger one
-// is early by as much.
+// that are closer than the fraction `touching` of their size count as touching. A smaller fraction
+// needs more steps; a larger one makes the time earlier.
 Touch first_contact(SupportShape& a, SupportShape& b, double threshold, double start,
                     double touching = 1e-10);
 

@@ -100,14 +100,15 @@ class MovingBody {
   }
   // Bound on the speed of any vertex about the centre.
   double turning_speed() const { return motion_.speed * sweep_ * (1 + 0x1p-40); }
-  // Bound on the speed of any vertex against something that goes by `drift`.
+  // Bound on the speed of any vertex relative to a point that moves by `drift`.
   double speed_about(const Vec& drift) const {
     return norm(motion_.linear - drift) * (1 + 0x1p-40) + turning_speed();
   }
   Vec angular() const { return motion_.speed * motion_.axis; }
   const Vec& axis() const { return motion_.axis; }  // unit, zero where nothing turns
   double angular_speed() const { return motion_.speed; }
-  // Largest magnitude that enters a position; the angle counts because its rounding turns the body.
+  // Largest magnitude that enters a position. The angle is part of it, because its rounding rotates
+  // the body.
   double magnitude() const {
     return norm(shift_) + norm(motion_.linear) + (4 + motion_.speed) * radius_ + rounding;
   }

@@ -35,8 +35,8 @@ struct LocalFrame {
   Vec back(const Vec& d) const { return d[0] * row[0] + d[1] * row[1] + d[2] * row[2]; }
 };
 
-// The motion of a body between two poses: its origin moves linearly, its frame turns at a constant
-// rate about the shortest rotation vector, or about the one nearest to `turn` if that is given.
+// The motion of a body between two poses. Its origin moves linearly. Its frame turns at a constant
+// rate, by the shortest rotation vector or, if `turn` is given, by the one nearest to `turn`.
 RigidMotion motion_between(const double* xpos_t0, const double* xmat_t0, const double* xpos_t1,
                            const double* xmat_t1, const double* turn = nullptr);
 
