@@ -23,11 +23,17 @@ th { background: #f4f4f4; } td a { white-space: nowrap; }
 .figures { display: flex; flex-wrap: wrap; gap: 1rem; }
 .figures img { flex: 1 1 24rem; max-width: 35rem; }
 img { max-width: 100%; height: auto; min-width: 0; } figure { margin: 1rem 0; }
-figure img { width: 56rem; }
+figure img { width: 56rem; } .first { flex: 1 1 22rem; max-width: 35rem; }
+.first img { width: 100%; max-width: none; }
 .no { background: #fde3d3; } .yes { background: #e1f0fa; } .note { color: #444; }
 summary { cursor: pointer; padding: 0.3rem 0; } code { background: #f4f4f4; }
 td:last-child { min-width: 6em; }
 @media (max-width: 40rem) { th, td { padding: 0.2rem 0.3rem; } }
+@media (prefers-color-scheme: dark) {
+  body { color: #e4e4e4; background: #15181b; } th, code { background: #2a2f34; }
+  th, td { border-color: #3a4046; } a { color: #8ab8ff; } .note { color: #b0b0b0; }
+  img { background: #fff; } .no { background: #5a3420; } .yes { background: #1f3f55; }
+}
 @media print {
   body { font-size: 10pt; max-width: none; padding: 0; } table { font-size: 7.5pt; }
   nav, details { display: none; } .wide { overflow: visible; }

@@ -63,7 +63,7 @@ def _labelled(rows: Sequence[Row]) -> Iterator[Point]:
         n = sum(row["n"] for row in mine)
         wrong = sum(row["misses"] + row["false_hits"] for row in mine) / n
         cost = sum(row["us"] * row["n"] for row in mine) / n
-        role = "peer" if method.startswith("ipctk") else ""
+        role = {"ab2pf": "ours"}.get(method, "peer" if method.startswith("ipctk") else "")
         yield Point("Single queries with public labels", method, cost, wrong, "", role, *axes)
 
 

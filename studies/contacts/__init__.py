@@ -43,5 +43,5 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         n = sum(row["held"]["n"] for row in own)
         if known and n:
             lost = 1 - sum(row["held"]["value"] * row["held"]["n"] for row in own) / n
-            role = "peer" if method.startswith(PEERS) else ""
+            role = "peer" if method.startswith(PEERS) else "ours" if method == "guarded" else ""
             yield Point(question, method, sum(known) / len(known), lost, "", role, *axes)

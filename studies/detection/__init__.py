@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from studies.framework import Part, Point, Study, number, table_rows
+from studies.framework.headlines import HOURS, Found
 from tauguard.report import Row, cell
 
 STUDY = Study(
@@ -47,8 +48,8 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         question = "1 ms of arm, drives, observer and detector"
         error = f"score within {row['difference_to_online']:.0e} of the offline one"
         yield Point(question, "tauguard", row["total_us"], math.nan, error, "ours")
-        peer, its = "mujoco.rollout of the bare arm", number(row["peer_us"]) or 0.0
-        yield Point(question, peer, its, math.nan, "same motion", "peer")
+        bare, its = "mujoco.rollout of the bare arm alone", number(row["peer_us"]) or 0.0
+        yield Point(question, bare, its, math.nan, "same motion")
     for row in table_rows(rows, "kernel")[:1]:
         question = f"the SVR's output, {row['support_vectors']} support vectors"
         error = f"output within {row['difference_to_sklearn']:.0e}"
@@ -64,6 +65,13 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
             yield Point(question, row["detector"], us, 1 - found, "", "", *axes)
 
 
+def found(rows: Sequence[Row]) -> Iterator[Found]:
+    """Every detector at the threshold for a rate of false alarms, ours first."""
+    for row in (row for row in table_rows(rows, "hourly") if row["speed"] == 0):
+        rate = row["false_alarms_per_hour"]
+        yield Found(row["detector"], row["sensitivity"], rate, row["hours"], asked=0.25)
+
+
 def detections(rows: Sequence[Row]) -> Iterator[Row]:
     """Every detector at the threshold for a rate of false alarms, all speeds together."""
     for row in (row for row in table_rows(rows, "hourly") if row["speed"] == 0):
@@ -73,7 +81,9 @@ def detections(rows: Sequence[Row]) -> Iterator[Row]:
             "detector": row["detector"],
             "found from 16 N m up": f"{round((found['value'] or 0) * found['n'])} of {found['n']} "
             f"({cell(found)})",
-            "false alarms an hour": cell(row["false_alarms_per_hour"]),
+            "false alarms an hour": cell(row["false_alarms_per_hour"])
+            if row["hours"] >= HOURS
+            else f"{60 * row['hours']:.0f} min are too short to tell",
             "median delay": "-" if delay["median"] is None else f"{delay['median']:.0f} ms",
             "95 % within": "-" if delay["p95"] is None else f"{delay['p95']:.0f} ms",
         }

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 from studies import STUDIES
 from studies.framework.bench import chart, printed
 from studies.framework.collect import collect, read_rows
+from studies.framework.headlines import headlines
 from studies.framework.pareto import svg
 from studies.framework.rows import Point, groups
 from studies.framework.study import Part, all_parts, find, package
@@ -158,6 +159,7 @@ class Report:
         points, attempt = self._of_studies("points"), self.missing.attempt
         bodies = {f"Study: {name}": self._part(name, self.parts[name]) for name in self.found}
         detections = tables(self._of_studies("detections"), {}) or NONE
+        first = attempt("first screen", lambda: headlines(points, self._of_studies("found")), "")
         sections = {
             "How fast, how wrong, beside whom": attempt("first table", lambda: _beside(points), ""),
             "Collisions found, false alarms": DETECTIONS + detections,
@@ -166,9 +168,10 @@ class Report:
             "Hard cases": attempt("hard cases", lambda: _cases(cases), "") if cases else "",
             "Mistakes to look at": mistakes,
             **bodies,
+            "Machine and versions": self._machines(),
         }
         target = self.folder / "index.html"
-        write_atomic(target, page("tauguard: speed against error", sections, self._lead()))
+        write_atomic(target, page("tauguard: speed against error", sections, first + self._gaps()))
         return target
 
     def _of_studies(self, function: str) -> list[Any]:
@@ -230,8 +233,8 @@ class Report:
             self.missing.add(what, line)  # matplotlib draws an empty panel
         return f"<figure>{picture(drawn, 'png', what)}</figure>" if drawn else EMPTY
 
-    def _lead(self) -> str:
-        """Machines and versions in paragraphs, and a list of what the page does not show."""
+    def _machines(self) -> str:
+        """Machines and versions in paragraphs, and files of the folder that are no study's."""
         machines: dict[str, list[str]] = {}
         for name, one in self.found.items():
             on = one["machine"]
@@ -241,18 +244,22 @@ class Report:
         lines = [f"{len(self.found)} of {len(self.parts)} parts of studies. {RUNS}"]
         for text, names in machines.items():
             lines.append(text + (f" ({', '.join(names)})." if len(machines) > 1 else "."))
+        known = {f"{name}.json" for name in self.parts} | set(BESIDE)
+        others = sorted(p.name for p in self.folder.glob("*.json") if p.name not in known)
+        lines += [f"Files of no study, not read: {', '.join(others)}."] if others else []
+        return "".join(f"<p>{escape(line)}</p>" for line in lines)
+
+    def _gaps(self) -> str:
+        """What the page does not show, as HTML."""
         absent = [
             name + (f" ({self.failed[name]})" if name in self.failed else "")
             for name in self.parts
             if name not in self.found
         ]
-        known = {f"{name}.json" for name in self.parts} | set(BESIDE)
-        others = sorted(p.name for p in self.folder.glob("*.json") if p.name not in known)
-        lines += [f"Not in this report: {', '.join(absent)}."] if absent else []
-        lines += [f"Files of no study, not read: {', '.join(others)}."] if others else []
+        text = f"<p>Not in this report: {escape(', '.join(absent))}.</p>" if absent else ""
         items = "".join(f"<li>{escape(line)}</li>" for line in self.missing.lines)
         ending = f'<div class="no"><p>Not shown, or not whole:</p><ul>{items}</ul></div>'
-        return "".join(f"<p>{escape(line)}</p>" for line in lines) + (ending if items else "")
+        return text + (ending if items else "")
 
 
 def time_text(us: float) -> str:

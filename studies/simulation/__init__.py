@@ -53,7 +53,7 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         error = f"joints within {peer['q_difference_rad']:.0e} rad of rollout's"
         yield Point(question, "the environment", us[0], math.nan, error, "ours")
         method = "mujoco.rollout of the bare physics"
-        yield Point(question, method, us[1], math.nan, "same motion", "peer")
+        yield Point(question, method, us[1], math.nan, "same motion")
 
 
 def _point(row: Row, question: str, method: str, error: str, axis: str) -> Iterator[Point]:
