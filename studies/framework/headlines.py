@@ -66,7 +66,7 @@ def _fast(points: Sequence[Point]) -> str:
             _name(axes, k, f"{name}: {_round(ratios[name])}")
         axes.axvline(1.0, color="0.3", lw=0.8)
         axes.set(xscale="log", xlabel="time of the peer over time of tauguard", yticks=[])
-        axes.set_xlim(min(0.5, *ratios.values()), None)
+        axes.set_xlim(0.5 * min(1.0, *ratios.values()), None)
 
     return _shown(text, draw, len(ratios), "time of the peer over time of tauguard")
 
@@ -146,6 +146,7 @@ def _shown(text: str, draw: Callable[[Any], None], bars: int, what: str) -> str:
     with plt.rc_context({"font.size": 9, "svg.hashsalt": what}):
         figure, axes = plt.subplots(figsize=(5.2, 0.9 + 0.36 * bars), layout="constrained")
         draw(axes)
+        axes.set_ylim(-0.5, bars - 0.2)
         axes.spines[["top", "right", "left"]].set_visible(False)
         out = io.StringIO()
         figure.savefig(out, format="svg", metadata={"Date": None})
