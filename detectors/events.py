@@ -2,7 +2,7 @@
 
 The alarm series is True where the score has stayed above the threshold for the confirmation time
 t_c. An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm that starts
-between onset and onset + 0.5 s (clamping: its end) detects that collision.
+between onset and onset + 0.5 s (clamping: or its end, if that is later) detects that collision.
 """
 
 from __future__ import annotations
@@ -91,9 +91,13 @@ def find_alarms(t: ArrayLike, alarm: ArrayLike, merge_gap: float = MERGE_GAP) ->
 
 
 def detection_window(collision: Collision) -> Interval:
-    """When an alarm must start to detect ``collision``: [s], [s]."""
-    end = collision.end if collision.kind == "clamp" else collision.onset + WINDOW
-    return collision.onset, end
+    """When an alarm must start to detect ``collision``: [s], [s].
+
+    A clamping can be detected until its end, and one that lets go within milliseconds for as long
+    as any other collision.
+    """
+    soon = collision.onset + WINDOW
+    return collision.onset, max(collision.end, soon) if collision.kind == "clamp" else soon
 
 
 def occupied(collision: Collision) -> Interval:

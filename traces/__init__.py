@@ -7,6 +7,7 @@ from tauguard.lazy import on_demand
 if TYPE_CHECKING:
     from tauguard.traces.contacts import CheckedContacts
     from tauguard.traces.mcap import read_mcap, write_mcap
+    from tauguard.traces.resample import resampled
     from tauguard.traces.severity import STRATA, stratum
     from tauguard.traces.trace import KINDS, Alarm, Collision, Detection, Trace, Truth
 
@@ -20,6 +21,7 @@ __all__ = [
     "Trace",
     "Truth",
     "read_mcap",
+    "resampled",
     "stratum",
     "write_mcap",
 ]

@@ -130,7 +130,8 @@ def _columns(trace: Trace, arm: ArmModel, model: FrictionModel, rate: float) -> 
     """
     key, found = _COLUMNS.get(id(trace), (None, None))
     if found is None or key is None or key[0] is not arm or key[1:] != (model, rate):
-        found = filtered_columns(trace, arm.robot, arm.drive_gain, model, rate, free_rows(trace))
+        known = trace, arm.robot, arm.drive_gain, model, rate, free_rows(trace)
+        found = filtered_columns(*known, sampled=trace.dt > SLOWEST)
         if id(trace) not in _COLUMNS:
             weakref.finalize(trace, _COLUMNS.pop, id(trace), None)
         _COLUMNS[id(trace)] = (arm, model, rate), found

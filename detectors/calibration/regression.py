@@ -103,6 +103,7 @@ def filtered_columns(
     used: Bools,
     rest: float | None = None,
     held: Array | None = None,
+    sampled: bool = False,
 ) -> Filtered:
     """The same of any rows of a trace, thinned to 0.02 s.
 
@@ -115,13 +116,16 @@ def filtered_columns(
         used: which rows, shape (T,).
         rest: a joint that has stood still for longer counts no more [s]; ``None``: it counts.
         held: what load-dependent friction grows with [N m], shape (T, n).
+        sampled: see :class:`~tauguard.detectors.Estimator`.
     """
     stride = max(1, round(4e-3 / trace.dt))
     count = len(trace.t) // stride
     rows = count * stride
 
     def mean(x: Array) -> Array:
-        """Sum over the samples of a thinned interval, in which the drive torque acts throughout."""
+        """Mean over a thinned interval, in which the drive torque acts throughout."""
+        if sampled:
+            x = (x + np.concatenate([x[1:], x[-1:]])) / 2
         out: Array = x[:rows].reshape(count, stride, *x.shape[1:]).mean(axis=1)
         return out
 

@@ -49,8 +49,9 @@ class Unknowns:
     that of noise and beliefs, without ``noise_inflation``."""
     every: float = 0.01  #: time between two corrections [s]
     noise_inflation: float = 1.0
-    """Corrections that an error of the model lasts for: the variance of a correction's noise is so
-    many times ``noise^2``. With 1 the filter takes every correction for news."""
+    """Corrections that an error of the model lasts for, fewer in a log slower than ``every``: the
+    variance of a correction's noise is so many times ``noise^2``. With 1 the filter takes every
+    correction for news."""
     transition: float = 0.0
     """Relative error of friction that has just changed: with c_j how far it is from its low-pass of
     30/s [N m], (transition c_j)^2 is added to ``noise^2``."""
@@ -140,6 +141,7 @@ class Estimator:
         gain: ArrayLike = PLAIN_GAIN,
         dt: float = 1e-3,
         unknowns: Unknowns | None = None,
+        sampled: bool = False,
     ) -> None:
         """Build the native form.
 
@@ -148,6 +150,8 @@ class Estimator:
             gain: rate of the observer [1/s], a number or one a joint.
             dt: sample interval [s]; intervals of single samples may differ.
             unknowns: what to track (default: payload, offsets, friction).
+            sampled: currents are instants of a slow log, and between two of them torque and
+                friction count with their mean; else they act until the next sample.
         """
         self.arm = arm
         self.dt = float(intervals(dt, 2)[0])
@@ -155,6 +159,9 @@ class Estimator:
         joints = arm.robot.joints
         friction = arm.friction or FrictionModel.coulomb_viscous(np.zeros(joints), 0.0)
         assert arm.noise is not None
+        every = max(1, round(self.unknowns.every / self.dt))
+        # An error of the model lasts for fewer corrections where these are further apart.
+        rarer = max(1.0, every * self.dt / self.unknowns.every)
         self.native = _observer.Estimator(
             arm.robot.chain,
             friction.basis(joints),
@@ -165,12 +172,13 @@ class Estimator:
             self.unknowns.persistences(joints),
             [float(s) for s in arm.noise],
             self.unknowns.clip,
-            max(1, round(self.unknowns.every / self.dt)),
-            self.unknowns.noise_inflation,
+            every,
+            max(1.0, self.unknowns.noise_inflation / rarer),
             self.unknowns.transition,
             self.unknowns.weighted,
             arm.sensors.fusion_gains(self.dt) if arm.sensors else [],
             PLAIN_GAIN,
+            sampled,
         )
 
     def run(

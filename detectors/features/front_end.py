@@ -21,6 +21,7 @@ from tauguard.detectors.calibration.calibrate import calibrate
 from tauguard.detectors.estimation.estimator import MOTION, ArmModel, Estimate, Estimator, Unknowns
 from tauguard.detectors.estimation.noise_model import TERMS, NoiseModel
 from tauguard.detectors.estimation.observer import DETECTION_GAIN, PLAIN_GAIN
+from tauguard.detectors.estimation.velocity import SLOWEST
 from tauguard.detectors.events import undisturbed_rows
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import check_trace, common_interval
@@ -99,8 +100,8 @@ class NativeStream:
             ) from None
 
 
-#: Every so many samples of collision-free motion are enough to fit a noise model.
-THIN = 5
+#: One sample in so many seconds of collision-free motion is enough to fit a noise model.
+THIN = 5e-3
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,8 @@ class FrontEndSettings:
         joints = tuple(j - 1 for j in self.joints if 1 <= j <= count)
         if not joints:
             raise ValueError(f"joints {self.joints}: expected some of 1 to {count}")
-        free = [np.flatnonzero(rows)[::THIN] for rows in undisturbed_rows(traces, self.settle)]
+        thin = max(1, round(THIN / dt))
+        free = [np.flatnonzero(rows)[::thin] for rows in undisturbed_rows(traces, self.settle)]
         if not sum(len(rows) for rows in free):
             raise ValueError(
                 f"no collision-free motion after the first {self.settle:g} s of any trace"
@@ -189,7 +191,7 @@ class FrontEnd(Frozen):
     def estimator(self) -> Estimator:
         """A fresh estimator of this arm."""
         unknowns = Unknowns.for_detection() if self.adapt else Unknowns.none()
-        return Estimator(self.arm, self.gain, self.dt, unknowns)
+        return Estimator(self.arm, self.gain, self.dt, unknowns, sampled=self.dt > SLOWEST)
 
     def estimate(self, trace: Trace) -> Estimate:
         """The estimate of a trace; the last one is kept while the trace lives.

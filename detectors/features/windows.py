@@ -45,7 +45,8 @@ class WindowShape:
             raise ValueError(
                 f"dt {dt}, t_I {interval}, t_W {window} s: expected 0 < dt, t_I <= t_W"
             )
-        lag, count = max(1, round(interval / dt)), round(window / interval) + 1
+        lag = max(1, round(interval / dt))
+        count = max(1, round(window / (lag * dt))) + 1
         notes = []
         for name, asked, got in (
             ("t_I", interval, lag * dt),

@@ -30,6 +30,10 @@
 // inertia, is most of what a joint at rest shows; and how far friction was of late from its usual
 // value: a joint breaks away, stops or turns. M is that of arm and tracked payload.
 //
+// Torques act until the next sample, or with `sampled` are instants of a slow log: between two of
+// them torque and friction count with their mean, as gravity does. Half a sample of lag would
+// otherwise be, while an arm accelerates, as large as a collision.
+//
 // The plain residual is that of an observer of rate `plain_gain` that tracks nothing.
 #pragma once
 
@@ -65,6 +69,7 @@ struct EstimatorSettings {
   bool weighted = false;       // see above; false: all of the unexplained residual counts
   std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
   double plain_gain = 100.0;   // [1/s]
+  bool sampled = false;        // torques are instants; false: they act until the next sample
 };
 
 class Estimator {
@@ -218,17 +223,21 @@ class Estimator {
       change_decay_ = std::exp(-dt / change_lasts);
       decay_dt_ = dt;
     }
+    const double now = set_.sampled ? 0.5 : 0.0;  // the part of this sample's torque
+    const auto acting = [now](double before, double after) {
+      return before + now * (after - before);
+    };
     for (std::size_t j = 0; j < n_; ++j) {
       residual_[j] = observer_step(residual_[j], decay_[j], dt, p_[j], p_before_[j], beta_[j],
-                                   beta_before_[j], tau_before_[j]);
+                                   beta_before_[j], acting(tau_before_[j], tau_[j]));
       plain_[j] = observer_step(plain_[j], plain_decay_, dt, p_[j], p_before_[j], beta_[j],
-                                beta_before_[j], plain_tau_before_[j]);
+                                beta_before_[j], acting(plain_tau_before_[j], plain_tau_[j]));
       if (!adapts_) continue;
       for (std::size_t a = j * payload_numbers; a < (j + 1) * payload_numbers; ++a)
         load_[a] = observer_step(load_[a], decay_[j], dt, load_p_[a], load_p_before_[a],
                                  load_beta_[a], load_beta_before_[a], 0.0);
       for (std::size_t a = j * per_joint; a < (j + 1) * per_joint; ++a)
-        own_[a] += decay_[j] * (-own_before_[a] - own_[a]);
+        own_[a] += decay_[j] * (-acting(own_before_[a], own_now_[a]) - own_[a]);
       usual_[j] += smooth_decay_ * (own_[per_joint * j + coulomb_at] - usual_[j]);
       const double off = std::fabs(own_[per_joint * j + coulomb_at] - usual_[j]);
       change_[j] = std::max(off, change_[j] * change_decay_);

@@ -28,6 +28,11 @@ STUDY = Study(
             "any robot (--robot): collisions found, delays and false alarms",
             ("robot", "keep"),
         ),
+        "sampling": Part(
+            "detection.sampling",
+            "slow logs, from 23.8 Hz on: collisions found, delays and false alarms at each rate",
+            ("keep",),
+        ),
         "online": Part(
             "detection.online",
             "observer and SVR a sample: microseconds, and fewer support vectors",

@@ -134,7 +134,9 @@ def arm_tallies(job: tuple[Size, int, int]) -> Tallies:
     known, hours = replace(size.under, payloads=payloads), size.calibration_hours / len(SPEEDS)
     detectors = trained(seed, arm, size.names, size.training, size.under)
     pools = [free_pool(stream(seed, CALIBRATE, 9), v, (arm,), hours, known) for v in SPEEDS]
-    scores = joined([free_scores(detectors, simulate(e)) for pool in pools for _, e in pool])
+    scores = joined(
+        [free_scores(detectors, size.under.logged(simulate(e))) for pool in pools for _, e in pool]
+    )
     fleet = {
         name: Operated(detector, dict(_alarms(detector, scores[name], size.asked)))
         for name, detector in detectors.items()
@@ -160,7 +162,7 @@ def _judged(size: Size, seed: int, arm: int, fleet: dict[str, Operated]) -> Iter
     fresh, struck = stream(seed, TEST, 9), stream(seed, TEST, 10, arm)
     for k, speed in enumerate(SPEEDS):
         for _, episode in free_pool(fresh, speed, (arm,), size.hours / len(SPEEDS), size.under):
-            yield on_free(fleet, simulate(episode))
+            yield on_free(fleet, size.under.logged(simulate(episode)))
         if size.per_stratum:
             pool = struck_pool(
                 struck, speed, (arm,), size.per_stratum, conditions=size.under, first=k

@@ -78,6 +78,15 @@ def test_matching(alarms, delays, false):
     assert matching.free_seconds == pytest.approx(40 - 0.5 - 2.0)
 
 
+def test_a_clamping_that_lets_go_at_once_can_be_found_like_any_other_collision():
+    brief = collision(20.0, 20.005, "clamp")
+    matching = match([Alarm(20.007, 20.1)], [brief], SPAN)
+    assert matching.delays == pytest.approx((0.007,))
+    assert matching.false_alarms == ()
+    late = match([Alarm(20.51, 20.6)], [brief], SPAN)
+    assert (late.delays, len(late.false_alarms)) == ((None,), 1)
+
+
 def test_cases_are_equal_pieces_of_collision_free_time():
     false = [Alarm(3.0, 3.1), Alarm(5.9, 6.1)]
     matching = match([*false, Alarm(10.1, 13.0)], [STRIKE, CLAMP], SPAN, case_seconds=2.0)

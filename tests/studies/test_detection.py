@@ -74,6 +74,15 @@ def test_a_robot_is_judged_by_its_own_torques(bench):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+def test_slow_logs_have_a_row_for_each_rate(bench):
+    file, _ = bench("detection-sampling")
+    rows = {(row["hz"], row["detector"]): row for row in file["rows"]}
+    assert set(rows) == {(hz, n) for hz in (23.8, 100.0) for n in ("srq-svr", "moving-thresholds")}
+    slow, fast = (rows[hz, "srq-svr"]["sensitivity"]["value"] for hz in (23.8, 100.0))
+    assert 0.5 < slow <= fast
+
+
 def test_a_sample_online_has_the_score_of_the_batch(bench):
     file, _ = bench("detection_online")
     steps = [row for row in file["rows"] if row["study"] == "step"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tauguard.detectors import ArmModel, Estimator, RobotNumbers
+from tauguard.detectors import ArmModel, Estimator, RobotNumbers, Unknowns
 from tauguard.detectors.estimation.velocity import SensorNoise
 from tauguard.traces import Trace
 
@@ -88,6 +88,23 @@ def test_the_estimator_uses_it_online_as_in_batch(pendulum):
     np.testing.assert_array_equal(np.array(rows), batch.unexplained)
     rough = [np.diff(e.residual[300:, 0]).std() for e in (batch, noisy)]
     assert rough[0] < 0.6 * rough[1]
+
+
+@pytest.mark.parametrize("dt", [1 / 23.8, 1e-2, 4e-3])
+def test_a_slow_log_of_instants_has_no_lag_of_its_torques(pendulum, dt):
+    t = np.arange(200) * dt
+    q, qd, torque = np.sin(2 * t), 2 * np.cos(2 * t), -4 * np.sin(2 * t) * 0.22
+    signals = (t, *(x[:, None] for x in (q, qd, torque)))
+    exact, held = (
+        Estimator(ArmModel(pendulum, np.ones(1)), 200.0, dt, Unknowns.none(), sampled=sampled)
+        .run(*signals)
+        .residual
+        for sampled in (True, False)
+    )
+    # Of the trapezoid's rule, dt^2 / 12 |d^2 torque / dt^2|; the residual is a mean of such errors.
+    assert np.abs(exact).max() <= dt**2 / 12 * 16 * 0.22 * 1.001
+    # Half an interval of lag times |d torque / dt|, reached four fifths of it.
+    assert np.abs(held).max() > 0.8 * dt / 2 * 8 * 0.22
 
 
 def test_what_cannot_be_noise_is_refused(pendulum):

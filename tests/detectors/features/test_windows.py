@@ -18,18 +18,18 @@ def test_the_dissertations_window_is_44_numbers():
 
 
 @pytest.mark.parametrize(
-    ("dt", "lag", "words"),
+    ("dt", "lag", "count", "words"),
     [
-        (10e-3, 1, ["t_I = 8 ms is 1 sample", "t_c = 3 ms is 1 sample", "spans 100 ms"]),
-        (42e-3, 1, ["at 42 ms", "spans 420 ms"]),
-        (4e-3, 2, ["t_c = 3 ms is 1 sample"]),
-        (2e-3, 4, ["t_c = 3 ms is 2 samples"]),
+        (10e-3, 1, 9, ["t_I = 8 ms is 1 sample", "t_c = 3 ms is 1 sample", "spans 80 ms"]),
+        (42e-3, 1, 3, ["at 42 ms", "spans 84 ms"]),
+        (4e-3, 2, 11, ["t_c = 3 ms is 1 sample"]),
+        (2e-3, 4, 11, ["t_c = 3 ms is 2 samples"]),
     ],
 )
-def test_what_a_rate_cannot_carry_is_counted_in_samples_and_said(dt, lag, words):
+def test_what_a_rate_cannot_carry_is_counted_in_samples_and_said(dt, lag, count, words):
     shape = WindowShape.at(dt, confirmation=3e-3)
     assert shape.lag == lag
-    assert shape.count == 11
+    assert shape.count == count
     for word in words:
         assert word in shape.note
 

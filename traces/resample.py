@@ -1,0 +1,77 @@
+"""A trace at a lower sample rate, as a slower controller would have logged it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tauguard.arrays import Array
+from tauguard.traces.trace import Trace, Truth
+
+
+def resampled(trace: Trace, hz: float) -> Trace:
+    """The trace every 1 / ``hz`` seconds.
+
+    What a robot measures, it measures at an instant: positions, velocities, currents and commands
+    are interpolated. True torques are averaged over the interval that ends at a sample, so that no
+    impulse is lost or counted twice; contact force, link and point are those of the interval's
+    largest force. Collisions keep their times, and checked contacts are left out.
+
+    Args:
+        trace: of two samples or more.
+        hz: the new rate, at most the trace's own [Hz].
+
+    Raises:
+        ValueError: a rate that is not above 0 or higher than the trace's own, or a trace that is
+            over before the second sample.
+    """
+    if not (hz > 0 and len(trace.t) > 1 and hz * trace.dt < 1.01):
+        own = f"one of {1 / trace.dt:g} Hz" if len(trace.t) > 1 else f"{len(trace.t)} samples"
+        raise ValueError(f"hz {hz:g} of {own}: expected above 0 and no more than the trace's own")
+    t = np.arange(trace.t[0], trace.t[-1] + 1e-9, 1 / hz)
+    if len(t) < 2:
+        raise ValueError(f"hz {hz:g}: the trace is over before the second sample")
+
+    def at(values: Array) -> Array:
+        return np.column_stack([np.interp(t, trace.t, column) for column in values.T])
+
+    return replace(
+        trace,
+        t=t,
+        q=at(trace.q),
+        qd=at(trace.qd),
+        current=at(trace.current),
+        q_des=None if trace.q_des is None else at(trace.q_des),
+        qd_des=None if trace.qd_des is None else at(trace.qd_des),
+        qdd_des=None if trace.qdd_des is None else at(trace.qdd_des),
+        truth=None if trace.truth is None else _truth(trace.truth, trace.t, t),
+        contacts=(),
+    )
+
+
+def _truth(truth: Truth, t: Array, new: Array) -> Truth:
+    """Torques averaged, contacts from the row of each interval's largest force."""
+    ends = np.searchsorted(t, new + 1e-9)
+    begins = np.minimum(np.concatenate(([0], ends[:-1])), ends - 1)
+    force = truth.contact_force
+    rows = np.array([b + force[b:e].argmax() for b, e in zip(begins, ends, strict=True)])
+    poses = truth.obstacle_poses
+    return replace(
+        truth,
+        tau_ext=_averaged(truth.tau_ext, t, new),
+        contact_force=force[rows],
+        payload=truth.payload[ends - 1],
+        contact_link=truth.contact_link[rows],
+        contact_point=truth.contact_point[rows],
+        contact_vector=truth.contact_vector[rows],
+        obstacle_poses=poses[ends - 1] if len(poses) else poses,
+    )
+
+
+def _averaged(values: Array, t: Array, new: Array) -> Array:
+    """Means over the intervals that end at ``new``; the first row is as it was."""
+    pieces = (values[1:] + values[:-1]) / 2 * np.diff(t)[:, None]
+    area = np.concatenate([np.zeros_like(values[:1]), pieces.cumsum(axis=0)])
+    upto = np.column_stack([np.interp(new, t, column) for column in area.T])
+    return np.concatenate([values[:1], np.diff(upto, axis=0) / np.diff(new)[:, None]])
