@@ -65,7 +65,7 @@ def _there(path: Path, name: str, quick: bool, seed: int) -> bool:
 def _run(folder: Path, name: str, quick: bool, seed: int) -> str | None:
     """Run a part, and return why it failed."""
     start = time.monotonic()
-    command = [sys.executable, "-m", "tauguard", "bench", name, "--seed", str(seed)]
+    command = [sys.executable, "-m", "studies", "bench", name, "--seed", str(seed)]
     command += ["--json", str(folder / f"{name}.json"), "--figure", str(folder / f"{name}.png")]
     log = folder / f"{name}.log"
     with log.open("w") as out:
