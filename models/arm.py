@@ -282,6 +282,10 @@ def _completed(robot: Robot, file: ArmFile, sources: dict[str, str]) -> Arm:
         said.sources["inertia"] = (
             f"no body can have the file's of {names}: made the nearest possible"
         )
+    if file.replaced:
+        said.sources["shapes"] = "; ".join(
+            f"{name}: {what}" for name, what in file.replaced.items()
+        )
     if file.gripper:
         said.sources["gripper"] = f"{robot.gripper}ed: {', '.join(file.gripper)}".replace(
             "passiveed", "passive"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +12,16 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.models.mjcf import SpecText, compiled
-from tauguard.models.robot_check import checked_robot, checked_text
-from tauguard.models.urdf_inertia import mend_inertias
+from tauguard.models.robot_check import checked_robot
+from tauguard.models.urdf import UrdfFile, coarse, is_urdf, max_speeds, read_urdf
 
 #: Collision bits: what the arm has and what obstacles have, so that the arm never meets itself.
 ARM_BITS, OBSTACLE_BITS = 1, 2
-#: Radius of the capsule that stands for a link without collision geometry [m].
-STICK_RADIUS = 0.05
+#: Radius of the capsule that stands for a link without any shape: at most [m], and as a fraction of
+#: the arm's length.
+STICK_RADIUS, STICK_FRACTION = 0.05, 0.125
+#: Its colour, and the group of collision shapes where others show.
+STICK_COLOUR, HIDDEN = (0.85, 0.6, 0.25, 1.0), 3
 #: Below a chain of at least this many joints a branch is a gripper, if it has fewer joints.
 GRIPPER_FROM, GRIPPER_JOINTS = 4, 4
 #: A last joint that is called so moves a gripper, too.
@@ -45,7 +47,8 @@ class ArmFile:
     gripper: tuple[str, ...]  #: joints below the flange
     model: mujoco.MjModel  #: of ``spec``, compiled without its shapes
     mended: tuple[str, ...]  #: links of a URDF whose inertia no body can have
-    sticks: tuple[str, ...]  #: links without collision geometry, which got a capsule
+    sticks: tuple[str, ...]  #: links without any shape, which got a capsule
+    replaced: dict[str, str]  #: links whose shape is not the file's, and what it is
 
 
 def read_arm(
@@ -57,8 +60,8 @@ def read_arm(
     """The arm in a file.
 
     Actuators, sensors and keyframes are left out (the drive is ours), welded bodies are fused into
-    the links that carry them, mesh files are written into the text, and a link without collision
-    geometry gets a capsule along it.
+    the links that carry them, mesh files are written into the text. A link without collision
+    geometry collides as the convex hulls of what shows, and gets a capsule where nothing does.
 
     Args:
         path: MJCF or URDF.
@@ -72,14 +75,14 @@ def read_arm(
         ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
             joints; the message says what would work.
     """
-    mended: tuple[str, ...] = ()
-    if _is_urdf(path):
-        spec, mended = _urdf_spec(path)
+    if is_urdf(path):
+        urdf = read_urdf(path)
     else:
-        spec = mujoco.MjSpec.from_file(str(checked_robot(path)))
+        urdf = UrdfFile(mujoco.MjSpec.from_file(str(checked_robot(path))))
+    spec = urdf.spec
     _name_joints(spec)
     model = compiled(spec)
-    limits, speeds = _torque_limits(model), _speeds(path)
+    limits, speeds = _torque_limits(model), max_speeds(path)
     keyframe = model.key_qpos[0].copy() if model.nkey else None
     address = {model.joint(j).name: int(model.jnt_qposadr[j]) for j in range(model.njnt)}
     names = [model.joint(j).name for j in range(model.njnt)]
@@ -95,14 +98,17 @@ def read_arm(
         if weld_gripper:
             _weld(spec, list(gripper))
     _mark_tools(spec, tool)
+    unread = {_carrier(spec, link): words for link, words in urdf.unread.items()}
     spec.fuse_static()
     links, joints = _chain(spec, gripper)
-    sticks = _let_collide(spec, links)
+    sticks, replaced = _let_collide(spec, links, unread)
     model = SpecText(spec).dynamics()
     at = [names.index(name) for name in joints]
     home = None if keyframe is None else keyframe[[address[name] for name in joints]]
     speed = np.array([speeds.get(name, np.inf) for name in joints])
-    return ArmFile(spec, links, joints, limits[at], speed, home, gripper, model, mended, sticks)
+    return ArmFile(
+        spec, links, joints, limits[at], speed, home, gripper, model, urdf.mended, sticks, replaced
+    )
 
 
 def _mark_tools(spec: mujoco.MjSpec, tool: str | None) -> None:
@@ -125,70 +131,6 @@ def _name_joints(spec: mujoco.MjSpec) -> None:
         body.name = body.name or f"body{i + 1}"
     for i, joint in enumerate(spec.joints):
         joint.name = joint.name or f"joint{i + 1}"
-
-
-def _is_urdf(path: Path) -> bool:
-    return path.suffix.lower() == ".urdf" or "<robot" in path.read_text(errors="replace")[:4000]
-
-
-def _parsed(path: Path) -> ElementTree.Element:
-    try:
-        return ElementTree.fromstring(path.read_text(errors="replace"))
-    except ElementTree.ParseError as error:
-        raise ValueError(f"not well-formed XML ({error})") from None
-
-
-def _urdf_spec(path: Path) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
-    """A URDF whose meshes are where its ``package://`` names lead, going up from its folder.
-
-    Shapes that only show, and meshes that are not there or that MuJoCo does not read, are left out.
-    The second value names the links whose inertia was made possible.
-    """
-    root = _parsed(path)
-    mended = mend_inertias(root)
-    for link in root.findall("link"):
-        for shape in link.findall("visual"):
-            link.remove(shape)
-        for shape in link.findall("collision"):
-            mesh = shape.find("geometry/mesh")
-            if mesh is None:
-                continue
-            found = _mesh_file(path, mesh.get("filename", ""))
-            if found is None:
-                link.remove(shape)
-            else:
-                mesh.set("filename", str(found))
-    for old in root.findall("mujoco"):
-        root.remove(old)
-    extension = ElementTree.SubElement(root, "mujoco")
-    ElementTree.SubElement(extension, "compiler", {"strippath": "false", "fusestatic": "false"})
-    text = checked_text(ElementTree.tostring(root, encoding="unicode"))
-    return mujoco.MjSpec.from_string(text), mended
-
-
-def _mesh_file(urdf: Path, name: str) -> Path | None:
-    inside = Path(name.removeprefix("file://").split("://", 1)[-1])
-    if inside.suffix.lower() not in (".stl", ".obj", ".msh"):
-        return None
-    tails = [inside, Path(*inside.parts[1:]), Path(inside.name)]
-    for folder in urdf.resolve().parents:
-        for tail in tails[: 2 if folder != urdf.resolve().parent else 3]:
-            if (folder / tail).is_file():
-                return folder / tail
-    return None
-
-
-def _speeds(path: Path) -> dict[str, float]:
-    """Speed limits of a URDF's joints [rad/s]; MJCF has none."""
-    if not _is_urdf(path):
-        return {}
-    found = {}
-    for joint in _parsed(path).findall("joint"):
-        limit = joint.find("limit")
-        speed = float(limit.get("velocity", 0)) if limit is not None else 0.0
-        if speed > 0:
-            found[str(joint.get("name"))] = speed
-    return found
 
 
 def _weld(spec: mujoco.MjSpec, names: list[str]) -> None:
@@ -253,16 +195,21 @@ def _is_motor(model: mujoco.MjModel, i: int) -> bool:
 
 def _inline(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
     """Write mesh files into the text and drop textures, so that the text stands alone."""
-    for mesh in spec.meshes:
+    solid = {geom.meshname for geom in spec.geoms if geom.contype or geom.conaffinity}
+    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
         at = model.mesh(mesh.name or Path(mesh.file).stem)
         first, count = int(model.mesh_vertadr[at.id]), int(model.mesh_vertnum[at.id])
         face, faces = int(model.mesh_faceadr[at.id]), int(model.mesh_facenum[at.id])
         turn = np.zeros(9)
         mujoco.mju_quat2Mat(turn, model.mesh_quat[at.id])
         vertices = model.mesh_vert[first : first + count] @ turn.reshape(3, 3).T
+        vertices, triangles = vertices + model.mesh_pos[at.id], model.mesh_face[face : face + faces]
+        if at.name not in solid:
+            vertices, triangles = coarse(vertices, triangles)
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
         mesh.name = at.name
-        mesh.uservert = (vertices + model.mesh_pos[at.id]).ravel().tolist()
-        mesh.userface = model.mesh_face[face : face + faces].ravel().tolist()
+        mesh.uservert = vertices.ravel().tolist()
+        mesh.userface = triangles.ravel().tolist()
         mesh.file, mesh.scale = "", [1, 1, 1]
         mesh.refpos, mesh.refquat = [0, 0, 0], [1, 0, 0, 0]
     for texture in list(spec.textures):
@@ -333,25 +280,54 @@ def _branches(moving: list[mujoco.MjsBody]) -> str:
     )
 
 
-def _let_collide(spec: mujoco.MjSpec, links: tuple[str, ...]) -> tuple[str, ...]:
-    """Every colliding geom of the file gets the arm's bits; links without one get a capsule.
+def _carrier(spec: mujoco.MjSpec, name: str) -> str:
+    """The body that carries a body which cannot move in it: itself where it has a joint."""
+    body = spec.body(name)
+    while body is not None and body.name != "world" and not body.joints:
+        body = body.parent
+    return name if body is None else str(body.name)
 
-    Returns the names of the latter.
+
+def _let_collide(
+    spec: mujoco.MjSpec, links: tuple[str, ...], unread: dict[str, str]
+) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Every colliding geom of the file gets the arm's bits, and every link has one.
+
+    Returns the links without any shape, and all whose shape is not the file's and what it is.
     """
-    sticks = []
+    sticks, replaced = [], {}
     for geom in spec.geoms:
         if geom.contype or geom.conaffinity:
             geom.contype, geom.conaffinity = ARM_BITS, OBSTACLE_BITS
+    length = sum(float(np.linalg.norm(spec.body(link).pos)) for link in links[1:])
+    radius = min(STICK_RADIUS, STICK_FRACTION * length or STICK_RADIUS)
     for i, link in enumerate(links):
         body = spec.body(link)
-        if any(geom.contype for geom in body.geoms):
+        geoms = list(body.geoms)
+        solid = [geom for geom in geoms if geom.contype]
+        if solid:
+            for geom in solid if len(solid) < len(geoms) else ():
+                geom.group = geom.group or HIDDEN
+            if link in unread:
+                replaced[link] = f"without {unread[link]}"
             continue
-        sticks.append(link)
-        reach = np.array(spec.body(links[i + 1]).pos) if i + 1 < len(links) else np.zeros(3)
-        long = float(np.linalg.norm(reach)) > 2 * STICK_RADIUS
-        kind = mujoco.mjtGeom.mjGEOM_CAPSULE if long else mujoco.mjtGeom.mjGEOM_SPHERE
-        stick = body.add_geom(type=kind, size=[STICK_RADIUS, 0, 0], group=3, mass=0)
-        stick.contype, stick.conaffinity = ARM_BITS, OBSTACLE_BITS
-        if long:
-            stick.fromto = [0, 0, 0, *reach]
-    return tuple(sticks)
+        for geom in geoms:
+            geom.contype, geom.conaffinity = ARM_BITS, OBSTACLE_BITS
+        words = "convex hull of what shows"
+        if not geoms:
+            span = np.array(spec.body(links[i + 1]).pos) if i + 1 < len(links) else np.zeros(3)
+            _add_stick(body, span, radius)
+            sticks.append(link)
+            words = f"capsule of {1000 * radius:.0f} mm"
+        replaced[link] = words + (f": {unread[link]}" if link in unread else "")
+    return tuple(sticks), replaced
+
+
+def _add_stick(body: mujoco.MjsBody, span: np.ndarray, radius: float) -> None:
+    """A capsule along a link, a ball where it is short."""
+    long = float(np.linalg.norm(span)) > 2 * radius
+    kind = mujoco.mjtGeom.mjGEOM_CAPSULE if long else mujoco.mjtGeom.mjGEOM_SPHERE
+    stick = body.add_geom(type=kind, size=[radius, 0, 0], rgba=STICK_COLOUR, mass=0)
+    stick.contype, stick.conaffinity = ARM_BITS, OBSTACLE_BITS
+    if long:
+        stick.fromto = [0, 0, 0, *span]

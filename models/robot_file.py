@@ -11,6 +11,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.atomic_write import write_atomic
 from tauguard.models.robot_check import checked_robot
+from tauguard.models.urdf import xml_root
 from tauguard.untrusted_input import read_text
 
 #: Name of the element (URDF) or of the custom text (MJCF) that holds a note.
@@ -60,9 +61,9 @@ def read_note(source: str | Path) -> str | None:
 
 def _root(source: str | Path) -> ElementTree.Element:
     try:
-        return ElementTree.fromstring(read_text(source))
-    except ElementTree.ParseError as error:
-        raise ValueError(f"{source}: not well-formed XML ({error})") from None
+        return xml_root(read_text(source))
+    except ValueError as error:
+        raise ValueError(f"{source}: {error}") from None
 
 
 def _about_centre(numbers: Array) -> tuple[float, Array, Array]:

@@ -15,7 +15,7 @@ from tauguard.envs.gym.compiled import CompiledScene, compile_scene, region_pres
 from tauguard.envs.gym.placing import MOVES, STEP, StartsInContact, Usual
 from tauguard.envs.gym.randomization import check_options
 from tauguard.envs.gym.rendering import Picture
-from tauguard.envs.gym.settings import PERSON, Settings, one_of
+from tauguard.envs.gym.settings import Settings, one_of
 from tauguard.models import Scene
 
 #: Why a diverged episode ended.
@@ -25,10 +25,11 @@ DIVERGED_REASON = (
 RENDER_MODES = ("rgb_array", "human")
 #: Value of :attr:`StepMetrics.diverged` for an impossible force.
 IMPOSSIBLE = 2
-#: At most this many beginnings of an episode are drawn until the arm touches nothing.
-BEGINNINGS = 20
-#: Seeds of the beginnings that decide how a scene is arranged.
-ARRANGED = 6
+#: Beginnings of an episode that are drawn until the arm touches nothing.
+BEGINNINGS = 100
+#: Seeds of the beginnings by which a scene is arranged; of another arm than the package's own at
+#: most so many may be drawn again.
+ARRANGED, DRAWN_AGAIN = 12, 1
 
 
 class Outcome(NamedTuple):
@@ -348,29 +349,37 @@ def build(
         compiled = compile_scene(settings, task_type, task_type.arms, moved, default)
         batch = Batch(compiled, rows)
         task = task_type(batch, **own)
-        overlap = _overlap(task)
-        if overlap is None or overlap.kind not in _movable(settings, default, task_type):
+        movable = _movable(settings, default, task_type)
+        overlap = _overlap(task, set() if compiled.layout.own else movable)
+        if overlap is None or overlap.kind not in movable:
             break
-        moved[overlap.kind] = moved.get(overlap.kind, 0.0) + STEP
+        step = STEP * max(1.0, compiled.layout.scale)
+        moved[overlap.kind] = moved.get(overlap.kind, 0.0) + step
     if overlap is not None:
         raise overlap
     return compiled, batch, task
 
 
-def _overlap(task: Task) -> StartsInContact | None:
-    """What the arm overlaps in some of the drawn beginnings."""
+def _overlap(task: Task, strict: set[str]) -> StartsInContact | None:
+    """What the arm overlaps in beginnings: kinds in ``strict`` in few, others in all of a seed."""
+    missed = 0
     for seed in range(ARRANGED):
-        try:
-            task.begin(0, np.random.default_rng(seed))
-        except StartsInContact as error:
-            return error
+        rng = np.random.default_rng(seed)
+        for _ in range(BEGINNINGS):
+            try:
+                task.start(0, rng)
+                break
+            except StartsInContact as error:
+                missed += 1
+                if missed > (DRAWN_AGAIN if error.kind in strict else BEGINNINGS):
+                    return error
     return None
 
 
 def _movable(settings: Settings, default: frozenset[str], task_type: type[Task]) -> set[str]:
     """Kinds of things that the environment places itself."""
     kinds = set(default & {"table", "cloth"})
-    kinds |= {"person"} if PERSON in settings.obstacles else set()
+    kinds |= {item for item in settings.obstacles if isinstance(item, str)}
     return kinds | ({"second arm"} if task_type.arms == 2 else set())
 
 

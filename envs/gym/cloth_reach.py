@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import numpy as np
+
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.compiled import tool_position
@@ -35,10 +37,12 @@ class ClothBetween(CarefulReach):
         sheet = compiled.scene.spec.cloth
         if sheet is None:
             return True
-        x, y, _ = sheet.position
-        tool = tool_position(compiled, self.batch.datas[i], arm)
-        beyond = (place[0] - x) * (tool[0] - x) < 0 and abs(place[0] - x) > ASIDE
-        return bool(beyond and abs(place[1] - y) < sheet.size / 2)
+        layout = compiled.layout
+        x, y = layout.ahead(np.array(sheet.position))
+        there, left = layout.ahead(place)
+        here, _ = layout.ahead(tool_position(compiled, self.batch.datas[i], arm))
+        beyond = (there - x) * (here - x) < 0 and abs(there - x) > min(1.0, layout.scale) * ASIDE
+        return beyond and abs(left - y) < sheet.size / 2
 
 
 class ClothReachEnv(ArmEnv):

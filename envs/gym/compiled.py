@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from tauguard.arrays import Array
 from tauguard.envs.gym.placing import Layout, Usual
 from tauguard.envs.gym.randomization import check_names
-from tauguard.envs.gym.second_arm import PLACE, add_second_arm, both_drives
+from tauguard.envs.gym.second_arm import APART, add_second_arm, both_drives
 from tauguard.envs.gym.settings import PERSON, Settings
 from tauguard.envs.plant import Gains
 from tauguard.models import (
@@ -34,9 +34,12 @@ from tauguard.models import (
 )
 from tauguard.models.person import PersonPart
 
-#: A tool pose to reach lies at least this high and this far from the base's axis [m].
-LOWEST, NEAREST = 0.12, 0.2
-#: A region moves this far to both sides of the middle of its line, in units of the reach.
+#: A tool pose to reach lies at least this high and this far from the base's axis [m], of a short
+#: arm nearer [reach].
+LOWEST, NEAREST, SHORT = 0.12, 0.2, (0.25, 0.4)
+#: No arm reaches less far than this [m].
+LEAST_REACH = 0.02
+#: A region turns back this far from the middle of its line, in units of the reach.
 SPAN = 0.6
 #: Speeds at which regions cross [m/s]: a person's hand at work moves at up to 1.6 (ISO 13855),
 #: a torso at less.
@@ -171,7 +174,7 @@ def compile_scene(
         spec = replace(spec, cloth=layout.cloth(settings.cloth))
     scene = compose(spec, visuals=False)
     if arms == 2:
-        scene = add_second_arm(scene, layout.second_arm(PLACE))
+        scene = add_second_arm(scene, layout.second_arm(APART))
     if settings.ideal_drive:
         scene = without_losses(scene)
     if settings.payload_g > 0:
@@ -377,7 +380,10 @@ def tool_position(compiled: CompiledScene, data: mujoco.MjData, arm: int = 0) ->
 
 
 def arm_reach(scene: Scene) -> float:
-    """Largest distance from the first joint to the last link over 200 fixed random poses [m]."""
+    """Largest distance from the first joint to the last link over 200 fixed random poses [m].
+
+    Where that link turns in place, the size of its shapes.
+    """
     model, data = scene.model, mujoco.MjData(scene.model)
     rng = np.random.default_rng(0)
     low, high = pose_box(scene)
@@ -388,7 +394,11 @@ def arm_reach(scene: Scene) -> float:
         mujoco.mj_kinematics(model, data)
         span = data.xpos[scene.link_bodies[-1]] - data.xanchor[first]
         best = max(best, float(np.linalg.norm(span)))
-    return best
+    if best > LEAST_REACH:
+        return best
+    own = np.flatnonzero(model.geom_bodyid == scene.link_bodies[-1])
+    sizes = np.linalg.norm(model.geom_pos[own], axis=1) + model.geom_rbound[own]
+    return max(LEAST_REACH, float(sizes.max(initial=0.0)))
 
 
 def pose_box(scene: Scene) -> tuple[Array, Array]:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import mujoco
 import numpy as np
 
+from tauguard.arrays import Array
 from tauguard.models import BodyProxy, Cloth, Person, Scene, Table, cura6
 
-#: The lines on which body regions cross: position, direction and length in units of the arm's
-#: reach.
+Vector = tuple[float, float, float]
+
+#: Where the body regions cross: position and direction in units of the arm's reach, span [reach].
 LINES = {
     "hand": ((0.55, 0.0, 0.40), (0.0, 1.0, 0.0)),
     "lower_arm": ((0.70, 0.10, 0.30), (1.0, 0.0, 0.0)),
@@ -26,8 +29,13 @@ OPPOSITE, NEAREST_PERSON = 0.9, 0.6
 USUAL_REACH = 1.146
 #: Names of a second arm's parts begin with this.
 SECOND = "arm2_"
-#: A thing that overlaps the arm is moved by this distance [m], at most this number of times.
+#: What overlaps is moved by this [m] a time, more for a long arm, at most so often.
 STEP, MOVES = 0.05, 16
+#: An arm whose first joint is higher above its floor than this [reach] stands on a pedestal; one
+#: that works below that joint hangs from this height [reach].
+SHOULDER, HANGING = 0.5, 1.1
+#: A base within this of the origin stands in it [reach].
+CENTRED = 0.1
 
 
 class StartsInContact(ValueError):
@@ -49,13 +57,52 @@ class Layout:
     reach: float  #: of the arm [m]
     own: bool = True  #: the arm of the package, for which places are stated in metres
     moved: Mapping[str, float] = field(default_factory=dict)
-    """How far each kind of thing moves to be clear of the arm [m]: "person" and "cloth" away from
-    the base, "table" down, "second arm" away."""
+    """How far each kind of thing moves to be clear of the arm [m]: "person", "cloth" and body
+    regions away from the base, "table" down, "second arm" away."""
+    base: Vector = (0.0, 0.0, 0.0)  #: of the arm, on the floor that it works above [m]
+    quarter: int = 0  #: the arm works along x, y, -x or -y
 
     @classmethod
     def of(cls, bare: Scene, reach: float, moved: Mapping[str, float]) -> Layout:
-        """Of an arm with a reach."""
-        return cls(reach, bare.facts.name in cura6.NAMES, moved)
+        """Of an arm with a reach: where it stands and which way it faces at home."""
+        if bare.facts.name in cura6.NAMES:
+            return cls(reach, True, moved)
+        model, data = bare.model, mujoco.MjData(bare.model)
+        data.qpos[bare.qpos_adr] = bare.home
+        mujoco.mj_kinematics(model, data)
+        first = data.xanchor[model.joint(bare.joint_names[0]).id]
+        x, y, up = data.xpos[bare.link_bodies[-1]] - first
+        low = float(first[2]) - reach * (SHOULDER if up > -CENTRED * reach else HANGING)
+        away = np.hypot(*first[:2]) > CENTRED * reach
+        quarter = round(float(np.arctan2(y, x)) / (np.pi / 2)) % 4
+        return cls(
+            reach,
+            False,
+            moved,
+            (*(first[:2].tolist() if away else (0.0, 0.0)), max(low, min(0.0, float(first[2])))),
+            quarter if np.hypot(x, y) > CENTRED * reach else 0,
+        )
+
+    @property
+    def yaw(self) -> float:
+        """Which way the arm faces, about z [rad]."""
+        return self.quarter * np.pi / 2
+
+    def turn(self, direction: Vector) -> Vector:
+        """A direction in the arm's frame, in the world."""
+        x, y, z = direction
+        x, y = ((x, y), (-y, x), (-x, -y), (y, -x))[self.quarter]
+        return x, y, z
+
+    def at(self, place: Vector) -> Vector:
+        """A place in the arm's frame, in the world [m]."""
+        x, y, z = self.turn(place)
+        return x + self.base[0], y + self.base[1], z + self.base[2]
+
+    def ahead(self, place: Array) -> tuple[float, float]:
+        """A place in the world, ahead of the arm and to its left [m]."""
+        x, y = float(place[0]) - self.base[0], float(place[1]) - self.base[1]
+        return ((x, y), (y, -x), (-x, -y), (-y, x))[self.quarter]
 
     @property
     def scale(self) -> float:
@@ -66,11 +113,18 @@ class Layout:
         """A body region on its line through the workspace."""
         position, direction = LINES.get(region, OTHER_LINE)
         x, y, z = (self.reach * c for c in position)
-        return BodyProxy(region, position=(x, y, z), direction=direction)
+        place = (x + self.moved.get(region, 0.0), y, z)
+        return BodyProxy(region, position=self.at(place), direction=self.turn(direction))
+
+    def someone(self, ahead: float, left: float, facing: float, **about: Any) -> Person:
+        """A person at a place in the arm's frame [m], facing a direction in it [rad]."""
+        x, y, z = self.at((ahead, left, 0.0))
+        floor = z + Person.floor if self.base[2] else Person.floor
+        return Person(position=(x, y), facing=facing + self.yaw, floor=floor, **about)
 
     def opposite(self) -> Person:
         """A person at work opposite the arm, within its reach."""
-        return Person(position=(max(OPPOSITE * self.reach, NEAREST_PERSON), 0.0))
+        return self.someone(max(OPPOSITE * self.reach, NEAREST_PERSON), 0.0, np.pi)
 
     def person(self, someone: Person) -> Person:
         """Farther from the arm, where that is needed."""
@@ -83,24 +137,36 @@ class Layout:
 
     def table(self, board: Table) -> Table:
         """A table for this arm."""
-        if self.scale == 1.0 and not self.moved.get("table"):
+        if self.own and not self.moved.get("table"):
             return board
         x, y, z = (self.scale * c for c in board.position)
         a, b, c = (self.scale * c for c in board.half_extents)
-        return Table((x, y, z - self.moved.get("table", 0.0)), (a, b, c))
+        extents = (b, a, c) if self.quarter % 2 else (a, b, c)
+        return Table(self.at((x, y, z - self.moved.get("table", 0.0))), extents)
 
     def cloth(self, sheet: Cloth) -> Cloth:
         """A cloth for this arm."""
-        if self.scale == 1.0 and not self.moved.get("cloth"):
+        if self.own and not self.moved.get("cloth"):
             return sheet
         x, y, z = (self.scale * c for c in sheet.position)
-        place = (x + self.moved.get("cloth", 0.0), y, z)
-        return replace(sheet, position=place, size=self.scale * sheet.size)
+        place, quat = self.at((x + self.moved.get("cloth", 0.0), y, z)), np.zeros(4)
+        mujoco.mju_mulQuat(quat, self.quat, sheet.quat_wxyz)
+        w, i, j, k = quat.tolist()
+        return replace(sheet, position=place, size=self.scale * sheet.size, quat_wxyz=(w, i, j, k))
 
-    def second_arm(self, place: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Where a second arm stands, in the first one's frame [m]."""
-        x, y, z = (self.scale * c for c in place)
-        return x + self.moved.get("second arm", 0.0), y, z
+    @property
+    def quat(self) -> Array:
+        """The arm's frame in the world, w x y z."""
+        return np.array([np.cos(self.yaw / 2), 0.0, 0.0, np.sin(self.yaw / 2)])
+
+    def apart(self, distance: float) -> float:
+        """How far ahead a second arm stands [m]."""
+        return self.scale * distance + self.moved.get("second arm", 0.0)
+
+    def second_arm(self, distance: float) -> Vector:
+        """Where the frame of a second arm is that faces the first: the world turned by pi [m]."""
+        x, y, _ = self.at((self.apart(distance), 0.0, 0.0))
+        return x + self.base[0], y + self.base[1], 0.0
 
 
 class Usual:
@@ -150,7 +216,9 @@ def check_clear(
     if geom < 0:
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) or "cloth"
     else:
-        name = model.geom(geom).name or model.body(int(bodies[k, other])).name
+        body = int(bodies[k, other])
+        name = model.body(body).name if body in links else model.geom(geom).name
+        name = name or model.body(body).name
     kinds = {"person_": "person", "table": "table", SECOND: "second arm"}
     kind = next((kinds[start] for start in kinds if name.startswith(start)), name)
     if geom < 0:

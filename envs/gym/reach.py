@@ -11,7 +11,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv, Outcome, Task
 from tauguard.envs.gym.batch import Batch, StepMetrics
-from tauguard.envs.gym.compiled import LOWEST, NEAREST, pose_box, tool_position
+from tauguard.envs.gym.compiled import LOWEST, NEAREST, SHORT, pose_box, tool_position
 from tauguard.envs.gym.vector import VectorArmEnv
 
 #: A target counts as reached this near [m], and is worth this much reward.
@@ -28,6 +28,8 @@ NEAR_PERSON, CANDIDATES = 0.5, 6
 HAND_FRACTION, HAND_DEVIATION, HAND_STAYS = (0.4, 1.0), 0.03, 0.6
 #: A target is at least this far from where the tool is [m].
 APART = 0.1
+#: Of a short arm tolerance and distance are these fractions of its reach.
+SHORT_TOLERANCE, SHORT_APART = 0.1, 0.33
 
 
 class Reach(Task):
@@ -56,6 +58,12 @@ class Reach(Task):
         base = batch.compiled.scene.model.joint(batch.compiled.scene.joint_names[0]).id
         mujoco.mj_forward(batch.compiled.scene.model, self._scratch)
         self._base: list[float] = self._scratch.xanchor[base].tolist()
+        layout = batch.compiled.layout
+        low, near = (f * layout.reach for f in SHORT)
+        self._lowest, self._nearest = layout.base[2] + min(LOWEST, low), min(NEAREST, near)
+        self._apart = min(APART, SHORT_APART * layout.reach)
+        #: A target counts as reached this near [m].
+        self.tolerance = min(TOLERANCE, SHORT_TOLERANCE * layout.reach)
 
     def start(self, i: int, rng: np.random.Generator) -> None:
         """Near home, regions anywhere on their lines, a new target."""
@@ -83,7 +91,7 @@ class Reach(Task):
                 qpos[at], qvel[moves] = side * place * span, -side * speed
 
     def draw(self, i: int, rng: np.random.Generator, arm: int, apart: Array | None) -> Array:
-        """A place [m] that the tool can reach, at least :data:`APART` from ``apart``."""
+        """A place [m] that the tool can reach, at least 0.1 m from ``apart``."""
         compiled, scratch = self.batch.compiled, self._scratch
         (adr, low, high), (bx, by, _) = self._poses[arm], self._base
         place = np.zeros(3)
@@ -92,9 +100,9 @@ class Reach(Task):
             mujoco.mj_kinematics(compiled.scene.model, scratch)
             place = tool_position(compiled, scratch, arm)
             x, y, z = place.tolist()
-            near = arm == 0 and math.hypot(x - bx, y - by) < NEAREST
-            still = apart is not None and np.linalg.norm(place - apart) < APART
-            if z >= LOWEST and not near and not still and self.suits(i, arm, place):
+            near = arm == 0 and math.hypot(x - bx, y - by) < self._nearest
+            still = apart is not None and np.linalg.norm(place - apart) < self._apart
+            if z >= self._lowest and not near and not still and self.suits(i, arm, place):
                 break
         return place
 
@@ -119,7 +127,7 @@ class Reach(Task):
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
         """Progress and bonus; never over by itself. The memory is the last distance [m]."""
-        reached = step.distance < TOLERANCE
+        reached = step.distance < self.tolerance
         rewards = {"progress": memory - step.distance, "target": BONUS * reached}
         return Outcome(rewards, success=reached, memory=step.distance)
 

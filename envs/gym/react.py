@@ -76,7 +76,8 @@ class React(Task):
     def proxy(cls, region: str, bare: Scene, layout: Layout) -> BodyProxy:
         """On the path of the swing, free to move along it."""
         tool, along = home_swing(bare, layout.own)
-        x, y, z = (tool + LINK * along + BALL * along).tolist()
+        away = max(1.0, layout.scale) * LINK + BALL + layout.moved.get(region, 0.0)
+        x, y, z = (tool + away * along).tolist()
         return BodyProxy(region, (x, y, z), direction=tuple(along.tolist()), radius=BALL)
 
     @classmethod

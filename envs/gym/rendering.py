@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauguard.envs.gym.compiled import CompiledScene
+from tauguard.envs.gym.second_arm import APART
 
 #: Of a picture [px].
 HEIGHT, WIDTH = 480, 640
@@ -104,19 +105,20 @@ class Stage:
 
     def look(self, camera: Any) -> None:
         """From beside the first arm's front; two arms from the side, so that neither hides one."""
-        compiled, reach = self._world, self._world.layout.reach
+        compiled, layout = self._world, self._world.layout
+        reach = layout.reach
         if compiled.person is not None:
             places = np.array([*_bases(compiled), [*compiled.person.position, 0.0]])
             x, y = places[:, :2].mean(axis=0)
             camera.lookat[:] = (x, y, compiled.person.floor + 0.5 * compiled.person.stature)
             camera.distance, camera.azimuth, camera.elevation = 2.9, 130.0, -12.0
         elif compiled.arms == 1:
-            camera.lookat[:] = (0.35 * reach, 0.0, 0.4 * reach)
+            camera.lookat[:] = layout.at((0.35 * reach, 0.0, 0.4 * reach))
             camera.distance, camera.azimuth, camera.elevation = 1.9 * reach, 140.0, -20.0
         else:
-            base = self.model.body_pos[self.model.body_rootid[compiled.tools[-1][1]]]
-            camera.lookat[:] = (base[0] / 2, base[1] / 2, 0.35 * reach)
+            camera.lookat[:] = layout.at((layout.apart(APART) / 2, 0.0, 0.35 * reach))
             camera.distance, camera.azimuth, camera.elevation = 2.4 * reach, 100.0, -20.0
+        camera.azimuth += np.degrees(layout.yaw)
 
     def follow(self) -> None:
         """Take over the simulated state."""

@@ -14,11 +14,11 @@ from tauguard.models.mjcf import SpecText
 from tauguard.models.obstacles import Springy, add_pairs
 from tauguard.models.scene import _add_label, label_region, lean_model, region_names
 
-#: The second arm stands here in the first one's frame [m] and faces it.
-PLACE = (1.1, 0.0, 0.0)
+#: The second arm stands so far ahead of the first [m] and faces it.
+APART = 1.1
 
 
-def add_second_arm(scene: Scene, place: tuple[float, float, float] = PLACE) -> Scene:
+def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0, 0.0)) -> Scene:
     """The scene with a second, nominal arm of the same kind; joints and links of both in a row.
 
     The two arms can touch each other and everything around them. The model has no visual shapes;

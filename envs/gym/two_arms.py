@@ -10,7 +10,7 @@ from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.placing import Layout
 from tauguard.envs.gym.reach import CarefulReach, Reach
-from tauguard.envs.gym.second_arm import PLACE
+from tauguard.envs.gym.second_arm import APART
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import Person, Scene, Table
 
@@ -32,8 +32,8 @@ class TwoArms(Reach):
     @classmethod
     def person(cls, bare: Scene, layout: Layout) -> Person:
         """Beside the table, looking at it."""
-        x = layout.second_arm(PLACE)[0] / 2
-        return Person(position=(x, -max(BESIDE * layout.reach, 0.6)), facing=np.pi / 2)
+        middle, beside = layout.apart(APART) / 2, max(BESIDE * layout.reach, 0.6)
+        return layout.someone(middle, -beside, np.pi / 2)
 
 
 class TwoArmsShared(CarefulReach):
@@ -47,7 +47,8 @@ class TwoArmsShared(CarefulReach):
         """The first arm's in the middle, the second's near to it."""
         layout = self.batch.compiled.layout
         if arm == 0:
-            return bool(abs(place[0] - layout.second_arm(PLACE)[0] / 2) < MIDDLE * layout.scale)
+            middle = layout.apart(APART) / 2
+            return abs(layout.ahead(place)[0] - middle) < MIDDLE * layout.scale
         gap = float(np.linalg.norm(place - self.batch.target[i, 0]))
         return GAP[0] * layout.scale < gap < GAP[1] * layout.scale
 

@@ -197,8 +197,8 @@ def explained(
     notes: tuple[str, ...] = ()
     if sticks:
         notes = (
-            f"{robot.name}: no shape found of {', '.join(sticks)}, taken as capsules of 50 mm "
-            "radius for link and force; with its meshes in or above the file's folder they are "
+            f"{robot.name}: no shape found of {', '.join(sticks)}, taken as thin capsules "
+            "for link and force; with its meshes in or above the file's folder they are "
             "better",
         )
     found_causes = Diagnoser.of(detector.arm, surface).diagnose(trace, alarms)

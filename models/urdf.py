@@ -1,0 +1,246 @@
+"""A URDF as MuJoCo takes it: its meshes found, read in any format, and coarse where they only show.
+
+trimesh reads STL, OBJ, Collada, PLY, glTF and others, MuJoCo its own MSH.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.arrays import Array
+from tauguard.models.robot_check import checked_text
+from tauguard.models.urdf_inertia import mend_inertias
+
+#: Larger files are not read [bytes]; of a mesh of more triangles the convex hull collides.
+MOST_BYTES, MOST_FACES = 1 << 27, 50_000
+#: A mesh that only shows is drawn on a grid of so many cells along its longest side, the finest
+#: that leaves so many triangles.
+SHOWN_CELLS, SHOWN_FACES = (64, 45, 32, 24), 5000
+#: Least thickness over length; what is thinner becomes the box around it: MuJoCo needs a volume.
+FLATTEST = 1e-3
+#: Of a mesh that has no colour.
+GREY = (0.7, 0.72, 0.75, 1.0)
+#: A prefix of an element or attribute; xacro leaves some that nothing declares.
+_PREFIX = re.compile(r"(</?|\s)([A-Za-z_][\w.-]*):(?=[A-Za-z_][\w.-]*[\s=/>])")
+
+
+@dataclass
+class UrdfFile:
+    """What a URDF says that its MjSpec does not."""
+
+    spec: Any = None  #: with its meshes in it
+    mended: tuple[str, ...] = ()  #: links whose inertia was made possible
+    unread: dict[str, str] = field(default_factory=dict)  #: link: the shape that is left out, why
+
+
+def is_urdf(path: Path) -> bool:
+    """Whether a file is a URDF, by its ending or its beginning."""
+    return path.suffix.lower() == ".urdf" or "<robot" in path.read_text(errors="replace")[:4000]
+
+
+def xml_root(text: str) -> ElementTree.Element:
+    """The root of a robot's XML; prefixes of names count as part of them.
+
+    Raises:
+        ValueError: not XML.
+    """
+    try:
+        return ElementTree.fromstring(_PREFIX.sub(r"\1\2_", text))
+    except ElementTree.ParseError as error:
+        raise ValueError(f"not well-formed XML ({error})") from None
+
+
+def max_speeds(path: Path) -> dict[str, float]:
+    """Speed limits of a URDF's joints [rad/s]; MJCF has none."""
+    if not is_urdf(path):
+        return {}
+    found = {}
+    for joint in xml_root(path.read_text(errors="replace")).findall("joint"):
+        limit = joint.find("limit")
+        speed = float(limit.get("velocity", 0)) if limit is not None else 0.0
+        if speed > 0:
+            found[str(joint.get("name"))] = speed
+    return found
+
+
+Mesh = tuple[Array, NDArray[np.int64]]
+
+
+def read_urdf(path: Path) -> UrdfFile:
+    """The spec of a URDF, with every mesh that is there and can be read.
+
+    Raises:
+        ValueError: not a robot that MuJoCo can read.
+    """
+    root = xml_root(path.read_text(errors="replace"))
+    found, meshes = UrdfFile(mended=mend_inertias(root)), dict[str, Mesh]()
+    for old in root.findall("mujoco"):
+        root.remove(old)
+    extension = ElementTree.SubElement(root, "mujoco")
+    options = {"strippath": "false", "fusestatic": "false", "discardvisual": "false"}
+    ElementTree.SubElement(extension, "compiler", options)
+    checked_text(ElementTree.tostring(_without_meshes(root), encoding="unicode"))
+    for link in root.findall("link"):
+        for shape in _mesh_shapes(link):
+            mesh = shape.find("geometry/mesh")
+            assert mesh is not None
+            file = Path(mesh.get("filename", "").removeprefix("file://").split("://", 1)[-1])
+            key = f"{shape.tag}{len(meshes)}_{file.stem}.stl"
+            try:
+                meshes[key] = _read(path, file, shape)
+            except ValueError as error:
+                link.remove(shape)
+                found.unread.setdefault(str(link.get("name")), f"{file.name} {error}")
+            mesh.set("filename", key)
+    found.spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    for mesh in found.spec.meshes:
+        vertices, faces = meshes[mesh.file]
+        if mesh.file.startswith("visual"):
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        turned = faces[:, ::-1] if np.prod(mesh.scale) < 0 else faces
+        mesh.uservert = (vertices * mesh.scale).ravel().tolist()
+        mesh.userface = turned.ravel().tolist()
+        mesh.file, mesh.scale = "", [1, 1, 1]
+    return found
+
+
+def _mesh_shapes(link: ElementTree.Element) -> list[ElementTree.Element]:
+    shapes = [*link.findall("visual"), *link.findall("collision")]
+    return [shape for shape in shapes if shape.find("geometry/mesh") is not None]
+
+
+def _without_meshes(root: ElementTree.Element) -> ElementTree.Element:
+    bare = copy.deepcopy(root)
+    for link in bare.findall("link"):
+        for shape in _mesh_shapes(link):
+            link.remove(shape)
+    return bare
+
+
+def _read(urdf: Path, name: Path, shape: ElementTree.Element) -> Mesh:
+    """The mesh of a shape; what only shows is coarse, and gets its file's colour.
+
+    Raises:
+        ValueError: what is wrong with the file, without its name.
+    """
+    source = _find(urdf, name)
+    if source is None:
+        raise ValueError("is not there")
+    vertices, faces, colour = load_mesh(source)
+    if shape.tag == "visual":
+        vertices, faces = coarse(vertices, faces)
+        if shape.find("material") is None:
+            material = ElementTree.SubElement(shape, "material", {"name": ""})
+            rgba = " ".join(f"{c:.3f}" for c in colour)
+            ElementTree.SubElement(material, "color", {"rgba": rgba})
+    thin = np.ptp(vertices, axis=0)
+    if thin.min() < FLATTEST * thin.max() or (shape.tag != "visual" and len(faces) > MOST_FACES):
+        return _hull(vertices)
+    return vertices, faces
+
+
+def _find(urdf: Path, inside: Path) -> Path | None:
+    """A mesh file by its package's name, going up from the URDF's folder."""
+    tails = [inside, Path(*inside.parts[1:]), Path(inside.name)]
+    for folder in urdf.resolve().parents:
+        for tail in tails[: 2 if folder != urdf.resolve().parent else 3]:
+            if (folder / tail).is_file():
+                return folder / tail
+    return None
+
+
+def load_mesh(source: Path) -> tuple[Array, NDArray[np.int64], Array]:
+    """Vertices [m], shape (V, 3), triangles, shape (F, 3), and colour, shape (4,), of a file.
+
+    Raises:
+        ValueError: it cannot be read, or has no triangles; the message leaves out its name.
+    """
+    if source.stat().st_size > MOST_BYTES:
+        raise ValueError(f"is larger than {MOST_BYTES >> 20} MB")
+    try:
+        read = _load_msh if source.suffix.lower() == ".msh" else _load_any
+        vertices, faces, colour = read(source)
+    except Exception as error:  # whatever a foreign reader raises
+        raise ValueError(f"cannot be read ({' '.join(str(error).split())[:80]})") from None
+    if len(faces) == 0 or not np.isfinite(vertices).all():
+        raise ValueError("has no triangles, or vertices that are not finite")
+    return vertices, faces, colour
+
+
+def _load_any(source: Path) -> tuple[Array, NDArray[np.int64], Array]:
+    import trimesh
+
+    scene = trimesh.load_scene(source)
+    mesh = scene.to_mesh()
+    units = re.match(r"([\d.eE+-]+) \* meters", scene.units or "")  # as Collada states them
+    vertices = np.asarray(mesh.vertices, dtype=np.float64) * (float(units[1]) if units else 1.0)
+    visual = mesh.visual.to_color() if hasattr(mesh.visual, "to_color") else mesh.visual
+    colour = np.asarray(visual.main_color, dtype=float) / 255
+    if colour.shape != (4,) or not mesh.visual.defined:
+        colour = np.array(GREY)
+    return vertices, np.asarray(mesh.faces, dtype=np.int64), colour
+
+
+def _load_msh(source: Path) -> tuple[Array, NDArray[np.int64], Array]:
+    numbers = np.fromfile(source, dtype="<i4", count=4)
+    vertices, normals, texture, faces = numbers.tolist()
+    floats = np.fromfile(source, dtype="<f4", offset=16, count=3 * vertices)
+    first = 16 + 4 * (3 * vertices + 3 * normals + 2 * texture)
+    rows = np.fromfile(source, dtype="<i4", offset=first, count=3 * faces)
+    return floats.reshape(-1, 3).astype(float), rows.reshape(-1, 3).astype(np.int64), np.array(GREY)
+
+
+def coarse(vertices: Array, faces: NDArray[np.int64]) -> Mesh:
+    """A mesh for show: vertices within a cell of a grid become one, see :data:`SHOWN_CELLS`.
+
+    Args:
+        vertices: [m], shape (V, 3).
+        faces: shape (F, 3).
+    """
+    low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
+    points, drawn = vertices, faces
+    for cells in SHOWN_CELLS if size > 0 else ():
+        if len(drawn) <= SHOWN_FACES:
+            break
+        grid = np.floor((vertices - low) * (cells / size)).astype(np.int64)
+        _, first, group = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+        points, drawn = vertices[first], group.reshape(-1)[faces]
+        drawn = drawn[(drawn != np.roll(drawn, 1, axis=1)).all(axis=1)]
+        _, one = np.unique(np.sort(drawn, axis=1), axis=0, return_index=True)
+        drawn = drawn[np.sort(one)]
+    return points, drawn
+
+
+def _hull(vertices: Array) -> Mesh:
+    """The convex hull, at least :data:`FLATTEST` of its length thick.
+
+    Raises:
+        ValueError: the points do not span a body.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    least = FLATTEST * float((high - low).max())
+    if (high - low < least).any():  # a sheet: the box around it
+        low, high = np.minimum(low, high - least), np.maximum(high, low + least)
+        vertices = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
+    try:
+        hull = ConvexHull(vertices)
+    except QhullError:
+        raise ValueError("spans no body") from None
+    used, faces = np.unique(hull.simplices, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    points = vertices[used]
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - points.mean(axis=0)) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return points, faces.astype(np.int64)
