@@ -132,18 +132,20 @@ def load_arm(source: str | Robot) -> Arm:
 
     Args:
         source: "cura6", a name of :data:`tauguard.models.ROBOTS`, an MJCF or URDF file, a TOML file
-            (:meth:`Robot.from_toml`), or a robot. What it leaves open is derived.
+            (:meth:`Robot.from_toml`), or a robot; a file may be followed by ``#`` and the names of
+            the arm's joints (:meth:`Robot.named`). What it leaves open is derived.
 
     Raises:
         ValueError: not a robot that MuJoCo can read, or not one serial chain of hinge and slide
             joints; the message says what would work.
         FileNotFoundError: no such name or file.
     """
-    robot = source if isinstance(source, Robot) else Robot(file=str(source))
+    robot = source if isinstance(source, Robot) else Robot.named(str(source))
     if robot.file in NAMED:
         return _cura6(robot)
     if robot.file.lower().endswith(".toml") and Path(robot.file).is_file():
-        robot = Robot.from_toml(robot.file)
+        described = Robot.from_toml(robot.file)
+        robot = described if robot.joints is None else replace(described, joints=robot.joints)
     path, sources = Path(robot.file), dict[str, str]()
     if not path.is_file():
         robot, path, sources = _by_name(robot)

@@ -92,7 +92,8 @@ def read_arm(
     _weigh(spec, model)
     gripper: tuple[str, ...] = ()
     if wanted is not None:
-        _weld(spec, [name for name in names if name not in _known(wanted, names)])
+        kept = _known(spec, wanted, names)
+        _weld(spec, [name for name in names if name not in kept])
     else:
         gripper = _find_gripper(spec)
         if weld_gripper:
@@ -118,11 +119,23 @@ def _mark_tools(spec: mujoco.MjSpec, tool: str | None) -> None:
             body.add_site(name=body.name)
 
 
-def _known(wanted: tuple[str, ...], names: list[str]) -> tuple[str, ...]:
-    for name in wanted:
-        if name not in names:
-            raise ValueError(f"joints: no joint {name!r}; the file has {', '.join(names)}")
-    return wanted
+def _known(spec: mujoco.MjSpec, wanted: tuple[str, ...], names: list[str]) -> set[str]:
+    """The joints of the file that are meant: by name, or from one to another below it."""
+    kept = set()
+    for entry in wanted:
+        ends = entry.split("..")
+        for name in ends:
+            if name not in names:
+                raise ValueError(f"joints: no joint {name!r}; the file has {', '.join(names)}")
+        body = spec.joint(ends[-1]).parent
+        chain = set(ends[-1:])
+        while ends[0] not in chain:
+            if body is None or body.name == "world":
+                raise ValueError(f"joints {entry!r}: {ends[-1]} does not move with {ends[0]}")
+            chain |= {joint.name for joint in body.joints}
+            body = body.parent
+        kept |= chain
+    return kept
 
 
 def _name_joints(spec: mujoco.MjSpec) -> None:
@@ -266,6 +279,19 @@ def _all_of(body: mujoco.MjsBody, gripper: tuple[str, ...]) -> bool:
     return all(joint.name in gripper for joint in _joints_below(body))
 
 
+def _ends(moving: list[mujoco.MjsBody]) -> str:
+    """The longest branch, up to where it branches again: an example of how joints are named."""
+    chains = []
+    for body in moving:
+        names, level = [], [body]
+        while len(level) == 1:
+            names += [joint.name for joint in level[0].joints]
+            level = [part for part in level[0].bodies if any(_joints_below(part))]
+        chains.append(names)
+    names = max(chains, key=len)
+    return f"{names[0]}..{names[-1]}" if names else ".."
+
+
 def _branches(moving: list[mujoco.MjsBody]) -> str:
     """Where it branches, and what to do about it."""
     parts = []
@@ -275,8 +301,8 @@ def _branches(moving: list[mujoco.MjsBody]) -> str:
         parts.append(f"{body.name} ({len(names)} joints: {shown})")
     return (
         f"it branches into {'; '.join(parts)}; expected one serial chain of joints. Name those of "
-        'the arm, Robot(file, joints=("...", ...)) or joints = ["...", ...] in a TOML file, and '
-        "the others are welded"
+        f"the arm, --arm-joints {_ends(moving)} or Robot(file, joints=({_ends(moving)!r},)) or "
+        f"joints in a TOML file, and the others are welded"
     )
 
 

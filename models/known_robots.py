@@ -18,13 +18,16 @@ from tauguard.models.robot import Robot, RobotDrive
 _READY = (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854)
 _UR_HOME = (-1.5708, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 _DEG = 0.017453292519943295
+#: Arms with published numbers and light shapes, that need no other package.
+PUBLISHED = Path(__file__).parent / "published"
 
 
 @dataclass(frozen=True)
 class KnownRobot:
-    """A row: a file within ``example-robot-data``, a name in ``mujoco-menagerie``, and numbers."""
+    """A row: a file here, one within ``example-robot-data`` or a name in ``mujoco-menagerie``."""
 
     robot: Robot  #: its ``file`` is the name
+    own: str | None  #: file in :data:`PUBLISHED`
     urdf: str | None  #: path below ``robots`` of example-robot-data
     menagerie: str | None
     sources: Mapping[str, str]  #: source of each field that the row states
@@ -36,10 +39,11 @@ def _row(
     menagerie: str | None,
     sources: dict[str, str],
     drive: RobotDrive | None = None,
+    own: str | None = None,
     **numbers: object,
 ) -> tuple[str, KnownRobot]:
     robot = Robot(file=name, drive=drive or RobotDrive(), **numbers)  # type: ignore[arg-type]
-    return name, KnownRobot(robot, urdf, menagerie, MappingProxyType(sources))
+    return name, KnownRobot(robot, own, urdf, menagerie, MappingProxyType(sources))
 
 
 _UR_SOURCE = {"home": "elbow up, tool down; the keyframe of mujoco-menagerie's UR arms"}
@@ -66,8 +70,9 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
             _row(
                 "ur5e",
                 None,
-                "universal_robots_ur5e",
+                None,
                 _UR_SOURCE | _UR_SIZES,
+                own="ur5e.xml",
                 home=_UR_HOME,
                 torque_limit=(150.0, 150.0, 150.0, 28.0, 28.0, 28.0),
                 max_speed=3.1416,
@@ -91,14 +96,15 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
             ),
             _row(
                 "panda",
-                "panda_description/urdf/panda.urdf",
-                "franka_emika_panda",
+                None,
+                None,
                 {
                     "home": "Franka's ready pose",
                     "torque_limit": "libfranka's limits",
                     "max_speed": "libfranka's limits",
                     "drive": "Coulomb level: half the sigmoid's height in Gaz et al. 2019",
                 },
+                own="panda.xml",
                 home=_READY,
                 torque_limit=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
                 max_speed=(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
@@ -107,12 +113,13 @@ ROBOTS: Mapping[str, KnownRobot] = MappingProxyType(
             _row(
                 "iiwa14",
                 None,
-                "kuka_iiwa_14",
+                None,
                 {
                     "home": "the keyframe of mujoco-menagerie",
                     "torque_limit": "estimate: KUKA's data sheet from memory, not checked",
                     "max_speed": "estimate: KUKA's data sheet from memory, not checked",
                 },
+                own="iiwa14.xml",
                 home=(0.0, 0.7854, 0.0, -1.5708, 0.0, 0.0, 0.0),
                 torque_limit=(320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0),
                 max_speed=tuple(_DEG * s for s in (85, 85, 100, 75, 130, 135, 135)),
@@ -162,7 +169,7 @@ def known_names() -> tuple[str, ...]:
 
 
 def find_file(name: str) -> Path:
-    """The model file of an arm by name: from example-robot-data, else a downloaded menagerie.
+    """The model file of an arm by name: the package's own, example-robot-data's, or menagerie's.
 
     Nothing is downloaded here: ``tauguard robot NAME --download`` does it.
 
@@ -170,6 +177,8 @@ def find_file(name: str) -> Path:
         FileNotFoundError: no installed package has it; the message says what to do.
     """
     row = ROBOTS.get(name)
+    if row is not None and row.own is not None:
+        return PUBLISHED / row.own
     urdf, menagerie = (row.urdf, row.menagerie) if row else (None, name)
     if urdf is not None:
         for root in robot_data_folders():

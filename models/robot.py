@@ -129,7 +129,8 @@ class Robot:
 
     file: str
     joints: tuple[str, ...] | None = None
-    """Names of the arm's joints, base to tip; all others are welded. Default: the only chain."""
+    """Names of the arm's joints, base to tip, or ``FIRST..LAST`` for all between two of them; all
+    others are welded. Default: the only chain."""
     gripper: str = "weld"  #: what becomes of joints below the flange, one of :data:`GRIPPERS`
     home: Numbers | None = None  #: [rad]
     tool: str | None = None  #: name of a site or body
@@ -160,6 +161,14 @@ class Robot:
             object.__setattr__(self, "joints", tuple(self.joints))
         if not 0 <= self.friction_compensation <= 1:
             raise ValueError(f"friction_compensation {self.friction_compensation}: expected 0 to 1")
+
+    @classmethod
+    def named(cls, text: str) -> Robot:
+        """From ``FILE`` or ``FILE#JOINTS``, joints with commas between or ``FIRST..LAST``."""
+        file, _, names = text.partition("#")
+        if not names or Path(text).is_file():
+            return cls(text)
+        return cls(file, joints=tuple(name.strip() for name in names.split(",")))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Robot:

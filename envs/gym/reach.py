@@ -59,8 +59,9 @@ class Reach(Task):
         mujoco.mj_forward(batch.compiled.scene.model, self._scratch)
         self._base: list[float] = self._scratch.xanchor[base].tolist()
         layout = batch.compiled.layout
-        low, near = (f * layout.reach for f in SHORT)
-        self._lowest, self._nearest = layout.base[2] + min(LOWEST, low), min(NEAREST, near)
+        height, away = (f * layout.reach for f in SHORT)
+        self._lowest = layout.base[2] + min(LOWEST, height)
+        self._nearest = min(NEAREST, away)
         self._apart = min(APART, SHORT_APART * layout.reach)
         #: A target counts as reached this near [m].
         self.tolerance = min(TOLERANCE, SHORT_TOLERANCE * layout.reach)

@@ -22,6 +22,7 @@ def command(
     out: Path = Path("demo"),
     seed: int = 0,
     robot: str = "cura6",
+    arm_joints: str | None = None,
     workers: int | None = None,
     json: Path | None = None,
 ) -> None:
@@ -35,6 +36,8 @@ def command(
         out: folder of the results (made if it does not exist).
         seed: of the arm and of everything drawn; the same seed gives the same files.
         robot: which arm, by name or file: see `tauguard robot`.
+        arm_joints: the arm's joints, in a file with several chains: names with commas between, or
+            FIRST..LAST.
         workers: processes for the simulation (default: all processors).
         json: write the summary here as well.
     """
@@ -50,6 +53,7 @@ def command(
     from tauguard.models import load_arm
     from tauguard.report import write_json
 
+    robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     load_arm(robot)  # an unknown one is named before anything is simulated
     plan = demo_plan(seed, robot)
     print(

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 def command(
     robot: Annotated[str | None, tyro.conf.Positional] = None,
     /,
+    arm_joints: str | None = None,
     download: bool = False,
     json: Path | None = None,
     try_: Annotated[bool, tyro.conf.arg(name="try")] = False,
@@ -24,6 +25,8 @@ def command(
 
     Args:
         robot: a name, an MJCF or URDF file, or a TOML file that describes a robot.
+        arm_joints: the arm's joints, in a file with several chains: names with commas between, or
+            FIRST..LAST.
         download: fetch the model by mujoco-menagerie where it has not been fetched before.
         json: write the description as JSON.
         try_: run episodes of every environment with the arm: what begins in contact, the largest
@@ -51,6 +54,7 @@ def command(
             raise ValueError(
                 "--download needs mujoco-menagerie: install the extra `arms`"
             ) from None
+    robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     scene = compose(SceneSpec(arm=robot), visuals=False)
     gains = Gains.for_scene(scene)
     rows = table(scene.facts, gains)
@@ -114,7 +118,11 @@ def names() -> str:
     from tauguard.models.arm import NAMED
 
     lines = [f"{name:<14} part of tauguard" for name in NAMED]
-    for name, row in ROBOTS.items():
+    rows = sorted(ROBOTS.items(), key=lambda item: item[1].own is None)
+    for name, row in rows:
+        if row.own is not None:
+            lines.append(f"{name:<14} part of tauguard: published numbers, light shapes")
+            continue
         packages = [
             package
             for package, has in (

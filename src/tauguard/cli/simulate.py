@@ -25,6 +25,7 @@ def command(
     mismatch_seed: int | None = 0,
     checkers: tuple[str, ...] = (),
     robot: str = "cura6",
+    arm_joints: str | None = None,
     objects: Path | None = None,
     workers: int | None = None,
     json: Path | None = None,
@@ -50,6 +51,8 @@ def command(
         checkers: contact checkers (mujoco, cloth, rigid) to run at every step; the recordings and
             the replay show the contacts that they report.
         robot: name or file of the arm; see `tauguard robot`.
+        arm_joints: the arm's joints, in a file with several chains: names with commas between, or
+            FIRST..LAST.
         objects: TOML file that describes the objects around the arm; the page "Build a scene of
             your own" explains its format.
         workers: number of processes; the default is one for each processor.
@@ -64,6 +67,7 @@ def command(
         raise ValueError(f"--episodes {episodes}: expected 1 or more")
     if min(collisions, free) < 0:
         raise ValueError(f"--collisions {collisions}, --free {free}: expected 0 or more")
+    robot = robot if arm_joints is None else f"{robot}#{arm_joints}"
     if payloads_g is None:
         scale = torque_scale(robot)
         payloads_g = tuple(scale * load for load in LOADS)
