@@ -95,6 +95,10 @@ def make_plant(scene: Scene, nominal: Drive, gains: Gains, data: mujoco.MjData) 
     for obj in scene.spec.objects:
         if obj.path:
             plant.carry(int(model.body(obj.name).mocapid[0]), np.array(obj.path))
+        if obj.belt is not None:
+            joint = model.joint(obj.name)
+            speed = float(np.linalg.norm(obj.belt))
+            plant.belt(int(joint.qposadr[0]), int(joint.dofadr[0]), speed)
     return plant
 
 

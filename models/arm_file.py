@@ -11,9 +11,9 @@ import mujoco
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.models.mjcf import SpecText, compiled
+from tauguard.models.mjcf import SpecText, compiled, inline_meshes
 from tauguard.models.robot_check import checked_robot
-from tauguard.models.urdf import UrdfFile, coarse, is_urdf, max_speeds, read_urdf
+from tauguard.models.urdf import UrdfFile, is_urdf, max_speeds, read_urdf
 
 #: Collision bits: what the arm has and what obstacles have, so that the arm never meets itself.
 ARM_BITS, OBSTACLE_BITS = 1, 2
@@ -88,7 +88,7 @@ def read_arm(
     names = [model.joint(j).name for j in range(model.njnt)]
     for element in (*spec.actuators, *spec.sensors, *spec.keys):
         spec.delete(element)
-    _inline(spec, model)
+    inline_meshes(spec, model)
     _weigh(spec, model)
     gripper: tuple[str, ...] = ()
     if wanted is not None:
@@ -204,31 +204,6 @@ def _is_motor(model: mujoco.MjModel, i: int) -> bool:
     """Whether actuator ``i`` turns its control into a torque, without any feedback."""
     plain = model.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_FIXED
     return bool(plain and model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_NONE)
-
-
-def _inline(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Write mesh files into the text and drop textures, so that the text stands alone."""
-    solid = {geom.meshname for geom in spec.geoms if geom.contype or geom.conaffinity}
-    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
-        at = model.mesh(mesh.name or Path(mesh.file).stem)
-        first, count = int(model.mesh_vertadr[at.id]), int(model.mesh_vertnum[at.id])
-        face, faces = int(model.mesh_faceadr[at.id]), int(model.mesh_facenum[at.id])
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, model.mesh_quat[at.id])
-        vertices = model.mesh_vert[first : first + count] @ turn.reshape(3, 3).T
-        vertices, triangles = vertices + model.mesh_pos[at.id], model.mesh_face[face : face + faces]
-        if at.name not in solid:
-            vertices, triangles = coarse(vertices, triangles)
-            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-        mesh.name = at.name
-        mesh.uservert = vertices.ravel().tolist()
-        mesh.userface = triangles.ravel().tolist()
-        mesh.file, mesh.scale = "", [1, 1, 1]
-        mesh.refpos, mesh.refquat = [0, 0, 0], [1, 0, 0, 0]
-    for texture in list(spec.textures):
-        spec.delete(texture)
-    for material in spec.materials:
-        material.textures = [""] * len(material.textures)
 
 
 def _weigh(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:

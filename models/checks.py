@@ -22,6 +22,18 @@ def not_negative(owner: object, *names: str) -> None:
             raise ValueError(f"{type(owner).__name__}.{name} {value}: expected 0 or more")
 
 
+def vector(owner: object, name: str, size: int) -> tuple[float, ...]:
+    """The numbers of a field, or ``ValueError`` where they are not ``size`` finite ones."""
+    value = getattr(owner, name)
+    try:
+        numbers = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        numbers = np.zeros(0)
+    if numbers.shape != (size,) or not np.isfinite(numbers).all():
+        raise ValueError(f"{type(owner).__name__}.{name} {value!r}: expected {size} finite numbers")
+    return tuple(numbers.tolist())
+
+
 def shaped(owner: object, shape: tuple[int, ...], meaning: str, *names: str) -> None:
     """The named fields have ``shape``, or ``ValueError`` that says what the axes mean."""
     for name in names:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import functools
+from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from tauguard.models.mujoco_library import library
+from tauguard.models.urdf import coarse
 
 #: Significant digits that identify every double.
 _DIGITS = 17
@@ -95,3 +98,28 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
             return spec.compile()
         except (ValueError, RuntimeError):
             raise ValueError(str(error)) from error
+
+
+def inline_meshes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+    """Write mesh files into the text and drop textures, so that the text stands alone."""
+    solid = {geom.meshname for geom in spec.geoms if geom.contype or geom.conaffinity}
+    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
+        at = model.mesh(mesh.name or Path(mesh.file).stem)
+        first, count = int(model.mesh_vertadr[at.id]), int(model.mesh_vertnum[at.id])
+        face, faces = int(model.mesh_faceadr[at.id]), int(model.mesh_facenum[at.id])
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, model.mesh_quat[at.id])
+        vertices = model.mesh_vert[first : first + count] @ turn.reshape(3, 3).T
+        vertices, triangles = vertices + model.mesh_pos[at.id], model.mesh_face[face : face + faces]
+        if at.name not in solid:
+            vertices, triangles = coarse(vertices, triangles)
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        mesh.name = at.name
+        mesh.uservert = vertices.ravel().tolist()
+        mesh.userface = triangles.ravel().tolist()
+        mesh.file, mesh.scale = "", [1, 1, 1]
+        mesh.refpos, mesh.refquat = [0, 0, 0], [1, 0, 0, 0]
+    for texture in list(spec.textures):
+        spec.delete(texture)
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)

@@ -131,10 +131,10 @@ class Person:
         """Of the middle of the chest above the floor [m]."""
         return self.hip_height + 0.78 * self.length("trunk")
 
-    def parts(self) -> Iterator[PersonPart]:
-        """The capsules, in the order of :data:`SEGMENTS`."""
+    def parts(self, number: int = 0) -> Iterator[PersonPart]:
+        """The capsules of the scene's person of a number, in the order of :data:`SEGMENTS`."""
         for segment in SEGMENTS:
-            yield PersonPart(self, segment)
+            yield PersonPart(self, segment, prefix(number))
 
 
 @dataclass(frozen=True)
@@ -143,11 +143,12 @@ class PersonPart:
 
     person: Person
     segment: Segment
+    prefix: str = "person_"
 
     @property
     def name(self) -> str:
         """Of its body and geom."""
-        return f"person_{self.segment.name}"
+        return self.prefix + self.segment.name
 
     @property
     def limits(self) -> BodyRegion:
@@ -181,9 +182,14 @@ _COLOURS = {"pelvis": _TROUSERS, "thigh": _TROUSERS, "lower_leg": _TROUSERS, "ch
             "abdomen": _SHIRT, "upper_arm": _SHIRT}  # fmt: skip
 
 
-def add_person(spec: mujoco.MjSpec, person: Person) -> dict[str, PersonPart]:
+def prefix(number: int) -> str:
+    """What the names of the parts of a scene's first, second, ... person begin with."""
+    return f"person{number + 1}_" if number else "person_"
+
+
+def add_person(spec: mujoco.MjSpec, person: Person, number: int = 0) -> dict[str, PersonPart]:
     """Add the capsules to the world of ``spec``; their contacts come with ``add_pairs``."""
-    parts = {part.name: part for part in person.parts()}
+    parts = {part.name: part for part in person.parts(number)}
     x, y = person.position
     for name, part in parts.items():
         segment = part.segment

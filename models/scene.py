@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import mujoco
@@ -29,9 +30,9 @@ from tauguard.models.obstacles import (
     add_table,
 )
 from tauguard.models.payload import add_payload_body
-from tauguard.models.person import Person, add_person
+from tauguard.models.person import Person, PersonPart, add_person
 from tauguard.models.robot import Robot
-from tauguard.models.scene_objects import SceneObject, add_object, hold
+from tauguard.models.scene_objects import SceneObject, add_object, check_apart, hold
 
 #: Integrators by MuJoCo's names.
 INTEGRATORS = {
@@ -59,7 +60,7 @@ class SceneSpec:
     base_pose: tuple[tuple[float, ...], ...] | None = None  #: of the arm's world, (4, 4)
     integrator: str = "implicitfast"  #: one of :data:`INTEGRATORS`
     proxies: tuple[BodyProxy, ...] = ()  #: body regions of a person
-    person: Person | None = None
+    people: tuple[Person, ...] = ()
     region_labels: bool = False  #: a contact sensor on every body region, after the links
     table: Table | None = None
     cloth: Cloth | None = None
@@ -160,6 +161,7 @@ def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
     obstacles = _add_parts(arm, spec)
     text = SpecText(whole)
     model = whole.compile() if visuals else lean_model(whole)
+    check_apart(model, spec.objects)
     joints = [model.joint(name) for name in arm.joints]
     return Scene(
         model=model,
@@ -225,7 +227,12 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     for name, obstacle in obstacles.items():
         add_obstacle(whole, obstacle, name)
     parts: dict[str, Springy] = {**obstacles}
+    taken = {body.name for body in whole.bodies} | set(region_names(replace(spec, objects=())))
+    taken |= {f"link{i + 1}" for i in range(len(arm.links))}
     for obj in spec.objects:
+        if obj.name in taken:
+            raise ValueError(f"object {obj.name}: the scene has a part of this name; take another")
+        taken.add(obj.name)
         if obj.touchable:
             parts |= {geom.name: obj for geom in add_object(whole, obj)}
         else:
@@ -239,8 +246,8 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     if spec.labels:
         for i, link in enumerate(arm.links, start=1):
             _add_label(whole, link, f"contact_link{i}")
-    if spec.person is not None:
-        parts |= add_person(whole, spec.person)
+    for number, person in enumerate(spec.people):
+        parts |= add_person(whole, person, number)
     if spec.region_labels:
         for name in region_names(spec):
             label_region(whole, spec, name, arm.links[0])
@@ -250,11 +257,17 @@ def _add_parts(arm: Arm, spec: SceneSpec) -> tuple[str, ...]:
     return (*obstacles, *moving)
 
 
+def people_parts(spec: SceneSpec) -> Iterator[PersonPart]:
+    """The capsules of all people, person after person."""
+    for number, person in enumerate(spec.people):
+        yield from person.parts(number)
+
+
 def region_names(spec: SceneSpec) -> tuple[str, ...]:
-    """Bodies that the arm must not press too hard: the proxies, the person's, then the objects."""
-    person = () if spec.person is None else tuple(part.name for part in spec.person.parts())
+    """Bodies that the arm must not press too hard: the proxies, people's, then the objects."""
+    people = (part.name for part in people_parts(spec))
     objects = (obj.name for obj in spec.objects if obj.touchable)
-    return (*(proxy.region for proxy in spec.proxies), *person, *objects)
+    return (*(proxy.region for proxy in spec.proxies), *people, *objects)
 
 
 def label_region(whole: mujoco.MjSpec, spec: SceneSpec, name: str, arm: str = "") -> None:

@@ -12,7 +12,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tauguard.models.checks import above_zero, not_negative
+from tauguard.models.checks import above_zero, not_negative, vector
+from tauguard.models.mjcf import inline_meshes, xml_text
 from tauguard.untrusted_input import read_text, reading
 
 Vector = tuple[float, float, float]
@@ -26,6 +27,12 @@ MOTIONS = ("fixed", "held", "free")
 #: Objects touch one another, and the table, by this bit; the arm meets them by contact pairs.
 OBJECT_BIT = 4
 _COLOUR = (0.55, 0.6, 0.65, 1.0)
+#: Mass of a conveyor's belt: what lies on it does not slow it down [kg].
+BELT_MASS = 1e4
+#: Sizes of shapes lie between these [m].
+LEAST, MOST = 1e-5, 1e3
+#: Free objects may overlap others by this much at the beginning [m]; more would throw them.
+RESTING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -41,13 +48,16 @@ class Shape:
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the one that is wrong."""
-        for name in ("size", "position", "quat_wxyz", "rgba"):
-            object.__setattr__(self, name, tuple(map(float, np.atleast_1d(getattr(self, name)))))
         if self.kind not in SHAPES:
             raise ValueError(f"shape {self.kind!r}: expected one of {', '.join(SHAPES)}")
-        if len(self.size) != SHAPES[self.kind] or not all(s > 0 for s in self.size):
+        object.__setattr__(self, "size", tuple(np.atleast_1d(self.size).tolist()))
+        for name, size in (("position", 3), ("quat_wxyz", 4), ("rgba", 4)):
+            object.__setattr__(self, name, vector(self, name, size))
+        object.__setattr__(self, "quat_wxyz", _unit(self.quat_wxyz, self.kind))
+        if len(self.size) != SHAPES[self.kind] or not all(LEAST < s < MOST for s in self.size):
             raise ValueError(
-                f"{self.kind} size {self.size}: expected {SHAPES[self.kind]} numbers above 0 [m]"
+                f"{self.kind} size {self.size}: expected {SHAPES[self.kind]} numbers between "
+                f"{LEAST} and {MOST} [m]"
             )
         if self.kind == "mesh" and not Path(self.file).is_file():
             raise ValueError(f"mesh {self.file!r}: no such file")
@@ -63,15 +73,18 @@ class SceneObject:
 
     name: str
     shapes: tuple[Shape, ...] = ()
-    mjcf: str = (
-        ""  #: text or file of an MJCF fragment instead of shapes; its bodies may have joints
-    )
+    mjcf: Any = ""
+    """Text or file of an MJCF fragment instead of shapes, a ``mujoco.MjSpec`` or a root of
+    dm_control's ``mjcf``; kept as text with its meshes inside. Its bodies may have joints."""
     position: Vector = (0.0, 0.0, 0.0)  #: in the world [m]; of a held one in the tool's frame
     quat_wxyz: Quat = (1.0, 0.0, 0.0, 0.0)
     motion: str = "fixed"  #: one of :data:`MOTIONS`
     path: tuple[tuple[float, ...], ...] = ()
     """Rows of time [s] and position [m], from 0 on; after the last row it begins anew. It replaces
     ``position``."""
+    belt: Vector | None = None
+    """Velocity of the surface of a conveyor in its own frame [m/s]: it stays where it is and
+    carries what lies on it."""
     mass: float = 1.0  #: of a free or held one [kg]
     stiffness: float = 1e5  #: of its contact with the arm [N/m]
     damping: float = 100.0  #: of its contact with the arm [N s/m]
@@ -82,8 +95,9 @@ class SceneObject:
         """Check the values: ``ValueError`` names the one that is wrong."""
         shapes = tuple(s if isinstance(s, Shape) else Shape(**s) for s in self.shapes)
         object.__setattr__(self, "shapes", shapes)
-        for name in ("position", "quat_wxyz"):
-            object.__setattr__(self, name, tuple(map(float, getattr(self, name))))
+        object.__setattr__(self, "position", vector(self, "position", 3))
+        object.__setattr__(self, "quat_wxyz", _unit(vector(self, "quat_wxyz", 4), self.name))
+        object.__setattr__(self, "mjcf", _text(self.mjcf, self.name))
         path = tuple(tuple(map(float, row)) for row in self.path)
         object.__setattr__(self, "path", path)
         if not self.name.isidentifier():
@@ -99,7 +113,16 @@ class SceneObject:
             if getattr(self, name) is not None:
                 above_zero(self, name)
         not_negative(self, "damping")
+        if self.belt is not None:
+            object.__setattr__(self, "belt", vector(self, "belt", 3))
+            if self.motion != "fixed" or path or not any(self.belt):
+                raise ValueError(
+                    f"object {self.name}: belt {self.belt}: expected motion 'fixed', no path, and "
+                    "a velocity that is not zero"
+                )
         if path:
+            if not np.isfinite(path).all():
+                raise ValueError(f"object {self.name}: path: expected finite numbers")
             times = [row[0] for row in path]
             if self.motion != "fixed" or any(len(row) != 4 for row in path) or len(path) < 2:
                 raise ValueError(
@@ -113,8 +136,7 @@ class SceneObject:
     @classmethod
     def from_spec(cls, name: str, spec: mujoco.MjSpec, **keywords: Any) -> SceneObject:
         """From a ``mujoco.MjSpec``; its keywords are those of the class."""
-        spec.compile()
-        return cls(name, mjcf=spec.to_xml(), **keywords)
+        return cls(name, mjcf=spec, **keywords)
 
     @property
     def moves(self) -> bool:
@@ -125,6 +147,34 @@ class SceneObject:
     def touchable(self) -> bool:
         """Whether it is something that the arm can touch, not a part of the arm."""
         return self.motion != "held"
+
+
+def _unit(quat: tuple[float, ...], name: str) -> Quat:
+    size = float(np.linalg.norm(quat))
+    if not size > 0:
+        raise ValueError(f"{name}: quat_wxyz {quat}: expected a quaternion that is not zero")
+    w, x, y, z = (c / size for c in quat)
+    return w, x, y, z
+
+
+def _text(mjcf: Any, name: str) -> str:
+    """MJCF text that stands alone."""
+    if isinstance(mjcf, str) and (not mjcf or mjcf.lstrip().startswith("<")):
+        return mjcf
+    try:
+        if isinstance(mjcf, mujoco.MjSpec):
+            spec = mjcf.copy()
+        elif hasattr(mjcf, "to_xml_string"):  # dm_control's
+            spec = mujoco.MjSpec.from_string(mjcf.to_xml_string(), assets=mjcf.get_assets())
+        elif not Path(mjcf).is_file():
+            raise ValueError(f"mjcf {str(mjcf)!r}: no such file, and no MJCF text")
+        else:
+            spec = mujoco.MjSpec.from_file(str(mjcf))
+        inline_meshes(spec, spec.compile())
+        spec.compile()
+    except ValueError as error:
+        raise ValueError(f"object {name}: {' '.join(str(error).split())}") from None
+    return xml_text(spec)
 
 
 def load_objects(path: str | Path) -> tuple[SceneObject, ...]:
@@ -193,23 +243,25 @@ def add_object(spec: mujoco.MjSpec, obj: SceneObject) -> list[mujoco.MjsGeom]:
     )
     if obj.motion == "free":
         body.add_freejoint()
+    if obj.belt is not None:
+        axis = np.array(obj.belt) / np.linalg.norm(obj.belt)
+        body.add_joint(name=obj.name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        body.gravcomp = 1
     geoms = _fill(spec, body, obj)
     for geom in geoms:
         geom.contype = geom.conaffinity = OBJECT_BIT
-        if obj.motion == "free":
-            geom.mass = obj.mass / len(geoms)
+        if obj.motion == "free" or obj.belt is not None:
+            geom.mass = (obj.mass if obj.belt is None else BELT_MASS) / len(geoms)
     return geoms
 
 
 def _fill(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: SceneObject) -> list[mujoco.MjsGeom]:
     """The geoms of an object on a body, named after it."""
     if obj.mjcf:
-        text = obj.mjcf
-        child = (
-            mujoco.MjSpec.from_string(text)
-            if text.lstrip().startswith("<")
-            else mujoco.MjSpec.from_file(text)
-        )
+        try:
+            child = mujoco.MjSpec.from_string(obj.mjcf)
+        except ValueError as error:
+            raise ValueError(f"object {obj.name}: {' '.join(str(error).split())}") from None
         spec.attach(child, frame=body.add_frame(), prefix=f"{obj.name}_")
     else:
         for k, shape in enumerate(obj.shapes):
@@ -220,6 +272,37 @@ def _fill(spec: mujoco.MjSpec, body: mujoco.MjsBody, obj: SceneObject) -> list[m
     for k, geom in enumerate(geoms):
         geom.name = f"{obj.name}_{k}"
     return geoms
+
+
+def check_apart(model: mujoco.MjModel, objects: tuple[SceneObject, ...]) -> None:
+    """Free objects overlap nothing else that objects can touch at the beginning.
+
+    Raises:
+        ValueError: one does, by more than :data:`RESTING`; the message has both names.
+    """
+    free = {obj.name for obj in objects if obj.motion == "free"}
+    if not free:
+        return
+    data, parts = mujoco.MjData(model), {obj.name for obj in objects if obj.touchable}
+    mujoco.mj_fwdPosition(model, data)
+    for contact in data.contact:
+        names = [_owner(model, int(geom), parts) for geom in contact.geom]
+        if contact.dist < -RESTING and names[0] != names[1] and free & set(names):
+            first, second = sorted(names, key=lambda name: name not in free)
+            raise ValueError(
+                f"objects: {first} is {-1000 * contact.dist:.0f} mm inside {second}; expected free "
+                "objects that overlap nothing"
+            )
+
+
+def _owner(model: mujoco.MjModel, geom: int, parts: set[str]) -> str:
+    """The object that a geom belongs to, else the geom's own name."""
+    body = int(model.geom_bodyid[geom])
+    while body:
+        if model.body(body).name in parts:
+            return str(model.body(body).name)
+        body = int(model.body_parentid[body])
+    return model.geom(geom).name or "the scene"
 
 
 def _below(body: mujoco.MjsBody) -> Iterable[mujoco.MjsBody]:

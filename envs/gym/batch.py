@@ -103,7 +103,8 @@ class Batch:
             regions).
         peak: of each body region, by the names of :data:`PEAK`, zero without a touch, shape (rows,
             regions).
-        reaches, walks: what a person does, see :func:`tauguard.envs.gym.people.draw_script`.
+        reaches, walks: what people do, person after person, see
+            :func:`tauguard.envs.gym.people.draw_script`.
         drawn: what differs from the scene in each copy's episode, by name.
     """
 
@@ -129,8 +130,9 @@ class Batch:
         self.alarm_last = np.zeros(rows, dtype=np.bool_)
         self.cost_sum = np.zeros(rows)
         self.drawn: list[dict[str, Array]] = [{} for _ in range(rows)]
-        self.reaches = np.zeros((rows, 2, REACHES, _plant.REACH_WIDTH))
-        self.walks = np.zeros((rows, WALKS, _plant.WALK_WIDTH))
+        people = max(1, len(compiled.people))
+        self.reaches = np.zeros((rows, 2 * people, REACHES, _plant.REACH_WIDTH))
+        self.walks = np.zeros((rows, people * WALKS, _plant.WALK_WIDTH))
         self._variants: list[Variant | None] = [None] * rows
         self._scratch = mujoco.MjData(compiled.scene.model)
         self.datas = [mujoco.MjData(compiled.scene.model) for _ in range(rows)]
@@ -153,10 +155,10 @@ class Batch:
         variant = self._variants[i]
         return self.compiled.scene.model if variant is None else variant.model
 
-    def person(self, i: int) -> Person | None:
-        """The person of copy ``i``."""
+    def people(self, i: int) -> tuple[Person, ...]:
+        """The people of copy ``i``."""
         variant = self._variants[i]
-        return self.compiled.person if variant is None else variant.person
+        return self.compiled.people if variant is None else variant.people
 
     def draw(self, i: int, rng: np.random.Generator, stated: Mapping[str, Any]) -> None:
         """Draw what the setting ``randomize`` names for the next episode of copy ``i``."""
@@ -181,11 +183,12 @@ class Batch:
         mujoco.mj_resetData(self.model(i), data)
         data.qpos[self.compiled.scene.qpos_adr] = q
 
-    def send_person(self, i: int, rng: np.random.Generator) -> None:
-        """Draw what the person of copy ``i`` does in the next episode, if there is one."""
-        person = self.person(i)
-        if person is not None:
-            self.reaches[i], self.walks[i] = draw_script(person, rng)
+    def send_people(self, i: int, rng: np.random.Generator) -> None:
+        """Draw what the people of copy ``i`` do in the next episode."""
+        for p, person in enumerate(self.people(i)):
+            reaches, walks = draw_script(person, rng)
+            self.reaches[i, 2 * p : 2 * p + 2] = reaches
+            self.walks[i, p * WALKS : (p + 1) * WALKS] = walks
 
     def start(self, i: int) -> None:
         """Begin an episode of copy ``i`` from the state in its data.
@@ -330,7 +333,7 @@ class Batch:
             reaches=self.reaches[i],
             walks=self.walks[i],
         )
-        around = _surroundings(compiled, self.observations, self.person(i))
+        around = _surroundings(compiled, self.observations, self.people(i))
         plant.surround(around, _controls(compiled), rows, substeps=compiled.settings.substeps)
         return plant
 
@@ -358,7 +361,7 @@ def _controls(compiled: CompiledScene) -> _plant.Controls:
 
 
 def _surroundings(
-    compiled: CompiledScene, observations: list[Entry], person: Person | None
+    compiled: CompiledScene, observations: list[Entry], people: tuple[Person, ...]
 ) -> _plant.Surroundings:
     model, scene = compiled.scene.model, compiled.scene
     each = len(scene.joint_names) // compiled.arms
@@ -381,8 +384,8 @@ def _surroundings(
             _plant.Tool(site=site, body=body, first=first) for site, body, first in compiled.tools
         ],
         regions=[_region(compiled, region) for region in compiled.regions],
-        person_begin=-1 if person is None else len(scene.spec.proxies),
-        person=anatomy(person),
+        people_begin=len(scene.spec.proxies),
+        people=[anatomy(person) for person in people],
         sensor_begin=_sensor(model, "contact_link1") if labels else -1,
         low=[entry.low for entry in observations],
         high=[entry.high for entry in observations],

@@ -33,6 +33,7 @@ from tauguard.models import (
     without_losses,
 )
 from tauguard.models.person import PersonPart
+from tauguard.models.scene import people_parts
 
 #: A tool pose to reach lies at least this high and this far from the base's axis [m], of a short
 #: arm nearer [reach].
@@ -98,7 +99,7 @@ class CompiledScene:
     max_speed: Array  #: [rad/s], shape (n,)
     tools: tuple[tuple[int, int, int], ...]  #: an arm: site or -1, body, index of its first joint
     regions: tuple[RegionInfo, ...]
-    person: Person | None
+    people: tuple[Person, ...]
     force_bound: ForceBound
     layout: Layout  #: the arm's reach, and how things were placed
 
@@ -106,6 +107,11 @@ class CompiledScene:
     def arms(self) -> int:
         """How many arms there are."""
         return len(self.tools)
+
+    @property
+    def person(self) -> Person | None:
+        """The first of the people."""
+        return self.people[0] if self.people else None
 
     @functools.cached_property
     def least_pressure(self) -> Array:
@@ -165,9 +171,9 @@ def compile_scene(
         visuals=False,
     )
     layout = Layout.of(bare, arm_reach(bare), moved)
-    proxies, person = _people(settings, bare, layout, places)
-    check_names(settings.randomize or {}, person, settings.checkers)
-    spec = replace(spec, proxies=proxies, person=person)
+    proxies, people = _people(settings, bare, layout, places)
+    check_names(settings.randomize or {}, people, settings.checkers)
+    spec = replace(spec, proxies=proxies, people=people)
     if settings.table is not None and "table" in default:
         spec = replace(spec, table=layout.table(settings.table))
     if settings.cloth is not None and "cloth" in default:
@@ -187,19 +193,19 @@ def compile_scene(
 
 def _people(
     settings: Settings, bare: Scene, layout: Layout, places: type[Usual]
-) -> tuple[tuple[BodyProxy, ...], Person | None]:
-    """The body regions and the person that were asked for, placed."""
+) -> tuple[tuple[BodyProxy, ...], tuple[Person, ...]]:
+    """The body regions and the people that were asked for, placed."""
     proxies: list[BodyProxy] = []
-    person = None
+    people: list[Person] = []
     for item in settings.obstacles:
         if isinstance(item, Person):
-            person = item
+            people.append(item)
         elif item == PERSON:
-            person = layout.person(places.person(bare, layout))
+            people.append(layout.person(places.person(bare, layout)))
         else:
             own = item if isinstance(item, BodyProxy) else places.proxy(item, bare, layout)
             proxies.append(own)
-    return tuple(proxies), person
+    return tuple(proxies), tuple(people)
 
 
 def _known(
@@ -227,7 +233,7 @@ def _known(
         max_speed=np.tile(speed, arms),
         tools=find_tools(scene, arms),
         regions=_regions(scene, layout.reach),
-        person=scene.spec.person,
+        people=scene.spec.people,
         force_bound=_force_bound(settings, scene, bare, speed, arms),
         layout=layout,
     )
@@ -247,18 +253,18 @@ def _force_bound(
     regions = _regions(scene, 1.0)
     if regions:
         masses = scene.model.body_mass[[r.body for r in regions]]
-        speeds = [_fastest(r, scene.spec.person) for r in regions]
+        speeds = [_fastest(r, scene.spec.people) for r in regions]
         driven += float((0.5 * masses * np.square(speeds)).max())
     stiffness = max([BODY_REGIONS["skull"].stiffness, *(r.stiffness for r in regions)])
     return ForceBound(math.sqrt(2 * stiffness * moving), math.sqrt(2 * stiffness * driven))
 
 
-def _fastest(region: RegionInfo, person: Person | None) -> float:
+def _fastest(region: RegionInfo, people: tuple[Person, ...]) -> float:
     """At which a region may meet the arm [m/s]."""
-    if region.mocap < 0 or person is None:
+    if region.mocap < 0:
         return region.speed
     limb = region.name.endswith(("hand", "arm"))
-    return person.walk_speed + (person.hand_speed if limb else 0.0)
+    return max(person.walk_speed + (person.hand_speed if limb else 0.0) for person in people)
 
 
 def nominal_drive(settings: Settings, bare: Scene) -> Drive:
@@ -269,10 +275,9 @@ def nominal_drive(settings: Settings, bare: Scene) -> Drive:
 def _regions(scene: Scene, reach: float) -> tuple[RegionInfo, ...]:
     """The proxies, the person's, then the objects."""
     spec = scene.spec
-    person = () if spec.person is None else spec.person.parts()
     return (
         *(_region(scene, proxy, reach) for proxy in spec.proxies),
-        *(_segment(scene, part) for part in person),
+        *(_segment(scene, part) for part in people_parts(spec)),
         *(_object(scene, obj) for obj in spec.objects if obj.touchable),
     )
 

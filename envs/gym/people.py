@@ -21,10 +21,8 @@ ASIDE, BEHIND = (0.5, 1.2), (0.0, 0.6)
 AHEAD, ACROSS, ABOVE = (0.5, 1.3), (-0.5, 0.8), (0.0, 0.55)
 
 
-def anatomy(person: Person | None) -> _plant.Anatomy:
+def anatomy(person: Person) -> _plant.Anatomy:
     """The native form."""
-    if person is None:
-        return _plant.Anatomy()
     names = (
         "trunk", "shoulder", "hip_half", "neck", "head", "upper_arm", "lower_arm", "hand",
         "grip", "thigh", "shank",

@@ -11,6 +11,7 @@ import numpy as np
 
 from tauguard.arrays import Array
 from tauguard.models import BodyProxy, Cloth, Person, Scene, Table, cura6
+from tauguard.models.scene import people_parts
 
 Vector = tuple[float, float, float]
 
@@ -34,6 +35,8 @@ STEP, MOVES = 0.05, 16
 #: An arm whose first joint is higher above its floor than this [reach] stands on a pedestal; one
 #: that works below that joint hangs from this height [reach].
 SHOULDER, HANGING = 0.5, 1.1
+#: People may stand this far within a table or an object [m].
+LEANING = 0.01
 #: A base within this of the origin stands in it [reach].
 CENTRED = 0.1
 
@@ -46,7 +49,7 @@ class StartsInContact(ValueError):
         self.kind = kind
         super().__init__(
             f"the episode begins in contact: {link} is {1000 * depth:.1f} mm inside {other}; "
-            "expected a place that the arm leaves free at home"
+            "expected a place that is free at the beginning, the arm at home"
         )
 
 
@@ -200,6 +203,7 @@ def check_clear(
     for name in ("qpos", "mocap_pos", "mocap_quat"):
         getattr(scratch, name)[:] = getattr(data, name)
     mujoco.mj_fwdPosition(model, scratch)
+    _check_people(scene, model, scratch)
     if not scratch.ncon:
         return
     contacts, links = scratch.contact, set(scene.link_bodies.tolist())
@@ -219,10 +223,31 @@ def check_clear(
         body = int(bodies[k, other])
         name = model.body(body).name if body in links else model.geom(geom).name
         name = name or model.body(body).name
-    kinds = {"person_": "person", "table": "table", SECOND: "second arm"}
+    kinds = {"person": "person", "table": "table", SECOND: "second arm"}
     kind = next((kinds[start] for start in kinds if name.startswith(start)), name)
     if geom < 0:
         kind = "cloth"
     elif kind == name and link.startswith(SECOND):  # the first arm's base
         kind = "second arm"
     raise StartsInContact(kind, link, name, float(depth[k]))
+
+
+def _check_people(scene: Scene, model: mujoco.MjModel, placed: mujoco.MjData) -> None:
+    """Whether people overlap no table and no object, which they do not touch in the simulation."""
+    spec = scene.spec
+    around = [model.geom("table").id] if spec.table is not None else []
+    bodies = {model.body(obj.name).id for obj in spec.objects if obj.touchable}
+    around += [g for g in range(model.ngeom) if _within(model, int(model.geom_bodyid[g]), bodies)]
+    for part in people_parts(spec) if around else ():
+        own = model.geom(part.name).id
+        for geom in around:
+            depth = -mujoco.mj_geomDistance(model, placed, own, geom, 0.1, None)
+            if depth > LEANING:
+                other = model.geom(geom).name
+                raise StartsInContact("person", part.name, other, float(depth))
+
+
+def _within(model: mujoco.MjModel, body: int, of: set[int]) -> bool:
+    while body and body not in of:
+        body = int(model.body_parentid[body])
+    return body in of

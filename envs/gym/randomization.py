@@ -14,7 +14,6 @@ from tauguard.arrays import Array
 from tauguard.models import Drive, Person, Scene
 from tauguard.models.obstacles import pair_weights
 from tauguard.models.payload import load_body
-from tauguard.models.person import SEGMENTS
 
 if TYPE_CHECKING:
     from tauguard.envs.gym.compiled import CompiledScene
@@ -154,14 +153,16 @@ def _in_range(where: str, name: str, values: Array) -> None:
         raise ValueError(f"{where} {values.tolist()}: expected {low:g} to {high:g}")
 
 
-def check_names(names: Iterable[str], person: Person | None, checkers: tuple[str, ...]) -> None:
+def check_names(
+    names: Iterable[str], people: tuple[Person, ...], checkers: tuple[str, ...]
+) -> None:
     """Whether the scene has what is drawn.
 
     Raises:
         ValueError: it has not; the message names the first.
     """
     for name in names:
-        if name in _OF_PERSON and person is None:
+        if name in _OF_PERSON and not people:
             raise ValueError(f"randomize: {name!r} without a person; add obstacles=('person',)")
         if name == "stature" and checkers:
             raise ValueError("randomize: 'stature' with checkers: they know one size of the person")
@@ -211,19 +212,18 @@ class Variant:
 
     model: mujoco.MjModel
     drive: Drive
-    person: Person | None
+    people: tuple[Person, ...]
 
 
 def vary(compiled: CompiledScene, model: mujoco.MjModel, drawn: Mapping[str, Array]) -> Variant:
     """Put drawn values into ``model``, the model of one copy."""
     base = compiled.scene.model
     _weigh(compiled.scene, base, model, drawn)
-    person = compiled.person
-    if person is not None:
-        own: dict[str, Any] = {name: float(drawn[name][0]) for name in _OF_PERSON if name in drawn}
-        person = replace(person, **own)
-        _resize(model, person)
-    return Variant(model, _drive(compiled.scene.drive, drawn), person)
+    own: dict[str, Any] = {name: float(drawn[name][0]) for name in _OF_PERSON if name in drawn}
+    people = tuple(replace(person, **own) for person in compiled.people)
+    for number, person in enumerate(people):
+        _resize(model, person, number)
+    return Variant(model, _drive(compiled.scene.drive, drawn), people)
 
 
 def _weigh(
@@ -244,9 +244,9 @@ def _weigh(
     model.pair_solref[direct] = base.pair_solref[direct] * ratio[:, None]
 
 
-def _resize(model: mujoco.MjModel, person: Person) -> None:
-    for segment in SEGMENTS:
-        geom = model.geom(f"person_{segment.name}").id
+def _resize(model: mujoco.MjModel, person: Person, number: int) -> None:
+    for part in person.parts(number):
+        geom, segment = model.geom(part.name).id, part.segment
         radius, half = segment.radius * person.stature, segment.half * person.stature
         model.geom_size[geom, :2] = radius, half
         model.geom_rbound[geom] = radius + half

@@ -72,7 +72,7 @@ class Reach(Task):
         home = batch.compiled.scene.home
         batch.place(i, home + rng.uniform(-START_SPREAD, START_SPREAD, len(home)))
         self.send_regions(i, rng)
-        batch.send_person(i, rng)
+        batch.send_people(i, rng)
         batch.start(i)
         for arm in range(batch.compiled.arms):
             batch.target[i, arm] = self.draw(i, rng, arm, None)

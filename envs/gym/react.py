@@ -99,7 +99,7 @@ class React(Task):
         self.swing[i] = self._plan(begin, speed, period)
         batch.place(i, self.swing[i][0])
         batch.target[i, 0] = begin + (self._run_up + self._beyond) * self._along
-        batch.send_person(i, rng)
+        batch.send_people(i, rng)
         batch.start(i)
         self.memory[i] = 0.0
         still = np.zeros(len(batch.actions))

@@ -12,7 +12,7 @@ from tauguard.models import Drive, Scene
 from tauguard.models.arm import ARM_BITS, OBSTACLE_BITS
 from tauguard.models.mjcf import SpecText
 from tauguard.models.obstacles import Springy, add_pairs
-from tauguard.models.scene import _add_label, label_region, lean_model, region_names
+from tauguard.models.scene import _add_label, label_region, lean_model, people_parts, region_names
 
 #: The second arm stands so far ahead of the first [m] and faces it.
 APART = 1.1
@@ -49,9 +49,8 @@ def add_second_arm(scene: Scene, place: tuple[float, float, float] = (APART, 0.0
             _add_label(whole, link, f"contact_link{i}")
         for name in region_names(scene.spec):
             label_region(whole, scene.spec, name)
-    person = () if scene.spec.person is None else scene.spec.person.parts()
     parts: dict[str, Springy] = {proxy.region: proxy for proxy in scene.spec.proxies}
-    parts |= {part.name: part for part in person}
+    parts |= {part.name: part for part in people_parts(scene.spec)}
     parts |= {
         geom.name: obj
         for obj in scene.spec.objects

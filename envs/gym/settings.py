@@ -119,9 +119,8 @@ def _check_obstacles(obstacles: tuple[Any, ...]) -> None:
     for item in obstacles:
         if not isinstance(item, BodyProxy | Person) and item not in known:
             raise ValueError(f"obstacles: {item!r}; expected some of {', '.join(known)}")
-    people = [item for item in obstacles if item == PERSON or isinstance(item, Person)]
-    if len(people) > 1:
-        raise ValueError(f"obstacles: {len(people)} persons; expected at most one")
+    if obstacles.count(PERSON) > 1:
+        raise ValueError("obstacles: 'person' twice; place others by Person(position=...)")
 
 
 def _objects(value: Any) -> tuple[SceneObject, ...]:

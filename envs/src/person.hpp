@@ -121,6 +121,9 @@ class Person {
     if (body_.reacts && force > felt && touched_[segment] < 0) touched_[segment] = t;
   }
 
+  // How far the nearer hand is from a place [m].
+  double away(Vec3 place) const { return std::min(norm(place - grip_[0]), norm(place - grip_[1])); }
+
   // The nearer hand goes to a place now, whatever it was about to do.
   void aim(Vec3 place, double hold, double t) {
     if (walking_ || body_.hanging) return;

@@ -225,21 +225,21 @@ void bind_surroundings(nb::module_& m) {
       .def(
           "__init__",
           [](Surroundings* self, std::vector<Link> links, Numbers gravity, std::vector<Tool> tools,
-             std::vector<Region> regions, int person_begin, const Anatomy& person, int sensor_begin,
-             Numbers low, Numbers high) {
+             std::vector<Region> regions, int people_begin, const std::vector<Anatomy>& people,
+             int sensor_begin, Numbers low, Numbers high) {
             if (gravity.size() != 3) throw nb::value_error("gravity: expected three numbers");
             new (self) Surroundings{
                 Kinematics{nullptr, std::move(links), Vec3{gravity[0], gravity[1], gravity[2]}},
                 std::move(tools),
                 std::move(regions),
-                person_begin,
-                Person(person),
+                people_begin,
+                std::vector<Person>(people.begin(), people.end()),
                 std::move(low),
                 std::move(high),
                 sensor_begin};
           },
-          nb::kw_only(), "links"_a, "gravity"_a, "tools"_a, "regions"_a, "person_begin"_a,
-          "person"_a, "sensor_begin"_a, "low"_a, "high"_a);
+          nb::kw_only(), "links"_a, "gravity"_a, "tools"_a, "regions"_a, "people_begin"_a,
+          "people"_a, "sensor_begin"_a, "low"_a, "high"_a);
 }
 
 void bind_outputs(nb::module_& m) {
@@ -322,6 +322,10 @@ void bind_plant(nb::module_& m) {
             p.carried.push_back(std::move(c));
           },
           "mocap"_a, "path"_a)
+      .def(
+          "belt",
+          [](Plant& p, int qpos, int dof, double speed) { p.belts.push_back({qpos, dof, speed}); },
+          "qpos"_a, "dof"_a, "speed"_a)
       .def("reset", &Plant::reset)
       .def("relax", &Plant::relax)
       .def("step", &step_one, "action"_a)

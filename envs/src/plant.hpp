@@ -33,6 +33,12 @@ struct Carried {
   }
 };
 
+// The surface of a conveyor: a slide that moves at a speed [m/s] and stays where it is.
+struct Belt {
+  int qpos = -1, dof = -1;
+  double speed = 0;
+};
+
 class Plant {
  public:
   Plant(Physics physics, DriveTrain drives)
@@ -47,13 +53,14 @@ class Plant {
   Controls controls;
   int substeps = 1;
   std::vector<Carried> carried;
+  std::vector<Belt> belts;
 
   // Prepares the plant for an environment: sets the surroundings of the arm and the output rows.
   void surround(Surroundings around, Rows rows) {
     around_ = std::move(around);
     around_.arms.physics = &physics_;
     rows_ = std::move(rows);
-    if (peopled()) around_.person.bind(script());
+    for (std::size_t p = 0; p < around_.people.size(); ++p) around_.people[p].bind(script(p));
   }
 
   std::size_t joints() const { return drives_.size(); }
@@ -78,9 +85,9 @@ class Plant {
     std::fill_n(rows_.tau_ext.data(), joints(), 0.0);
     clear_peaks();
     speeds_.assign(around_.regions.size(), Vec3{});
-    if (peopled()) {
-      around_.person.reset(script());
-      show_person();
+    for (std::size_t p = 0; p < around_.people.size(); ++p) {
+      around_.people[p].reset(script(p));
+      show_person(p);
     }
     for (std::size_t i = 0; i < joints(); ++i) q_[i] = physics_.qpos()[drives_.joints[i].qpos];
     controls.reset(q_);
@@ -111,9 +118,12 @@ class Plant {
     }
   }
 
-  // The person's nearer hand goes to a place [m] now and stays there for `hold` [s].
+  // The hand that is nearest to a place [m] goes there now and stays for `hold` [s].
   void aim(Vec3 place, double hold) {
-    if (peopled()) around_.person.aim(place, hold, static_cast<double>(count_) * drives_.dt);
+    Person* nearest = nullptr;
+    for (Person& person : around_.people)
+      if (!nearest || person.away(place) < nearest->away(place)) nearest = &person;
+    if (nearest) nearest->aim(place, hold, static_cast<double>(count_) * drives_.dt);
   }
 
   void finish() {
@@ -199,7 +209,7 @@ class Plant {
     for (Region& r : around_.regions) each(r.touching), each(r.force);
     speeds_.resize(around_.regions.size());
     for (Vec3& v : speeds_) each(v.x), each(v.y), each(v.z);
-    if (peopled()) around_.person.visit(each);
+    for (Person& person : around_.people) person.visit(each);
     Contact& c = contact_;
     each(c.force), each(c.cost), each(c.ratio), each(c.region_force), each(c.link), each(c.region);
     each(c.onset), each(c.onset_time), each(c.last);
@@ -235,7 +245,9 @@ class Plant {
       return k >= 0 && static_cast<std::size_t>(k) <= most;
     };
     return within(contact_.link, joints()) && within(contact_.region, around_.regions.size()) &&
-           count_ >= 0 && (!peopled() || around_.person.plausible());
+           count_ >= 0 &&
+           std::all_of(around_.people.begin(), around_.people.end(),
+                       [](const Person& p) { return p.plausible(); });
   }
 
   // One physics step: the state before it into a row, the drives' torques, mj_step.
@@ -250,7 +262,7 @@ class Plant {
       physics_.applied()[j.dof] = drives_.apply(i, wanted, q[i], qd[i]) + held;
       current[i] = drives_.states[i].current;
     }
-    if (peopled()) move_person();
+    for (std::size_t p = 0; p < around_.people.size(); ++p) move_person(p);
     carry();
     physics_.step();
     sound_ = physics_.sound();
@@ -263,30 +275,38 @@ class Plant {
       double* place = physics_.mocap_position(c.mocap);
       place[0] = p.x, place[1] = p.y, place[2] = p.z;
     }
+    for (const Belt& b : belts) physics_.qpos()[b.qpos] = 0, physics_.qvel()[b.dof] = b.speed;
   }
 
-  bool peopled() const { return around_.person_begin >= 0; }
-
-  Script script() const {
-    return {rows_.reaches.data(), rows_.walks.data(), rows_.reaches.shape(1), rows_.walks.shape(0)};
+  // Of a person: two rows of hands, and their part of the walks.
+  Script script(std::size_t p) const {
+    const std::size_t reaches = rows_.reaches.shape(1);
+    const std::size_t walks = rows_.walks.shape(0) / around_.people.size();
+    return {rows_.reaches.data() + p * 2 * reaches * reach_width,
+            rows_.walks.data() + p * walks * walk_width, reaches, walks};
   }
 
-  void move_person() {
-    Person& person = around_.person;
+  std::size_t first_region(std::size_t p) const {
+    return static_cast<std::size_t>(around_.people_begin) + p * person_segments;
+  }
+
+  void move_person(std::size_t p) {
+    Person& person = around_.people[p];
     const double t = static_cast<double>(count_) * drives_.dt;
     for (int k = 0; k < person_segments; ++k)
-      person.touch(k, around_.regions[around_.person_begin + k].force, t);
+      person.touch(k, around_.regions[first_region(p) + k].force, t);
     person.advance(t, drives_.dt);
-    show_person();
+    show_person(p);
   }
 
-  void show_person() {
+  void show_person(std::size_t p) {
+    const Person& person = around_.people[p];
     for (int k = 0; k < person_segments; ++k) {
-      const int mocap = around_.regions[around_.person_begin + k].mocap;
-      const Vec3 c = around_.person.centre[k];
+      const int mocap = around_.regions[first_region(p) + k].mocap;
+      const Vec3 c = person.centre[k];
       double* place = physics_.mocap_position(mocap);
       place[0] = c.x, place[1] = c.y, place[2] = c.z;
-      std::copy_n(around_.person.quat_wxyz[k].data(), 4, physics_.mocap_quaternion(mocap));
+      std::copy_n(person.quat_wxyz[k].data(), 4, physics_.mocap_quaternion(mocap));
     }
   }
 

@@ -23,8 +23,8 @@ struct Surroundings {
   Kinematics arms;
   std::vector<Tool> tools;
   std::vector<Region> regions;
-  int person_begin = -1;  // the first of a person's regions; -1: nobody is there
-  Person person;
+  int people_begin = 0;  // the first of the people's regions, person after person
+  std::vector<Person> people;
   std::vector<double> low, high;  // of the observation
   int sensor_begin = -1;          // of the links' contact sensors; -1: none
 };
@@ -35,7 +35,7 @@ struct Rows {
   Held q, qd, current, tau;  // physics steps x joints
   Held contact, region;      // physics steps x contact_width, physics steps x regions x 7
   Held tau_peak, peak;       // joints; regions x peak_width
-  Held reaches, walks;       // the person's script: hands x rows x reach_width, rows x walk_width
+  Held reaches, walks;       // the people's scripts: hands x rows x reach_width, rows x walk_width
 
   Metrics& result() const { return *reinterpret_cast<Metrics*>(metrics.data()); }
 };

@@ -188,5 +188,48 @@ def test_forces_on_a_person_are_the_engines():
 def test_obstacles_say_what_would_work():
     with pytest.raises(ValueError, match="person, skull"):
         gym.make(REACH, obstacles=("persn",))
-    with pytest.raises(ValueError, match="at most one"):
-        gym.make(REACH, obstacles=("person", FAR))
+    with pytest.raises(ValueError, match="'person' twice"):
+        gym.make(REACH, obstacles=("person", "person"))
+
+
+def test_several_people_are_each_as_if_alone():
+    """Their regions follow one another, and each moves as the only person with the same script."""
+    other = Person(position=(-0.2, 1.4), facing=-np.pi / 2)
+    both = gym.make(REACH, obstacles=("person", other)).unwrapped
+    both.reset(seed=3)
+    assert len(both.regions) == 30
+    assert both.regions[15].name == "person2_skull"
+    alone = gym.make(REACH, obstacles=(other,)).unwrapped
+    alone.reset(seed=3)
+    batch = alone.batch
+    batch.reaches[0], batch.walks[0] = both.batch.reaches[0, 2:], both.batch.walks[0, 8:]
+    batch.start(0)
+    for _ in range(150):
+        both.step(np.zeros(6))
+        alone.step(np.zeros(6))
+    model, data = both.model, both.data
+    for region in alone.regions:
+        twin = region.name.replace("person_", "person2_")
+        there = data.body(f"{twin}_motion").xpos
+        assert there == pytest.approx(alone.data.body(f"{region.name}_motion").xpos, abs=1e-12)
+    state = both.get_state()
+    once = both.step(np.full(6, 0.1))[0]
+    both.set_state(state)
+    assert np.array_equal(both.step(np.full(6, 0.1))[0], once)
+    assert model.ngeom > 30
+
+
+def test_a_second_person_is_felt_limited_and_costed():
+    """A person placed into the tool's path is hit although they are not the first."""
+    other = Person(position=(0.0, 0.45), facing=-np.pi / 2, motion="still", reacts=False)
+    env = gym.make(REACH, obstacles=(FAR, other), control="joint_velocity").unwrapped
+    env.reset(seed=0)
+    hit = np.zeros(30)
+    for _ in range(250):
+        *_, info = env.step(np.array([1.0, 0, 0, 0, 0, 0]))
+        hit = np.maximum(hit, info["region_force"])
+        if hit.max() > 50:
+            break
+    assert hit[:15].max() == 0
+    assert hit[15:].max() > 50
+    assert env.regions[info["region"] - 1].name.startswith("person2_")

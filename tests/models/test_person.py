@@ -28,7 +28,7 @@ def test_every_capsule_is_a_region_of_the_limits():
 @pytest.mark.parametrize("posture", ["standing", "seated"])
 def test_the_capsules_weigh_and_measure_what_they_say(stature, posture):
     person = Person(stature=stature, posture=posture)
-    model = compose(SceneSpec(person=person)).model
+    model = compose(SceneSpec(people=(person,))).model
     for part in person.parts():
         geom = model.geom(part.name)
         assert geom.size[0] == pytest.approx(part.segment.radius * stature)
@@ -74,7 +74,7 @@ def test_the_peak_of_a_blow_is_that_of_the_two_mass_model(region, mass, tmp_path
     part = next(p for p in person.parts() if p.segment.name == region)
     path = tmp_path / "rail.xml"
     path.write_text(RAIL.format(z=part.segment.height * person.stature, mass=mass))
-    scene = compose(SceneSpec(arm=str(path), person=person, gravity=(0, 0, 0), timestep=2e-4))
+    scene = compose(SceneSpec(arm=str(path), people=(person,), gravity=(0, 0, 0), timestep=2e-4))
     model, data = scene.model, mujoco.MjData(scene.model)
     # Only the struck capsule stays; the others go out of the way.
     for other in person.parts():

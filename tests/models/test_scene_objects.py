@@ -161,3 +161,80 @@ def test_an_object_in_an_episode_is_hit_labelled_and_in_its_text():
     quiet = trace.truth.contact_force == 0
     assert 0 < quiet.sum() < len(quiet)
     assert (trace.truth.tau_ext[quiet] == 0).all()
+
+
+def test_a_conveyor_carries_what_lies_on_it_and_stays_where_it_is():
+    bed = Shape("box", (0.6, 0.15, 0.02))
+    belt = SceneObject("belt", (bed,), position=(0.0, 0.8, 0.1), belt=(0.3, 0.0, 0.0))
+    part = SceneObject(
+        "part", (Shape("box", (0.03,) * 3),), position=(-0.4, 0.8, 0.15), motion="free"
+    )
+    env = make(belt, part)
+    env.reset(seed=0)
+    places = []
+    for _ in range(200):
+        env.step(np.zeros(6))
+        places.append(env.data.body("part").xpos[0])
+    assert np.diff(places[100:]).mean() / 0.01 == pytest.approx(0.3, rel=0.01)
+    assert env.data.body("belt").xpos == pytest.approx([0.0, 0.8, 0.1], abs=1e-3)
+    trace = simulate(Episode(3, seconds=1.0, objects=(belt, part)))
+    k = trace.truth.obstacle_names.index("part")
+    assert np.ptp(trace.truth.obstacle_poses[:, k, 0, 3]) > 0.2
+
+
+def test_what_is_written_by_dm_control_or_mujoco_is_an_object():
+    spec = mujoco.MjSpec.from_string("<mujoco><worldbody/></mujoco>")
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1])
+    fixtures = [SceneObject("a", mjcf=spec, position=(0.9, 0.5, 0.2))]
+    if (mjcf := pytest.importorskip("dm_control.mjcf")) is not None:
+        root = mjcf.RootElement(model="jig")
+        root.worldbody.add("geom", type="cylinder", size=[0.1, 0.2])
+        fixtures.append(SceneObject("b", mjcf=root, position=(0.9, -0.5, 0.2)))
+    env = make(*fixtures)
+    assert [region.name for region in env.regions] == ["a", "b"]
+    assert env.model.geom("b_0").type == mujoco.mjtGeom.mjGEOM_CYLINDER
+    again = SceneObject(**json.loads(json.dumps({"name": "a", "mjcf": fixtures[0].mjcf})))
+    assert again.mjcf == fixtures[0].mjcf
+
+
+def test_an_mjcf_file_with_a_mesh_stands_alone(tmp_path):
+    trimesh.creation.box((0.1, 0.2, 0.3)).export(tmp_path / "part.stl")
+    text = (
+        '<mujoco><asset><mesh file="part.stl"/></asset><worldbody><geom type="mesh" mesh="part"/>'
+    )
+    (tmp_path / "jig.xml").write_text(text + "</worldbody></mujoco>")
+    jig = SceneObject("jig", mjcf=str(tmp_path / "jig.xml"), position=(0.9, 0.5, 0.2))
+    (tmp_path / "part.stl").unlink()
+    model = mujoco.MjModel.from_xml_string(make(jig).scene.xml)
+    assert sorted(model.geom_aabb[model.geom("jig_0").id, 3:]) == pytest.approx([0.05, 0.1, 0.15])
+
+
+@pytest.mark.parametrize(
+    ("objects", "message"),
+    [
+        ([("link1", (0.9, 0.5, 0.2), "fixed")], "object link1: the scene has a part of this name"),
+        ([("a", (0.9, 0.5, 0.2), "fixed"), ("b", (0.93, 0.5, 0.2), "free")], "b is .* mm inside a"),
+        ([("a", (0.9, 0.5, 0.2), "free"), ("b", (0.93, 0.5, 0.2), "free")], "a is .* mm inside b"),
+    ],
+)
+def test_objects_at_places_that_cannot_be_are_refused_by_name(objects, message):
+    placed = [SceneObject(n, (BALL,), position=p, motion=m) for n, p, m in objects]
+    with pytest.raises(ValueError, match=message):
+        make(*placed)
+    with pytest.raises(ValueError, match=message):
+        simulate(Episode(3, seconds=1.0, objects=tuple(placed)))
+
+
+def test_a_person_does_not_begin_inside_an_object():
+    def at(x):
+        block = SceneObject("block", (Shape("box", (0.1,) * 3),), position=(x, 0.0, 0.1))
+        return gym.make(REACH, obstacles=("person",), objects=(block,)).unwrapped
+
+    free = gym.make(REACH, obstacles=("person",)).unwrapped.compiled.person.position
+    env = at(free[0])
+    assert env.compiled.person.position[0] > free[0] + 0.1
+    env.reset(seed=0)
+    block = env.model.geom("block_0").id
+    for region in env.regions[:-1]:
+        geom = env.model.geom(region.name).id
+        assert mujoco.mj_geomDistance(env.model, env.data, geom, block, 0.5, None) > -0.01

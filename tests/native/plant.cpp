@@ -132,13 +132,13 @@ Surroundings around(const Scene& scene) {
   }
   s.tools.push_back({scene.id(mjOBJ_SITE, "tool"), -1, 0});
   s.regions.push_back(region(scene, "hand", -1));
-  s.person_begin = 1;
+  s.people_begin = 1;
   for (int k = 0; k < person_segments; ++k) {
     const std::string name = "frame" + std::to_string(k);
     s.regions.push_back(region(scene, name, scene.model->body_mocapid[scene.id(mjOBJ_BODY, name)]));
   }
-  s.person = Person({0.9,  0.5,  0.22, 0.1,  0.09, 0.22, 0.32, 0.25,  0.18,  0.09,
-                     0.42, 0.42, 0.0,  M_PI, 1.0,  0.8,  0.2,  false, false, true});
+  s.people.emplace_back(Anatomy{0.9,  0.5,  0.22, 0.1,  0.09, 0.22, 0.32, 0.25,  0.18,  0.09,
+                                0.42, 0.42, 0.0,  M_PI, 1.0,  0.8,  0.2,  false, false, true});
   s.sensor_begin = scene.model->sensor_adr[scene.id(mjOBJ_SENSOR, "on_link1")];
   return s;
 }

@@ -1,0 +1,96 @@
+"""Trained policies as plain files: a small network in NumPy, without pickle and without PyTorch."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tauguard.arrays import Array
+from tauguard.untrusted_input import reading
+
+#: Observations are normalised and cut to this many standard deviations, as VecNormalize does.
+CLIP = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class MlpPolicy:
+    """Layers with tanh between them, after a normalisation of the observation.
+
+    ``policy(observation)`` is the action, shape (m,), or a row each of observations (N, size).
+    """
+
+    mean: Array  #: of the observation, shape (size,)
+    deviation: Array  #: shape (size,)
+    weights: tuple[Array, ...]  #: of each layer, shape (outputs, inputs)
+    biases: tuple[Array, ...]  #: shape (outputs,)
+
+    def __call__(self, observation: ArrayLike) -> Array:
+        """The action, within [-1, 1].
+
+        Raises:
+            ValueError: an observation of another size.
+        """
+        seen = np.asarray(observation, dtype=float)
+        if seen.shape[-1] != len(self.mean):
+            raise ValueError(
+                f"observation of {seen.shape[-1]} numbers: the policy expects {len(self.mean)}, of "
+                "the environment and keywords that it was trained with"
+            )
+        x = np.clip((seen - self.mean) / self.deviation, -CLIP, CLIP)
+        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            x = x @ weight.T + bias
+            if k + 1 < len(self.weights):
+                x = np.tanh(x)
+        return np.clip(x, -1.0, 1.0)
+
+    def __repr__(self) -> str:
+        """Its sizes."""
+        sizes = [len(self.mean), *(len(bias) for bias in self.biases)]
+        return f"MlpPolicy({' -> '.join(map(str, sizes))})"
+
+    def save(self, path: str | Path) -> None:
+        """Write it as a NumPy archive of single precision."""
+        layers = {f"weight{k}": w for k, w in enumerate(self.weights)}
+        layers |= {f"bias{k}": b for k, b in enumerate(self.biases)}
+        arrays = {"mean": self.mean, "deviation": self.deviation, **layers}
+        single: dict[str, Any] = {name: value.astype("f4") for name, value in arrays.items()}
+        np.savez_compressed(path, **single)
+
+    @classmethod
+    def load(cls, path: str | Path) -> MlpPolicy:
+        """The policy of a file.
+
+        Raises:
+            ValueError: not such a file.
+            FileNotFoundError: no such file.
+        """
+        with reading(Path(path), "expected a policy that MlpPolicy.save wrote"):
+            with np.load(path, allow_pickle=False) as file:
+                arrays = {name: np.asarray(file[name], dtype=float) for name in file.files}
+            count = sum(name.startswith("weight") for name in arrays)
+            weights = tuple(arrays[f"weight{k}"] for k in range(count))
+            biases = tuple(arrays[f"bias{k}"] for k in range(count))
+            widths = [len(arrays["mean"]), *map(len, biases)]
+            shapes = [(b, a) for a, b in itertools.pairwise(widths)]
+            if not count or [w.shape for w in weights] != shapes:
+                raise ValueError("layers that do not fit one another")
+            return cls(arrays["mean"], arrays["deviation"], weights, biases)
+
+    @classmethod
+    def from_sb3(cls, model: Any, normalize: Any) -> MlpPolicy:
+        """The mean action of a Stable-Baselines3 actor-critic with a ``VecNormalize``."""
+        net = model.policy
+        layers = [part for part in net.mlp_extractor.policy_net if hasattr(part, "weight")]
+        layers.append(net.action_net)
+        rms = normalize.obs_rms
+        return cls(
+            np.asarray(rms.mean),
+            np.sqrt(np.asarray(rms.var) + normalize.epsilon),
+            tuple(layer.weight.detach().numpy().astype(float) for layer in layers),
+            tuple(layer.bias.detach().numpy().astype(float) for layer in layers),
+        )
