@@ -104,7 +104,7 @@ def arm_surface(
     """The surface of the arm in a robot file, and the links whose shape is a capsule only.
 
     Meshes of a URDF are looked for from its folder upwards. A link without a shape that MuJoCo
-    reads is a capsule along it; how far the last one reaches, nobody knows.
+    reads becomes a capsule along it. This is impossible for the last link, whose end is unknown.
 
     Args:
         path: MJCF or URDF file.
