@@ -192,6 +192,7 @@ class GuardedStepper:
                 integrator RK4; a contact filter (``mjcb_contactfilter``); a mocap pose that is not
                 finite; a shape that is none. Nothing was stepped.
             mujoco.FatalError: an error of MuJoCo's; the state is that of before.
+            RuntimeError: called within a step of this guard: by another thread, or in a callback.
         """
         contacts = self._guard.step(self, each)
         if contacts < 0:

@@ -5,7 +5,9 @@
 
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "arrays.hpp"
 #include "followed_fields.hpp"
@@ -197,6 +199,8 @@ class Guard {
   // The number of contacts where nothing else is to be said, or -1. `owner` is not held beyond the
   // call: it holds this.
   int step(nb::handle owner, nb::object each) {
+    refuse_within_step();
+    const Stepping stepping(this);
     owner_ = owner;
     if (fields_.changed() || !stepper_->acceptable()) owner.attr("_follow")();
     std::function<void()> call;
@@ -226,6 +230,7 @@ class Guard {
   }
 
   nb::bytes saved() const {
+    refuse_within_step();
     Writer writer;
     stepper_->archive(writer);
     return nb::bytes(writer.bytes().data(), writer.bytes().size());
@@ -262,14 +267,28 @@ class Guard {
     return rows_of(through);
   }
   Integers stiffened() const {
+    if (stepping_ != std::this_thread::get_id()) refuse_within_step();
     Integers out;
     for (const int pair : stepper_->stiffened()) out.append(pair);
     return out;
   }
-  void close() { stepper_->close(); }
-  void reset() { stepper_->reset(); }
+  void close() { refuse_within_step(), stepper_->close(); }
+  void reset() { refuse_within_step(), stepper_->reset(); }
 
  private:
+  // While a step is made. The flag is read and written with the GIL held.
+  struct Stepping {
+    explicit Stepping(Guard* guard) : guard(guard) { guard->stepping_ = std::this_thread::get_id(); }
+    ~Stepping() { guard->stepping_ = {}; }
+    Guard* guard;
+  };
+  void refuse_within_step() const {
+    if (stepping_ != std::thread::id{})
+      throw std::runtime_error(
+          "a step of this guard is being made, by another thread or around this callback: wait for "
+          "its end, or use a guard and an MjData for each thread");
+  }
+
   // MuJoCo's stacks, which an error leaves as they were when it came.
   struct Stacks {
     explicit Stacks(const Engine& engine) : e(engine) {
@@ -328,6 +347,7 @@ class Guard {
   std::vector<char> pulled_;
   std::vector<Sheet> sheets_;
   std::unique_ptr<Stepper> stepper_;
+  std::thread::id stepping_;  // that makes a step now, or none
 };
 
 }  // namespace

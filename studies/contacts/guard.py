@@ -18,9 +18,8 @@ import numpy as np
 
 from oracles.energy import EnergyGain
 from oracles.tunnelling import Tunnelling
-from studies.contacts import rigid_scenes as rigid
-from studies.contacts import soft_scenes as soft
-from studies.contacts.drawing import Drawn
+from scenes import rigid, soft
+from scenes.drawing import Drawn
 from studies.framework import JobCache, answer, table_rows
 from tauguard.contacts import GuardedStepper
 from tauguard.contacts.scenes import arm_boxes, arm_cloth

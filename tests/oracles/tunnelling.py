@@ -17,14 +17,16 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from tauguard.arrays import Array
-from tauguard.contacts.pairs import geom_flex_pairs, geom_pairs
 
 #: Fraction of the half thickness that erosion leaves.
 LEFT = 0.03
+#: Pairs whose eroded shapes are closer than this fraction of both half thicknesses at the start
+#: are in each other already.
+SUNK = 0.1
 #: Eroded shapes closer than this have met [m].
 MEET = 1e-7
-#: Most distance queries of one pair on one path.
-MOST = 400
+#: Most distance queries of one pair on one path; a pair that needs more is not judged.
+MOST = 20_000
 #: Faces of a triangle and of a tetrahedron.
 _FACES = {3: [(0, 1, 2), (0, 2, 1)], 4: [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]}
 
@@ -49,29 +51,35 @@ class Tunnelling:
 
     Attributes:
         pairs: Names of the pairs that passed through each other, in order; "flex" names any flex.
+        undecided: Paths that took too many distance queries to be followed to their ends.
 
     Args:
         model: MjModel.
-        data: MjData in the first state. Pairs whose eroded shapes meet there are left out.
+        data: MjData in the first state. Pairs whose eroded shapes meet there, or nearly, are left
+            out.
     """
 
     def __init__(self, model: Any, data: Any) -> None:
         """Make the eroded shapes."""
         self._model, self._scratch = model, mujoco.MjData(model)
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
-        pairs, soft = geom_pairs(model), geom_flex_pairs(model)
-        self._eroded = {g: eroded(model, g) for g in {*pairs.first, *pairs.second, *soft.first}}
-        self._bound = np.where(model.geom_rbound > 0, model.geom_rbound, np.inf)
-        self._reach = np.linalg.norm(model.geom_pos, axis=1) + model.geom_rbound
-        self._soft = [
-            (int(g), int(f), simplices(model, int(f)))
-            for g, f in zip(soft.first, soft.second, strict=True)
-        ]
+        rows, soft = may_touch(model), may_touch_flexes(model)
+        self._eroded = {g: eroded(model, g) for g in {*rows.ravel(), *(g for g, _ in soft)}}
+        self._soft = [(g, f, simplices(model, f)) for g, f in soft]
         self.pairs: list[tuple[str, str]] = []
+        self.undecided = 0
         self._poses = self._read(data, None)
-        rows = np.stack([pairs.first, pairs.second], axis=1)
+        self._bound = np.array([_radius(model, g) for g in range(model.ngeom)])
+        arm = np.linalg.norm(self._poses.geom - self._poses.body[model.geom_bodyid], axis=1)
+        self._reach = arm + np.where(np.isfinite(self._bound), self._bound, 0.0)
         apart = np.array([self._distance(a, b, self._poses, self._poses) for a, b in rows.tolist()])
-        self._pairs, self._apart = rows[apart > 0], apart[apart > 0]
+        thin = np.array([half_thickness(model, g) for g in range(model.ngeom)])
+        free = apart > SUNK * thin[rows].sum(axis=1)
+        self._pairs, self._apart, here = rows[free], apart[free], self._poses
+        self._soft = [
+            (g, f, e[~self._meeting(g, f, e, self._bound[g], here, here, SUNK * thin[g])])
+            for g, f, e in self._soft
+        ]
 
     def observe(self, data: Any) -> None:
         """Follow the path from the last state to this one; ends at the first pair that passed."""
@@ -90,7 +98,7 @@ class Tunnelling:
                 self.pairs.append((self._model.geom(one).name, self._model.geom(other).name))
         for geom, flex, elements in self._soft:
             sweep = self._bound[geom] + moved[geom]
-            if self._meets_flex(geom, flex, elements, sweep, before, after):
+            if self._meeting(geom, flex, elements, sweep, before, after).any():
                 self.pairs.append((self._model.geom(geom).name, "flex"))
 
     def _read(self, data: Any, last: Poses | None) -> Poses:
@@ -125,21 +133,30 @@ class Tunnelling:
         ]
         return self._advance(moving[0], moving[1], 0.0)
 
-    def _meets_flex(
-        self, geom: int, flex: int, elements: Any, sweep: float, before: Poses, after: Poses
-    ) -> bool:
-        """Whether the eroded geom meets one of the simplices on this path."""
-        radius = LEFT * float(self._model.flex_radius[flex])
+    def _meeting(
+        self,
+        geom: int,
+        flex: int,
+        elements: Any,
+        sweep: float,
+        before: Poses,
+        after: Poses,
+        near_by: float = 0.0,
+    ) -> Any:
+        """By simplex: whether the eroded geom comes within ``near_by`` [m] of it. Shape (E,)."""
+        radius = near_by + (SUNK if near_by else LEFT) * float(self._model.flex_radius[flex])
         low = np.minimum(before.vertices, after.vertices)[elements].min(axis=1)
         high = np.maximum(before.vertices, after.vertices)[elements].max(axis=1)
         at = before.geom[geom]
+        sweep += radius
         near = (at + sweep > low).all(axis=1) & (at - sweep < high).all(axis=1)
         near &= (self._model.flex_vertbodyid[elements] != self._model.geom_bodyid[geom]).all(axis=1)
         body = _Body(self._model, geom, self._eroded[geom], self._reach, before, after)
-        return any(
-            self._advance(body, _Simplex(before.vertices[e], after.vertices[e]), radius) <= 0
-            for e in elements[near]
-        )
+        for k in np.flatnonzero(near).tolist():
+            e = elements[k]
+            flat = _Simplex(before.vertices[e], after.vertices[e])
+            near[k] = self._advance(body, flat, radius) <= 0
+        return near
 
     def _advance(self, a: _Body | _Simplex, b: _Body | _Simplex, radius: float) -> float:
         """Conservative advancement: final distance less ``radius`` [m]; 0 if it vanishes before."""
@@ -152,7 +169,8 @@ class Tunnelling:
             if t >= 1 or t + distance / max(speed, 1e-300) >= 1:
                 return max(float(distance - (1 - t) * speed), 1e-12)
             t += distance / speed
-        return 0.0
+        self.undecided += 1
+        return 1e-12
 
 
 class _Body:
@@ -204,6 +222,81 @@ class _Simplex:
         return _convex(x, _FACES[len(x)]), coal.Transform3s.Identity()
 
 
+#: Kinds of geoms that are followed.
+_FOLLOWED = ("PLANE", "SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
+
+
+def _followed(model: Any) -> Any:
+    kinds = [int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in _FOLLOWED]
+    return np.isin(model.geom_type, kinds)
+
+
+def may_touch(model: Any, followed: bool = True) -> Any:
+    """Geoms that MuJoCo lets meet, by its manual's rules. Shape (P, 2), lower id first.
+
+    Args:
+        model: MjModel.
+        followed: Without height fields and signed distance fields.
+    """
+    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    if model.opt.disableflags & off:
+        return np.zeros((0, 2), dtype=int)
+    chosen = np.zeros((model.ngeom, model.ngeom), dtype=bool)
+    weld, kinds = model.body_weldid, mujoco.mjtGeom
+    filtered = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    excluded = {divmod(int(signature), 1 << 16) for signature in model.exclude_signature}
+    for a in range(model.nbody):
+        for b in range(a + 1, model.nbody):
+            one, other = int(weld[a]), int(weld[b])
+            still = model.body_dofnum[one] == 0 and model.body_dofnum[other] == 0
+            if one == other or still or (a, b) in excluded:
+                continue
+            child = (
+                one == weld[model.body_parentid[other]] or other == weld[model.body_parentid[one]]
+            )
+            if filtered and child and one != 0 and other != 0:
+                continue
+            first, second = (
+                model.body_geomadr[k] + np.arange(model.body_geomnum[k]) for k in (a, b)
+            )
+            masks = model.geom_contype[first][:, None] & model.geom_conaffinity[second]
+            back = model.geom_conaffinity[first][:, None] & model.geom_contype[second]
+            chosen[np.ix_(first, second)] = (masks | back) != 0
+    chosen[model.pair_geom1, model.pair_geom2] = True
+    chosen |= chosen.T
+    flat = np.isin(model.geom_type, [int(kinds.mjGEOM_PLANE), int(kinds.mjGEOM_HFIELD)])
+    chosen &= ~(flat[:, None] & flat)
+    if followed:
+        chosen &= _followed(model)[:, None] & _followed(model)
+    return np.argwhere(np.triu(chosen, 1))
+
+
+def may_touch_flexes(model: Any) -> list[tuple[int, int]]:
+    """Geoms, of those that are followed, and flexes that MuJoCo lets meet."""
+    off = mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    if model.opt.disableflags & off:
+        return []
+    masks = model.geom_contype[:, None] & model.flex_conaffinity
+    back = model.geom_conaffinity[:, None] & model.flex_contype
+    found = np.argwhere(((masks | back) != 0) & _followed(model)[:, None])
+    return [(int(g), int(f)) for g, f in found]
+
+
+def _radius(model: Any, geom: int) -> float:
+    """Of a ball around a geom's centre that contains it [m]; infinite for a plane."""
+    kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+    size = np.abs(model.geom_size[geom])
+    if kind == "mesh":
+        return float(np.linalg.norm(_mesh_points(model, geom), axis=1).max())
+    if kind in ("plane", "hfield", "sdf"):
+        return float(np.inf)
+    return float(
+        {"sphere": size[0], "capsule": size[:2].sum(), "cylinder": np.hypot(*size[:2])}.get(
+            kind, np.linalg.norm(size)
+        )
+    )
+
+
 def simplices(model: Any, flex: int) -> Any:
     """Simplices of a flex as indices into the vertices of all flexes. Shape (E, corners)."""
     corners = int(model.flex_dim[flex]) + 1
@@ -231,6 +324,18 @@ def _whole_turns(turn: Array, expected: Array) -> Array:
     return np.asarray(turn + 2 * np.pi * whole[:, None] * axis)
 
 
+def half_thickness(model: Any, geom: int) -> float:
+    """Half the least thickness of a geom [m]; 0 of a plane."""
+    kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+    size = np.abs(model.geom_size[geom])
+    if kind == "mesh":
+        return _inner_ball(ConvexHull(_mesh_points(model, geom)).equations)[1]
+    if kind in ("plane", "hfield", "sdf"):
+        return 0.0
+    least = {"sphere": size[:1], "capsule": size[:1], "cylinder": size[:2]}.get(kind, size)
+    return float(least.min())
+
+
 def eroded(model: Any, geom: int) -> Any:
     """The eroded shape of a geom in its own frame, as a shape of coal's."""
     kind = mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
@@ -252,20 +357,30 @@ def eroded(model: Any, geom: int) -> Any:
 
 def _eroded_mesh(model: Any, geom: int) -> Any:
     """The convex hull with its faces moved inwards."""
-    mesh = int(model.geom_dataid[geom])
-    begin, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    points = np.asarray(model.mesh_vert[begin : begin + count], dtype=np.float64)
+    points = _mesh_points(model, geom)
     faces = ConvexHull(points).equations
-    rows = np.c_[faces[:, :3], np.ones(len(faces))]  # the largest ball: n.x + r <= -d
-    best = linprog([0, 0, 0, -1], rows, -faces[:, 3], bounds=[(None, None)] * 4).x
-    moved = faces + np.array([0, 0, 0, (1 - LEFT) * best[3]])
+    middle, radius = _inner_ball(faces)
+    moved = faces + np.array([0, 0, 0, (1 - LEFT) * radius])
     try:
-        points = np.unique(HalfspaceIntersection(moved, best[:3]).intersections.round(9), axis=0)
+        points = np.unique(HalfspaceIntersection(moved, middle).intersections.round(9), axis=0)
         hull = ConvexHull(points)
     except QhullError:
-        points = best[:3] + LEFT * (points - best[:3])
+        points = middle + LEFT * (points - middle)
         hull = ConvexHull(points)
     return _convex(points, hull.simplices)
+
+
+def _inner_ball(faces: Array) -> tuple[Array, float]:
+    """Centre and radius of the largest ball in a hull: n.x + r <= -d for each face."""
+    rows = np.c_[faces[:, :3], np.ones(len(faces))]
+    best = linprog([0, 0, 0, -1], rows, -faces[:, 3], bounds=[(None, None)] * 4).x
+    return best[:3], float(best[3])
+
+
+def _mesh_points(model: Any, geom: int) -> Array:
+    mesh = int(model.geom_dataid[geom])
+    begin, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    return np.asarray(model.mesh_vert[begin : begin + count], dtype=np.float64)
 
 
 def _convex(points: Any, faces: Any) -> Any:

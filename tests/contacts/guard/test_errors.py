@@ -1,5 +1,8 @@
 """An error within a guarded step leaves the state of before and ends no process."""
 
+import copy
+import threading
+
 import mujoco
 import numpy as np
 import pytest
@@ -92,3 +95,41 @@ def test_a_warning_of_mujocos_still_arrives(tmp_path, monkeypatch):
     finally:
         mujoco.set_mju_user_warning(before)
     assert any("arena memory" in message for message in messages), messages
+
+
+def test_a_step_within_a_step_is_refused():
+    model, data = ball_cloth(50.0).start(5e-3)
+    guard, messages = GuardedStepper(model, data), []
+
+    def each():
+        for call in (guard.step, guard.reset, guard.close, lambda: copy.deepcopy(guard)):
+            with pytest.raises(RuntimeError, match="a step of this guard is being made") as found:
+                call()
+            messages.append(found.value)
+        assert isinstance(guard.stiffened, tuple)
+
+    while not messages:
+        guard.step(each)
+    assert len(messages) % 4 == 0
+
+
+def test_threads_on_one_guard_are_refused_not_mixed():
+    model, data = ball_cloth(50.0).start(5e-3)
+    guard, made, refused = GuardedStepper(model, data), [], []
+
+    def go():
+        for _ in range(10):
+            try:
+                guard.step()
+                made.append(1)
+            except RuntimeError as error:
+                refused.append(str(error))
+
+    threads = [threading.Thread(target=go) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) + len(refused) == 40
+    assert all("use a guard and an MjData for each thread" in text for text in refused)
+    assert data.time == pytest.approx(len(made) * 5e-3)

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from studies.contacts.drawing import (
+from scenes.drawing import (
     AFTER,
     ALONG_X,
     GYRATION,

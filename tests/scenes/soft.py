@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from studies.contacts.drawing import (
+from scenes.drawing import (
     AFTER,
     GEOM,
     INTEGRATORS,
