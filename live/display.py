@@ -30,10 +30,17 @@ class BackgroundDisplay:
         self._wake, self._over = threading.Event(), False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._state = ""
+        self._failed: Exception | None = None
         self.dropped = 0
 
     def put(self, sample: Sample, answer: Answer) -> None:
-        """Take one answer; returns at once."""
+        """Take one answer; returns at once.
+
+        Raises:
+            Exception: what showing an earlier answer raised. Nothing is shown any more.
+        """
+        if self._failed is not None:
+            raise self._failed
         changed, self._state = answer.state != self._state, answer.state
         if len(self._queue) >= self._most and not (changed and len(self._queue) < 2 * self._most):
             self.dropped += 1
@@ -56,5 +63,9 @@ class BackgroundDisplay:
         while not self._over or self._queue:
             self._wake.wait()
             self._wake.clear()
-            while self._queue:
-                self._show(*self._queue.popleft())
+            try:
+                while self._queue:
+                    self._show(*self._queue.popleft())
+            except Exception as error:
+                self._failed = error
+                return

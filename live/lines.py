@@ -56,7 +56,12 @@ class LineStream(Closing):
                 return None
             left = deadline - time.monotonic()
             data = self._file.buffer.raw.read(65536)  # type: ignore[attr-defined]
+            if data is None:  # another process read it, or made the input non-blocking
+                continue
             if not data:
+                if self._pending.strip():  # its last number may be cut
+                    self.events.append(f"line {self._lines + 1} has no end and was left out")
+                    self._pending = b""
                 raise StreamClosed("the input has ended")
             self._pending += data
             if len(self._pending) > LONGEST and b"\n" not in self._pending:

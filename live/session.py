@@ -163,6 +163,7 @@ class _SilenceClock:
         self._session, self._most, self._report = session, most, report
         self._lock, self._over = threading.Lock(), threading.Event()
         self._last = time.monotonic()
+        self._failed: Exception | None = None
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def heard(self, sample: Sample, answer: Answer, latency: int, said: Answer) -> None:
@@ -178,8 +179,18 @@ class _SilenceClock:
             since = time.monotonic() - self._last
             if since < self._most:
                 return self._most - since
-            self._report(*self._session.silent(since))
+            silence = self._session.silent(since)
+            if self._failed is None:
+                try:
+                    self._report(*silence)
+                except Exception as error:  # silence is recorded all the same
+                    self._failed = error
             return self._most
+
+    def check(self) -> None:
+        """Raise what a report raised in the clock's thread."""
+        if self._failed is not None:
+            raise self._failed
 
     def _run(self) -> None:
         while not self._over.wait(self._look()):
@@ -214,7 +225,7 @@ def listen(
         seconds: by this machine's clock.
         report: called after every answer, and every 20 ms while no sample comes (with a sample of
             NaN). It must return at once; the latency does not include it. During silence another
-            thread calls it, never two at a time.
+            thread calls it, never two at a time. An exception of it ends the session.
         keep: keep the samples, for :meth:`Session.trace`.
     """
     session, lateness = Session(stream.joint_names, keep), Lateness(1 / stream.rate)
@@ -225,6 +236,7 @@ def listen(
         with _SilenceClock(session, lateness.most, report or _no_report) as clock:
             while (now := time.monotonic()) < end:
                 sample = stream.read(min(lateness.most, end - now))
+                clock.check()
                 if sample is None:
                     continue
                 answer = monitor.step(sample.t, sample.q, sample.qd, sample.current)

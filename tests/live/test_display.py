@@ -4,6 +4,7 @@ import threading
 import time
 
 import numpy as np
+import pytest
 
 from tauguard.detectors.alarms.monitor import Answer
 from tauguard.live import Sample
@@ -40,3 +41,13 @@ def test_a_terminal_that_hangs_holds_up_nothing_and_what_is_dropped_is_counted()
         assert 980 <= view.dropped <= 991
         hangs.set()
     assert seen[-1] == "fault"  # a change of state is kept
+
+
+def test_a_display_that_fails_is_an_error_and_not_a_screen_that_stands_still():
+    def show(sample, answer):
+        raise BrokenPipeError("nobody reads")
+
+    with BackgroundDisplay(show) as view, pytest.raises(BrokenPipeError, match="nobody reads"):
+        for k in range(1000):
+            view.put(*given(k))
+            time.sleep(0.001)

@@ -358,6 +358,36 @@ def test_a_stream_that_blocks_is_a_fault_by_a_clock_of_its_own():
     assert session.state.startswith("fault: no samples: nothing for 1")
 
 
+def test_a_report_that_fails_during_silence_ends_the_session_with_its_error():
+    """The thread of the clock would end, and silence would be taken for free."""
+
+    def report(sample, answer):
+        if np.isnan(sample.q).all():
+            raise KeyError("told")
+
+    text, into = piped()
+    with pytest.raises(KeyError, match="told"):
+        listen(LineStream(text, ("a",), RATE), AlwaysFree(), 5.0, report)
+    os.close(into)
+    text.close()
+
+
+def test_an_input_that_does_not_block_has_not_ended():
+    """As a shell leaves it that shares its terminal: a read finds nothing although it was ready."""
+    text, into = piped()
+    os.set_blocking(text.fileno(), False)
+    with LineStream(text, ("a",), RATE) as stream:
+        stream._ready = SimpleNamespace(select=lambda timeout: [1], close=lambda: None)
+        assert stream.read(0.01) is None
+        os.write(into, b"1,2,3,4\n5,6,7,8.")
+        assert stream.read(1.0).t == 1
+        os.close(into)
+        with pytest.raises(StreamClosed, match="the input has ended"):
+            stream.read(1.0)
+        assert stream.events == ["line 2 has no end and was left out"]
+    text.close()
+
+
 class Alarmed(AlwaysFree):
     """A monitor whose alarm is up."""
 
