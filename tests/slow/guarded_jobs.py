@@ -29,13 +29,14 @@ _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 class Run:
-    """One scene, guarded or plain, with edits drawn from the same seed."""
+    """One scene: guarded, with edits between steps, or plain without edits."""
 
     def __init__(self, family: str, seed: int, number: int, guarded: bool = True) -> None:
         place = list(FAMILIES).index(family)
         self.rng = np.random.default_rng([seed, place, number])
         self.scene = FAMILIES[family](self.rng)
-        self.rate = 0.02 if family == "crowd" else float(self.rng.choice(RATES))
+        rate = 0.02 if family == "crowd" else float(self.rng.choice(RATES))
+        self.rate = rate if guarded else 0.0
         self.model, self.data = self.scene.start(self.scene.timestep)
         self.guard = GuardedStepper(self.model, self.data) if guarded else None
         self.counts: Counter[str] = Counter(scenes=1)
