@@ -47,7 +47,10 @@ def test_a_display_that_fails_is_an_error_and_not_a_screen_that_stands_still():
     def show(sample, answer):
         raise BrokenPipeError("nobody reads")
 
-    with BackgroundDisplay(show) as view, pytest.raises(BrokenPipeError, match="nobody reads"):
+    def put(view):
         for k in range(1000):
             view.put(*given(k))
             time.sleep(0.001)
+
+    with BackgroundDisplay(show) as view, pytest.raises(BrokenPipeError, match="nobody reads"):
+        put(view)
