@@ -278,7 +278,9 @@ class Guard {
  private:
   // While a step is made. The flag is read and written with the GIL held.
   struct Stepping {
-    explicit Stepping(Guard* guard) : guard(guard) { guard->stepping_ = std::this_thread::get_id(); }
+    explicit Stepping(Guard* guard) : guard(guard) {
+      guard->stepping_ = std::this_thread::get_id();
+    }
     ~Stepping() { guard->stepping_ = {}; }
     Guard* guard;
   };
