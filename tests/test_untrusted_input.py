@@ -106,18 +106,19 @@ def test_bombs_of_nesting_in_robot_and_model_files(tmp_path):
             load_model(model)
 
 
+@pytest.mark.parametrize(("count", "size"), [(2, 70 << 20), (7, 10 << 20)])
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
-def test_mcap_bomb_is_refused_before_it_unpacks(compression, tmp_path):
+def test_mcap_bomb_is_refused_before_it_unpacks(compression, count, size, tmp_path):
     from mcap.writer import CompressionType, Writer
 
     path = tmp_path / "bomb.mcap"
     with open(path, "wb") as stream:
-        writer = Writer(stream, 1 << 31, CompressionType[compression.upper()])
+        writer = Writer(stream, size, CompressionType[compression.upper()])
         writer.start()
         schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
         channel = writer.register_channel("/joint_states", "cdr", schema)
-        for k in range(2):
-            writer.add_message(channel, k, bytes(70 << 20), k)
+        for k in range(count):
+            writer.add_message(channel, k, bytes(size), k)
         writer.finish()
     assert path.stat().st_size < 2_000_000
     for read in (read_log, read_mcap):
