@@ -52,6 +52,9 @@ class Unknowns:
     """Corrections that an error of the model lasts for, fewer in a log slower than ``every``: the
     variance of a correction's noise is so many times ``noise^2``. With 1 the filter takes every
     correction for news."""
+    started: float = 0.0
+    """Motion of a joint before its first correction [s]: the friction of a joint that stands may
+    hold any torque. 0: joints at rest correct the unknowns, too."""
     transition: float = 0.0
     """Relative error of friction that has just changed: with c_j how far it is from its low-pass of
     30/s [N m], (transition c_j)^2 is added to ``noise^2``."""
@@ -61,7 +64,7 @@ class Unknowns:
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
-        for name, least in (("noise_inflation", 1.0), ("transition", 0.0)):
+        for name, least in (("noise_inflation", 1.0), ("transition", 0.0), ("started", 0.0)):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= least):
                 raise ValueError(f"{name} {value}: expected a number, {least:g} or more")
@@ -70,6 +73,27 @@ class Unknowns:
     def for_detection(cls) -> Unknowns:
         """For detectors: model errors last some 0.2 s, and are a tenth of a change of friction."""
         return cls(noise_inflation=20.0, transition=0.1, weighted=True)
+
+    @classmethod
+    def for_logs(cls, mass: float, moment: float) -> Unknowns:
+        """For real arms, whose ``noise`` is 0.3 friction levels: it lasts some 0.6 s.
+
+        Args:
+            mass: standard deviation of the load [kg].
+            moment: of each axis of its first moment [kg m].
+        """
+        return cls(
+            payload=mass,
+            moment=moment,
+            offset=1 / 3,
+            viscous=0.3,
+            coulomb=0.3,
+            slow=300.0,
+            fast=300.0,
+            every=0.05,
+            noise_inflation=12.0,
+            started=0.3,
+        )
 
     @classmethod
     def none(cls) -> Unknowns:
@@ -159,9 +183,8 @@ class Estimator:
         joints = arm.robot.joints
         friction = arm.friction or FrictionModel.coulomb_viscous(np.zeros(joints), 0.0)
         assert arm.noise is not None
-        every = max(1, round(self.unknowns.every / self.dt))
         # An error of the model lasts for fewer corrections where these are further apart.
-        rarer = max(1.0, every * self.dt / self.unknowns.every)
+        rarer = max(1.0, self.dt / self.unknowns.every)
         self.native = _observer.Estimator(
             arm.robot.chain,
             friction.basis(joints),
@@ -172,9 +195,10 @@ class Estimator:
             self.unknowns.persistences(joints),
             [float(s) for s in arm.noise],
             self.unknowns.clip,
-            every,
+            self.unknowns.every,
             max(1.0, self.unknowns.noise_inflation / rarer),
             self.unknowns.transition,
+            self.unknowns.started,
             self.unknowns.weighted,
             arm.sensors.fusion_gains(self.dt) if arm.sensors else [],
             PLAIN_GAIN,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from tauguard.arrays import Array
 from tauguard.detectors import _observer
 from tauguard.detectors.calibration.recording import Recording
 from tauguard.detectors.dynamics.robot import gravity_torque
-from tauguard.detectors.estimation.estimator import ArmModel
+from tauguard.detectors.estimation.estimator import ArmModel, Estimator, Unknowns
 
 
 @dataclass(frozen=True)
@@ -157,6 +157,12 @@ def friction_level(arm: ArmModel, recordings: Sequence[Recording]) -> Array:
     return least
 
 
+#: Rate of the observer [1/s].
+FREE_GAIN = 30.0
+
+#: Error of the model in motion, in friction levels: the noise of the estimator.
+ERROR = 0.3
+
 #: A joint slower than this [rad/s] for a while is at rest.
 SLOW = _observer.REGIME_SLOW
 
@@ -169,15 +175,10 @@ def native(arm: ArmModel, bound: Bound, load: LoadDeviation) -> _observer.FreeMo
         bound: of its joints.
         load: how uncertain the carried load is.
     """
-    assert arm.friction is not None
+    unknowns = Unknowns.for_logs(load.mass, load.moment)
+    believed = replace(arm, noise=ERROR * bound.friction, sensors=None)
     return _observer.FreeMotion(
-        arm.robot.chain,
-        arm.friction.basis(arm.robot.joints),
-        arm.drive_gain.tolist(),
-        arm.friction.weights.ravel().tolist(),
-        bound.friction.tolist(),
-        load.mass,
-        load.moment,
+        Estimator(believed, FREE_GAIN, unknowns=unknowns).native,
         bound.rest.tolist(),
         bound.stop.tolist(),
         bound.least.tolist(),

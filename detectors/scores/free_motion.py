@@ -71,7 +71,7 @@ class Judged:
 
     t: Array  #: [s], shape (T,)
     qd: Array  #: [rad/s], shape (T, n)
-    qdd: Array  #: [rad/s^2], shape (T, n)
+    qdd: Array  #: sizes of accelerations [rad/s^2], shape (T, n)
     ratio: Array  #: of each joint's signal to its bound, at most 1 until confirmed, shape (T, n)
     bound: Array  #: [N m], shape (T, n)
     residual: Array  #: without biases [N m], shape (T, n)

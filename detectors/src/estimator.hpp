@@ -5,17 +5,15 @@
 // The residual of a wrong model is linear in what is wrong: r = Phi theta + tau_ext with Phi the
 // columns of the unknowns, passed through the observer's own filter. theta holds the payload at the
 // last link (mass and first moment in that link's frame) and, per joint, a torque offset and the
-// relative errors of viscous and Coulomb friction. Each is an Ornstein-Uhlenbeck process with its
-// own standard deviation and time constant: what no motion excites falls back to zero. A standard
-// deviation of 0 removes an unknown.
-//
-// An innovation z of more than c = `clip` standard deviations counts as c^2 / z: the larger it is,
-// the less it says about the model, and the sooner it is a collision. The deviation is that of one
-// innovation; `inflation` is no part of it, or a held contact would be learned as a payload.
+// relative errors of viscous and Coulomb friction; slow_errors.hpp tracks them.
 //
 // Errors of the model last longer than the time between two corrections, each of which would take
 // them for news: the noise of a correction has `inflation` times its variance, or the filter soon
 // trusts a wrong payload, and friction errors many times their deviation, more than what it sees.
+// The gate of an innovation knows no `inflation`, or a held contact would be learned as a payload.
+//
+// The friction of a joint at rest may hold any torque: with `started` above 0 only joints that have
+// moved for so long correct the unknowns.
 //
 // Where friction has just changed (a joint breaks away, stops or turns) the model is wrong by a
 // fraction `transition` of the change: a variance that is added to the noise's.
@@ -44,16 +42,16 @@
 #include "chain.hpp"
 #include "friction.hpp"
 #include "observer.hpp"
+#include "slow_errors.hpp"
 #include "velocity.hpp"
 
 namespace tauguard::detectors {
 
-constexpr int payload_numbers = 4;  // mass and first moment
-constexpr int per_joint = 3;        // offset, viscous, Coulomb
 constexpr int coulomb_at = 2;
 constexpr double acceleration_rate = 30.0;  // [1/s]
 constexpr int motion_numbers = 3;           // torque of accelerations, inertia, change
 constexpr double change_lasts = 0.3;        // time constant with which a change is forgotten [s]
+constexpr double slow = 0.02;               // a joint slower than this stands [rad/s]
 
 struct EstimatorSettings {
   std::vector<double> drive_gain;   // N m/A, n
@@ -63,9 +61,10 @@ struct EstimatorSettings {
   std::vector<double> persistence;  // time constants of the unknowns [s], 4 + 3 n
   std::vector<double> noise;        // standard deviation of the residual [N m], n
   double clip = 3.0;
-  int every = 10;              // samples between two corrections
+  double every = 0.01;         // time between two corrections [s]
   double inflation = 1.0;      // corrections that an error of the model lasts for
   double transition = 0.0;     // relative error of friction that has just changed
+  double started = 0.0;        // motion of a joint before its first correction [s]
   bool weighted = false;       // see above; false: all of the unexplained residual counts
   std::vector<double> fusion;  // of position and velocity, 6 n; empty: velocity as measured
   double plain_gain = 100.0;   // [1/s]
@@ -79,33 +78,36 @@ class Estimator {
         basis_(std::move(basis)),
         set_(std::move(settings)),
         n_(chain_.joints.size()),
-        m_(payload_numbers + per_joint * n_),
         work_(n_),
         memory_(n_ * basis_.memory()),
         column_(basis_.columns()),
         fusion_(set_.fusion, n_),
-        theta_(m_),
-        covariance_(m_ * m_),
-        gathered_(m_),
-        row_(m_),
+        errors_(set_.deviation, set_.persistence, set_.clip),
+        adapts_(errors_.any()),
         carrying_(chain_),
         mass_(n_ * n_) {
-    for (auto* v : {&p_, &beta_, &p_before_, &beta_before_, &tau_, &tau_before_, &residual_,
-                    &decay_, &plain_, &plain_tau_, &plain_tau_before_, &smooth_, &usual_, &inertia_,
-                    &change_, &acceleration_, &one_, &moved_, &unused_})
+    for (auto* v : {&p_,     &beta_,           &p_before_,         &beta_before_,
+                    &tau_,   &tau_before_,     &residual_,         &decay_,
+                    &plain_, &plain_tau_,      &plain_tau_before_, &smooth_,
+                    &usual_, &inertia_,        &change_,           &acceleration_,
+                    &one_,   &column_of_mass_, &unused_,           &moved_})
       v->resize(n_);
     for (auto* v : {&load_p_, &load_beta_, &load_p_before_, &load_beta_before_, &load_})
       v->resize(payload_numbers * n_);
     for (auto* v : {&own_now_, &own_before_, &own_}) v->resize(per_joint * n_);
-    adapts_ = false;
-    for (const double d : set_.deviation) adapts_ = adapts_ || d > 0;
   }
 
   std::size_t joints() const { return n_; }
-  std::size_t unknowns() const { return m_; }
+  std::size_t unknowns() const { return theta().size(); }
   bool started() const { return started_; }
-  const std::vector<double>& theta() const { return theta_; }
+  const std::vector<double>& theta() const { return errors_.state(); }
   const std::vector<double>& plain() const { return plain_; }
+  double moved(std::size_t j) const { return moved_[j]; }  // how long joint j has moved [s]
+  const std::vector<double>& acceleration() const { return acceleration_; }  // sizes [rad/s^2]
+  // Standard deviation that uncertain unknowns give the residual of joint j [N m].
+  double spread(std::size_t j) {
+    return adapts_ ? std::sqrt(std::max(errors_.variance(j, load(j), own(j)), 0.0)) : 0.0;
+  }
 
   void reset() {
     started_ = false;
@@ -128,6 +130,7 @@ class Estimator {
     for (std::size_t j = 0; j < n_; ++j) {
       residual[j] = unexplained[j] = residual_[j];
       if (started_) smooth_[j] += smooth_decay_ * (qd[j] - smooth_[j]);
+      moved_[j] = std::fabs(qd[j]) < slow || !started_ ? 0.0 : moved_[j] + dt;
       acceleration_[j] = std::fabs(acceleration_rate * (qd[j] - smooth_[j]));
       motion[n_ + j] = inertia_[j];
       motion[2 * n_ + j] = change_[j];
@@ -138,9 +141,10 @@ class Estimator {
     }
     if (adapts_) {
       for (std::size_t j = 0; j < n_; ++j)
-        unexplained[j] = (residual_[j] - expected(j)) * certainty(j);
-      if (started_ && ++since_ >= set_.every) {
-        correct(dt * since_);
+        unexplained[j] = (residual_[j] - errors_.predicted(j, load(j), own(j))) * certainty(j);
+      if (started_) since_ += dt;
+      if (since_ > 0 && !(since_ < set_.every - 0.5 * dt)) {
+        correct();
         weigh(q);
       }
     }
@@ -152,12 +156,11 @@ class Estimator {
     std::copy(qd, qd + n_, smooth_.begin());
     fusion_.reset(q, qd);
     for (std::size_t j = 0; j < n_; ++j) basis_.reset(q[j], &memory_[j * basis_.memory()]);
-    for (auto* v : {&residual_, &plain_, &load_, &own_, &usual_, &mass_, &inertia_, &change_,
-                    &theta_, &covariance_})
+    for (auto* v :
+         {&residual_, &plain_, &load_, &own_, &usual_, &mass_, &inertia_, &change_, &moved_})
       std::fill(v->begin(), v->end(), 0.0);
-    for (std::size_t a = 0; a < m_; ++a)
-      covariance_[a * m_ + a] = set_.deviation[a] * set_.deviation[a];
-    since_ = 0;
+    errors_.reset();
+    since_ = 0.0;
     if (adapts_) weigh(q);
   }
 
@@ -165,16 +168,16 @@ class Estimator {
   void weigh(const double* q) {
     Inertial& held = carrying_.joints.back().inertial;
     const Inertial& empty = chain_.joints.back().inertial;
-    held.mass = empty.mass - theta_[0];
-    held.moment = empty.moment - Vec3{theta_[1], theta_[2], theta_[3]};
+    held.mass = empty.mass - theta()[0];
+    held.moment = empty.moment - Vec3{theta()[1], theta()[2], theta()[3]};
     std::fill(inertia_.begin(), inertia_.end(), 0.0);
     for (std::size_t k = 0; k < n_; ++k) {
       one_[k] = 1.0;
-      carrying_.momentum(q, one_.data(), moved_.data(), unused_.data(), work_);
+      carrying_.momentum(q, one_.data(), column_of_mass_.data(), unused_.data(), work_);
       one_[k] = 0.0;
       for (std::size_t j = 0; j < n_; ++j) {
-        mass_[j * n_ + k] = std::fabs(moved_[j]);
-        inertia_[j] += moved_[j] * moved_[j];
+        mass_[j * n_ + k] = std::fabs(column_of_mass_[j]);
+        inertia_[j] += column_of_mass_[j] * column_of_mass_[j];
       }
     }
     for (double& x : inertia_) x = std::sqrt(x);
@@ -211,7 +214,7 @@ class Estimator {
     double sum = beta_[j];
     if (adapts_)
       for (int a = 0; a < payload_numbers; ++a)
-        sum -= load_beta_[payload_numbers * j + a] * theta_[a];
+        sum -= load_beta_[payload_numbers * j + a] * theta()[a];
     return sum;
   }
 
@@ -254,21 +257,13 @@ class Estimator {
     own_before_ = own_now_;
   }
 
-  double expected(std::size_t j) const {
-    double sum = 0.0;
-    for (int a = 0; a < payload_numbers; ++a) sum += load_[payload_numbers * j + a] * theta_[a];
-    for (int a = 0; a < per_joint; ++a)
-      sum += own_[per_joint * j + a] * theta_[payload_numbers + per_joint * j + a];
-    return sum;
-  }
+  const double* load(std::size_t j) const { return &load_[payload_numbers * j]; }
+  const double* own(std::size_t j) const { return &own_[per_joint * j]; }
 
   double certainty(std::size_t j) const {
     if (!set_.weighted) return 1.0;
-    const double* h = &load_[payload_numbers * j];
     const double noise = set_.noise[j] * set_.noise[j];
-    double more = changed(j);
-    for (int a = 0; a < payload_numbers; ++a)
-      for (int b = 0; b < payload_numbers; ++b) more += h[a] * covariance_[a * m_ + b] * h[b];
+    const double more = changed(j) + errors_.payload_variance(load(j));
     return more > 0 ? std::sqrt(noise / (noise + more)) : 1.0;
   }
 
@@ -278,63 +273,33 @@ class Estimator {
     return off * off;
   }
 
-  // The Kalman filter: time update over `elapsed` seconds, then one scalar update per joint.
-  void correct(double elapsed) {
-    since_ = 0;
-    for (std::size_t a = 0; a < m_; ++a) row_[a] = std::exp(-elapsed / set_.persistence[a]);
-    for (std::size_t a = 0; a < m_; ++a) {
-      theta_[a] *= row_[a];
-      for (std::size_t b = 0; b < m_; ++b) covariance_[a * m_ + b] *= row_[a] * row_[b];
-      covariance_[a * m_ + a] += (1 - row_[a] * row_[a]) * set_.deviation[a] * set_.deviation[a];
-    }
-    for (std::size_t j = 0; j < n_; ++j) update(j);
-  }
-
-  void update(std::size_t j) {
-    const std::size_t first = payload_numbers + per_joint * j;
-    std::fill(row_.begin(), row_.end(), 0.0);
-    for (int a = 0; a < payload_numbers; ++a) row_[a] = load_[payload_numbers * j + a];
-    for (int a = 0; a < per_joint; ++a) row_[first + a] = own_[per_joint * j + a];
-    double variance = set_.inflation * (set_.noise[j] * set_.noise[j] + changed(j));
-    for (std::size_t b = 0; b < m_; ++b) {
-      double sum = 0.0;
-      for (int a = 0; a < payload_numbers; ++a) sum += covariance_[b * m_ + a] * row_[a];
-      for (int a = 0; a < per_joint; ++a) sum += covariance_[b * m_ + first + a] * row_[first + a];
-      gathered_[b] = sum;
-    }
-    double believed = 0.0;
-    for (std::size_t b = 0; b < m_; ++b) believed += row_[b] * gathered_[b];
-    double innovation = residual_[j] - expected(j);
-    const double limit = set_.clip * std::sqrt(variance / set_.inflation + believed);
-    variance += believed;
-    if (std::fabs(innovation) > limit) innovation = limit * limit / innovation;
-    for (std::size_t a = 0; a < m_; ++a) {
-      const double k = gathered_[a] / variance;
-      theta_[a] += k * innovation;
-      for (std::size_t b = 0; b <= a; ++b) {
-        covariance_[a * m_ + b] -= k * gathered_[b];
-        covariance_[b * m_ + a] = covariance_[a * m_ + b];
-      }
-    }
+  void correct() {
+    errors_.fade(since_);
+    since_ = 0.0;
+    for (std::size_t j = 0; j < n_; ++j)
+      if (set_.started == 0.0 || moved_[j] > set_.started)
+        errors_.correct(j, residual_[j], load(j), own(j),
+                        set_.noise[j] * set_.noise[j] + changed(j), set_.inflation);
   }
 
   Chain chain_;
   FrictionBasis basis_;
   EstimatorSettings set_;
-  std::size_t n_, m_;
+  std::size_t n_;
   Workspace work_;
   std::vector<double> memory_, column_;
   VelocityFusion fusion_;
-  std::vector<double> theta_, covariance_, gathered_, row_;
+  SlowErrors errors_;
+  bool adapts_;
   std::vector<double> p_, beta_, p_before_, beta_before_, tau_, tau_before_, residual_, decay_;
   std::vector<double> load_p_, load_beta_, load_p_before_, load_beta_before_, load_;
-  std::vector<double> own_now_, own_before_, own_, smooth_, usual_;
+  std::vector<double> own_now_, own_before_, own_, smooth_, usual_, moved_;
   std::vector<double> plain_, plain_tau_, plain_tau_before_;
   Chain carrying_;  // the arm with the tracked payload
-  std::vector<double> mass_, inertia_, change_, acceleration_, one_, moved_, unused_;
+  std::vector<double> mass_, inertia_, change_, acceleration_, one_, column_of_mass_, unused_;
   double decay_dt_ = -1.0, smooth_decay_ = 0.0, plain_decay_ = 0.0, change_decay_ = 0.0;
-  int since_ = 0;
-  bool started_ = false, adapts_ = false;
+  double since_ = 0.0;  // last correction [s]
+  bool started_ = false;
 };
 
 }  // namespace tauguard::detectors

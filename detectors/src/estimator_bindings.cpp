@@ -98,8 +98,8 @@ void bind_estimator(nb::module_& m) {
           [](Estimator* self, const Chain& chain, const FrictionBasis& basis,
              const Numbers& drive_gain, const Numbers& gain, const Numbers& weights,
              const Numbers& deviation, const Numbers& persistence, const Numbers& noise,
-             double clip, int every, double inflation, double transition, bool weighted,
-             const Numbers& fusion, double plain_gain, bool sampled) {
+             double clip, double every, double inflation, double transition, double started,
+             bool weighted, const Numbers& fusion, double plain_gain, bool sampled) {
             const std::size_t n = chain.joints.size(), unknown = payload_numbers + per_joint * n;
             require(drive_gain.size() == n && gain.size() == n && noise.size() == n &&
                         weights.size() == n * basis.columns() && deviation.size() == unknown &&
@@ -109,11 +109,11 @@ void bind_estimator(nb::module_& m) {
             new (self)
                 Estimator(chain, basis,
                           {drive_gain, gain, weights, deviation, persistence, noise, clip, every,
-                           inflation, transition, weighted, fusion, plain_gain, sampled});
+                           inflation, transition, started, weighted, fusion, plain_gain, sampled});
           },
           "chain"_a, "basis"_a, "drive_gain"_a, "gain"_a, "weights"_a, "deviation"_a,
           "persistence"_a, "noise"_a, "clip"_a, "every"_a, "inflation"_a, "transition"_a,
-          "weighted"_a, "fusion"_a, "plain_gain"_a, "sampled"_a)
+          "started"_a, "weighted"_a, "fusion"_a, "plain_gain"_a, "sampled"_a)
       .def_prop_ro("started", &Estimator::started)
       .def(
           "theta",

@@ -12,18 +12,13 @@ namespace {
 
 using Numbers = std::vector<double>;
 
-FreeMotion* make(const Chain& chain, const FrictionBasis& basis, const Numbers& drive_gain,
-                 const Numbers& weights, const Numbers& level, double mass, double moment,
-                 const Numbers& rest, const Numbers& stop, const Numbers& least,
-                 const Numbers& moving, const Numbers& start) {
-  const std::size_t n = chain.joints.size();
-  require(n > 0 && drive_gain.size() == n && level.size() == n && rest.size() == n &&
-              stop.size() == n && least.size() == n && start.size() == n &&
-              moving.size() == 4 * n && weights.size() == n * basis.columns() &&
-              basis.cycles.size() == n * basis.ripples,
+FreeMotion* make(const Estimator& estimator, const Numbers& rest, const Numbers& stop,
+                 const Numbers& least, const Numbers& moving, const Numbers& start) {
+  const std::size_t n = estimator.joints();
+  require(n > 0 && rest.size() == n && stop.size() == n && least.size() == n && start.size() == n &&
+              moving.size() == 4 * n,
           "FreeMotion: array lengths differ");
-  return new FreeMotion(
-      chain, basis, {drive_gain, weights, level, mass, moment, {rest, stop, least, moving, start}});
+  return new FreeMotion(estimator, {rest, stop, least, moving, start});
 }
 
 void copy(const std::vector<double>& from, double* to) { std::copy(from.begin(), from.end(), to); }
@@ -53,8 +48,7 @@ void run(FreeMotion& stream, In1 dt, In2 q, In2 qd, In2 current, Out2 ratio, Out
 
 void bind_free_motion(nb::module_& m) {
   nb::class_<FreeMotion>(m, "FreeMotion")
-      .def(nb::new_(&make), "chain"_a, "basis"_a, "drive_gain"_a, "weights"_a, "level"_a, "mass"_a,
-           "moment"_a, "rest"_a, "stop"_a, "least"_a, "moving"_a, "start"_a)
+      .def(nb::new_(&make), "estimator"_a, "rest"_a, "stop"_a, "least"_a, "moving"_a, "start"_a)
       .def("reset", &FreeMotion::reset)
       .def("run", &run, "dt"_a, "q"_a, "qd"_a, "current"_a, "ratio"_a.noconvert(),
            "bound"_a.noconvert(), "residual"_a.noconvert(), "qdd"_a.noconvert(),
@@ -68,7 +62,7 @@ void bind_free_motion(nb::module_& m) {
             return *std::max_element(stream.ratio().begin(), stream.ratio().end());
           },
           "q"_a, "qd"_a, "current"_a, "dt"_a);
-  m.attr("REGIME_SLOW") = Regimes::slow;
+  m.attr("REGIME_SLOW") = slow;
 }
 
 }  // namespace tauguard::detectors

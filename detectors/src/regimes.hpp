@@ -9,7 +9,7 @@
 // change away from what was before counts, so that letting go is no new push. Other joints go on as
 // before.
 //
-// In motion the residual without biases counts. The bound is linear in speed and
+// In motion the residual without slow errors counts. The bound is linear in speed and
 // accelerations; while a joint starts, its friction is between static and sliding, and more is
 // allowed.
 //
@@ -21,6 +21,8 @@
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "estimator.hpp"
 
 namespace tauguard::detectors {
 
@@ -34,8 +36,7 @@ struct RegimeBounds {
 
 class Regimes {
  public:
-  static constexpr double slow = 0.02;       // a joint slower than this [rad/s] ...
-  static constexpr double wait = 0.1;        // ... for so long [s] is at rest
+  static constexpr double wait = 0.1;        // a joint that is slow for so long [s] is at rest
   static constexpr double full_speed = 0.1;  // motion from which `stop` counts fully [rad/s]
   static constexpr double settles = 1.0;     // time constant with which that is forgotten [s]
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
@@ -50,7 +51,6 @@ class Regimes {
 
   void reset() {
     slow_for_.assign(n_, 10.0);
-    moved_.assign(n_, 0.0);
     base_.assign(n_, 0.0);
     before_.assign(n_, 0.0);
     rest_.assign(n_, 0);
@@ -61,7 +61,6 @@ class Regimes {
     stirred_ = usual_ = 1.0;
   }
 
-  const double* moved() const { return moved_.data(); }  // how long in motion [s]
   bool rest(std::size_t j) const { return rest_[j]; }
 
   // Speeds [rad/s], `dt` s after the last; goes before judge().
@@ -71,7 +70,6 @@ class Regimes {
       const double speed = std::fabs(qd[j]);
       fastest = std::max(fastest, speed);
       slow_for_[j] = speed < slow ? slow_for_[j] + dt : 0.0;
-      moved_[j] = speed < slow ? 0.0 : moved_[j] + dt;
     }
     const double keep = std::exp(-dt / settles);
     stirred_ = std::max(keep * stirred_, std::min(1.0, fastest / full_speed));
@@ -80,10 +78,10 @@ class Regimes {
   }
 
   // Ratios of what counts to its bound, at most 1 until confirmed, and the bounds [N m]. `residual`
-  // is the observer's, `left` it less biases, `spread` the deviation that they leave, all
-  // [N m], n.
-  void judge(const double* residual, const double* left, const double* spread, const double* qd,
-             const double* qdd, double dt, double* ratio, double* bound) {
+  // is the observer's, `left` it less slow errors, `spread` the deviation that they leave, all
+  // [N m]; `moved` is the time for which each joint has been in motion [s]; n numbers each.
+  void judge(const double* residual, const double* left, const double* spread, const double* moved,
+             const double* qd, const double* qdd, double dt, double* ratio, double* bound) {
     double hardest = 0.0;
     for (std::size_t j = 0; j < n_; ++j) hardest = std::max(hardest, std::fabs(qdd[j]));
     for (std::size_t j = 0; j < n_; ++j) {
@@ -99,7 +97,7 @@ class Regimes {
         const double linear =
             per[0] + per[1] * std::fabs(qd[j]) + per[2] * std::fabs(qdd[j]) + per[3] * hardest;
         bound[j] = std::max(linear, of_.least[j]) + spread[j] +
-                   of_.start[j] * std::exp(-moved_[j] / starts);
+                   of_.start[j] * std::exp(-moved[j] / starts);
       }
       ratio[j] = confirmed(j, std::fabs(signal) / bound[j], dt);
     }
@@ -133,7 +131,7 @@ class Regimes {
 
   RegimeBounds of_;
   std::size_t n_;
-  std::vector<double> slow_for_, moved_, base_, before_, since_, own_, above_;
+  std::vector<double> slow_for_, base_, before_, since_, own_, above_;
   std::vector<int> count_;
   std::vector<char> rest_;
   double stirred_ = 1.0, usual_ = 1.0;  // interval of samples, gaps aside [s]

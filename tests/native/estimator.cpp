@@ -104,8 +104,7 @@ int free_motions(Random& random, int rounds) {
   for (int round = 0; round < 10 * rounds; ++round) {
     const std::size_t n = 1 + random() % 7;
     const FrictionBasis basis = basis_of(random, n);
-    const FreeSettings set = free_settings(random, n, basis.columns());
-    FreeMotion stream(chain_of(random, n), basis, set);
+    FreeMotion stream = free_motion_of(random, chain_of(random, n), basis);
     const bool hard = round % 2;
     const Motion m(random, n, samples, hard);
     Numbers first;

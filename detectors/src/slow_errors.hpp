@@ -1,0 +1,129 @@
+// The Kalman filter for what a model does not know and what changes slowly: a payload, which loads
+// every joint, and errors of each joint's own.
+//
+// Each state is an Ornstein-Uhlenbeck process with a standard deviation and a time constant: what
+// no measurement tells falls back to zero, which stands for the calibrated model. A deviation of 0
+// removes a state. A measurement is one joint's residual. Its row has entries for the payload and
+// for the joint's own errors alone.
+//
+// A collision must not change the states. An innovation z of more than c = `clip` standard
+// deviations counts as c^2 / z: the larger it is, the less it says about the model.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace tauguard::detectors {
+
+constexpr int payload_numbers = 4;  // mass [kg] and first moment in the last link's frame [kg m]
+constexpr int per_joint = 3;        // errors of a joint's own: offset, viscous, Coulomb
+
+class SlowErrors {
+ public:
+  // `deviation` and `persistence` [s]: payload, then those of each joint, 4 + 3 n.
+  SlowErrors(std::vector<double> deviation, std::vector<double> persistence, double clip)
+      : m_(deviation.size()),
+        clip_(clip),
+        deviation_(std::move(deviation)),
+        persistence_(std::move(persistence)),
+        state_(m_),
+        gathered_(m_),
+        row_(m_),
+        covariance_(m_ * m_) {
+    reset();
+  }
+
+  const std::vector<double>& state() const { return state_; }
+  bool any() const {
+    return std::any_of(deviation_.begin(), deviation_.end(), [](double d) { return d > 0; });
+  }
+
+  void reset() {
+    std::fill(state_.begin(), state_.end(), 0.0);
+    std::fill(covariance_.begin(), covariance_.end(), 0.0);
+    for (std::size_t a = 0; a < m_; ++a) covariance_[a * m_ + a] = deviation_[a] * deviation_[a];
+  }
+
+  // The residual that the states predict at joint j, of the derivatives of the residual by the
+  // payload and by the joint's own errors.
+  double predicted(std::size_t j, const double* payload, const double* own) const {
+    double sum = 0.0;
+    for (int a = 0; a < payload_numbers; ++a) sum += payload[a] * state_[a];
+    for (int a = 0; a < per_joint; ++a) sum += own[a] * state_[first(j) + a];
+    return sum;
+  }
+
+  // Variance of the residual because the payload is uncertain.
+  double payload_variance(const double* payload) const {
+    double sum = 0.0;
+    for (int a = 0; a < payload_numbers; ++a)
+      for (int b = 0; b < payload_numbers; ++b)
+        sum += payload[a] * covariance_[a * m_ + b] * payload[b];
+    return sum;
+  }
+
+  // Variance of the residual because any state is uncertain.
+  double variance(std::size_t j, const double* payload, const double* own) {
+    set_row(j, payload, own);
+    return gather(j);
+  }
+
+  // Time update over `elapsed` seconds.
+  void fade(double elapsed) {
+    for (std::size_t a = 0; a < m_; ++a) row_[a] = std::exp(-elapsed / persistence_[a]);
+    for (std::size_t a = 0; a < m_; ++a) {
+      state_[a] *= row_[a];
+      for (std::size_t b = 0; b < m_; ++b) covariance_[a * m_ + b] *= row_[a] * row_[b];
+      covariance_[a * m_ + a] += (1 - row_[a] * row_[a]) * deviation_[a] * deviation_[a];
+    }
+  }
+
+  // Corrects the states by joint j's residual, whose noise has `variance`. Its errors last for
+  // `inflation` corrections, which together count as one measurement; the gate is that of one.
+  void correct(std::size_t j, double residual, const double* payload, const double* own,
+               double variance, double inflation) {
+    set_row(j, payload, own);
+    const double believed = gather(j), total = inflation * variance + believed;
+    const double limit = clip_ * std::sqrt(variance + believed);
+    double innovation = residual - predicted(j, payload, own);
+    if (std::fabs(innovation) > limit) innovation = limit * limit / innovation;
+    for (std::size_t a = 0; a < m_; ++a) {
+      const double k = gathered_[a] / total;
+      state_[a] += k * innovation;
+      for (std::size_t b = 0; b <= a; ++b) {
+        covariance_[a * m_ + b] -= k * gathered_[b];
+        covariance_[b * m_ + a] = covariance_[a * m_ + b];
+      }
+    }
+  }
+
+ private:
+  static std::size_t first(std::size_t j) { return payload_numbers + per_joint * j; }
+
+  void set_row(std::size_t j, const double* payload, const double* own) {
+    std::fill(row_.begin(), row_.end(), 0.0);
+    std::copy_n(payload, payload_numbers, row_.begin());
+    std::copy_n(own, per_joint, row_.begin() + static_cast<std::ptrdiff_t>(first(j)));
+  }
+
+  // Writes covariance times row; returns the variance of the prediction.
+  double gather(std::size_t j) {
+    for (std::size_t b = 0; b < m_; ++b) {
+      double sum = 0.0;
+      for (int a = 0; a < payload_numbers; ++a) sum += covariance_[b * m_ + a] * row_[a];
+      for (int a = 0; a < per_joint; ++a)
+        sum += covariance_[b * m_ + first(j) + a] * row_[first(j) + a];
+      gathered_[b] = sum;
+    }
+    double believed = 0.0;
+    for (std::size_t b = 0; b < m_; ++b) believed += row_[b] * gathered_[b];
+    return believed;
+  }
+
+  std::size_t m_;
+  double clip_;
+  std::vector<double> deviation_, persistence_, state_, gathered_, row_, covariance_;
+};
+
+}  // namespace tauguard::detectors
