@@ -6,9 +6,11 @@ one. What is asked here is the least that every detector does; it says nothing o
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from tauguard.detectors.alarms.alarm import CollisionAlarm
+from tauguard.detectors.alarms.alarm import CollisionAlarm, floor_of
 from tauguard.detectors.dynamics.robot import gravity_torque
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.traces.trace import Trace
@@ -52,9 +54,15 @@ def check_ranges(alarm: CollisionAlarm) -> None:
 def check_alarms(alarm: CollisionAlarm) -> None:
     """Refuse a detector that no impact moves, or one that is never silent on an arm at rest.
 
+    A learned score and the plain thresholds beneath it have to do so each by itself.
+
     Raises:
         ValueError: says which, or that a score is not a number.
     """
+    plain = floor_of(alarm)
+    if alarm.floor is not None and plain is not None:
+        check_alarms(CollisionAlarm(plain, alarm.threshold, alarm.confirmation, alarm.floor))
+        alarm = replace(alarm, floor=None)
     trace, first = standing_then_hit(alarm.detector.arm, alarm.detector.dt, alarm.settle)
     up = alarm.detect(trace).alarm
     if not up[first:].any():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,12 +46,17 @@ class CollisionAlarm(Frozen):
     confirmation: float = CONFIRMATION  #: t_c [s]
     normalisation: SpeedNormalisation | None = None  #: None: the score is compared as it is
     inputs: UsualInput | None = None  #: what its samples look like; None: not known
+    floor: SpeedNormalisation | None = None
+    """Of the plain thresholds beneath a learned score (``detector.floor``), with the tail of
+    :attr:`normalisation`: the larger of both normalised scores counts. None: the score alone."""
 
     def __post_init__(self) -> None:
         """Check: ``ValueError``."""
         confirmation_samples(self.confirmation, self.detector.dt)
         if np.isnan(self.threshold):
             raise ValueError("threshold: not a number")
+        if self.floor is not None and (self.normalisation is None or floor_of(self) is None):
+            raise ValueError("floor: of a detector without one, or of a score not normalised")
 
     @property
     def settle(self) -> float:
@@ -67,14 +72,15 @@ class CollisionAlarm(Frozen):
         """Scores of a trace relative to the speed normalisation, shape (T,)."""
         if self.normalisation is None:
             return score
-        return self.normalisation(score, recent_speed(trace.qd, trace.dt))
+        speed = recent_speed(trace.qd, trace.dt)
+        level, plain = self.normalisation(score, speed), floor_of(self)
+        if self.floor is None or plain is None:
+            return level
+        return np.maximum(level, self.floor(_finite(plain.scores(trace), trace), speed))
 
     def scores(self, trace: Trace) -> Array:
         """The normalised score, shape (T,)."""
-        score = self.detector.scores(trace)
-        if not np.isfinite(score).all():
-            raise ValueError(f"{LOST}; first at {trace.t[~np.isfinite(score)][0]:g} s")
-        return self.normalised(score, trace)
+        return self.normalised(_finite(self.detector.scores(trace), trace), trace)
 
     def sustained(self, trace: Trace, score: Array | None = None) -> Array:
         """What the normalised score has reached throughout the last t_c, shape (T,).
@@ -90,7 +96,9 @@ class CollisionAlarm(Frozen):
         return sustained(np.where(self._settled(trace), level, -np.inf), self.samples)
 
     def free_scores(self, trace: Trace, score: Array | None = None) -> FreeScores:
-        """The normalised scores of a trace's collision-free rows, for a threshold.
+        """The scores of a trace's collision-free rows, for a threshold.
+
+        Where this alarm does not normalise them, those of the detector's floor are beside them.
 
         Args:
             trace: of the detector's arm.
@@ -99,7 +107,12 @@ class CollisionAlarm(Frozen):
         Raises:
             ValueError: the trace is over before the detector has settled.
         """
-        return FreeScores.of(self.sustained(trace, score), trace, self.settle)
+        found = FreeScores.of(self.sustained(trace, score), trace, self.settle)
+        plain = floor_of(self)
+        if self.normalisation is not None or plain is None:
+            return found
+        beneath = CollisionAlarm(plain, np.inf, self.confirmation).free_scores(trace)
+        return replace(found, floor=beneath)
 
     def _settled(self, trace: Trace) -> NDArray[np.bool_]:
         return np.asarray(trace.t - trace.t[0] > self.settle - self.detector.dt / 2)
@@ -130,6 +143,17 @@ class CollisionAlarm(Frozen):
         return AlarmStream(self)
 
 
+def floor_of(alarm: CollisionAlarm) -> FittedDetector | None:
+    """The plain thresholds beneath a learned score; None: it has none."""
+    return getattr(alarm.detector, "floor", None)
+
+
+def _finite(score: Array, trace: Trace) -> Array:
+    if not np.isfinite(score).all():
+        raise ValueError(f"{LOST}; first at {trace.t[~np.isfinite(score)][0]:g} s")
+    return score
+
+
 class AlarmStream:
     """An alarm as the samples of one recording come in.
 
@@ -139,7 +163,7 @@ class AlarmStream:
 
     def __init__(self, alarm: CollisionAlarm) -> None:
         """Begin anew."""
-        detector, speed = alarm.detector, alarm.normalisation
+        detector = alarm.detector
         self._dt, self._first = detector.dt, True
         self.native = _observer.Alarm(
             native_scores(detector),
@@ -148,9 +172,8 @@ class AlarmStream:
             alarm.threshold,
             alarm.samples,
             memory_samples(detector.dt),
-            [] if speed is None else np.asarray(speed.speed).tolist(),
-            [] if speed is None else np.asarray(speed.base).tolist(),
-            [] if speed is None else np.asarray(speed.unit).tolist(),
+            _levels(alarm.normalisation),
+            _levels(alarm.floor),
         )
 
     @property
@@ -183,6 +206,14 @@ class AlarmStream:
             raise ValueError("q, qd, current: expected float64 arrays, one entry a joint") from None
         self._first = False
         return up
+
+
+def _levels(speed: SpeedNormalisation | None) -> _observer.Levels:
+    if speed is None:
+        return _observer.Levels([], [], [])
+    return _observer.Levels(
+        *(np.asarray(x).tolist() for x in (speed.speed, speed.base, speed.unit))
+    )
 
 
 def native_scores(detector: FittedDetector) -> _observer.Scores:

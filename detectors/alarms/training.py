@@ -20,9 +20,9 @@ from tauguard.detectors.events import CONFIRMATION
 from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.scores.detector import Detector, FittedDetector
 from tauguard.detectors.scores.free_motion import FittedFreeMotion
-from tauguard.detectors.thresholds.free_scores import FreeScores, speed_normalisation
+from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.guarantee import Guarantee, guaranteed_threshold
-from tauguard.detectors.thresholds.tail_model import threshold_for_rate
+from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
 from tauguard.traces.trace import Trace
 
 #: Fraction of the collision-free training traces that the threshold comes from without folds.
@@ -173,10 +173,10 @@ def _with_rate(
     detector: FittedDetector, found: Sequence[FreeScores], per_hour: float, confirmation: float
 ) -> tuple[CollisionAlarm, list[FreeScores]]:
     """Normalise the scores and choose the threshold from them."""
-    normalisation = speed_normalisation(found)
-    scores = [one.over(normalisation) for one in found]
+    levels, floor = normalisations(found)
+    scores = [one.over(levels, floor) for one in found]
     threshold = threshold_for_rate(scores, per_hour)
-    return CollisionAlarm(detector, threshold, confirmation, normalisation), scores
+    return CollisionAlarm(detector, threshold, confirmation, levels, floor=floor), scores
 
 
 def with_guarantee(

@@ -29,7 +29,8 @@ class SrqSvr(Windowed):
     """The dissertation's regressor on the residual in standard deviations.
 
     One factor brings the median distance between windows of collisions and of collision-free
-    motion to ``distance``, a length that the kernel resolves.
+    motion to ``distance``, a length that the kernel resolves. Beneath the score lie the thresholds
+    of ``moving-thresholds``: they find what is far from anything that the regressor has seen.
     """
 
     windows: int = 3000
@@ -40,6 +41,7 @@ class SrqSvr(Windowed):
     distance: float = 2.0  #: median distance after scaling; 0 leaves the windows as they are
     vectors: int = 400  #: support vectors that are kept, at most; 0 keeps all
     name: ClassVar[str] = "srq-svr"
+    floored: ClassVar[bool] = True
     mining_gap: ClassVar[float] = 0.1
     stream_of_seeds: ClassVar[int] = 1
 
@@ -87,6 +89,7 @@ class PlainSrqSvr(SrqSvr):
         default_factory=lambda: FrontEndSettings(adapt=False, settle=0.5, calibrate=False)
     )
     name: ClassVar[str] = "srq-svr-plain"
+    floored: ClassVar[bool] = False
 
     def bare(self, traces: Sequence[Trace], front: FrontEnd) -> Scaling:
         """Residuals in N m."""

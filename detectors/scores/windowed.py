@@ -32,6 +32,7 @@ from tauguard.detectors.features.windows import (
     severity,
     severity_targets,
 )
+from tauguard.detectors.scores.baselines import FittedThresholds, MovingThresholds
 from tauguard.detectors.scores.kernel import KernelMachine
 from tauguard.traces.trace import Trace
 
@@ -65,6 +66,7 @@ class Windowed(ABC):
     graded: bool = True  #: targets grow with the torque, and scores are severities; else 0 and 1
     front: FrontEndSettings = field(default_factory=FrontEndSettings)
     name: ClassVar[str] = "windowed"
+    floored: ClassVar[bool] = False  #: whether plain thresholds lie beneath the score
     mining_gap: ClassVar[float] = 0.05  #: between two mined moments [s]
     stream_of_seeds: ClassVar[int] = 3  #: that the windows are drawn from
 
@@ -90,7 +92,8 @@ class Windowed(ABC):
             x, y = np.concatenate([x, hardest]), np.concatenate([y, np.zeros(len(hardest))])
             regressor = self.learn(x, y)
         finished = self.finished(regressor)
-        return FittedWindowed(self.name, front, scaling, shape, finished, self.graded)
+        limits = MovingThresholds(self.front).fit(traces, arm).limits if self.floored else None
+        return FittedWindowed(self.name, front, scaling, shape, finished, self.graded, limits)
 
     def targets(self, traces: Sequence[Trace], front: FrontEnd) -> list[Array]:
         """What the regressor should say of each trace, shape (T,)."""
@@ -191,6 +194,17 @@ class FittedWindowed(OnFrontEnd):
     shape: WindowShape
     regressor: Regressor
     graded: bool  #: the regressor says x / (1 + x), and the score is x
+    limits: Array | None = None
+    """Of :attr:`floor`, shape (joints,); ``None``: there is none."""
+
+    @property
+    def floor(self) -> FittedThresholds | None:
+        """Plain thresholds on the same residual: what passes them is an alarm, too."""
+        if self.limits is None:
+            return None
+        return FittedThresholds(
+            self.front, self.front.scaling(), self.limits, MovingThresholds.name
+        )
 
     def scores(self, trace: Trace) -> Array:
         """Output of the regressor or its :func:`severity`, shape (T,)."""
@@ -200,7 +214,7 @@ class FittedWindowed(OnFrontEnd):
 
     def stream(self) -> NativeStream | WindowStream:
         """The same, sample by sample; of a kernel machine all of it is native."""
-        machine = self.regressor
+        machine, floor = self.regressor, self.floor
         if not isinstance(machine, KernelMachine):
             return WindowStream(self)
         vectors, weights = map(np.ascontiguousarray, (machine.vectors, machine.weights))
@@ -214,6 +228,8 @@ class FittedWindowed(OnFrontEnd):
             machine.intercept,
             machine.sigma,
             self.graded,
+            [] if floor is None else floor.scaling.numbers[1],
+            [] if floor is None else floor.limits.tolist(),
         )
         return NativeStream(scores, self.dt)
 

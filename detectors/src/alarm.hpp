@@ -87,6 +87,7 @@ struct AlarmSettings {
   std::int64_t samples = 1;  // in a row above it
   std::int64_t memory = 1;   // samples that a speed counts for
   Levels levels;
+  Levels floor;  // of the plain thresholds beneath; none: they do not count
 };
 
 class Alarm {
@@ -107,12 +108,17 @@ class Alarm {
   // Whether the alarm is up at this sample, `dt` s after the last.
   bool step(const double* q, const double* qd, const double* current, double dt) {
     double score = scores_->step(q, qd, current, dt);
-    if (!std::isfinite(score))
+    const bool floored = !set_.floor.speed.empty();
+    const double plain = floored ? scores_->floor() : 0.0;
+    if (!std::isfinite(score) || !std::isfinite(plain))
       throw std::invalid_argument(
           "the score is not a number: a sample was out of any arm's range; begin anew without it");
     time_ = time_ < 0 ? 0.0 : time_ + dt;
-    if (!set_.levels.speed.empty())
-      score = set_.levels.normalised(score, speed_.step(qd, joints()));
+    if (!set_.levels.speed.empty()) {
+      const double now = speed_.step(qd, joints());
+      score = set_.levels.normalised(score, now);
+      if (floored) score = std::max(score, set_.floor.normalised(plain, now));
+    }
     score_ = score;
     run_ = score > set_.threshold && time_ > set_.settle ? run_ + 1 : 0;
     return run_ >= set_.samples;

@@ -54,25 +54,32 @@ Source limit_scores(const Estimator& estimator, const std::vector<std::int64_t>&
 Source kernel_scores(const Estimator& estimator, const std::vector<std::int64_t>& joints,
                      const Numbers& weights, double units, double factor, bool compress,
                      std::size_t lag, std::size_t count, In2 vectors, In1 coef, double intercept,
-                     double sigma, bool graded) {
+                     double sigma, bool graded, const Numbers& floor_weights,
+                     const Numbers& floor_limits) {
   require(lag > 0 && count > 0 && vectors.shape(1) == joints.size() * count &&
               coef.shape(0) == vectors.shape(0) && sigma > 0,
           "kernel_scores: vectors of another size than the window, or sigma not above 0");
+  Scaling plain(joints, floor_weights, 1.0, 1.0, false);
+  require(plain.fits(estimator.joints()) &&
+              (floor_limits.empty() || floor_limits.size() == joints.size()),
+          "floor: expected four weights a joint, and a limit a joint that is used or none");
   return std::make_shared<KernelScores>(
       residual_of(estimator, joints, weights, units, factor, compress),
       Window(joints.size(), lag, count),
       KernelSum(vectors.data(), coef.data(), coef.shape(0), vectors.shape(1), intercept, sigma),
-      graded);
+      graded, Floor{std::move(plain), floor_limits});
 }
 
 Alarm* make_alarm(Source scores, double dt, double settle, double threshold, std::int64_t samples,
-                  std::int64_t memory, const Numbers& speed, const Numbers& base,
-                  const Numbers& unit) {
+                  std::int64_t memory, const Levels& levels, const Levels& floor) {
   require(scores && dt > 0 && samples > 0 && memory > 0, "dt, samples, memory: expected above 0");
+  return new Alarm(std::move(scores), {dt, settle, threshold, samples, memory, levels, floor});
+}
+
+Levels* make_levels(const Numbers& speed, const Numbers& base, const Numbers& unit) {
   require(base.size() == speed.size() && unit.size() == speed.size(),
           "speed, base, unit: expected as many of each");
-  return new Alarm(std::move(scores),
-                   {dt, settle, threshold, samples, memory, {speed, base, unit}});
+  return new Levels{speed, base, unit};
 }
 
 Monitor* make_monitor(const FaultCheck& check, const Alarm& alarm, const Estimator& observer,
@@ -119,16 +126,17 @@ void bind_monitor(nb::module_& m) {
         "factor"_a, "compress"_a, "limits"_a);
   m.def("kernel_scores", &kernel_scores, "estimator"_a, "joints"_a, "weights"_a, "units"_a,
         "factor"_a, "compress"_a, "lag"_a, "count"_a, "vectors"_a, "coef"_a, "intercept"_a,
-        "sigma"_a, "graded"_a);
+        "sigma"_a, "graded"_a, "floor_weights"_a, "floor_limits"_a);
   m.def(
       "python_scores",
       [](nb::object make, std::size_t joints) -> Source {
         return std::make_shared<PythonScores>(std::move(make), joints);
       },
       "make"_a, "joints"_a);
+  nb::class_<Levels>(m, "Levels").def(nb::new_(&make_levels), "speed"_a, "base"_a, "unit"_a);
   nb::class_<Alarm>(m, "Alarm")
       .def(nb::new_(&make_alarm), "scores"_a, "dt"_a, "settle"_a, "threshold"_a, "samples"_a,
-           "memory"_a, "speed"_a, "base"_a, "unit"_a)
+           "memory"_a, "levels"_a, "floor"_a)
       .def_prop_ro("score", &Alarm::score)
       .def(
           "step",

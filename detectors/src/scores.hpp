@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "estimator.hpp"
@@ -18,6 +19,8 @@ class Scores {
   virtual void reset() = 0;  // the next sample is the first
   // The score of a sample, `dt` s after the last; n numbers each.
   virtual double step(const double* q, const double* qd, const double* current, double dt) = 0;
+  // The score of the plain thresholds beneath, at the same sample.
+  virtual double floor() const { return -std::numeric_limits<double>::infinity(); }
 };
 
 // The largest of some numbers; NaN where one is.
@@ -59,8 +62,12 @@ class ScaledResidual {
   void reset() { estimator_.reset(); }
   const double* step(const double* q, const double* qd, const double* current, double dt) {
     estimator_.step(q, qd, current, dt, residual_.data(), unexplained_.data(), motion_.data());
-    scaling_.row(unexplained_.data(), qd, motion_.data(), joints(), row_.data());
+    scale(scaling_, qd, row_.data());
     return row_.data();
+  }
+  // The residual of the last step by another scaling.
+  void scale(const Scaling& scaling, const double* qd, double* out) const {
+    scaling.row(unexplained_.data(), qd, motion_.data(), joints(), out);
   }
 
  private:
@@ -68,6 +75,12 @@ class ScaledResidual {
   Scaling scaling_;
   std::vector<double> residual_, unexplained_, motion_, row_;
 };
+
+// The largest ratio of size to limit; `x` is overwritten.
+inline double largest_ratio(std::vector<double>& x, const std::vector<double>& limits) {
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = std::fabs(x[k]) / limits[k];
+  return largest(x.data(), x.size());
+}
 
 // The largest ratio of scaled residual to limit.
 class LimitScores final : public Scores {
@@ -80,8 +93,8 @@ class LimitScores final : public Scores {
   void reset() override { residual_.reset(); }
   double step(const double* q, const double* qd, const double* current, double dt) override {
     const double* scaled = residual_.step(q, qd, current, dt);
-    for (std::size_t k = 0; k < ratio_.size(); ++k) ratio_[k] = std::fabs(scaled[k]) / limits_[k];
-    return largest(ratio_.data(), ratio_.size());
+    std::copy_n(scaled, ratio_.size(), ratio_.begin());
+    return largest_ratio(ratio_, limits_);
   }
 
  private:
@@ -95,17 +108,25 @@ inline double severity(double target) {
   return bounded / (1 - bounded);
 }
 
+// Plain thresholds on the residual in another scaling; none without limits.
+struct Floor {
+  Scaling scaling;
+  std::vector<double> limits;
+};
+
 // A kernel machine on windows of the scaled residual.
 class KernelScores final : public Scores {
  public:
   // The window has a column a column of the residual, the kernel the window's size. Of a graded
   // machine the score is the severity.
-  KernelScores(ScaledResidual residual, Window window, KernelSum kernel, bool graded)
+  KernelScores(ScaledResidual residual, Window window, KernelSum kernel, bool graded, Floor floor)
       : residual_(std::move(residual)),
         window_(std::move(window)),
         kernel_(std::move(kernel)),
         graded_(graded),
-        x_(window_.size()) {}
+        floor_(std::move(floor)),
+        x_(window_.size()),
+        ratio_(floor_.limits.size()) {}
 
   std::size_t joints() const override { return residual_.joints(); }
   void reset() override {
@@ -115,15 +136,22 @@ class KernelScores final : public Scores {
   double step(const double* q, const double* qd, const double* current, double dt) override {
     window_.step(residual_.step(q, qd, current, dt), x_.data());
     const double output = kernel_.at(x_.data());
+    if (!ratio_.empty()) {
+      residual_.scale(floor_.scaling, qd, ratio_.data());
+      plain_ = largest_ratio(ratio_, floor_.limits);
+    }
     return graded_ ? severity(output) : output;
   }
+  double floor() const override { return plain_; }
 
  private:
   ScaledResidual residual_;
   Window window_;
   KernelSum kernel_;
   bool graded_;
-  std::vector<double> x_;
+  Floor floor_;
+  std::vector<double> x_, ratio_;
+  double plain_ = -std::numeric_limits<double>::infinity();
 };
 
 }  // namespace tauguard::detectors

@@ -34,6 +34,7 @@ class FreeScores:
     peaks: Array  #: highest sustained score of every piece, shape (P,)
     speeds: Array  #: recent speed where it stands [rad/s], shape (P,)
     seconds: float  #: of collision-free motion
+    floor: FreeScores | None = None  #: of the plain thresholds beneath the score
 
     @classmethod
     def of(cls, level: Array, trace: Trace, settle: float) -> FreeScores:
@@ -80,9 +81,14 @@ class FreeScores:
         found: Array = self.peaks[:whole].reshape(-1, case).max(axis=1)
         return found
 
-    def over(self, levels: SpeedNormalisation) -> FreeScores:
-        """Normalised: the speed hardly changes within a piece."""
-        return replace(self, peaks=levels(self.peaks, self.speeds))
+    def over(
+        self, levels: SpeedNormalisation, floor: SpeedNormalisation | None = None
+    ) -> FreeScores:
+        """Normalised, the larger of score and floor: the speed hardly changes within a piece."""
+        peaks, plain = levels(self.peaks, self.speeds), self.floor
+        if floor is not None and plain is not None:
+            peaks = np.maximum(peaks, floor(plain.peaks, plain.speeds))
+        return replace(self, peaks=peaks, floor=None)
 
     def alarms(self, threshold: float) -> int:
         """How many alarms a threshold gives, those less than the merge gap apart as one."""

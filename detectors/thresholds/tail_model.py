@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauguard.arrays import Array
-from tauguard.detectors.thresholds.free_scores import FreeScores
+from tauguard.detectors.thresholds.free_scores import FreeScores, speed_normalisation
+from tauguard.detectors.thresholds.speed_normalisation import SpeedNormalisation
 
 #: The tail's shape where its peaks do not show another. Estimates of 26 simulated arms with two
 #: detectors have means of 0.18 and 0.20 and deviations of 0.12; chance alone makes 0.07. False
@@ -121,3 +122,32 @@ def threshold_for_rate(scores: Sequence[FreeScores], per_hour: float) -> float:
     peaks = np.sort(np.concatenate([one.blocks()[0] for one in scores]))[::-1]
     hours = sum(one.seconds for one in scores) / 3600
     return tail_level(peaks, per_hour * hours, max(2, round(TAIL * len(peaks))))
+
+
+#: Rate at which a learned score and the plain thresholds beneath it have equal levels [1/h].
+ALIKE = 1.0
+
+
+def normalisations(
+    scores: Sequence[FreeScores],
+) -> tuple[SpeedNormalisation, SpeedNormalisation | None]:
+    """The normalisation of a score, and that of the plain thresholds beneath it.
+
+    Both normalised scores exceed one level :data:`ALIKE` times an hour, so that one threshold on
+    the larger of them asks as much of either.
+
+    Args:
+        scores: not normalised, an episode each.
+
+    Returns:
+        The second is ``None`` where the score has no floor.
+    """
+    levels = speed_normalisation(scores)
+    beneath = [one.floor for one in scores if one.floor is not None]
+    if not beneath:
+        return levels, None
+    floor = speed_normalisation(beneath)
+    reached = threshold_for_rate([one.over(levels) for one in scores], ALIKE)
+    plain = threshold_for_rate([one.over(floor) for one in beneath], ALIKE)
+    factor = plain / reached if min(plain, reached) > 0 else 1.0
+    return levels, replace(floor, unit=factor * floor.unit)

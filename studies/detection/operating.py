@@ -7,7 +7,7 @@ reduced to alarms at the operating points, and forgotten.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,8 +24,7 @@ from tauguard.detectors import (
 )
 from tauguard.detectors.calibration.nominal import nominal_design
 from tauguard.detectors.evaluation.matching import Matching
-from tauguard.detectors.thresholds.free_scores import speed_normalisation
-from tauguard.detectors.thresholds.tail_model import tail_level, threshold_for_rate
+from tauguard.detectors.thresholds.tail_model import normalisations, tail_level, threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.traces import Collision, Trace
 
@@ -122,10 +121,12 @@ def operated(
     """
     found = {}
     for name, detector in detectors.items():
-        levels = speed_normalisation([one for own in free.values() for one in own[name]])
-        normal = {speed: [one.over(levels) for one in own[name]] for speed, own in free.items()}
+        levels, floor = normalisations([one for own in free.values() for one in own[name]])
+        normal = {
+            speed: [one.over(levels, floor) for one in own[name]] for speed, own in free.items()
+        }
         hourly = threshold_for_rate([one for own in normal.values() for one in own], per_hour)
-        alarms = {}
+        alarms, normalised = {}, CollisionAlarm(detector, 0.0, normalisation=levels, floor=floor)
         for amperes in AMPERES if network else ():
             if name == network:
                 alarms[str(amperes)] = CollisionAlarm(detector, amperes)
@@ -135,8 +136,8 @@ def operated(
                 for speed, own in normal.items()
             )
             threshold = min(max(matched), hourly)
-            alarms[str(amperes)] = CollisionAlarm(detector, threshold, normalisation=levels)
-        alarms[HOURLY] = CollisionAlarm(detector, hourly, normalisation=levels)
+            alarms[str(amperes)] = replace(normalised, threshold=threshold)
+        alarms[HOURLY] = replace(normalised, threshold=hourly)
         found[name] = Operated(detector, alarms)
     return found
 

@@ -36,9 +36,8 @@ from studies.framework import JobCache, Workers
 from tauguard.datasets.plans import TRAINING_PAYLOADS
 from tauguard.detectors import CollisionAlarm, FittedDetector, FreeScores, poisson_rate
 from tauguard.detectors.evaluation.metrics import HEADLINE, delay_metrics
-from tauguard.detectors.thresholds.free_scores import speed_normalisation
 from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
-from tauguard.detectors.thresholds.tail_model import threshold_for_rate
+from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.report import Row, rate
 from tauguard.report.charts import errorbars
@@ -147,10 +146,11 @@ def arm_tallies(job: tuple[Size, int, int]) -> Tallies:
 def _alarms(
     detector: FittedDetector, scores: Sequence[FreeScores], asked: Sequence[float]
 ) -> Iterator[tuple[str, CollisionAlarm]]:
-    levels = speed_normalisation(scores)
+    levels, floor = normalisations(scores)
+    aimed = CollisionAlarm(detector, 0.0, normalisation=levels, floor=floor)
     for per_hour in asked:
-        threshold = threshold_for_rate([one.over(levels) for one in scores], per_hour)
-        yield point(AIMED, per_hour), CollisionAlarm(detector, threshold, normalisation=levels)
+        threshold = threshold_for_rate([one.over(levels, floor) for one in scores], per_hour)
+        yield point(AIMED, per_hour), replace(aimed, threshold=threshold)
         try:
             held = guaranteed_threshold(scores, per_hour).threshold
         except ValueError:

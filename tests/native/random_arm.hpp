@@ -74,18 +74,17 @@ inline EstimatorSettings settings_of(Random& random, std::size_t n, std::size_t 
   s.weights = uniforms(random, n * columns, 0, 1);
   s.deviation = adapts ? uniforms(random, unknowns, 0, 1) : Numbers(unknowns, 0.0);
   s.persistence = uniforms(random, unknowns, 1, 60), s.noise = uniforms(random, n, 0.1, 1);
-  s.every = 1 + static_cast<int>(random() % 10), s.weighted = random() % 2;
+  s.every = uniform(random, 1e-3, 2e-2), s.started = random() % 2 ? 0.1 : 0,
+  s.weighted = random() % 2;
   s.inflation = random() % 2 ? 20 : 1, s.transition = random() % 2 ? 0.1 : 0;
   if (adapts && random() % 2) s.fusion = uniforms(random, n * VelocityFusion::gain_numbers, 0, 0.5);
   return s;
 }
 
-inline FreeSettings free_settings(Random& random, std::size_t n, std::size_t columns) {
-  return {uniforms(random, n, 1, 20),
-          uniforms(random, n * columns, 0, 1),
-          uniforms(random, n, 0.1, 5),
-          uniform(random, 0, 2),
-          uniform(random, 0, 0.2),
+inline FreeMotion free_motion_of(Random& random, const Chain& chain, const FrictionBasis& basis) {
+  const std::size_t n = chain.joints.size();
+  Estimator estimator(chain, basis, settings_of(random, n, basis.columns(), true));
+  return {std::move(estimator),
           {uniforms(random, n, 0.1, 1), uniforms(random, n, 0, 1), uniforms(random, n, 0.1, 1),
            uniforms(random, 4 * n, 0, 1), uniforms(random, n, 0, 1)}};
 }
@@ -94,9 +93,7 @@ inline FreeSettings free_settings(Random& random, std::size_t n, std::size_t col
 inline std::shared_ptr<Scores> scores_of(Random& random, int kind, const Chain& chain,
                                          const FrictionBasis& basis) {
   const std::size_t n = chain.joints.size();
-  if (kind == 0)
-    return std::make_shared<FreeScores>(
-        FreeMotion(chain, basis, free_settings(random, n, basis.columns())));
+  if (kind == 0) return std::make_shared<FreeScores>(free_motion_of(random, chain, basis));
   std::vector<std::int64_t> joints;
   for (std::size_t j = 0; j < n; ++j) joints.push_back(static_cast<std::int64_t>(n - 1 - j));
   const Numbers weights = random() % 2 ? Numbers{} : uniforms(random, noise_terms * n, 0.1, 1);
@@ -106,9 +103,10 @@ inline std::shared_ptr<Scores> scores_of(Random& random, int kind, const Chain& 
     return std::make_shared<LimitScores>(std::move(residual), uniforms(random, n, 0.1, 2));
   const std::size_t count = 1 + random() % 11, size = n * count, vectors = random() % 40;
   const Numbers z = uniforms(random, vectors * size, -1, 1), c = uniforms(random, vectors, -1, 1);
-  return std::make_shared<KernelScores>(std::move(residual), Window(n, 1 + random() % 8, count),
-                                        KernelSum(z.data(), c.data(), vectors, size, 0.1, 3),
-                                        random() % 2);
+  return std::make_shared<KernelScores>(
+      std::move(residual), Window(n, 1 + random() % 8, count),
+      KernelSum(z.data(), c.data(), vectors, size, 0.1, 3), random() % 2,
+      Floor{Scaling(joints, weights, 1, 1, false), uniforms(random, n, 0.1, 2)});
 }
 
 struct MonitoredArm {
@@ -133,7 +131,7 @@ struct MonitoredArm {
     TorqueBounds bounds;
     bounds.opposed = Numbers(n, -0.4), bounds.least = Numbers(n, 0.4);
     bounds.most = Numbers(n, 1.7);
-    Alarm alarm(scores_of(random, kind, chain, basis), {dt, 0.1, 0.5, 2, 250, levels});
+    Alarm alarm(scores_of(random, kind, chain, basis), {dt, 0.1, 0.5, 2, 250, levels, levels});
     Estimator observer(chain, basis, settings_of(random, n, basis.columns(), false));
     monitor.reset(new Monitor(FaultCheck(usual), std::move(alarm), std::move(observer),
                               TorqueCheck(one, one, bounds), {dt, 0.1, 0.02, 0.1, 2}));

@@ -1,9 +1,12 @@
 """A trained alarm as a whole: what it finds, online as in batch, bad input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
+from tauguard.datasets.plans import free_episodes
 from tauguard.detectors import (
     ArmModel,
     PlainSrqSvr,
@@ -13,9 +16,14 @@ from tauguard.detectors import (
     match_detection,
     train,
 )
-from tauguard.detectors.alarms.training import left_out, train_and_score
+from tauguard.detectors.alarms.training import left_out, train_and_score, with_rate
+from tauguard.detectors.evaluation.semi_real import Added, add_contact
 from tauguard.detectors.features.front_end import FrontEndSettings
+from tauguard.detectors.scores.baselines import MovingThresholds
+from tauguard.detectors.thresholds.speed_normalisation import recent_speed
 from tauguard.detectors.thresholds.tail_model import threshold_for_rate
+from tauguard.envs import simulate
+from tauguard.models import Mismatch
 
 
 def test_it_finds_collisions_on_unseen_motions_with_unknown_payloads(alarm, unseen):
@@ -38,6 +46,31 @@ def test_online_equals_batch(alarm, unseen):
     assert score.tobytes() == batch.score[:rows].tobytes()
     np.testing.assert_array_equal(up, batch.alarm[:rows])
     assert up.any()
+
+
+def test_a_blow_unlike_any_of_the_training_is_found_by_the_floor(alarm, training, arm):
+    """Blows of 90 N m on joints 2 and 3 alone, for 5 ms: to some the regressor hardly answers."""
+    trace = simulate(free_episodes(78, 1, 9.0, (30.0,), (2000.0,), Mismatch(seed=11))[0])
+    starts = 4.0 + 0.4 * np.arange(12)
+    for start, angle in zip(starts, np.linspace(0, 2 * np.pi, 12), strict=True):
+        torque = np.array([np.cos(angle), np.sin(angle)])
+        blow = Added(start, 0.005, (0, *(90 * torque / np.abs(torque).max()), 0, 0, 0))
+        trace = add_contact(trace, arm.drive_gain, blow)
+    rare = with_rate(alarm.detector, training[:9], 0.25)
+    scores = np.array([one.scores(trace) for one in (rare, replace(rare, floor=None))])
+    rows = [(trace.t >= start) & (trace.t < start + 0.05) for start in starts]
+    both, alone = np.array([scores[:, own].max(axis=1) for own in rows]).T
+    assert (both > 2 * rare.threshold).all()
+    assert (alone < 0.6 * both).any()
+
+
+def test_the_floor_is_that_of_moving_thresholds(alarm, training, unseen, arm):
+    own = alarm.detector
+    plain = MovingThresholds(FrontEndSettings()).fit(held_out(training)[0], arm)
+    assert own.floor.scores(unseen[0]).tobytes() == plain.scores(unseen[0]).tobytes()
+    speed = recent_speed(unseen[0].qd, unseen[0].dt)
+    beneath = alarm.floor(own.floor.scores(unseen[0]), speed)
+    assert (alarm.scores(unseen[0]) >= beneath).all()
 
 
 def test_the_plain_form_is_the_dissertations(training, arm):

@@ -29,9 +29,10 @@ class Told:
 
 def native(told, joints, settle, threshold, samples, memory, levels):
     columns = (levels.speed, levels.base, levels.unit) if levels else ([], [], [])
+    none = _observer.Levels([], [], [])
     scores = _observer.python_scores(lambda: told, joints)
-    columns = ([float(x) for x in column] for column in columns)
-    return _observer.Alarm(scores, DT, settle, threshold, samples, memory, *columns)
+    levels = _observer.Levels(*([float(x) for x in column] for column in columns))
+    return _observer.Alarm(scores, DT, settle, threshold, samples, memory, levels, none)
 
 
 @given(
@@ -84,7 +85,7 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="dt, samples, memory"):
         native(Told([]), 2, 0.0, 0.5, 0, 1, None)
     with pytest.raises(ValueError, match="as many of each"):
-        _observer.Alarm(_observer.python_scores(lambda: Told([]), 2), DT, 0, 0, 1, 1, [1.0], [], [])
+        _observer.Levels([1.0], [], [])
 
 
 def test_an_error_of_a_python_stream_is_its_own():
