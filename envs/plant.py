@@ -115,6 +115,10 @@ def _joints(scene: Scene, nominal: Drive, gains: Gains) -> list[_plant.Joint]:
     warm = 0.0 if friction is None else friction.temperature - friction.reference_temperature
     level = 0.0 if friction is None else 1 + friction.coulomb_per_kelvin * warm
     thick = 0.0 if friction is None else 1 + friction.viscous_per_kelvin * warm
+    slope = np.zeros((len(drive.gain), 0))
+    widths = np.zeros(0)
+    if friction is not None and friction.slope is not None and friction.slope_velocity is not None:
+        slope, widths = level * friction.slope, friction.slope_velocity
     known, compensated = nominal.friction, scene.facts.compensation
     return [
         _plant.Joint(
@@ -130,6 +134,8 @@ def _joints(scene: Scene, nominal: Drive, gains: Gains) -> list[_plant.Joint]:
             viscous=0.0 if friction is None else friction.viscous[i] * thick,
             bristle_stiffness=0.0 if friction is None else friction.bristle_stiffness[i],
             load=0.0 if friction is None else friction.load[i],
+            slope=slope[i].tolist(),
+            slope_velocity=widths.tolist(),
             kp=gains.kp[i],
             kd=gains.kd[i],
             rated_speed=0.0 if drive.rated_speed is None else drive.rated_speed[i],

@@ -8,6 +8,7 @@ from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
 from tauguard.models.drive_text import drive_of, drive_text
 from tauguard.models.impact import blow_velocity, reflected_mass, standard_mass
 from tauguard.models.known_robots import ROBOTS
+from tauguard.models.left_over import LeftOver
 from tauguard.models.link_surface import LinkSurface, arm_surface, link_surface
 from tauguard.models.mismatch import Mismatch
 from tauguard.models.nominal import add_payload, compiled, pin_model
@@ -30,6 +31,7 @@ __all__ = [
     "Drive",
     "Facts",
     "Friction",
+    "LeftOver",
     "LinkSurface",
     "Mismatch",
     "Person",

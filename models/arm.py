@@ -149,11 +149,17 @@ def load_arm(source: str | Robot) -> Arm:
     path, sources = Path(robot.file), dict[str, str]()
     if not path.is_file():
         robot, path, sources = _by_name(robot)
+    files = [path, *(Path(f) for f in (_left_over(robot),) if f and Path(f).is_file())]
     try:
-        arm = _from_file(robot, path, path.stat().st_mtime_ns, tuple(sources.items()))
+        modified = max(file.stat().st_mtime_ns for file in files)
+        arm = _from_file(robot, path, modified, tuple(sources.items()))
     except ValueError as error:
         raise ValueError(f"arm {robot.file}: {' '.join(str(error).split())}") from None
     return replace(arm, spec=arm.spec.copy())
+
+
+def _left_over(robot: Robot) -> str | None:
+    return None if robot.drive.sensors is None else robot.drive.sensors.left_over
 
 
 @functools.lru_cache(maxsize=4)

@@ -10,6 +10,7 @@ import numpy as np
 from tauguard.arrays import Array, Bools
 from tauguard.models import cura6
 from tauguard.models.drive import Drive, Friction, Ripple, Sensors, cura6_drive
+from tauguard.models.left_over import LeftOver
 from tauguard.models.robot import RobotDrive, RobotRipple, RobotSensors, per_joint
 
 #: Presliding distance of joints of which only the friction level is known [rad].
@@ -74,6 +75,9 @@ def _stated_friction(stated: RobotDrive, n: int) -> Friction | None:
     length = stated.row("presliding", n)
     if length is not None:
         known["bristle_stiffness"] = coulomb / length
+    if stated.slope is not None and stated.slope_velocity is not None:
+        known["slope"] = np.array(stated.slope)
+        known["slope_velocity"] = np.atleast_1d(stated.slope_velocity)
     return replace(friction, **known)
 
 
@@ -92,7 +96,9 @@ def _stated_sensors(stated: RobotSensors | None, n: int) -> Sensors | None:
         position_quantum=stated.position_quantum,
         velocity_noise=stated.velocity_noise,
         velocity_quantum=stated.velocity_quantum,
-        directional=_stated_ripple(stated.directional),
+        rate=stated.rate,
+        jitter=stated.jitter,
+        left_over=None if stated.left_over is None else LeftOver.read(stated.left_over),
     )
 
 

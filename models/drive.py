@@ -8,10 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.models import cura6
 from tauguard.models.checks import above_zero, not_negative, shaped
+from tauguard.models.left_over import LeftOver, Player
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,8 @@ class Friction:
 
     With the bristle deflection z [rad], velocity v and transmitted torque tau::
 
-        g(v)  = [Fc + (Fs - Fc) exp(-(v / vs)^2)] (1 + load |tau|) (1 + kc (T - T0))
+        g(v)  = [Fc + (Fs - Fc) exp(-(v / vs)^2) + sum_k s_k tanh(|v| / w_k)]
+                (1 + load |tau|) (1 + kc (T - T0))
         dz/dt = v - k |v| / g(v) z            (exact over a step for a constant v)
         tau_friction = k z + viscous (1 + kv (T - T0)) v
 
@@ -38,11 +41,20 @@ class Friction:
     viscous_per_kelvin: float = -0.012  #: kv [1/K]
     reference_temperature: float = 35.0  #: T0 [degC]
     temperature: float = 35.0  #: T of this episode [degC]
+    slope: Array | None = None  #: s, rises of the level with the speed [N m], shape (n, k)
+    slope_velocity: Array | None = None  #: w [rad/s], shape (k,)
 
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
         per_joint = tuple(f.name for f in fields(self) if f.type == "Array")
         shaped(self, (len(self.coulomb),), "one a joint", *per_joint)
+        if (self.slope is None) != (self.slope_velocity is None):
+            raise ValueError("Friction.slope, slope_velocity: expected both or neither")
+        if self.slope is not None and self.slope_velocity is not None:
+            shape = (len(self.coulomb), len(self.slope_velocity))
+            shaped(self, shape, "joints, slopes", "slope")
+            not_negative(self, "slope")
+            above_zero(self, "slope_velocity")
         above_zero(self, "stribeck_velocity")
         not_negative(self, "coulomb", "bristle_stiffness", "viscous", "load")
         if not ((self.bristle_stiffness > 0) | (self.coulomb == 0)).all():
@@ -84,10 +96,6 @@ class Ripple:
         return series
 
 
-#: Speed range over which an error that follows the sign of the velocity changes its sign [rad/s].
-DIRECTION_SPEED = 0.02
-
-
 @dataclass(frozen=True)
 class Sensors:
     """Measurement noise and quantisation; a quantum of 0 does not quantise."""
@@ -97,26 +105,52 @@ class Sensors:
     position_quantum: float = 2e-6  #: [rad]
     velocity_noise: float = 5e-4  #: standard deviation [rad/s]
     velocity_quantum: float = 0.0  #: [rad/s]
-    directional: Ripple | None = None
-    """Error of the reported current that changes sign with the velocity; it has no effect on the
-    motion. Its cycles count per revolution of a joint."""
+    rate: float = 0.0  #: samples a second; 0: one at every physics step
+    jitter: float = 0.0  #: standard deviation of a sample's time [s]
+    left_over: LeftOver | None = None
+    """Errors of the current's model along recorded motions: added to what is reported, without an
+    effect on the motion."""
 
     def __post_init__(self) -> None:
         """Check shapes and signs: ``ValueError`` names the field."""
         shaped(self, (len(self.current_noise),), "one a joint", "current_quantum")
-        not_negative(self, *(f.name for f in fields(self) if f.name != "directional"))
-        if self.directional is not None:
-            shaped(
-                self.directional,
-                (len(self.current_noise), len(self.directional.cycles)),
-                "joints, harmonics",
-                "amplitude",
+        not_negative(self, *(f.name for f in fields(self) if f.name != "left_over"))
+        joints = 0 if self.left_over is None else self.left_over.qd.shape[1]
+        if self.left_over is not None and joints != len(self.current_noise):
+            raise ValueError(
+                f"Sensors.left_over: of {joints} joints, expected {len(self.current_noise)}"
             )
 
+    def player(self, dt: float, rng: np.random.Generator) -> Player | None:
+        """What plays the left-over errors of one episode; None where there are none."""
+        return None if self.left_over is None else Player(self.left_over, dt, rng)
+
+    def samples(self, t: Array, rng: np.random.Generator) -> NDArray[np.intp]:
+        """Which of the physics steps at times ``t`` [s] are sampled, rising."""
+        if self.rate <= 0 or len(t) < 2 or self.rate * (t[1] - t[0]) > 1:
+            return np.arange(len(t))
+        times = np.arange(t[0], t[-1], 1 / self.rate)
+        times[1:] += self.jitter * rng.normal(size=len(times) - 1)
+        return np.unique(np.clip(np.rint((times - t[0]) / (t[1] - t[0])), 0, len(t) - 1)).astype(
+            np.intp
+        )
+
     def measure(
-        self, rng: np.random.Generator, q: Array, qd: Array, current: Array
+        self,
+        rng: np.random.Generator,
+        q: Array,
+        qd: Array,
+        current: Array,
+        player: Player | None = None,
     ) -> tuple[Array, Array, Array]:
         """Measured signals from true ones of shape (T, n): noise is added, then they are quantised.
+
+        Args:
+            rng: of the noise.
+            q: positions [rad].
+            qd: velocities [rad/s].
+            current: [A].
+            player: of the left-over errors, see :meth:`player`; it remembers the samples before.
 
         Raises:
             ValueError: signals that are not all of one shape (T, n) for the n of these sensors.
@@ -127,8 +161,8 @@ class Sensors:
                 f"expected (T, {len(self.current_noise)}) each"
             )
         amperes = current + rng.normal(size=current.shape) * self.current_noise
-        if self.directional is not None:
-            amperes += self.directional.at(q) * np.tanh(qd / DIRECTION_SPEED)
+        if player is not None:
+            amperes += player.next(qd)
         speed = qd + rng.normal(size=qd.shape) * self.velocity_noise
         return (
             _rounded(q, self.position_quantum),

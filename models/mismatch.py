@@ -77,6 +77,7 @@ class Mismatch:
                 static=friction.static * level,
                 bristle_stiffness=friction.bristle_stiffness * level,
                 viscous=friction.viscous * viscous,
+                slope=None if friction.slope is None else friction.slope * level[:, None],
             )
         if ripple is not None:
             ripple = replace(

@@ -51,11 +51,13 @@ class RobotSensors:
     position_quantum: float = 0.0  #: [rad]
     velocity_noise: float = 0.0  #: standard deviation [rad/s]
     velocity_quantum: float = 0.0  #: [rad/s]
-    directional: RobotRipple | None = None  #: error that changes sign with the velocity [A]
+    rate: float = 0.0  #: samples a second; 0: one at every physics step
+    jitter: float = 0.0  #: standard deviation of a sample's time [s]
+    left_over: str | None = None  #: CSV file, see :class:`tauguard.models.left_over.LeftOver`
 
     def __post_init__(self) -> None:
         """Check the values: ``ValueError`` names the field."""
-        for name in [field.name for field in fields(self) if field.name != "directional"]:
+        for name in [field.name for field in fields(self) if field.name != "left_over"]:
             value = _numbers(getattr(self, name), f"drive.sensors.{name}")
             object.__setattr__(self, name, value)
             if not np.all(np.asarray(value) >= 0):
@@ -83,6 +85,8 @@ class RobotDrive:
     stribeck_velocity: float | Numbers | None = None  #: [rad/s]
     presliding: float | Numbers | None = None  #: Coulomb friction over bristle stiffness [rad]
     load: float | Numbers | None = None  #: rise of the level per transmitted torque [1/(N m)]
+    slope: Rows | None = None  #: rises of the level with the speed [N m], shape (n, k)
+    slope_velocity: Numbers | None = None  #: over which [rad/s], shape (k,)
     ripple: RobotRipple | None = None
     sensors: RobotSensors | None = None
     like: str | None = None
@@ -95,8 +99,11 @@ class RobotDrive:
             raise ValueError(f'drive.like {self.like!r}: expected "cura6"')
         if self.gain is not None and self.torque_constant is not None:
             raise ValueError("drive.gain: not beside drive.torque_constant, which gives it too")
+        if self.slope is not None:
+            rows = tuple(tuple(np.atleast_1d(_numbers(r, "drive.slope"))) for r in self.slope)
+            object.__setattr__(self, "slope", rows)
         for field in fields(self):
-            if field.name in ("like", "ripple", "sensors"):
+            if field.name in ("like", "ripple", "sensors", "slope"):
                 continue
             value = getattr(self, field.name)
             if value is None:
@@ -183,9 +190,11 @@ class Robot:
             values: dict[str, Any] = tomllib.loads(read_text(path))
             if "file" not in values:
                 raise ValueError('no file; expected file = "arm.xml" (MJCF or URDF)')
-            beside = path.parent / str(values["file"])
-            if beside.is_file():
-                values["file"] = str(beside)
+            sensors = values.get("drive", {}).get("sensors", {})
+            for table, name in ((values, "file"), (sensors, "left_over")):
+                beside = path.parent / str(table.get(name, ""))
+                if beside.is_file():
+                    table[name] = str(beside)
             return cls.from_mapping(values)
 
     @classmethod
@@ -208,9 +217,6 @@ def _drive(values: Mapping[str, Any]) -> RobotDrive:
         parts["ripple"] = _part(RobotRipple, parts["ripple"], "drive.ripple")
     if "sensors" in parts:
         sensors = dict(parts["sensors"])
-        if "directional" in sensors:
-            where = "drive.sensors.directional"
-            sensors["directional"] = _part(RobotRipple, sensors["directional"], where)
         parts["sensors"] = _part(RobotSensors, sensors, "drive.sensors")
     return RobotDrive(**parts)
 

@@ -11,12 +11,12 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.atomic_write import write_atomic
 from tauguard.detectors.calibration.arm_file import save_arm
-from tauguard.models import Ripple
-from tauguard.twin.drive_fit import DriveFit
-from tauguard.twin.identify import PRESLIDING, Twin
+from tauguard.twin.identify import Twin
 
 
-def write_twin(twin: Twin, robot: Path, out: Path, logs: Sequence[str], scale: str) -> Path:
+def write_twin(
+    twin: Twin, robot: Path, out: Path, logs: Sequence[str], scale: str
+) -> tuple[Path, Path]:
     """Write the description, and the bodies beside it.
 
     Args:
@@ -27,7 +27,7 @@ def write_twin(twin: Twin, robot: Path, out: Path, logs: Sequence[str], scale: s
         scale: what fixed the scale of the torques.
 
     Returns:
-        The file of the bodies.
+        The file of the bodies, and that of the left-over errors.
 
     Raises:
         ValueError: ``out`` does not end in .toml.
@@ -38,8 +38,13 @@ def write_twin(twin: Twin, robot: Path, out: Path, logs: Sequence[str], scale: s
     bodies = out.with_name(f"{out.stem}.bodies{robot.suffix}")
     save_arm(twin.arm, robot, bodies, scale=scale, logs=list(logs))
     _without_losses(bodies)
-    write_atomic(out, _text(twin, bodies.name, logs))
-    return bodies
+    sensors = twin.drive.sensors
+    assert sensors is not None
+    assert sensors.left_over is not None
+    left_over = out.with_name(f"{out.stem}.left_over.csv")
+    sensors.left_over.write(left_over)
+    write_atomic(out, _text(twin, bodies.name, left_over.name, logs))
+    return bodies, left_over
 
 
 def _without_losses(bodies: Path) -> None:
@@ -48,60 +53,47 @@ def _without_losses(bodies: Path) -> None:
     write_atomic(bodies, re.sub(r'\s(?:damping|frictionloss)="[^"]*"', "", text))
 
 
-def _text(twin: Twin, bodies: str, logs: Sequence[str]) -> str:
-    drive, sensors, friction, ripple = (
-        twin.drive, twin.drive.sensors, twin.drive.friction, twin.drive.ripple
-    )  # fmt: skip
+def _text(twin: Twin, bodies: str, left_over: str, logs: Sequence[str]) -> str:
+    drive, sensors, friction = twin.drive, twin.drive.sensors, twin.drive.friction
     assert sensors is not None
     assert friction is not None
-    assert ripple is not None
-    assert sensors.directional is not None
-    rows = twin.arm.robot.armature / drive.gear**2
+    assert friction.slope is not None
+    assert friction.slope_velocity is not None
+    half = {name: _half_widths(values) for name, values in twin.intervals.items()}
     lines = [
         *(f"# {note}" for note in twin.notes),
-        f"# sampled at {twin.rate:.4g} Hz, {1e3 * twin.jitter:.2g} ms standard deviation",
+        "# +- is half of a 95 % interval, from leaving out each part of the logs",
         f'file = "{bodies}"',
         f'source = "identified from {", ".join(logs)}"',
         "",
         "[drive]",
-        f"gain = {_row(drive.gain)}  # N m/A",
+        f"gain = {_row(drive.gain)}  # N m/A{half.get('gain', '')}",
         f"gear = {_row(drive.gear)}  # prior",
-        f"rotor_inertia = {_row(rows)}  # kg m^2, of the motor",
-        f"coulomb = {_row(friction.coulomb)}  # N m, {_spread(twin.fits, 'coulomb')}",
-        f"static = {_row(friction.static)}  # N m, {_spread(twin.fits, 'static')}",
+        f"rotor_inertia = {_row(twin.number('rotor'))}  # kg m^2{half.get('rotor', '')}",
+        f"coulomb = {_row(friction.coulomb)}  # N m{half.get('coulomb', '')}",
+        f"static = {_row(friction.static)}  # N m{half.get('static', '')}",
         f"stribeck_velocity = {_row(friction.stribeck_velocity)}  # rad/s, best of a few",
-        f"viscous = {_row(friction.viscous)}  # N m s/rad, {_spread(twin.fits, 'viscous')}",
-        f"load = {_row(friction.load)}  # 1/(N m)",
-        f"presliding = {PRESLIDING}  # rad, prior: reported positions do not resolve it",
-        "",
-        "[drive.ripple]  # offset, harmonics of the joint, lines of the motor, what is left",
-        *_series(ripple),
+        f"viscous = {_row(friction.viscous)}  # N m s/rad{half.get('viscous', '')}",
+        f"slope_velocity = {_row(friction.slope_velocity)}  # rad/s",
+        f"slope = [{', '.join(_row(row) for row in friction.slope)}]  # N m",
+        f"load = {_row(friction.load)}  # 1/(N m){half.get('load', '')}",
+        f"presliding = {_row(friction.coulomb / friction.bristle_stiffness)}  # rad, best of a few",
         "",
         "[drive.sensors]",
-        f"current_noise = {_row(sensors.current_noise)}  # A",
         f"current_quantum = {_row(sensors.current_quantum)}  # A",
         f"position_quantum = {_digits(sensors.position_quantum)}  # rad",
-        f"velocity_noise = {_digits(sensors.velocity_noise)}  # rad/s",
         f"velocity_quantum = {_digits(sensors.velocity_quantum)}  # rad/s",
-        "",
-        "[drive.sensors.directional]  # changes sign with the velocity",
-        *_series(sensors.directional),
+        f"rate = {_digits(sensors.rate)}  # samples a second",
+        f"jitter = {_digits(sensors.jitter)}  # s, standard deviation of a sample's time",
+        f'left_over = "{left_over}"  # errors of all this [A] along the logs, noise included',
     ]
     return "\n".join(lines) + "\n"
 
 
-def _series(ripple: Ripple) -> list[str]:
-    table = {"amplitude": ripple.amplitude, "phase": ripple.phase}
-    rows = [f"cycles = {_row(ripple.cycles)}"]
-    for name, values in table.items():
-        rows += [f"{name} = [", *(f"    {_row(row)}," for row in values), "]"]
-    return rows
-
-
-def _spread(fits: Sequence[DriveFit | None], name: str) -> str:
-    """Half the width of each 95 % interval."""
-    half = ["prior" if f is None else f"{1.96 * getattr(f, name)[1]:.2g}" for f in fits]
-    return f"+- {', '.join(half)}"
+def _half_widths(values: Array) -> str:
+    if not np.any(values):
+        return ", given"
+    return f", +- {', '.join('prior' if np.isnan(v) else f'{v:.2g}' for v in values)}"
 
 
 def _row(values: Array) -> str:

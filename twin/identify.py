@@ -1,28 +1,31 @@
-"""A twin from free logs: the calibrated bodies, and the drives that explain the rest."""
+"""A twin from free logs: the calibrated bodies, friction, and what neither explains."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from scipy.stats import t as student
 
 from tauguard.arrays import Array
 from tauguard.detectors import ArmModel
-from tauguard.models import Drive, Friction, Ripple, Sensors
+from tauguard.models import Drive, Friction, LeftOver, Sensors
 from tauguard.traces import Trace
-from tauguard.twin.drive_fit import LINES, DriveFit, columns, fit_joint
-from tauguard.twin.play import played, residual_of
-from tauguard.twin.signals import SLOW, Motion, motion_of, quantum, white_noise
-from tauguard.twin.wander import CYCLES, line_heights
+from tauguard.twin.drive_fit import SLOPES, FrictionFit, fit_friction
+from tauguard.twin.play import friction_torque, modelled
+from tauguard.twin.signals import Motion, motion_of, quantum, without_gaps
 
-#: Prior of what logs of a moving arm do not show: bristle length [rad].
-PRESLIDING = 1.5e-3
-#: Prior of the gear ratio, which the lines of ripple count in.
+#: Candidates of the angle over which friction turns around with the joint [rad], and the prior.
+PRESLIDING, USUAL = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2), 1e-3
+#: Slower than this a joint shows it [rad/s].
+TURNING = 0.1
+#: Prior of the gear ratio.
 GEAR = 101.0
-#: Of the phases of lines that stand for what is left.
-SEED = 0
+#: Least half width of an interval: no law of friction is truer [relative].
+FORM = 0.02
+#: The identified numbers that have an interval.
+NUMBERS = ("gain", "rotor", "coulomb", "static", "viscous", "load")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +34,20 @@ class Twin:
 
     arm: ArmModel  #: calibrated
     drive: Drive  #: what is simulated
-    fits: tuple[DriveFit | None, ...]  #: of each joint; None: it did not move enough
-    rate: float  #: samples a second
-    jitter: float  #: standard deviation of the sample interval [s]
+    fits: tuple[FrictionFit | None, ...]  #: of each joint; None: it did not move enough
     notes: tuple[str, ...]  #: what the logs do not show, one line each
+    intervals: dict[str, Array] = field(default_factory=dict)
+    """Half the width of the 95 % interval of each of :data:`NUMBERS`, shape (n,) each; NaN: a
+    prior, 0: given."""
+
+    def number(self, name: str) -> Array:
+        """One of :data:`NUMBERS`, shape (n,)."""
+        if name == "gain":
+            return self.drive.gain
+        if name == "rotor":
+            return np.asarray(self.arm.robot.armature / self.drive.gear**2)
+        value: Array = getattr(self.drive.friction, name)
+        return value
 
 
 def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) -> Twin:
@@ -49,145 +62,123 @@ def identify_twin(arm: ArmModel, traces: Sequence[Trace], current_limit: Array) 
         ValueError: no joint moves for long enough.
     """
     n = arm.robot.joints
-    motions = [motion_of(arm, trace) for trace in traces]
-    torques = [trace.current * arm.drive_gain for trace in traces]
-    with threadpool_limits(1, "blas"):  # small products: threads cost more than they save
-        fits = tuple(fit_joint(j, motions, torques, GEAR) for j in range(n))
-    known = [j for j in range(n) if fits[j] is not None]
-    if not known:
-        raise ValueError("no joint moves for two stretches of half a second: give longer logs")
-    notes = tuple(
-        f"{arm.robot.joint_names[j]}: hardly moves; its friction is a prior, like the other joints'"
-        for j in range(n)
-        if fits[j] is None
-    )
-    heights = [_heights(j, fits[j], motions, torques, arm) for j in range(n)]
+    parts = [(k, part) for k, trace in enumerate(traces) for part in without_gaps(trace)]
+    motions = [motion_of(arm, part) for _, part in parts]
+    torques = [part.current * arm.drive_gain for _, part in parts]
+    fits = tuple(fit_friction(j, motions, torques) if motions else None for j in range(n))
+    if all(fit is None for fit in fits):
+        raise ValueError("no joint moves for a second: give longer logs")
     drive = Drive(
         gain=arm.drive_gain,
         gear=np.full(n, GEAR),
         current_limit=current_limit,
         electrical_time_constant=None,
-        friction=_friction(fits, arm.drive_gain),
-        ripple=_ripple(fits, heights, arm.drive_gain),
-        sensors=_sensors(fits, traces, arm.drive_gain),
+        friction=_turning(_friction(fits, arm.drive_gain), motions, torques),
     )
-    drive = _levelled(arm, drive, traces)
-    steps = np.concatenate([np.diff(trace.t) for trace in traces])
-    rate, jitter = 1 / float(np.median(steps)), float(np.std(steps))
-    return Twin(arm, drive, fits, rate, jitter, notes)
+    sensors = replace(_sensors(traces, n), left_over=_left_over(arm, drive, parts))
+    return Twin(arm, replace(drive, sensors=sensors), fits, _notes(arm, fits, traces))
 
 
-def _levelled(arm: ArmModel, drive: Drive, traces: Sequence[Trace]) -> Drive:
-    """Random lines as high as the detector's residual asks, as far as more is needed at all."""
-    ripple = drive.ripple
-    assert ripple is not None
-    lines = len(CYCLES)
-    bare = replace(ripple, amplitude=ripple.amplitude.copy())
-    bare.amplitude[:, -lines:] = 0.0
-    real, none, full = (
-        _power(arm, [with_current(arm, d, trace) for trace in traces])
-        for d in (None, replace(drive, ripple=bare), drive)
-    )
-    share = np.clip((real - none) / np.maximum(full - none, 1e-12), 0.0, 1.0)
-    bare.amplitude[:, -lines:] = ripple.amplitude[:, -lines:] * np.sqrt(share)[:, None]
-    return replace(drive, ripple=bare)
+def with_intervals(twin: Twin, others: Sequence[Twin]) -> Twin:
+    """The twin with intervals by the jackknife over logs: errors of the model last for a log.
+
+    Args:
+        twin: of all logs.
+        others: each of all logs but one part.
+    """
+    count = len(others)
+    if count < 2:
+        return twin
+    wide, intervals = float(student.ppf(0.975, count - 1)), {}
+    for name in NUMBERS:
+        values = np.array([other.number(name) for other in others])
+        deviation = np.sqrt((count - 1) * values.var(axis=0))
+        known = np.array([fit is not None for fit in twin.fits]) | (name in ("gain", "rotor"))
+        form = 0.0 if name == "gain" else FORM * np.abs(twin.number(name))
+        intervals[name] = np.where(known, np.maximum(wide * deviation, form), np.nan)
+    return replace(twin, intervals=intervals)
 
 
-def with_current(arm: ArmModel, drive: Drive | None, trace: Trace) -> Trace:
-    """A log with the currents of a drive; as it is for None."""
-    return trace if drive is None else replace(trace, current=played(arm, drive, trace))
+def _notes(
+    arm: ArmModel, fits: Sequence[FrictionFit | None], traces: Sequence[Trace]
+) -> tuple[str, ...]:
+    names = arm.robot.joint_names
+    notes = [
+        f"{names[j]}: hardly moves; its friction is a prior, like the other joints'"
+        for j, fit in enumerate(fits)
+        if fit is None
+    ]
+    cuts = sum(len(without_gaps(trace, 0.0)) - 1 for trace in traces)
+    if cuts:
+        notes.append(f"{cuts} gaps in the logs' samples: what is beside them is used, not the gaps")
+    return tuple(notes)
 
 
-def _power(arm: ArmModel, traces: Sequence[Trace]) -> Array:
-    """Mean square of the residual of each joint while it moves [(N m)^2], shape (n,)."""
-    total, count = np.zeros(arm.robot.joints), np.zeros(arm.robot.joints)
-    for trace in traces:
-        moving = np.abs(trace.qd) > SLOW
-        total += (moving * residual_of(arm, trace) ** 2).sum(axis=0)
-        count += moving.sum(axis=0)
-    return np.asarray(total / np.maximum(count, 1))
-
-
-def _heights(
-    j: int, fit: DriveFit | None, motions: Sequence[Motion], torques: Sequence[Array], arm: ArmModel
-) -> Array:
-    """Amplitudes of the lines that stand for what the fit leaves [A], shape (lines,)."""
-    if fit is None:
-        return np.zeros(len(CYCLES))
-    angles, rests = [], []
-    for motion, torque in zip(motions, torques, strict=True):
-        rows = motion.moving[:, j]
-        table = columns(
-            motion.q[rows, j], motion.qd[rows, j], motion.bodies[rows, j], GEAR,
-            fit.stribeck_velocity,
-        )  # fmt: skip
-        angles.append(motion.q[rows, j])
-        rests.append((torque - motion.bodies)[rows, j] - table @ _coefficients(fit))
-    return line_heights(np.concatenate(angles), np.concatenate(rests) / arm.drive_gain[j])
-
-
-def _coefficients(fit: DriveFit) -> Array:
-    """In the order of the regression's columns."""
-    own = [fit.coulomb[0], fit.static[0], fit.load[0], fit.viscous[0], fit.offset]
-    return np.concatenate([own, fit.even.ravel(), fit.odd.ravel(), fit.lines.ravel()])
-
-
-def _friction(fits: Sequence[DriveFit | None], gain: Array) -> Friction:
-    known = [(fit, g) for fit, g in zip(fits, gain, strict=True) if fit is not None]
-
+def _friction(fits: Sequence[FrictionFit | None], gain: Array) -> Friction:
     def row(name: str) -> Array:
-        usual = float(np.median([getattr(fit, name)[0] / abs(g) for fit, g in known]))
-        pairs = zip(fits, gain, strict=True)
-        return np.array([usual * abs(g) if f is None else getattr(f, name)[0] for f, g in pairs])
+        values = [np.nan if f is None else getattr(f, name) / abs(g) for f, g in pairs]
+        usual = float(np.nanmedian(values))
+        return np.array([usual if np.isnan(v) else v for v in values]) * np.abs(gain)
 
-    coulomb, loads = (
-        np.maximum(row("coulomb"), 1e-6),
-        [0.0 if f is None else f.load[0] for f in fits],
-    )
+    pairs = list(zip(fits, gain, strict=True))
+    static = np.maximum(row("static"), 1e-6)
+    coulomb = np.maximum(row("coulomb"), 0.05 * static)
     return Friction(
         coulomb=coulomb,
-        static=np.maximum(row("static"), 1e-6),
+        static=static,
         stribeck_velocity=np.array([0.1 if f is None else f.stribeck_velocity for f in fits]),
         viscous=row("viscous"),
-        bristle_stiffness=coulomb / PRESLIDING,
-        load=np.array(loads) / coulomb,
+        bristle_stiffness=np.maximum(coulomb, static) / USUAL,
+        load=np.array([0.0 if f is None else f.load for f in fits]),
+        slope=np.array([np.zeros(len(SLOPES)) if f is None else f.slope for f in fits]),
+        slope_velocity=np.array(SLOPES),
     )
 
 
-def _series(pairs: Array) -> tuple[Array, Array]:
-    """Amplitudes and phases of a sine from cosine and sine parts, shape (h, 2)."""
-    return np.hypot(pairs[:, 0], pairs[:, 1]), np.arctan2(pairs[:, 0], pairs[:, 1])
+def _turning(friction: Friction, motions: Sequence[Motion], torques: Sequence[Array]) -> Friction:
+    """Friction with the bristle stiffness that fits best while joints turn around."""
+    level = friction.bristle_stiffness * USUAL
+    errors = []
+    for angle in PRESLIDING:
+        one, error = replace(friction, bristle_stiffness=level / angle), np.zeros(len(level))
+        for motion, torque in zip(motions, torques, strict=True):
+            steps = np.diff(motion.t, prepend=motion.t[0])
+            lost = friction_torque(one, motion.qd, motion.load, steps)
+            # Not at rest: there a joint holds what its controller asks for.
+            turns = motion.moving & (np.abs(motion.qd) < TURNING)
+            error += (turns * (torque - motion.bodies - lost) ** 2).sum(axis=0)
+        errors.append(error)
+    best = np.array(PRESLIDING)[np.argmin(errors, axis=0)]
+    turned = np.array(errors).max(axis=0) > 0
+    return replace(friction, bristle_stiffness=level / np.where(turned, best, USUAL))
 
 
-def _ripple(fits: Sequence[DriveFit | None], heights: Sequence[Array], gain: Array) -> Ripple:
-    """Offset, harmonics of the joint, lines of the motor, and the random lines of what is left."""
-    orders = np.arange(1.0, 1 + next(len(f.even) for f in fits if f is not None))
-    cycles = np.concatenate([[0.0], orders / GEAR, LINES, CYCLES / GEAR])
-    amplitude, phase = np.zeros((len(fits), len(cycles))), np.zeros((len(fits), len(cycles)))
-    drawn = np.random.default_rng(SEED).uniform(-np.pi, np.pi, size=(len(fits), len(CYCLES)))
-    for j, fit in enumerate(fits):
-        phase[j, -len(CYCLES) :], amplitude[j, -len(CYCLES) :] = drawn[j], heights[j]
-        if fit is not None:
-            pairs = np.concatenate([[[fit.offset, 0.0]], fit.even, fit.lines]) / gain[j]
-            amplitude[j, : len(pairs)], phase[j, : len(pairs)] = _series(pairs)
-    return Ripple(cycles, amplitude, phase)
+def _left_over(arm: ArmModel, drive: Drive, parts: Sequence[tuple[int, Trace]]) -> LeftOver:
+    """What the logs report beyond the model, at even steps; nothing is smoothed."""
+    dt = float(np.median(np.concatenate([np.diff(part.t) for _, part in parts])))
+    log, qd, errors = [], [], []
+    for k, (_, part) in enumerate(parts):
+        error = part.current - modelled(arm, drive.friction, drive.gain, part)
+        even = np.arange(part.t[0], part.t[-1], dt)
+        rows = np.minimum(np.searchsorted(part.t, even - 0.5 * dt), len(part.t) - 1)
+        log.append(np.full(len(rows), k))
+        qd.append(part.qd[rows])
+        errors.append(error[rows])
+    return LeftOver(1 / dt, np.concatenate(log), np.concatenate(qd), np.concatenate(errors))
 
 
-def _sensors(fits: Sequence[DriveFit | None], traces: Sequence[Trace], gain: Array) -> Sensors:
-    n = len(fits)
+def _sensors(traces: Sequence[Trace], n: int) -> Sensors:
+    """Quanta and times of the samples; all noise is in what is left over."""
     one = max(traces, key=lambda trace: len(trace.t))
-    steps = np.array([quantum(one.current[:, j]) for j in range(n)])
-    noise = [white_noise(one.current[:, j], steps[j]) for j in range(n)]
-    harmonics = next(len(f.odd) for f in fits if f is not None)
-    amplitude, phase = np.zeros((n, harmonics)), np.zeros((n, harmonics))
-    for j, fit in enumerate(fits):
-        if fit is not None:
-            amplitude[j], phase[j] = _series(fit.odd / gain[j])
+    steps = np.concatenate([np.diff(trace.t) for trace in traces])
+    usual = float(np.median(steps))
+    near = steps[steps < 1.9 * usual]
     return Sensors(
-        current_noise=np.array(noise),
-        current_quantum=steps,
+        current_noise=np.zeros(n),
+        current_quantum=np.array([quantum(one.current[:, j]) for j in range(n)]),
         position_quantum=max(quantum(one.q[:, j]) for j in range(n)),
-        velocity_noise=float(np.median([white_noise(one.qd[:, j], 0.0) for j in range(n)])),
+        velocity_noise=0.0,
         velocity_quantum=max(quantum(one.qd[:, j]) for j in range(n)),
-        directional=Ripple(np.arange(1.0, 1 + harmonics), amplitude, phase),
+        rate=1 / usual,
+        jitter=float(np.std(near) / np.sqrt(2)),
     )

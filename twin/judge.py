@@ -7,8 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingClassifier
+from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
 from sklearn.model_selection import GroupKFold, cross_val_predict
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from threadpoolctl import threadpool_limits
 
 from tauguard.arrays import Array, Bools
@@ -35,9 +38,11 @@ class Likeness:
     standing_peaks: Array  #: the same of the peaks, shape (n,)
     high: Array  #: fraction of the residual's power in sample-to-sample change, real and simulated
     correlation: Array  #: of residuals 0.1 s apart, real and simulated, shape (2, n)
-    moving_auc: float  #: of the classifier, .5: real and simulated cannot be told apart
-    standing_auc: float
-    real_auc: float  #: of real against real, moving
+    moving_auc: tuple[float, float]
+    """Areas of two classifiers, trees with boosting and logistic regression; .5: real and simulated
+    cannot be told apart."""
+    standing_auc: tuple[float, float]
+    real_auc: tuple[float, float]  #: of real against real, moving
     real_residuals: tuple[Array, ...]  #: of each log [N m]
     twin_residuals: tuple[Array, ...]
 
@@ -127,25 +132,34 @@ def _windows(values: Sequence[Array], rows: Sequence[Bools], dt: float) -> tuple
 
 def _auc(
     real: Sequence[Array], twin: Sequence[Array], rows: Sequence[Bools], dt: float, seed: int
-) -> float:
+) -> tuple[float, float]:
     a, groups = _windows(real, rows, dt)
     b, _ = _windows(twin, rows, dt)
     labels = np.repeat([0, 1], [len(a), len(b)])
     return _area(np.concatenate([a, b]), labels, np.concatenate([groups, groups]), seed)
 
 
-def _real_auc(real: Sequence[Array], rows: Sequence[Bools], dt: float, seed: int) -> float:
+def _real_auc(
+    real: Sequence[Array], rows: Sequence[Bools], dt: float, seed: int
+) -> tuple[float, float]:
     """Of windows of like motion: successive windows are given one label each in turn."""
     a, groups = _windows(real, rows, dt)
     return _area(a, np.arange(len(a), dtype=np.float64) % 2, groups, seed)
 
 
-def _area(table: Array, labels: Array, groups: Array, seed: int) -> float:
+def _area(table: Array, labels: Array, groups: Array, seed: int) -> tuple[float, float]:
     if len(table) < 2 * FEWEST or len(np.unique(groups)) < 5:
-        return float("nan")
-    model = HistGradientBoostingClassifier(max_iter=100, random_state=seed)
+        return (float("nan"),) * 2
+    models = (
+        HistGradientBoostingClassifier(max_iter=100, random_state=seed),
+        make_pipeline(StandardScaler(), LogisticRegression(max_iter=1000)),
+    )
     with threadpool_limits(1):  # small tables: threads cost more than they save
-        chance = cross_val_predict(
-            model, table, labels, groups=groups, cv=GroupKFold(5), method="predict_proba"
-        )
-    return float(roc_auc_score(labels, chance[:, 1]))
+        chances = [
+            cross_val_predict(
+                model, table, labels, groups=groups, cv=GroupKFold(5), method="predict_proba"
+            )
+            for model in models
+        ]
+    first, second = (float(roc_auc_score(labels, chance[:, 1])) for chance in chances)
+    return first, second

@@ -15,6 +15,16 @@ OBSERVER = 30.0
 _TRACKED = Unknowns.for_detection()
 
 
+def modelled(arm: ArmModel, friction: Friction | None, gain: Array, trace: Trace) -> Array:
+    """Currents that bodies and friction ask for along a log's motion [A], shape (T, n)."""
+    motion = motion_of(arm, trace)
+    torque = motion.bodies
+    if friction is not None:
+        steps = np.diff(trace.t, prepend=trace.t[0])
+        torque = torque + friction_torque(friction, motion.qd, motion.load, steps)
+    return np.asarray(torque / gain)
+
+
 def played(arm: ArmModel, drive: Drive, trace: Trace, seed: int = 0) -> Array:
     """Currents of the twin along a log's own motion [A], shape (T, n).
 
@@ -24,23 +34,19 @@ def played(arm: ArmModel, drive: Drive, trace: Trace, seed: int = 0) -> Array:
         trace: the motion; its currents are not used.
         seed: of the sensors' noise.
     """
-    motion = motion_of(arm, trace)
-    torque = motion.bodies.copy()
-    if drive.friction is not None:
-        steps = np.diff(trace.t, prepend=trace.t[0])
-        torque += friction_torque(drive.friction, motion.qd, motion.bodies, steps)
-    current = torque / drive.gain
+    current = modelled(arm, drive.friction, drive.gain, trace)
     if drive.ripple is not None:
         current += drive.ripple.at(trace.q * drive.gear)
     if drive.sensors is None:
         return current
     rng = np.random.default_rng(seed)
-    return drive.sensors.measure(rng, trace.q, motion.qd, current)[2]
+    player = drive.sensors.player(trace.dt, rng)
+    return drive.sensors.measure(rng, trace.q, trace.qd, current, player)[2]
 
 
 def residual_of(arm: ArmModel, trace: Trace) -> Array:
     """What a detector's estimator does not explain of a log [N m], shape (T, n)."""
-    estimator = Estimator(arm, OBSERVER, float(np.median(np.diff(trace.t))), _TRACKED)
+    estimator = Estimator(arm, OBSERVER, trace.dt, _TRACKED)
     return estimator.run(trace.t, trace.q, trace.qd, trace.current).unexplained
 
 
@@ -55,6 +61,9 @@ def friction_torque(friction: Friction, qd: Array, torque: Array, steps: Array) 
     """
     slip = np.exp(-((qd / friction.stribeck_velocity) ** 2))
     level = friction.coulomb + (friction.static - friction.coulomb) * slip
+    if friction.slope is not None and friction.slope_velocity is not None:
+        rises = np.tanh(np.abs(qd)[..., None] / friction.slope_velocity)
+        level += (friction.slope * rises).sum(axis=-1)
     level = np.maximum(level * (1 + friction.load * np.abs(torque)), 1e-9)
     z = np.zeros(qd.shape[1])
     out = np.empty_like(qd)

@@ -1,7 +1,8 @@
-"""What a log says before any model of a drive: smooth motion, and the bodies' torque along it."""
+"""What a log says before any model of a drive: its motion, and the bodies' torque along it."""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,22 +10,26 @@ from scipy.ndimage import gaussian_filter1d
 
 from tauguard.arrays import Array, Bools
 from tauguard.detectors import ArmModel, inverse_dynamics
+from tauguard.detectors.calibration.recording import cut
+from tauguard.detectors.dynamics.robot import momentum_terms
 from tauguard.traces import Trace
 
 #: A joint that is slower stands [rad/s].
 SLOW = 0.02
-#: Standard deviation of the filter before velocities are differentiated [s].
+#: Standard deviation of the filter of velocities that friction is computed from [s].
 SMOOTHING = 0.02
+#: A log ends, and another begins, where samples are so many intervals apart.
+GAP = 4.0
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A log's motion, smoothed without delay, and what bodies and rotors ask of the drives."""
+    """A log's motion, and what bodies and rotors ask of the drives."""
 
     t: Array  #: [s], shape (T,)
-    q: Array  #: [rad], shape (T, n)
-    qd: Array  #: [rad/s], shape (T, n)
-    bodies: Array  #: torque of gravity and inertia [N m], shape (T, n)
+    qd: Array  #: smoothed without delay [rad/s], shape (T, n)
+    load: Array  #: torque of gravity and inertia along the smoothed motion [N m], shape (T, n)
+    bodies: Array  #: the same, with which the momentum observer sees nothing [N m], shape (T, n)
 
     @property
     def moving(self) -> Bools:
@@ -35,15 +40,28 @@ class Motion:
 def motion_of(arm: ArmModel, trace: Trace) -> Motion:
     """The motion of a log, and its torque by the calibrated bodies.
 
+    ``bodies`` is the step of the measured momentum over each interval. What the velocities shake
+    is in it, as it is in the currents: a smoothed torque would leave one without the other.
+
     Args:
         arm: calibrated.
         trace: of the same joints.
     """
     width = SMOOTHING / float(np.median(np.diff(trace.t)))
     qd = gaussian_filter1d(trace.qd, width, axis=0)
-    qdd = np.gradient(qd, trace.t, axis=0)
-    bodies = inverse_dynamics(arm.robot, trace.q, qd, qdd)
-    return Motion(trace.t, trace.q, qd, bodies)
+    load = inverse_dynamics(arm.robot, trace.q, qd, np.gradient(qd, trace.t, axis=0))
+    momentum, beta = momentum_terms(arm.robot, trace.q, trace.qd, threads=1)
+    held = 0.5 * (beta[:-1] + beta[1:])
+    bodies = np.diff(momentum, axis=0) / np.diff(trace.t)[:, None] - held
+    return Motion(trace.t, qd, load, np.concatenate([bodies, bodies[-1:]]))
+
+
+def without_gaps(trace: Trace, shortest: float = 1.0) -> list[Trace]:
+    """The parts of a log between gaps in its samples that are longer than ``shortest`` [s]."""
+    steps = np.diff(trace.t)
+    ends = [0, *(np.flatnonzero(steps > GAP * np.median(steps)) + 1), len(trace.t)]
+    parts = [slice(a, b) for a, b in itertools.pairwise(ends)]
+    return [cut(trace, p) for p in parts if trace.t[p.stop - 1] - trace.t[p.start] > shortest]
 
 
 def quantum(signal: Array) -> float:
@@ -60,16 +78,3 @@ def quantum(signal: Array) -> float:
     turns = gaps / step
     off = np.abs(turns - np.rint(turns)) * step
     return step if np.mean(off < 0.1 * step) > 0.8 else 0.0
-
-
-def white_noise(signal: Array, step: float) -> float:
-    """Standard deviation of what changes from sample to sample, without rounding; shape (T,).
-
-    Third differences cancel motion: their variance is 20 times that of white noise. The median
-    keeps jumps out.
-    """
-    if len(signal) < 4:
-        return 0.0
-    third = np.diff(signal, 3)
-    variance = (float(np.median(np.abs(third))) / 0.6745) ** 2 / 20
-    return float(np.sqrt(max(variance - step**2 / 12, 0.0)))

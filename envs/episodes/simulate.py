@@ -6,10 +6,11 @@ import hashlib
 import importlib.metadata
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from tauguard.arrays import Array
 from tauguard.detectors import RobotNumbers, inverse_dynamics
@@ -223,11 +224,12 @@ class Simulation:
             wrenches.point[rows] = window.wrenches.point
         tau_ext = labels.external_torque(Poses(scene), rollout.q, wrenches)
         truth = _truth(motion.t, scene, rollout, wrenches, tau_ext, payload, injected)
-        sensors = scene.drive.sensors
+        sensors, rng = scene.drive.sensors, self._sensor_rng
         q, qd, current = rollout.q, rollout.qd, rollout.current
         if sensors is not None:
-            q, qd, current = sensors.measure(self._sensor_rng, q, qd, current)
-        return Trace(
+            player = sensors.player(episode.timestep, rng)
+            q, qd, current = sensors.measure(rng, q, qd, current, player)
+        trace = Trace(
             joint_names=tuple(scene.joint_names),
             t=motion.t,
             q=q,
@@ -253,6 +255,9 @@ class Simulation:
                 "episode.json": episode.to_json(),
             },
         )
+        if sensors is None or sensors.rate == 0:
+            return trace
+        return sampled(trace, sensors.samples(trace.t, rng))
 
 
 def _truth(
@@ -286,6 +291,24 @@ def _truth(
         obstacle_names=tuple(scene.obstacle_names),
         obstacle_poses=_matrices(rollout.poses),
     )
+
+
+def sampled(trace: Trace, rows: NDArray[np.intp]) -> Trace:
+    """The trace at some of its rows; collisions keep their own times."""
+    n = len(trace.t)
+    truth = trace.truth
+    if truth is not None:
+        truth = replace(truth, **_rows_of(truth, rows, n))
+    return replace(trace, truth=truth, **_rows_of(trace, rows, n))
+
+
+def _rows_of(values: Trace | Truth, rows: NDArray[np.intp], count: int) -> dict[str, Any]:
+    """The arrays of ``count`` rows, at some of them."""
+    return {
+        name: value[rows]
+        for name, value in vars(values).items()
+        if isinstance(value, np.ndarray) and len(value) == count
+    }
 
 
 def _matrices(poses: Array) -> Array:

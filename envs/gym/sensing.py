@@ -26,6 +26,7 @@ from tauguard.envs.gym.actions import observation_table
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.settings import DETECTORS
 from tauguard.models import Drive, pin_model
+from tauguard.models.left_over import Player
 
 #: The plain detector's thresholds: multiples of the breakaway friction and of the torque limit.
 FRICTION_FACTOR, TORQUE_FACTOR = 1.5, 0.03
@@ -321,6 +322,8 @@ class Sensing:
         """Keep the parts; ``make`` gives a fresh detector, ``None``: there is none."""
         self.sensors = compiled.scene.drive.sensors
         self._gain = compiled.nominal.gain
+        self._dt = float(compiled.scene.model.opt.timestep)
+        self._player: Player | None = None
         self._make = make
         self.detector = make() if make else None
         table = observation_table(compiled)
@@ -334,6 +337,7 @@ class Sensing:
 
     def reset(self) -> None:
         """A new episode."""
+        self._player = None
         self.detector = self._make() if self._make else None
 
     @property
@@ -355,9 +359,10 @@ class Sensing:
         self, rng: np.random.Generator, q: Array, qd: Array, current: Array
     ) -> tuple[Array, Array, Array]:
         """What the sensors say of true signals, shape (substeps, n) each."""
-        self.measured = (
-            (q, qd, current) if self.sensors is None else self.sensors.measure(rng, q, qd, current)
-        )
+        self.measured = (q, qd, current)
+        if self.sensors is not None:
+            self._player = self._player or self.sensors.player(self._dt, rng)
+            self.measured = self.sensors.measure(rng, q, qd, current, self._player)
         return self.measured
 
     def detect(self, q: Array, qd: Array, current: Array) -> tuple[Array, bool]:

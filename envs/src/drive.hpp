@@ -26,6 +26,7 @@ struct Joint {
   double rated_speed = 0.0, no_load_speed = 0.0;
   double known_coulomb = 0.0, known_viscous = 0.0;  // what the servo makes up for; N m, N m s/rad
   std::vector<double> cycles, amplitude, phase;     // per motor revolution; A; rad
+  std::vector<double> slope, slope_velocity;        // rises of the friction level; N m, rad/s
 };
 
 struct JointState {
@@ -39,8 +40,10 @@ struct JointState {
 inline double friction(const Joint& j, JointState& s, double v, double tau, double dt) {
   if (j.bristle_stiffness <= 0.0) return j.viscous * v;
   const double ratio = v / j.stribeck_velocity;
-  const double level = (j.coulomb + (j.breakaway - j.coulomb) * std::exp(-ratio * ratio)) *
-                       (1.0 + j.load * std::fabs(tau));
+  double level = j.coulomb + (j.breakaway - j.coulomb) * std::exp(-ratio * ratio);
+  for (std::size_t k = 0; k < j.slope.size(); ++k)
+    level += j.slope[k] * std::tanh(std::fabs(v) / j.slope_velocity[k]);
+  level *= 1.0 + j.load * std::fabs(tau);
   if (level > 0.0) {
     const double decay = std::exp(-j.bristle_stiffness * std::fabs(v) / level * dt);
     const double settled = (v > 0 ? level : -level) / j.bristle_stiffness;

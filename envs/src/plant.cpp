@@ -150,7 +150,8 @@ void bind_joint(nb::module_& m) {
              double gear, double coulomb, double breakaway, double stribeck_velocity,
              double viscous, double bristle_stiffness, double load, double kp, double kd,
              double rated_speed, double no_load_speed, double known_coulomb, double known_viscous,
-             Numbers cycles, Numbers amplitude, Numbers phase) {
+             Numbers cycles, Numbers amplitude, Numbers phase, Numbers slope,
+             Numbers slope_velocity) {
             *new (self) Joint() = {qpos,
                                    dof,
                                    gain,
@@ -171,12 +172,15 @@ void bind_joint(nb::module_& m) {
                                    known_viscous,
                                    std::move(cycles),
                                    std::move(amplitude),
-                                   std::move(phase)};
+                                   std::move(phase),
+                                   std::move(slope),
+                                   std::move(slope_velocity)};
           },
           nb::kw_only(), "qpos"_a, "dof"_a, "gain"_a, "nominal_gain"_a, "current_limit"_a, "gear"_a,
           "coulomb"_a, "breakaway"_a, "stribeck_velocity"_a, "viscous"_a, "bristle_stiffness"_a,
           "load"_a, "kp"_a, "kd"_a, "rated_speed"_a, "no_load_speed"_a, "known_coulomb"_a,
-          "known_viscous"_a, "cycles"_a, "amplitude"_a, "phase"_a);
+          "known_viscous"_a, "cycles"_a, "amplitude"_a, "phase"_a, "slope"_a = Numbers(),
+          "slope_velocity"_a = Numbers());
 }
 
 void bind_anatomy(nb::module_& m) {

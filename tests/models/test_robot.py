@@ -1,13 +1,12 @@
 """A robot described once: what is stated is used, what is not is derived and says so."""
 
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 import pytest
 
 from tauguard.models import (
     ROBOTS,
+    LeftOver,
     Robot,
     RobotDrive,
     SceneSpec,
@@ -201,6 +200,8 @@ def test_the_bodies_of_a_description_are_its_file(tmp_path, arm):
 
 def test_an_identified_drive_has_friction_ripple_and_sensors_of_its_own(tmp_path, arm):
     path, n = tmp_path / "r.toml", len(load_arm(str(arm(4))).joints)
+    rows = np.full((200, n), 0.3)
+    LeftOver(125.0, np.zeros(200, int), 0 * rows, rows).write(tmp_path / "left.csv")
     path.write_text(f"""
 file = "{arm(4)}"
 source = "identified from a.csv"
@@ -217,10 +218,8 @@ amplitude = {[[0.2]] * n}
 phase = {[[0.0]] * n}
 [drive.sensors]
 current_noise = 0.01
-[drive.sensors.directional]
-cycles = [1.0]
-amplitude = {[[0.3]] * n}
-phase = {[[np.pi / 2]] * n}
+rate = 125
+left_over = "left.csv"
 """)
     facts = load_arm(str(path)).facts
     drive = facts.drive
@@ -230,13 +229,12 @@ phase = {[[np.pi / 2]] * n}
     np.testing.assert_array_equal(drive.friction.static, 2.5)
     # Two cycles a turn are at their first peak after an eighth of it: sin(2 pi / 4) = 1.
     np.testing.assert_allclose(drive.ripple.at(np.full((1, n), np.pi / 4)), 0.2)
-    still, quick = np.zeros((1, n)), np.full((1, n), -1.0)
-    quiet = replace(drive.sensors, current_noise=np.zeros(n), velocity_noise=0.0)
-    rng = np.random.default_rng(0)
-    np.testing.assert_allclose(quiet.measure(rng, still, still, still)[2], 0.0)
-    np.testing.assert_allclose(quiet.measure(rng, still, quick, still)[2], -0.3)
+    # The left-over errors are read from the file beside the description, and no part of its text.
+    np.testing.assert_allclose(drive.sensors.left_over.current, 0.3)
+    assert drive.sensors.rate == 125
     again = drive_of(drive_text(drive))
-    np.testing.assert_array_equal(again.sensors.directional.amplitude, np.full((n, 1), 0.3))
+    assert again.sensors.rate == 125
+    assert again.sensors.left_over is None
 
 
 @pytest.mark.parametrize(

@@ -55,43 +55,33 @@ def command(
             may; a column map says so by its field "torque".
         json: write the figures here as JSON.
     """
+    from tauguard.cli.free_logs import free_logs
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import moving, read_logs, with_loads
-    from tauguard.datasets.real_arms import calibration_notes, check_named, initial_arm
+    from tauguard.datasets.real_arms import calibration_notes
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import check_loads, left_out
-    from tauguard.detectors.calibration.checks import check_signs, check_weight, torque_per_ampere
+    from tauguard.detectors.calibration.checks import check_weight, torque_per_ampere
     from tauguard.detectors.calibration.identification import identify
     from tauguard.report import write_json
 
     if gains and scale in ("masses", "payload"):
         raise ValueError(f"--gains: not beside --scale {scale}, which finds the gains")
-    read = read_logs(logs, columns, robot, torque)
-    print_notes(read.notes)
-    known = dict(zip(read.traces, with_loads(read.traces, payload), strict=True))
-    traces, notes = moving(read.traces)
-    print_notes(notes)
-    recordings = [known[name] for name in traces]
-    if not gains:
-        check_named(robot, columns, list(traces.values()))
-    arm, source = initial_arm(read.numbers, recordings, columns, gains, scale)
-    chosen = "gains" if source in ("preset", "torques") else source
-    for name, trace in traces.items():
-        check_signs(arm, name, trace)
-    found = identify(arm, recordings, scale=chosen)
-    if chosen == "gains":
-        check_weight(read.numbers, found.arm.robot, list(traces.values()))
+    given = free_logs(logs, robot, columns, gains, payload, torque, scale)
+    traces, recordings, arm = given.traces, given.recordings, given.arm
+    found = identify(arm, recordings, scale=given.scale)
+    if given.scale == "gains":
+        check_weight(given.numbers, found.arm.robot, list(traces.values()))
         check_loads(arm, list(traces), recordings)
     elif (ratio := torque_per_ampere(found.arm, list(traces.values()))) < SMALL_GAIN:
         print(
             f"note: the arm needs {ratio:.1f} N m per unit of the current columns, as little as if "
             "they held joint torques: if they are in N m, say --torque"
         )
-    held = left_out(arm, recordings, scale=chosen) if len(recordings) > 1 else []
+    held = left_out(arm, recordings, scale=given.scale) if len(recordings) > 1 else []
     print_notes(calibration_notes(found.arm, traces, recordings, held))
     target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
-    save_arm(found.arm, robot, target, scale=chosen, logs=list(traces))
-    result = summary(list(traces), found, held, target) | {"scale": source}
+    save_arm(found.arm, robot, target, scale=given.scale, logs=list(traces))
+    result = summary(list(traces), found, held, target) | {"scale": given.source}
     report(result, found)
     if json is not None:
         write_json(json, result)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 if TYPE_CHECKING:
-    from tauguard.detectors import ArmModel
+    from tauguard.arrays import Array
+    from tauguard.cli.free_logs import FreeLogs
     from tauguard.detectors.calibration.recording import Recording
-    from tauguard.twin import Likeness
+    from tauguard.traces import Trace
+    from tauguard.twin import Likeness, Twin
+
+#: Parts of the logs of which each is left out in turn, for the intervals.
+PARTS = 5
 
 
 def command(
@@ -43,63 +49,66 @@ def command(
         figure: a PNG of residuals, real and simulated.
         json: write the figures here as JSON.
     """
+    from tauguard.cli.free_logs import free_logs
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import moving, read_logs, with_loads
-    from tauguard.datasets.real_arms import calibration_notes, check_named, initial_arm
+    from tauguard.datasets.arm_logs import read_logs
+    from tauguard.datasets.real_arms import calibration_notes
     from tauguard.detectors.calibration.assessment import left_out
-    from tauguard.detectors.calibration.checks import check_signs
-    from tauguard.detectors.calibration.identification import identify
+    from tauguard.detectors.calibration.recording import pieces
     from tauguard.models import load_arm
     from tauguard.report import write_json
-    from tauguard.twin import compare, identify_twin
+    from tauguard.twin import compare, with_intervals
     from tauguard.twin.description import write_twin
 
-    read = read_logs(logs, columns, robot, torque)
-    print_notes(read.notes)
-    known = dict(zip(read.traces, with_loads(read.traces, payload), strict=True))
-    traces, notes = moving(read.traces)
-    print_notes(notes)
-    recordings = [known[name] for name in traces]
-    if not gains:
-        check_named(robot, columns, list(traces.values()))
-    arm, source = initial_arm(read.numbers, recordings, columns, gains, "auto")
-    for name, trace in traces.items():
-        check_signs(arm, name, trace)
-    scale = "gains" if source in ("preset", "torques") else source
+    if out.suffix != ".toml":
+        raise ValueError(f"--out {out}: expected a name that ends in .toml")
+    given = free_logs(logs, robot, columns, gains, payload, torque)
+    recordings, names = given.recordings, list(given.traces)
     limit = load_arm(str(robot)).torque_limit
-
-    def made(used: list[Recording]) -> tuple[ArmModel, Any]:
-        found = identify(arm, used, scale=scale).arm
-        bare = [r.trace for r in used if r.load is not None and r.load.mass == 0]
-        return found, identify_twin(found, bare, limit / found.drive_gain)
-
-    likeness, names = None, list(traces)
+    twin = made(given, recordings, limit)
+    parts = pieces(recordings, PARTS)
+    rest = [[r for i, r in enumerate(parts) if i != k] for k in range(len(parts))]
+    twin = with_intervals(twin, [made(given, some, limit) for some in rest if some])
+    judged, told, tried = twin, list[str](), list["Trace"]()
     if judge:
         others = read_logs(judge, columns, robot, torque)
         tried, told = list(others.traces.values()), list(others.traces)
-        model, twin = made(recordings)
-        likeness = compare(model, twin.drive, tried)
     else:
-        held = [k for k in range(2, len(names), 3) if known[names[k]].load is not None]
-        held = [k for k in held if recordings[k].load.mass == 0]  # type: ignore[union-attr]
-        told = [names[k] for k in held]
+        held = [k for k in range(2, len(names), 3) if _unloaded(recordings[k])]
+        tried, told = [recordings[k].trace for k in held], [names[k] for k in held]
         if held:
-            part = made([r for k, r in enumerate(recordings) if k not in held])
-            likeness = compare(part[0], part[1].drive, [recordings[k].trace for k in held])
-        model, twin = made(recordings)
-    apart = left_out(arm, recordings, scale=scale) if len(recordings) > 1 else []
-    print_notes((*calibration_notes(model, traces, recordings, apart), *twin.notes))
-    bodies = write_twin(twin, robot, out, names, source)
+            judged = made(given, [r for k, r in enumerate(recordings) if k not in held], limit)
+    likeness = compare(judged.arm, judged.drive, tried) if tried else None
+    apart = left_out(given.arm, recordings, scale=given.scale) if len(recordings) > 1 else []
+    notes = (*calibration_notes(twin.arm, given.traces, recordings, apart), *twin.notes)
+    print_notes(notes)
+    written = write_twin(replace(twin, notes=tuple(notes)), robot, out, names, given.source)
     rows = report(twin.arm.robot.joint_names, likeness, told)
     if figure is not None and likeness is not None:
         from tauguard.twin.figure import draw
 
         draw(figure, twin.arm.robot.joint_names, likeness)
         print(f"{figure}: drawn")
-    print(f"{out}, {bodies}: written")
+    print(f"{', '.join(map(str, (out, *written)))}: written")
     if json is not None:
-        result = {"name": "twin", "twin": str(out), "scale": source, "notes": list(twin.notes)}
+        result = {"name": "twin", "twin": str(out), "scale": given.source, "notes": list(notes)}
         write_json(json, result | {"judged_on": told, "rows": rows})
+
+
+def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:
+    """A twin from some of the logs; ``limit`` are the arm's largest torques [N m], shape (n,)."""
+    from tauguard.detectors.calibration.identification import identify
+    from tauguard.twin import identify_twin
+
+    found = identify(given.arm, used, scale=given.scale).arm
+    bare = [r.trace for r in used if _unloaded(r)]
+    if not bare:
+        raise ValueError("all logs carry a load: a twin needs one without, at least")
+    return identify_twin(found, bare, limit / abs(found.drive_gain))
+
+
+def _unloaded(recording: Recording) -> bool:
+    return recording.load is not None and recording.load.mass == 0
 
 
 def report(
@@ -132,9 +141,13 @@ def report(
         "standing": likeness.standing_auc,
         "real against real, moving": likeness.real_auc,
     }
-    text = "; ".join(f"{kind} {_two(value)}" for kind, value in areas.items())
-    print(f"a classifier that tells simulated from real (area, .5: it cannot): {text}")
-    return [*rows, {"residual": "area under the curve"} | {k: _two(v) for k, v in areas.items()}]
+    text = "; ".join(f"{kind} {_two(a)}, {_two(b)}" for kind, (a, b) in areas.items())
+    print(
+        "area under the curve of a classifier that tells simulated from real (boosted trees, "
+        f"logistic regression; .5: it cannot): {text}"
+    )
+    area = {k: f"{_two(a)}, {_two(b)}" for k, (a, b) in areas.items()}
+    return [*rows, {"residual": "area under the curve"} | area]
 
 
 def _two(value: float) -> str:
