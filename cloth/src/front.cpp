@@ -24,36 +24,12 @@ struct Total {
   }
 };
 
-// One chunk's walk: reads a run of the old cut, writes its part of the new one.
+// One chunk's walk: reads a run of the old cut and writes its part of the new one, once that
+// differs.
 class Walk {
  public:
   Walk(const FeatureTree& a, const FeatureTree& b, Total& total)
       : a_(a), b_(b), self_(&a == &b), test_(node_test(a.slots(), a.times())), total_(total) {}
-
-  bool overlap(NodePair p) {
-    if (++tests % pause == 0) look_up();
-    return a_.may_meet(p.a, b_, p.b) && test_(a_.node(p.a), b_.node(p.b));
-  }
-
-  void descend(NodePair p) {
-    if (overlap(p)) {
-      enter(p);
-    } else {
-      cut.push_back(p);
-    }
-  }
-
-  // Below a pair that overlaps.
-  void enter(NodePair p) {
-    if (a_.is_leaf(p.a) && b_.is_leaf(p.b)) {
-      cut.push_back(p);
-      leaf_pairs.push_back({p.a - a_.leaves(), p.b - b_.leaves()});
-      return;
-    }
-    NodePair child[4];
-    const int n = children(p, child);
-    for (int i = 0; i < n; ++i) descend(child[i]);
-  }
 
   // At one depth both sides split, else the deeper one: the other is a leaf.
   int children(NodePair p, NodePair* child) const {
@@ -68,36 +44,98 @@ class Walk {
     return n;
   }
 
+  // `n` entries of the old cut, at most a chunk. Where all children of a pair stand in a row and
+  // the pair itself is apart, it takes their place.
+  void move(const NodePair* entry, int n) {
+    bool meet[kept_grain];
+    for (int i = 0; i < n; ++i) {
+      // Nodes lie anywhere in memory: what is looked at some entries later is asked for now.
+      const NodePair& later = entry[std::min(i + ahead, n - 1)];
+      fetch(a_, later.a);
+      fetch(b_, later.b);
+      meet[i] = meets(entry[i]);
+    }
+    look_up();
+    // Most entries stay. Those of leaves that meet are written without a branch to mispredict.
+    NodePair found[kept_grain];
+    int count = 0;
+    for (int i = 0; i < n; ++i) {
+      const NodePair p = entry[i];
+      const bool leaves = both_leaves(p);
+      found[count] = leaf_numbers(p);
+      count += meet[i] & leaves;
+      if (meet[i] && !leaves) {
+        leaf_pairs.insert(leaf_pairs.end(), found, found + count);
+        count = 0;
+        differ(entry, i);
+        enter(p);
+      } else if (const int row = meet[i] ? 0 : apart_siblings(entry + i, meet + i, n - i)) {
+        differ(entry, i);
+        cut.push_back(parent(p));
+        i += row - 1;
+      } else if (differs) {
+        cut.push_back(p);
+      }
+    }
+    leaf_pairs.insert(leaf_pairs.end(), found, found + count);
+  }
+
+  std::vector<NodePair> cut, leaf_pairs;
+  bool differs = false;  // false: the run of the old cut stays, `cut` is empty
+  std::size_t tests = 0;
+
+ private:
+  static constexpr std::size_t pause = 1024;  // tests between two looks
+  static constexpr int ahead = 8;
+
+  bool meets(NodePair p) {
+    ++tests;
+    return a_.may_meet(p.a, b_, p.b) && test_(a_.node(p.a), b_.node(p.b));
+  }
+  bool both_leaves(NodePair p) const { return a_.is_leaf(p.a) & b_.is_leaf(p.b); }
+  NodePair leaf_numbers(NodePair p) const { return {p.a - a_.leaves(), p.b - b_.leaves()}; }
+
+  // From entry `i` on.
+  void differ(const NodePair* entry, int i) {
+    if (!differs) cut.assign(entry, entry + i);
+    differs = true;
+  }
+
+  void descend(NodePair p) {
+    if (tests % pause == 0) look_up();
+    meets(p) ? enter(p) : cut.push_back(p);
+  }
+
+  // Below a pair that overlaps.
+  void enter(NodePair p) {
+    if (both_leaves(p)) {
+      cut.push_back(p);
+      leaf_pairs.push_back(leaf_numbers(p));
+      return;
+    }
+    NodePair child[4];
+    const int n = children(p, child);
+    for (int i = 0; i < n; ++i) descend(child[i]);
+  }
+
   // The deeper side came from a split; at one depth both did.
   NodePair parent(NodePair p) const {
     const int gap = depth(p.a) - depth(p.b);
     return {gap >= 0 ? p.a / 2 : p.a, gap <= 0 ? p.b / 2 : p.b};
   }
 
-  // Entries [begin, end) of the old cut. Where all children of a pair stand in a row and the pair
-  // itself is apart, it takes their place.
-  void move(const NodePair* begin, const NodePair* end) {
-    while (begin < end) {
-      // Nodes lie anywhere in memory: what is looked at some entries later is asked for now.
-      const NodePair& later = begin[std::min<std::ptrdiff_t>(ahead, end - begin - 1)];
-      fetch(a_, later.a);
-      fetch(b_, later.b);
-      NodePair child[4];
-      const NodePair up = parent(*begin);
-      const int n = up.a > 0 && up.b > 0 ? children(up, child) : 0;
-      if (n == 0 || end - begin < n || !same(begin, child, n)) {
-        descend(*begin++);
-        continue;
-      }
-      bool overlaps[4], any = false;
-      for (int i = 0; i < n; ++i) any |= overlaps[i] = overlap(begin[i]);
-      if (!any && !overlap(up)) {
-        cut.push_back(up);
-      } else {
-        for (int i = 0; i < n; ++i) overlaps[i] ? enter(begin[i]) : cut.push_back(begin[i]);
-      }
-      begin += n;
-    }
+  // How many of the n entries are all children of one pair, if they and the pair are apart; else 0.
+  int apart_siblings(const NodePair* entry, const bool* meet, int n) {
+    const NodePair up = parent(*entry);
+    // First children have even numbers.
+    if (up.a == 0 || up.b == 0 || (2 * up.a == entry->a - 1) || (2 * up.b == entry->b - 1))
+      return 0;
+    NodePair child[4];
+    const int row = children(up, child);
+    if (row > n) return 0;
+    for (int i = 0; i < row; ++i)
+      if (meet[i] || entry[i].a != child[i].a || entry[i].b != child[i].b) return 0;
+    return row > 0 && !meets(up) ? row : 0;
   }
 
   // Ctrl-C, and the size that all walks together have reached.
@@ -107,35 +145,18 @@ class Walk {
     counted_ = cut.size();
   }
 
-  std::vector<NodePair> cut, leaf_pairs;
-  std::size_t tests = 0;
-
- private:
-  static constexpr std::size_t pause = 1024;  // tests between two looks
-
-  static bool same(const NodePair* x, const NodePair* y, int n) {
-    for (int i = 0; i < n; ++i)
-      if (x[i].a != y[i].a || x[i].b != y[i].b) return false;
-    return true;
-  }
-
-  const FeatureTree &a_, &b_;
-  static constexpr std::ptrdiff_t ahead = 8;
   static void fetch(const FeatureTree& tree, std::int32_t node) {
     constexpr int line = 16;  // floats
     const float* at = tree.node(node);
     for (int i = 0; i < 2 * tree.slots() * tree.times(); i += line) __builtin_prefetch(at + i);
   }
 
+  const FeatureTree &a_, &b_;
   bool self_;
   NodeTest test_;
   Total& total_;
   std::size_t counted_ = 0;
 };
-
-void append(std::vector<NodePair>& to, const std::vector<NodePair>& from) {
-  to.insert(to.end(), from.begin(), from.end());
-}
 
 }  // namespace
 
@@ -164,16 +185,28 @@ const std::vector<NodePair>& Front::update(const FeatureTree& a, const FeatureTr
   }
   std::vector<Walk> walks((cut_.size() + step - 1) / step, Walk(a, b, total));
   geometry::interruptible_for(cut_.size(), threads, step, [&](auto begin, auto end, auto c) {
-    walks[c].move(cut_.data() + begin, cut_.data() + end);
+    walks[c].move(cut_.data() + begin, static_cast<int>(end - begin));
   });
-  cut_.clear();
   leaf_pairs_.clear();
   tests_ = 0;
+  bool differs = false;
   for (const auto& w : walks) {
-    append(cut_, w.cut);
-    append(leaf_pairs_, w.leaf_pairs);
+    leaf_pairs_.insert(leaf_pairs_.end(), w.leaf_pairs.begin(), w.leaf_pairs.end());
     tests_ += w.tests;
+    differs |= w.differs;
   }
+  if (!differs) return leaf_pairs_;
+  std::vector<NodePair> cut;
+  for (std::size_t c = 0; c < walks.size(); ++c) {
+    const auto begin = cut_.begin() + c * step;
+    const auto& moved = walks[c].cut;
+    if (walks[c].differs) {
+      cut.insert(cut.end(), moved.begin(), moved.end());
+    } else {
+      cut.insert(cut.end(), begin, begin + std::min(step, cut_.size() - c * step));
+    }
+  }
+  cut_.swap(cut);
   return leaf_pairs_;
 }
 

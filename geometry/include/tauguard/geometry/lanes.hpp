@@ -82,17 +82,23 @@ TAUGUARD_INLINE unsigned count_of(unsigned x) {
   return (((x + (x >> 4)) & 0x0f0f) * 0x0101) >> 8 & 0x1f;
 }
 
-// Four 3-vectors.
-struct Vec3x4 {
-  Double4 x, y, z;
+// 3-vectors side by side.
+template <class Lanes>
+struct Vec3s {
+  Lanes x, y, z;
+  friend TAUGUARD_INLINE Vec3s operator+(Vec3s a, Vec3s b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  }
+  friend TAUGUARD_INLINE Vec3s operator-(Vec3s a, Vec3s b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+  }
+  friend TAUGUARD_INLINE Vec3s operator*(Lanes s, Vec3s a) { return {s * a.x, s * a.y, s * a.z}; }
+  friend TAUGUARD_INLINE Lanes dot(Vec3s a, Vec3s b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+  friend TAUGUARD_INLINE Vec3s cross(Vec3s a, Vec3s b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  }
+  friend TAUGUARD_INLINE Lanes largest(Vec3s a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); }
 };
-TAUGUARD_INLINE Vec3x4 operator+(Vec3x4 a, Vec3x4 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-TAUGUARD_INLINE Vec3x4 operator-(Vec3x4 a, Vec3x4 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-TAUGUARD_INLINE Vec3x4 operator*(Double4 s, Vec3x4 a) { return {s * a.x, s * a.y, s * a.z}; }
-TAUGUARD_INLINE Double4 dot(Vec3x4 a, Vec3x4 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-TAUGUARD_INLINE Vec3x4 cross(Vec3x4 a, Vec3x4 b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-TAUGUARD_INLINE Double4 largest(Vec3x4 a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); }
+using Vec3x4 = Vec3s<Double4>;
 
 }  // namespace tauguard::geometry
