@@ -39,6 +39,7 @@ TAUGUARD_INLINE void finish(const Vec3x4* p, const Vec3x4* q, const Vec3x4* r, G
   const Double4 error = 0x1p-43 * ((s * sizes[0]) * (s * sizes[1]) * (s * sizes[2])) + 0x1p-1000;
   const Cubics cubic{{b0, b1, b2, b3}};
   g.odd = static_cast<std::uint8_t>(bits(~fair));
+  g.open = static_cast<std::uint8_t>(bits(~(fair & (abs(b0) > error) & (abs(b3) > error))));
   g.no_root = static_cast<std::uint8_t>(bits(fair & one_sign(cubic, error)));
   g.one_root = static_cast<std::uint8_t>(bits(fair & one_root(cubic, error)));
   store4(g.value[Group::cubic], b0);

@@ -27,7 +27,8 @@ struct Group {
   // that it has no root; or one variation, so that it has one. Both 0 where the query's size keeps
   // it out of this.
   std::uint8_t no_root, one_root;
-  std::uint8_t odd;  // that size: too small, too large or not finite
+  std::uint8_t odd;   // that size: too small, too large or not finite
+  std::uint8_t open;  // odd, or the cubic may be zero at an end of the step: no cut can decide
 };
 
 // A part [start, start + length] of a query's time in which its cubic has exactly one root, beyond

@@ -107,11 +107,11 @@ Collisions described(const MeshCcd& ccd, MeshCcd::Kind kind, const std::vector<P
   }
   const auto places = in_order(parts);
   const std::size_t n = places.size();
-  all.pairs.resize(2 * n);
-  all.toi.resize(n);
-  all.point.resize(3 * n);
-  all.normal.resize(3 * n);
-  all.weights.resize(4 * n);
+  all.pairs = {ccd.spare(), 2 * n};
+  all.toi = {ccd.spare(), n};
+  all.point = {ccd.spare(), 3 * n};
+  all.normal = {ccd.spare(), 3 * n};
+  all.weights = {ccd.spare(), 4 * n};
   (kind == MeshCcd::Kind::vf ? describe_all<true> : describe_all<false>)(ccd.ends(), places,
                                                                          ccd.threads(), all);
   return all;
@@ -147,7 +147,6 @@ Collisions find_collisions(MeshCcd& ccd, MeshCcd::Kind kind, const NarrowPhase& 
                  {answers.toi, nullptr, nullptr, nullptr}, part.stats);
     const std::size_t hits = std::count(answers.hit, answers.hit + block.size, 1);
     if ((found += hits) > limit) throw TooMany("collisions of a kind", limit);
-    part.rows.reserve(part.rows.size() + hits);
     for (std::size_t i = 0; i < block.size; ++i) {
       if (!answers.hit[i]) continue;
       Row& row = part.rows.emplace_back();

@@ -3,17 +3,17 @@
 
 #include <cstdint>
 #include <functional>
-#include <vector>
 
 #include "mesh_ccd.hpp"
 #include "narrow_phase.hpp"
+#include "spare_memory.hpp"
 
 namespace tauguard::cloth {
 
 // The collisions of one kind, in the order of their pairs.
 struct Collisions {
-  std::vector<std::int32_t> pairs;                  // (n, 2)
-  std::vector<double> toi, point, normal, weights;  // (n), (n, 3), (n, 3), (n, 4)
+  SpareArray<std::int32_t> pairs;                  // (n, 2)
+  SpareArray<double> toi, point, normal, weights;  // (n), (n, 3), (n, 3), (n, 4)
   Stats stats;
   double narrow_s = 0;  // in the narrow phase, summed over threads
   double total_s = 0;   // candidates, narrow phase and sorting, by the clock

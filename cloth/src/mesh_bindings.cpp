@@ -32,10 +32,11 @@ using Positions = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::
 using Pairs = nb::ndarray<nb::numpy, std::int32_t, nb::shape<-1, 2>, nb::c_contig>;
 using Named = nb::typed<nb::dict, nb::str, nb::any>;
 
-template <class Array, class T>
-Array array_of(std::vector<T> values, std::initializer_list<std::size_t> shape) {
-  auto* owned = new std::vector<T>(std::move(values));
-  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+// Of a std::vector or a SpareArray.
+template <class Array, class Values>
+Array array_of(Values values, std::initializer_list<std::size_t> shape) {
+  auto* owned = new Values(std::move(values));
+  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<Values*>(p); });
   return Array(owned->data(), shape, owner);
 }
 

@@ -201,7 +201,7 @@ std::size_t MeshCcd::bytes() const {
                             topology_.faces.vertices.capacity() + groups_.of_vertex.capacity();
   return lists * sizeof(std::int32_t) + lines_.capacity() * sizeof(Line) + points_.bytes() +
          vertices_.bytes() + edges_.bytes() + faces_.bytes() + vf_front_.bytes() +
-         ee_front_.bytes();
+         ee_front_.bytes() + spare_->bytes();
 }
 
 }  // namespace tauguard::cloth

@@ -5,12 +5,14 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "candidates.hpp"
 #include "feature_tree.hpp"
 #include "front.hpp"
 #include "k_dop.hpp"
+#include "spare_memory.hpp"
 #include "topology.hpp"
 
 namespace tauguard::cloth {
@@ -61,6 +63,8 @@ class MeshCcd {
   TopologyChange update_topology(std::vector<std::int32_t> faces, Groups groups);
 
   const BroadStats& stats() const { return stats_; }
+  // For arrays that answers are handed out in; they may outlive this.
+  const std::shared_ptr<SpareMemory>& spare() const { return spare_; }
   std::size_t bytes() const;
 
  private:
@@ -72,6 +76,7 @@ class MeshCcd {
   void descend(bool fresh, std::size_t limit);
   void forget();
 
+  std::shared_ptr<SpareMemory> spare_ = std::make_shared<SpareMemory>();
   std::vector<Line> lines_;
   std::vector<std::uint8_t> isolated_;
   Topology topology_;

@@ -114,8 +114,8 @@ int make_pieces(Batch& b, int n, Stats& stats) {
   for (int g = 0; g < groups; ++g)
     for (unsigned lanes = rest[g]; lanes; lanes &= lanes - 1) {
       const int lane = __builtin_ctz(lanes);
-      const bool odd = b.groups[g].odd >> lane & 1;
-      (odd ? b.open[b.left++] : several[count++]) = g * width + lane;
+      const bool open = b.groups[g].open >> lane & 1;
+      (open ? b.open[b.left++] : several[count++]) = g * width + lane;
     }
   const Cut cut = batch_kernels().cut(b.groups, several, count, b.pieces + b.count);
   b.count += cut.pieces;

@@ -5,6 +5,7 @@
 #include "start_contact.hpp"
 
 #include <array>
+#include <cmath>
 
 #include "binary.hpp"
 
@@ -23,29 +24,38 @@ constexpr int sides_of_ee[][3] = {{0, 2, 3}, {3, 0, 1}, {1, 3, 2}, {2, 1, 0}};
 
 bool opposite(double a, double b) { return !((a > 0 && b > 0) || (a < 0 && b < 0)); }
 
-// The sign of (a - o) x (b - o). Faces that lie on one another share lines along the axes: there
-// differences are zero, which no rounding hides, and no product is needed.
-int turn(const double* o, const double* a, const double* b, int i, int j) {
-  const double ux = a[i] - o[i], uy = a[j] - o[j], vx = b[i] - o[i], vy = b[j] - o[j];
-  const int left = geometry::sign_of(ux) * geometry::sign_of(vy),
-            right = geometry::sign_of(uy) * geometry::sign_of(vx);
-  if (left == 0 || right == 0 || left != right) return geometry::sign_of(left - right);
-  const double flat[3][2] = {{o[i], o[j]}, {a[i], a[j]}, {b[i], b[j]}};
-  return geometry::orient2d(flat[0], flat[1], flat[2]);
-}
-
-// If one coordinate is the same in all, the other two, i and j, decide.
-AtStart in_plane(bool vf, const double* const* p, int i, int j) {
-  const int corners = vf ? 3 : 4;
+// If one coordinate is the same in all, the other two, i and j, decide: on which sides of the
+// hull's edges the origin lies. With u = 2^-53 a product of two differences has an error of 3 u,
+// and the difference of two products of one u more: 2^-51 is in use. Faces that lie on one another
+// share lines along the axes: there differences are zero, which no rounding hides. The loop has no
+// branches because its outcome changes from query to query.
+template <bool vf>
+AtStart in_plane(const double* const* p, int i, int j) {
+  constexpr int corners = vf ? 3 : 4;
   bool left = false, right = false;
+  unsigned unsure = 0;
   for (int c = 0; c < corners; ++c) {
     const int* side = vf ? sides_of_vf[c] : sides_of_ee[c];
-    const int sign = turn(p[side[0]], p[side[1]], p[side[2]], i, j);
-    left = left || sign > 0;
-    right = right || sign < 0;
-    if (left && right) return AtStart::apart;
+    const double *o = p[side[0]], *a = p[side[1]], *b = p[side[2]];
+    const double ax = a[i] - o[i], ay = a[j] - o[j], bx = b[i] - o[i], by = b[j] - o[j];
+    const double x = ax * by, y = ay * bx, size = std::fabs(x) + std::fabs(y), cross = x - y;
+    const bool plus = cross > 0x1p-51 * size, minus = cross < -0x1p-51 * size,
+               large = size > 1e-250, on = ((ax == 0) | (by == 0)) & ((ay == 0) | (bx == 0));
+    left |= plus & large;
+    right |= minus & large;
+    unsure |= unsigned(!(on | ((plus | minus) & large))) << c;
   }
-  if (left || right) return AtStart::touching;
+  if (left & right) return AtStart::apart;
+  for (; unsure; unsure &= unsure - 1) {
+    const int c = __builtin_ctz(unsure), *side = vf ? sides_of_vf[c] : sides_of_ee[c];
+    double flat[3][2];
+    for (int v = 0; v < 3; ++v) flat[v][0] = p[side[v]][i], flat[v][1] = p[side[v]][j];
+    const int sign = geometry::orient2d(flat[0], flat[1], flat[2]);
+    left |= sign > 0;
+    right |= sign < 0;
+  }
+  if (left & right) return AtStart::apart;
+  if (left | right) return AtStart::touching;
   // All corners on one line through the origin: the way around them covers their hull.
   for (int c = 0; c < corners; ++c) {
     const int *a = vf ? of_vf[c] : of_ee[c],
@@ -109,7 +119,7 @@ AtStart at_start(bool vf, const Ends& x, const std::int32_t* row) {
   for (int v = 0; v < 4; ++v) p[v] = x.at(false, row[v]);
   for (int k = 0; k < 3; ++k) {
     if (!(p[0][k] == p[1][k] && p[0][k] == p[2][k] && p[0][k] == p[3][k])) continue;
-    return in_plane(vf, p, (k + 1) % 3, (k + 2) % 3);
+    return (vf ? in_plane<true> : in_plane<false>)(p, (k + 1) % 3, (k + 2) % 3);
   }
   FixedInt<2> whole[3][4];
   for (int k = 0; k < 3; ++k) {

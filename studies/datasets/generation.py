@@ -17,7 +17,8 @@ import pyarrow.parquet as pq
 from oracles.bare_physics import rollout_pieces
 from oracles.processor_time import clock, count_time
 from studies.framework import number, table_rows, time_in_turn
-from tauguard.datasets.columns_of_shards import RESIDUAL, rounded, schema, stored, table
+from tauguard.datasets import columns_of_shards
+from tauguard.datasets.columns_of_shards import RESIDUAL, rounded, schema, stored
 from tauguard.datasets.configuration import load, parse
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.schedule import Planned, planned
@@ -114,7 +115,8 @@ def timed_parts(one: Planned) -> dict[str, float]:
             residual = residual_of(trace, robot, simulation.nominal)
         like = schema(len(trace.joint_names), True)
         with clock(spent, "writing"):
-            shard = table(stored(trace, 1), one.number, rounded(RESIDUAL, residual), like)
+            rows = stored(trace, 1)
+            shard = columns_of_shards.table(rows, one.number, rounded(RESIDUAL, residual), like)
             with pq.ParquetWriter(io.BytesIO(), like, **writing(like)) as writer:
                 writer.write_table(shard, len(trace.t))
     seen: Any = simulation._rollout

@@ -1,5 +1,7 @@
 """Whole frames: every collision of a mesh, against all pairs asked one by one and against truth."""
 
+import copy
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -179,6 +181,21 @@ def test_statistics_add_up():
         frame.stats.seconds[part] for part in ("project", "build", "refit", "traverse", "vf", "ee")
     )
     assert 50 < frame.stats.bytes / len(faces) < 5_000
+
+
+def test_answers_that_are_kept_stay_though_memory_of_others_is_used_again():
+    rng = np.random.default_rng(6)
+    faces, x_t0, x_t1 = sheet(20, rng)
+    ccd, kept, copies = MeshCCD(faces), [], []
+    for number in range(12):
+        frame = ccd.find(x_t0, x_t1 + rng.normal(scale=1e-3, size=x_t1.shape))
+        if number % 3 == 0:  # of the others the memory is free again
+            kept.append(frame)
+            copies.append(copy.deepcopy(frame))
+    del ccd  # answers outlive the mesh
+    for frame, before in zip(kept, copies, strict=True):
+        assert len(frame.vf) > 5
+        assert_same(frame, before)
 
 
 def test_method_is_named():

@@ -373,3 +373,19 @@ def test_an_installation_without_studies_says_where_they_are(tmp_path):
     assert done.returncode == 2
     assert "the studies are in the source distribution" in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+HOOKS = """
+from studies.framework.study import all_parts
+for name, part in all_parts().items():
+    for hook in ("measure", "draw", "judge", "table"):
+        function = getattr(part.load(), hook, None)
+        assert function is None or function.__module__.startswith("studies."), (name, hook)
+"""
+
+
+def test_what_a_part_is_asked_for_is_its_own_function():
+    # A name that a part imports for its own use must not pass for the one that prints its rows.
+    path = os.pathsep.join(map(str, (ROOT, ROOT / "tests")))
+    command = [sys.executable, "-c", HOOKS]
+    subprocess.run(command, check=True, cwd=ROOT, env={**os.environ, "PYTHONPATH": path})
