@@ -10,6 +10,8 @@ import mujoco
 #: Versions whose Newton solver factors a wrong Hessian if the Jacobian is sparse. It may then stop
 #: at its limit of iterations with wrong accelerations. Fixed in 4.0.1.
 WRONG_SPARSE_NEWTON = ("4.0.0",)
+#: Degrees of freedom from which on MuJoCo's choice of Jacobian, ``auto``, is the sparse one.
+SPARSE_FROM = 60
 
 
 def hit_by_sparse_newton(model: Any) -> bool:
@@ -23,6 +25,23 @@ def hit_by_sparse_newton(model: Any) -> bool:
         and int(model.opt.solver) == mujoco.mjtSolver.mjSOL_NEWTON
         and bool(mujoco.mj_isSparse(model))
     )
+
+
+def choose_jacobian(spec: Any) -> None:
+    """Choose the dense Jacobian in an MjSpec whose rigid bodies would get the sparse one.
+
+    Vertices of cloth do not count: for an arm with cloth both kinds agree to 5e-15, and a dense
+    Jacobian of so many vertices takes far longer.
+    """
+    kinds, option = mujoco.mjtJoint, spec.option
+    if mujoco.__version__ not in WRONG_SPARSE_NEWTON:
+        return
+    sizes = {kinds.mjJNT_FREE: 6, kinds.mjJNT_BALL: 3}
+    soft = {name for flex in spec.flexes for name in (*flex.vertbody, *flex.nodebody)}
+    bodies = [body for body in spec.bodies if body.name not in soft]
+    count = sum(sizes.get(joint.type, 1) for body in bodies for joint in body.joints)
+    if count >= SPARSE_FROM and option.jacobian == mujoco.mjtJacobian.mjJAC_AUTO:
+        option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
 
 
 def warn_of_sparse_newton(model: Any) -> None:

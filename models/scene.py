@@ -17,6 +17,7 @@ from tauguard.models.drive import Drive
 from tauguard.models.drive_text import drive_text
 from tauguard.models.mismatch import Mismatch
 from tauguard.models.mjcf import SpecText, without_shapes
+from tauguard.models.mujoco_defects import choose_jacobian
 from tauguard.models.obstacles import (
     BodyProxy,
     Clamp,
@@ -159,6 +160,7 @@ def compose(spec: SceneSpec, visuals: bool = True) -> Scene:
     if spec.mismatch is not None:
         spec.mismatch.perturb_arm(whole, list(arm.links))
     obstacles = _add_parts(arm, spec)
+    choose_jacobian(whole)
     text = SpecText(whole)
     model = whole.compile() if visuals else lean_model(whole)
     check_apart(model, spec.objects)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tauguard.contacts import GuardedStepper
-from tauguard.models import mujoco_defects
+from tauguard.models import SceneObject, SceneSpec, Shape, compose, mujoco_defects
+from tauguard.models.cloth import Cloth
 
 DENSE, SPARSE = mujoco.mjtJacobian.mjJAC_DENSE, mujoco.mjtJacobian.mjJAC_SPARSE
 
@@ -90,3 +91,22 @@ def test_a_model_that_is_hit_is_named_with_what_to_do(
 
 def test_a_small_model_is_not_hit():
     assert not mujoco_defects.hit_by_sparse_newton(pile(0, trees=1))
+
+
+def test_a_scene_of_many_loose_parts_has_the_dense_jacobian_and_cloth_keeps_its_own():
+    parts = tuple(
+        SceneObject(
+            f"part{k}", (Shape("sphere", (0.05,)),), motion="free", position=(1.0, 0.2 * k, 0.1)
+        )
+        for k in range(10)
+    )
+    kinds = mujoco.mjtJacobian
+    many, few = compose(SceneSpec(objects=parts)), compose(SceneSpec(objects=parts[:2]))
+    hit = mujoco.__version__ in mujoco_defects.WRONG_SPARSE_NEWTON
+    assert many.model.nv >= mujoco_defects.SPARSE_FROM
+    assert many.model.opt.jacobian == (kinds.mjJAC_DENSE if hit else kinds.mjJAC_AUTO)
+    assert not mujoco_defects.hit_by_sparse_newton(many.model)
+    assert few.model.opt.jacobian == kinds.mjJAC_AUTO
+    cloth = compose(SceneSpec(cloth=Cloth(count=9)))
+    assert cloth.model.nv >= mujoco_defects.SPARSE_FROM
+    assert cloth.model.opt.jacobian == kinds.mjJAC_AUTO
