@@ -92,8 +92,9 @@ def torque_ratios(traces: Sequence[Trace], arm: ArmModel) -> Array:
     found = np.ones((3, arm.robot.joints))
     for trace in traces:
         check = TorqueCheck(arm, trace.dt)
-        for q, qd, current in zip(trace.q, trace.qd, trace.current, strict=True):
-            check.step(q, qd, current)
+        residuals = check.observer.run(trace.t, trace.q, trace.qd, trace.current).residual
+        for residual, current in zip(residuals, trace.current, strict=True):
+            check.native.step(residual, current, trace.dt)
         own = check.extremes
         found = np.vstack([np.minimum(found[:2], own[:2]), np.maximum(found[2:], own[2:])])
     return found
