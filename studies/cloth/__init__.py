@@ -25,10 +25,16 @@ STUDY = Study(
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """Single queries, labelled queries, and frames."""
+    """Single queries, labelled queries, frames, and volumes of the broad phase."""
     yield from _queries(rows)
     yield from _labelled(rows)
     yield from _frames(rows)
+    axes = ("microseconds, sum", "candidates")
+    for volume, mine in groups(table_rows(rows, "volume"), lambda r: str(r["volume"])).items():
+        question = f"Bounding volumes, a frame of each of {len(mine)} deforming meshes"
+        cost = 1e3 * sum(number(row["frame_ms"]) or 0.0 for row in mine)
+        pairs = sum(row["vf_candidates"] + row["ee_candidates"] for row in mine)
+        yield Point(question, volume.replace("_", " "), cost, pairs, "", "", *axes)
 
 
 def _errors(rows: Sequence[Row]) -> str:

@@ -98,15 +98,3 @@ def judge(rows: Sequence[Row]) -> list[Row]:
         what = f"{n} adversarial queries: {key.replace('_', ' ')}"
         out.append(answer(what, "0", f"{count}", count == 0))
     return out
-
-
-def draw(rows: Sequence[Row], figure: Any) -> None:
-    """Fraction of the queries that exact arithmetic decides, by set."""
-    axes, own = figure.subplots(), table_rows(rows, "adversarial")
-    for i, kind in enumerate(("vf", "ee")):
-        part = [row for row in own if row["kind"] == kind]
-        at = np.arange(len(part)) + 0.4 * i - 0.2
-        axes.barh(at, [row["decided_exactly"] / row["n"] for row in part], 0.4, label=kind)
-    axes.set_yticks(range(len(KINDS)), list(KINDS))
-    axes.set(xlabel="fraction decided by exact arithmetic")
-    axes.legend()

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from oracles.recorded_collisions import FRAMES, keys, load_frame
 from studies.cloth import shared
 from studies.cloth.shared import CLOTHS, Step, scaled
-from studies.framework import answer, groups, table_rows, time_in_turn, timed
+from studies.framework import answer, table_rows, time_in_turn, timed
 from tauguard.cloth import Frame as FrameAnswer
 from tauguard.cloth import Groups
 from tauguard.cloth.comparators import METHODS
@@ -51,7 +51,6 @@ NOTES = {
     "speedup: both over ab2pf's whole frame.",
     "listed": "recorded frames beside the collisions that their authors list; late as above.",
 }
-SIZE = (11.0, 4.5)
 
 
 class Frame(NamedTuple):
@@ -281,32 +280,3 @@ def judge(rows: Sequence[Row]) -> list[Row]:
             met = timed(row["speedup"] >= PEER[1], quick)
             out.append(answer(f"a frame of {RECORDED}: {PEER[0]} over ab2pf", "10", text, met))
     return out
-
-
-def draw(rows: Sequence[Row], figure: Any) -> None:
-    """Time of each method, hatched where it misses collisions, and of ipctk, over ab2pf's."""
-    left, right = figure.subplots(1, 2)
-    frames = [row for row in table_rows(rows, "frame") if (row["method"], row["volume"]) in ENTRIES]
-    by_entry = groups(frames, lambda r: f"{r['method']}, {r['volume'].replace('_', ' ')}")
-    _bars(left, by_entry, "times_ab2pf")
-    left.set(title="A frame, one thread (hatched: misses collisions)", ylabel="time over ab2pf's")
-    peers = [row for row in table_rows(rows, "frame peer") if "speedup" in row]
-    _bars(right, groups(peers, lambda row: str(row["peer"])), "speedup")
-    right.set(title="The same frame by ipctk", ylabel="time over ab2pf's", yscale="log")
-
-
-def _bars(axes: Any, by_label: dict[str, list[Row]], key: str) -> None:
-    """One group of bars for each scene, one colour for each label."""
-    scenes = list(dict.fromkeys(row["scene"] for own in by_label.values() for row in own))
-    width = 0.8 / max(1, len(by_label))
-    for i, (label, own) in enumerate(by_label.items()):
-        at = [scenes.index(row["scene"]) + (i + 0.5) * width - 0.4 for row in own]
-        bars = axes.bar(at, [row[key] for row in own], width, label=label)
-        for bar, row in zip(bars, own, strict=True):
-            if row.get("missed"):
-                bar.set(hatch="////", edgecolor="white", linewidth=0)
-    axes.set_xticks(range(len(scenes)), scenes, rotation=30, ha="right", fontsize="x-small")
-    axes.axhline(1, color="black", linewidth=0.8, zorder=0)
-    axes.margins(y=0.35)
-    if by_label:
-        axes.legend(fontsize="x-small", ncols=2, loc="upper left")

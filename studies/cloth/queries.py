@@ -42,7 +42,6 @@ NOTES = {
     "hard query": "n public queries with exact labels. us: a query; decided_exactly: by exact "
     "arithmetic.",
 }
-SIZE = (9.0, 4.5)
 
 
 class Queries(NamedTuple):

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from time import process_time
-from typing import Any
 
 import numpy as np
 
 from studies.cloth.shared import CLOTHS, run_row, scaled, step_at
-from studies.framework import answer, groups, table_rows, time_in_turn
+from studies.framework import answer, table_rows, time_in_turn
 from tauguard.cloth import VOLUMES, MeshCCD
 from tauguard.cloth.scenes import SCENES, Scene
 from tauguard.report import Row
@@ -27,7 +26,6 @@ NOTES = {
     "size": "one frame of growing meshes, whose motion stays in proportion to their edges. "
     "exponent: slope of log frame_ms over log triangles, by scene.",
 }
-SIZE = (11.0, 4.5)
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
@@ -81,24 +79,3 @@ def judge(rows: Sequence[Row]) -> list[Row]:
         answer(what, "-", f"{min(slopes):.2f} to {max(slopes):.2f}"),
         answer("bytes for each triangle, most", "-", f"{most:.0f}"),
     ]
-
-
-def draw(rows: Sequence[Row], figure: Any) -> None:
-    """Growth with the mesh, and candidates by volume (dashed: volumes that move)."""
-    growth, left = figure.subplots(1, 2)
-    for name, own in groups(table_rows(rows, "size"), lambda row: str(row["scene"])).items():
-        label = f"{name.replace('_', ' ')}: n^{own[-1]['exponent']:.2f}"
-        times = [row["frame_ms"]["median"] for row in own]
-        growth.loglog([row["triangles"] for row in own], times, marker="o", label=label)
-    growth.set(title="Growth with the mesh", xlabel="triangles n", ylabel="time of a frame [ms]")
-    scenes = groups(table_rows(rows, "volume"), lambda row: str(row["scene"]))
-    for i, (name, own) in enumerate(scenes.items()):
-        for prefix, style in (("k_dop", "-"), ("moving_k_dop", "--")):
-            some = [row for row in own if row["volume"].startswith(prefix)]
-            k = [int(row["volume"].removeprefix(prefix)) for row in some]
-            pairs = [row["vf_candidates"] + row["ee_candidates"] for row in some]
-            line = {"label": name.replace("_", " ")} if style == "-" else {}
-            left.semilogy(k, pairs, style, marker="o", color=f"C{i}", **line)
-    left.set(title="Candidates (dashed: moving volumes)", xlabel="k of the k-DOP", ylabel="pairs")
-    for axes in (growth, left):
-        axes.legend(fontsize="x-small")

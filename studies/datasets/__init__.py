@@ -1,5 +1,6 @@
 """Datasets: generation and detectors trained from their files."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from studies.framework import Part, Point, Study, table_rows
@@ -9,7 +10,7 @@ STUDY = Study(
     "generating, storing and reading datasets, and detectors trained from their files",
     {
         "generation": Part(
-            "datasets.generation", "generation: rate beside mujoco.rollout, bytes, reading, memory"
+            "datasets.generation", "generation: rate beside mujoco.rollout, bytes, reading"
         ),
         "entries": Part(
             "datasets.entries",
@@ -22,7 +23,12 @@ STUDY = Study(
 
 
 def points(rows: Sequence[Row]) -> Iterator[Point]:
-    """False alarms against missed collisions: a point for each detector and split."""
+    """Generation beside rollout; false alarms against missed collisions, by detector and split."""
+    for row in (row for row in table_rows(rows, "rate") if "rollout / ours" in row):
+        question, us = f"a sample of a data set, {row['episodes']} episodes", row["rollout [us]"]
+        ours = us / row["rollout / ours"]
+        yield Point(question, "tauguard", ours, math.nan, "labels, residual, written", "ours")
+        yield Point(question, "mujoco.rollout of the scene", us, math.nan, "nothing kept", "peer")
     axes = ("false alarms an hour (none: 0.1)", "fraction missed from 16 N m up")
     for row in table_rows(rows, "entries"):
         question = f"Detectors trained from files, split {row['split']}"

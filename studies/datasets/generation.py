@@ -1,11 +1,8 @@
-"""Generation of datasets: speed beside ``mujoco.rollout``, size, reading speed and memory."""
+"""Generation of datasets: speed beside ``mujoco.rollout``, size and reading speed."""
 
 from __future__ import annotations
 
 import io
-import json
-import subprocess
-import sys
 import tempfile
 from dataclasses import replace
 from functools import partial
@@ -16,10 +13,10 @@ import pyarrow.parquet as pq
 
 from oracles.bare_physics import rollout_pieces
 from oracles.processor_time import clock, count_time
-from studies.framework import number, table_rows, time_in_turn
+from studies.framework import time_in_turn
 from tauguard.datasets import columns_of_shards
 from tauguard.datasets.columns_of_shards import RESIDUAL, rounded, schema, stored
-from tauguard.datasets.configuration import load, parse
+from tauguard.datasets.configuration import load
 from tauguard.datasets.generation import generate_dataset
 from tauguard.datasets.schedule import Planned, planned
 from tauguard.datasets.shard import residual_of, writing
@@ -32,22 +29,6 @@ from tauguard.report import Row
 NAME = "tauguard-collisions-v1"
 #: Parts of the work in their order; the row rates [Hz] at which the size is measured.
 PARTS, RATES = ("prepare", "targets", "steps", "labels", "observer", "writing"), (1000, 500, 100)
-#: Generates a configuration in a new process and prints the peak memory [MiB] of this process and
-#: of its largest worker. ``/proc`` is used because ``ru_maxrss`` includes the parent's memory.
-PROGRAM = """
-import json, resource, sys
-from pathlib import Path
-from tauguard.datasets.configuration import Configuration
-from tauguard.datasets.generation import generate_dataset
-if __name__ == "__main__":
-    generate_dataset(Configuration.from_json(Path(sys.argv[1]).read_text()), Path(sys.argv[2]), 2)
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    status = Path("/proc/self/status")
-    if status.exists():
-        own = int(status.read_text().partition("VmHWM:")[2].split()[0])
-    worker = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    print(json.dumps([own / 1024, worker / 1024]))
-"""
 NOTES = {
     "rate": "Episodes of tauguard-collisions-v1 under another seed; processor time of one core, 1 "
     "kHz, observer and writing included. us: a sample of each part; steps include the attempts at "
@@ -56,15 +37,12 @@ NOTES = {
     "from the motion by `rollout away` after 0.1 s.",
     "size": "MB (1e6 bytes) an hour of tauguard-collisions-v1 under another seed.",
     "read": "one column of one shard by pyarrow, MB of float32 a second, median of 7.",
-    "memory": "Peak resident memory [MiB] of the command and of the largest of two workers; "
-    "episodes of 1 s, 20 a shard.",
 }
 
 
 def measure(quick: bool, seed: int) -> list[Row]:
     """All rows; the quick run has few episodes."""
-    rows = rate_rows(quick, seed) + size_rows(quick, seed)
-    return rows + [memory_row(n, seed) for n in ((10, 50) if quick else (100, 1000, 10_000))]
+    return rate_rows(quick, seed) + size_rows(quick, seed)
 
 
 def rate_rows(quick: bool, seed: int) -> list[Row]:
@@ -144,38 +122,3 @@ def size_rows(quick: bool, seed: int) -> list[Row]:
                 seconds = time_in_turn(call, repeats=7)["read"]["median"]
                 read = {"study": "read", "rows": n, "pyarrow [MB/s]": 4e-6 * n / seconds}
     return [*rows, read]
-
-
-def memory_row(count: int, seed: int) -> Row:
-    """Peak resident memory of the command and of its largest worker, for ``count`` episodes."""
-    split = {"name": "train", "episodes": count, "seconds": 1.0, "struck": 0.0, "speeds": [30]}
-    split |= {"arms": ["cura6"], "individuals": [0]}
-    top = {"name": "short", "seed": seed, "rate": 100, "episodes_per_shard": 20}
-    with tempfile.TemporaryDirectory() as folder:
-        text, program = Path(folder) / "configuration.json", Path(folder) / "run.py"
-        text.write_text(parse({**top, "splits": [split]}).to_json())
-        program.write_text(PROGRAM)
-        command = [sys.executable, str(program), str(text), str(Path(folder) / "data")]
-        done = subprocess.run(command, capture_output=True, check=True)
-    own, worker = json.loads(done.stdout)
-    return {"study": "memory", "episodes": count, "command [MiB]": own, "worker [MiB]": worker}
-
-
-def draw(rows: list[Row], figure: Any) -> None:
-    """Where the time of a sample goes, and bytes an hour."""
-    left, right = figure.subplots(1, 2)
-    timed = [row for row in table_rows(rows, "rate") if f"{PARTS[0]} [us]" in row]
-    names, bottom = [str(row["episodes"]) for row in timed], [0.0] * len(timed)
-    for part in PARTS:
-        values = [number(row[f"{part} [us]"]) or 0.0 for row in timed]
-        left.bar(names, values, bottom=bottom, label=part)
-        bottom = [b + v for b, v in zip(bottom, values, strict=True)]
-    for k, row in enumerate(timed):
-        left.hlines(row["rollout [us]"], k - 0.4, k + 0.4, "black", "dashed")
-    left.axhline(1000 / 60, color="grey", linewidth=1)
-    left.set(ylabel="us a sample", title="grey: 60 x real time; dashed: rollout")
-    left.legend()
-    sizes = table_rows(rows, "size")
-    right.barh([row["rows a second"] for row in sizes], [row["MB an hour"] for row in sizes])
-    right.invert_yaxis()
-    right.set(xlabel="MB an hour")

@@ -1,6 +1,9 @@
 """Faults of samples, and logs played in real time."""
 
-from studies.framework import Part, Study
+from collections.abc import Iterator, Sequence
+
+from studies.framework import Part, Point, Study, table_rows
+from tauguard.report import Row
 
 STUDY = Study(
     "faults of a robot's samples: which are reported, how soon, and at what cost",
@@ -16,3 +19,14 @@ STUDY = Study(
         ),
     },
 )
+
+
+def points(rows: Sequence[Row]) -> Iterator[Point]:
+    """How soon a fault is seen, and how often it is not."""
+    axes = ("median delay of what is seen [ms]", "fraction not seen")
+    for row in table_rows(rows, "faults"):
+        if row["median_ms"] is not None:
+            delay, missed = max(row["median_ms"], 1.0), 1 - row["seen"]["value"]
+            yield Point(
+                f"Faults of samples, {row['arm']}", row["fault"], delay, missed, "", "", *axes
+            )

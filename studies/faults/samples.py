@@ -18,7 +18,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -211,18 +210,3 @@ def others(known: Sequence[ArmLogs]) -> list[Row]:
         row["median_s"] = float(np.median(seen)) if seen else None
         rows.append(row)
     return rows
-
-
-def draw(rows: list[Row], figure: Any) -> None:
-    """Delay of every fault, an arm a colour."""
-    own = [row for row in rows if row["study"] == "faults"]
-    names, axes = list(FAULTS), figure.add_subplot()
-    for k, arm in enumerate(dict.fromkeys(row["arm"] for row in own)):
-        part = [row for row in own if row["arm"] == arm and row["median_ms"] is not None]
-        y = [names.index(row["fault"]) + 0.2 * k for row in part]
-        axes.plot([max(row["median_ms"], 1) for row in part], y, "o", label=arm)
-    axes.axvline(20, color="grey", linestyle=":", label="20 ms")
-    axes.set_xscale("log")
-    axes.set_yticks(range(len(names)), names)
-    axes.set_xlabel("median delay of what is seen [ms]")
-    axes.legend()

@@ -14,8 +14,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from studies.framework import Workers, time_in_turn
 from tauguard.datasets import plans
 from tauguard.detectors import SrqSvr, detection_metrics, matchings, train
@@ -24,7 +22,6 @@ from tauguard.envs import Episode, simulate
 from tauguard.models import Mismatch
 from tauguard.models.drive import PARTS
 from tauguard.report import Row
-from tauguard.report.charts import errorbars
 from tauguard.traces import Trace
 
 #: False alarms an hour that the thresholds aim at.
@@ -114,25 +111,3 @@ def recordings(chosen: Episodes, part: str) -> list[Trace]:
     }
     poorer = [replace(episode, **absent.get(part, {})) for episode in chosen]
     return [simulate(episode, without=(part,) if part in PARTS else ()) for episode in poorer]
-
-
-def draw(rows: list[Row], figure: Any) -> None:
-    """False alarms and misses, believed and found, by what was left out."""
-    left, right = figure.subplots(1, 2, sharey=True)
-    labels = ("in the whole simulation", "in the poorer one")
-    for axes, keys, title in (
-        (left, ("false_per_hour", "believed_false"), "false alarms per hour"),
-        (right, ("from_16", "believed_from_16"), "fraction found from 16 N m up"),
-    ):
-        for k, (key, label) in enumerate(zip(keys, labels, strict=True)):
-            style = {"fmt": "os"[k], "color": f"C{k}", "label": label, "capsize": 3}
-            at = np.arange(len(rows)) + (-0.12, 0.12)[k]
-            errorbars(axes, at, (row[key] for row in rows), across=True, **style)
-        axes.set(xlabel=title)
-        axes.grid(alpha=0.3)
-    left.set_xscale("symlog", linthresh=10)
-    left.set_xlim(left=0)
-    left.set_yticks(range(len(rows)), [row["left out"] for row in rows])
-    left.invert_yaxis()
-    left.set_ylabel("left out of the simulation that it was trained in")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=2)
