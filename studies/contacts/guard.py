@@ -273,17 +273,3 @@ def judge(rows: Sequence[Row]) -> list[Row]:
 def table(rows: Sequence[Row]) -> list[Row]:
     """The rows of all time steps together, and the guard's at each."""
     return [r for r in rows if r.get("timestep_ms", "all") == "all" or r["method"] == "guarded"]
-
-
-def draw(rows: Sequence[Row], figure: Any) -> None:
-    """Scenes that each method holds, by family."""
-    whole = [row for row in table_rows(rows, "thrown") if row["timestep_ms"] == "all"]
-    families = list(dict.fromkeys(row["family"] for row in whole))
-    axes = figure.subplots()
-    for k, (method, color) in enumerate(zip(METHODS, ("0.6", "C1", "C2", "C0"), strict=True)):
-        mine = [row for row in whole if row["method"] == method]
-        at = [families.index(row["family"]) + 0.2 * k - 0.3 for row in mine]
-        axes.bar(at, [100 * r["held"]["value"] for r in mine], 0.18, color=color, label=method)
-    axes.set(ylabel="held [%]", ylim=(0, 105))
-    axes.set_xticks(range(len(families)), families, rotation=45)
-    axes.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.12), frameon=False)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -239,24 +239,3 @@ def measure(quick: bool, seed: int) -> list[Row]:
     signal = fitted.front.scaled(trace, fitted.scaling)
     windows = fitted.shape.of(signal, np.arange(len(signal)))
     return rows + kernel_rows(full[-1], windows, extent.single, seed)
-
-
-def draw(rows: list[Row], figure: Any) -> None:
-    """Microseconds and error over the number of support vectors."""
-    own = [r for r in rows if r["study"] == "kernel"]
-    count = [r["support_vectors"] for r in own]
-    left, right = figure.subplots(1, 2)
-    left.plot(count, [r["us"]["median"] for r in own], "o-", label="kernel sum, one window")
-    left.plot(count, [r["us_p99"] for r in own], ":", color="C0", label="99th percentile")
-    peers = [r["sklearn_us"]["median"] for r in own]
-    left.axhline(peers[0], color="black", ls="--", label="scikit-learn's predict, all vectors")
-    left.set(xlabel="support vectors", ylabel="microseconds a sample", yscale="log")
-    left.set_title("Time")
-    fewer = [r for r in own if r["error_max"] > 0]
-    for key, label in (("error_rms", "root mean square"), ("error_max", "largest")):
-        right.plot([r["us"]["median"] for r in fewer], [r[key] for r in fewer], "o-", label=label)
-    right.set(xlabel="microseconds a sample", ylabel="error of the SVR's output", yscale="log")
-    right.set_title("Speed against error of reduced sets")
-    for axis in (left, right):
-        axis.legend()
-        axis.grid(alpha=0.3)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from studies.detection.motions import (
     CALIBRATE,
@@ -40,7 +39,6 @@ from tauguard.detectors.thresholds.guarantee import guaranteed_threshold
 from tauguard.detectors.thresholds.tail_model import normalisations, threshold_for_rate
 from tauguard.envs import simulate
 from tauguard.report import Row, rate
-from tauguard.report.charts import errorbars
 from tauguard.traces import STRATA
 
 #: How a threshold is chosen: expected to give a rate, or guaranteed not to exceed it.
@@ -168,22 +166,3 @@ def _judged(size: Size, seed: int, arm: int, fleet: dict[str, Operated]) -> Iter
                 struck, speed, (arm,), size.per_stratum, conditions=size.under, first=k
             )
             yield from (on_struck(fleet, one) for one in pool)
-
-
-def draw(rows: list[Row], figure: Any) -> None:
-    """Rate found, with its interval, over the rate asked for."""
-    axes = figure.add_subplot()
-    asked = sorted({row["asked"] for row in rows})
-    lines = list(dict.fromkeys((row["detector"], row["threshold"]) for row in rows))
-    for k, line in enumerate(lines):
-        own = [r for r in rows if (r["detector"], r["threshold"]) == line and r["found"]["hours"]]
-        at = [row["asked"] * 1.05 ** (k - len(lines) / 2) for row in own]
-        if own:
-            errorbars(
-                axes, at, (r["found"] for r in own), fmt="o", capsize=3, label=", ".join(line)
-            )
-    axes.plot(asked, asked, "k--", label="as asked")
-    axes.set(xscale="log", yscale="symlog", xlabel="false alarms per hour, asked for")
-    axes.set(ylabel="counted on fresh motion", title="False alarms of arms nothing was set on")
-    axes.legend()
-    axes.grid(alpha=0.3)

@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from studies.detection.motions import Conditions, Training
 from studies.detection.rates import AIMED, Size, arm_tallies, collisions, point
@@ -22,7 +21,6 @@ from studies.framework import JobCache, Workers
 from tauguard.models import cura6_drive, load_arm
 from tauguard.models.arm import NAMED
 from tauguard.report import Row
-from tauguard.report.charts import errorbars
 
 #: The shipped detector, and others of which the first two read the same residual.
 NAMES = ("srq-svr", "moving-thresholds", "residual-thresholds", "boosting")
@@ -95,25 +93,3 @@ def conditions(name: str, folder: Path) -> Conditions:
     largest = float(facts.drive.torque_limit[:4].max())
     share = min(1.0, largest / float(cura6_drive().torque_limit.max()))
     return Conditions(robot=source, joints=len(facts.joints), share=share)
-
-
-def draw(rows: list[Row], figure: Any) -> None:
-    """Found and false alarms by robot, with their intervals."""
-    left, right = figure.subplots(1, 2)
-    robots = list(dict.fromkeys(row["robot"] for row in rows))
-    names = list(dict.fromkeys(row["detector"] for row in rows))
-    for k, name in enumerate(names):
-        own = [row for row in rows if row["detector"] == name]
-        at = [robots.index(row["robot"]) + 0.15 * (k - (len(names) - 1) / 2) for row in own]
-        struck = [(x, r["sensitivity"]) for x, r in zip(at, own, strict=True) if r["all"]["n"]]
-        struck = [(x, found) for x, found in struck if found["n"]]
-        errorbars(left, [x for x, _ in struck], (found for _, found in struck), fmt="o", label=name)
-        alarms = (row["false_alarms_per_hour"] for row in own)
-        errorbars(right, at, alarms, fmt="o", label=name)
-    right.axhline(ASKED, color="k", ls="--", label="aimed at")
-    left.set(ylabel="found of the harder collisions", ylim=(0, 1.03))
-    right.set(ylabel="false alarms per hour", yscale="symlog")
-    for axis in (left, right):
-        axis.set_xticks(range(len(robots)), robots)
-        axis.grid(alpha=0.3)
-    right.legend(fontsize=8)

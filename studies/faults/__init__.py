@@ -30,3 +30,7 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
             yield Point(
                 f"Faults of samples, {row['arm']}", row["fault"], delay, missed, "", "", *axes
             )
+    for row in table_rows(rows, "listen"):
+        axes = ("median latency [us]", "samples lost")
+        label, us = f"{row['rate [Hz]']:g} Hz", row["median [us]"]
+        yield Point("A log played by RTDE in real time", label, us, row["lost"], "", "", *axes)

@@ -54,8 +54,6 @@ SECONDS, EPISODES, SPEEDS, PER_HOUR = 20.0, 8, (20.0, 40.0, 60.0), 5.0
 TIMED = 4000
 #: The serving process must answer within this time [s].
 ANSWERS = 120.0
-#: Percentiles of the latency.
-LEVELS = ("median", "p99", "p99_9", "p99_99", "max")
 
 NOTES = {
     "listen": "a simulated arm with collisions, played in real time, all rates at once. events: "
@@ -221,18 +219,3 @@ def timed(call: Callable[[int], object], count: int) -> Row:
         spent[k] = time.thread_time_ns() - begin
     median, tail = np.percentile(spent / 1e3, (50, 99.9))
     return {"p50 [us]": float(median), "p99.9 [us]": float(tail)}
-
-
-def draw(rows: list[Row], figure: Any) -> None:
-    """Latency of each rate beside its period."""
-    axes = figure.subplots()
-    for k, row in enumerate(row for row in rows if row["study"] == "listen"):
-        # None: longer than the histogram of latencies reaches.
-        values = [float(row[f"{name} [us]"] or np.nan) / 1e3 for name in LEVELS]
-        label = f"{row['rate [Hz]']:g} Hz, {row['heard']:,} samples"
-        names = [name.replace("_", ".") for name in LEVELS]
-        axes.semilogy(names, values, "o-", color=f"C{k}", label=label)
-        period = 1e3 / float(row["rate [Hz]"])
-        axes.axhline(period, color=f"C{k}", linestyle=":", label=f"its period, {period:g} ms")
-    axes.set_ylabel("from packet to answer [ms]")
-    axes.legend(frameon=False)
