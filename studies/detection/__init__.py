@@ -63,8 +63,8 @@ def points(rows: Sequence[Row]) -> Iterator[Point]:
         yield Point(question, "scikit-learn's predict", its, math.nan, "the reference", "peer")
     for row in table_rows(rows, "kernel"):
         axes = ("microseconds a sample", "rms error of the output")
-        label, us = f"{row['support_vectors']} support vectors", number(row["us"]) or 0.0
-        yield Point("Reduced sets of the SVR", label, us, row["error_rms"], "", "", *axes)
+        label, cost_us = f"{row['support_vectors']} support vectors", number(row["us"]) or 0.0
+        yield Point("Reduced sets of the SVR", label, cost_us, row["error_rms"], "", "", *axes)
     for row in (row for row in table_rows(rows, "false alarms") if row["found"]["hours"]):
         axes, label = (
             ("asked for, an hour", "counted, an hour"),
