@@ -20,7 +20,7 @@ from tauguard.datasets.configuration_checks import (
     refuse,
 )
 from tauguard.datasets.robots import RobotSource, find_robot
-from tauguard.models import ROBOTS, cura6
+from tauguard.models import ROBOTS, SceneObject, cura6, load_objects
 
 #: The configurations that ship, by name.
 NAMED = ("tauguard-collisions-v1", "cura6-twin")
@@ -60,12 +60,14 @@ class Configuration:
     mismatch: tuple[tuple[str, float], ...]  #: half-widths, see :class:`tauguard.models.Mismatch`
     splits: tuple[Split, ...]
     robots: tuple[RobotSource, ...] = ()  #: arms that are not the package's own
+    objects: tuple[SceneObject, ...] = ()  #: things around the arm in every episode
 
     def to_json(self) -> str:
         """As JSON text with sorted keys: equal configurations give equal text."""
         values = asdict(self)
-        if not self.robots:
-            del values["robots"]
+        for name in ("robots", "objects"):
+            if not values[name]:
+                del values[name]
         return json.dumps(values, sort_keys=True)
 
     @classmethod
@@ -76,8 +78,10 @@ class Configuration:
         robots = tuple(
             RobotSource(**{k: _frozen(v) for k, v in r.items()}) for r in values.get("robots", ())
         )
-        rest = {k: _frozen(v) for k, v in values.items() if k not in ("splits", "robots")}
-        return cls(**rest, splits=splits, robots=robots)
+        objects = tuple(SceneObject(**one) for one in values.get("objects", ()))
+        parts = ("splits", "robots", "objects")
+        rest = {k: _frozen(v) for k, v in values.items() if k not in parts}
+        return cls(**rest, splits=splits, robots=robots, objects=objects)
 
     @property
     def sha256(self) -> str:
@@ -181,8 +185,10 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
         ]
         splits.append(_split(where, merged, min(joints)))
     _check_splits(splits)
+    around = top.pop("objects")
     return Configuration(
         **top,
+        objects=load_objects(folder / around) if around else (),
         mismatch=tuple(sorted(widths.items())),
         splits=tuple(splits),
         robots=tuple(robots[name] for name in sorted(robots)),

@@ -213,6 +213,7 @@ KEYS: dict[str, dict[str, Key]] = {
         "rate": Key(rows_a_second, "rows a second that divide 1000", 1000),
         "episodes_per_shard": Key(integer(1, 1000), "a whole number, 1 to 1000", 10),
         "residual": Key(flag, "true or false", False),
+        "objects": Key(text, "a TOML file that lists objects around the arm", ""),
     },
     "mismatch": {
         name: Key(number(0, largest), f"a half-width, 0 to {largest}", getattr(_DEFAULT, name))

@@ -39,7 +39,7 @@ def read_joint_states(path: Path, joint_names: Sequence[str] | None) -> Log:
         )
         contents.check_sum()
         if "tauguard.trace" in contents.metadata:
-            own = read_mcap(path)[0]
+            own = read_mcap(path)
             return Log(own, checked(own, lambda row: f"sample {row}"))
         topic, messages = _messages(content)
     except (McapError, struct.error, RecursionError) as error:

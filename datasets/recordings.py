@@ -94,7 +94,7 @@ def _place(folder: Path, number: int, episode: Episode) -> Path:
     """The file of an episode; another run's settings give another name."""
     kind = "episode" if episode.collisions or episode.objects else "free"
     old = folder / f"episode-{number:05d}.mcap"  # the name in earlier versions
-    if old.exists() and read_mcap(old)[0].meta.get("config_sha256") == episode.config_hash:
+    if old.exists() and read_mcap(old).meta.get("config_sha256") == episode.config_hash:
         return old
     return folder / f"{kind}-{number:05d}-{episode.config_hash[:6]}.mcap"
 
@@ -102,7 +102,7 @@ def _place(folder: Path, number: int, episode: Episode) -> Path:
 def _holds(path: Path, episode: Episode, checkers: Sequence[str]) -> bool:
     if not path.exists():
         return False
-    trace, _ = read_mcap(path)
+    trace = read_mcap(path)
     seen = [one.checker for one in trace.contacts]
     if seen != list(checkers):
         raise ValueError(
@@ -138,7 +138,7 @@ def labelled(folder: Path, arm: str | None = None) -> list[Trace]:
         raise ValueError(f"{folder}: no .mcap files; `tauguard simulate --out` writes some")
     traces = []
     for path in tqdm(paths, desc="read", unit="file", disable=None, leave=False):
-        trace, _ = read_mcap(path)
+        trace = read_mcap(path)
         if trace.truth is None:
             raise ValueError(f"{path}: no truth in it; simulated recordings have one")
         with reading(path):  # as for logs: a gap is not counted as time without an alarm

@@ -76,6 +76,7 @@ def planned(configuration: Configuration, split: Split, number: int) -> Planned:
         mismatch=None if individual < 0 else Mismatch(seed=individual, **widths),
         temperature=float(rng.uniform(*split.temperature)),
         arm=arm,
+        objects=configuration.objects,
     )
     source = configuration.source_of(arm)
     return Planned(split.name, number, arm, individual, episode, source)

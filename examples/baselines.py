@@ -1,78 +1,164 @@
-"""Baselines of the tasks: zero action, random, and straight to the target, fast and gently.
+"""Baselines of the tasks: zero and random actions, scripted controllers, learned policies.
 
-    python examples/baselines.py [EPISODES] [FIRST_SEED]
+    python examples/baselines.py [EPISODES] [FIRST_SEED] [TASK ...]
 
-Prints a Markdown table: success with its 95 % interval, targets, reward, episodes with a contact.
+Prints a Markdown table: success with its 95 % interval, targets, reward, largest force over its
+limit and seconds in hard contact (force over 100 N, at most 1), a mean an episode of 5 s each.
+`fast` goes straight to the target. The others do so too, and differ in what they do about people:
+
+* `power and force`: at the speed at which the impact with each region, and a lasting push, keep its
+  quasi-static limit (two-mass model of ISO 10218-2).
+* `separation`: stands while somebody is within the protective distance.
+* `admittance`: yields to the force that the momentum observer finds at the tool.
+* `ppo`, `ppo, budget`: trained by `examples/learn.py`, loaded from `examples/policies`.
 """
 
 import sys
 import warnings
+from pathlib import Path
 
 import gymnasium as gym
+import mujoco
 import numpy as np
 
+from tauguard.envs.policies import MlpPolicy
+from tauguard.envs.wrappers import SpeedAndSeparation
+from tauguard.models import standard_mass
 from tauguard.report import rate
 
 TASKS = ("Reach-v0", "React-v1", "ClothReach-v1", "TwoArms-v1")
-#: Fraction of the largest Cartesian speed at which a scripted tool goes to its target.
-SPEEDS = {"straight, fast": 1.0, "straight, gentle": 0.35}
+#: Tool velocities, 20 actions a second.
+KEYWORDS = {"control": "cartesian", "control_rate": 20.0, "max_episode_steps": 100}
+POLICIES = Path(__file__).with_name("policies")
+#: Force of the hardest contact that counts [N]; tool speed where no region limits it [m/s].
+HARD, UNLIMITED = 100.0, 0.25
+#: Of the admittance: damping [N s/m], force that is not believed [N], and speed over that of
+#: `power and force`.
+DAMPING, DEAD, YIELDING = 250.0, 15.0, 1.5
 
 
-def straight(env, speed):
-    """The Cartesian action that brings every tool nearer to its target."""
-    batch, n, arms = env.batch, len(env.scene.joint_names), env.compiled.arms
+def zero(env, info):
+    return np.zeros(env.action_space.shape)
+
+
+def random(env, info):
+    return env.action_space.sample()
+
+
+def velocity(env, speed):
+    """Of each tool towards its target [m/s], slower near to it, shape (arms, 3)."""
+    arms, n = env.unwrapped.compiled.arms, len(env.unwrapped.scene.joint_names)
     first = 3 * n + 3 * arms
-    left = batch.observation[0, first : first + 3 * arms].reshape(arms, 3)
-    largest = np.array([entry.high for entry in batch.actions]).reshape(arms, 6)[:, :3]
-    step = 0.1 * left / largest
-    size = np.abs(step).max(axis=1, keepdims=True)
-    action = np.zeros((arms, 6))
-    action[:, :3] = step * np.minimum(1, speed / np.maximum(size, 1e-9))
-    return action.ravel()
+    left = env.unwrapped.batch.observation[0, first : first + 3 * arms].reshape(arms, 3)
+    distance = np.linalg.norm(left, axis=1, keepdims=True)
+    return left / np.maximum(distance, 1e-9) * np.minimum(speed, 5 * distance)
 
 
-def play(task, policy, episodes, first=0):
-    """Successes, targets, rewards, largest force over its limit and contacts, one an episode."""
+def action(env, wanted):
+    """The action for tool velocities [m/s]."""
+    largest = np.array([e.high for e in env.unwrapped.batch.actions]).reshape(len(wanted), 6)
+    full = largest[:, :3] * env.unwrapped.compiled.settings.control_rate
+    out = np.zeros((len(wanted), 6))
+    out[:, :3] = np.clip(wanted / full, -1, 1)
+    return out.ravel()
+
+
+def fast(env, info):
+    return action(env, velocity(env, 1.0))
+
+
+def limited_speed(env):
+    """At which an impact and a push keep the quasi-static limit of every region [m/s]."""
+    arm = standard_mass(env.unwrapped.scene)
+    speeds = [UNLIMITED]
+    for region in env.unwrapped.regions:
+        mass = float(env.unwrapped.model.body_subtreemass[region.body])
+        reduced = 1 / (1 / arm + 1 / mass)
+        speeds.append(region.quasi_static / np.sqrt(reduced * region.stiffness))
+    return min(speeds)
+
+
+def power_and_force(env, info):
+    return action(env, velocity(env, limited_speed(env)))
+
+
+def admittance(env, info):
+    inner = env.unwrapped
+    wanted = velocity(env, YIELDING * limited_speed(env))
+    each = len(inner.scene.joint_names) // len(wanted)
+    jac = np.zeros((3, inner.model.nv))
+    for a, (site, body, first) in enumerate(inner.compiled.tools):
+        place = inner.data.site_xpos[site] if site >= 0 else inner.data.xpos[body]
+        mujoco.mj_jac(inner.model, inner.data, jac, None, place.copy(), body)
+        dofs = inner.scene.dof_adr[first : first + each]
+        force = np.linalg.lstsq(jac[:, dofs].T, info["residual"][first : first + each])[0]
+        size = np.linalg.norm(force)
+        wanted[a] += force * max(0.0, size - DEAD) / max(size, 1e-9) / DAMPING
+    return action(env, wanted)
+
+
+def learned(file):
+    policy = MlpPolicy.load(file)
+    return lambda env, info: policy(env.unwrapped.batch.observation[0])
+
+
+def baselines(task):
+    """By name: what acts, keywords and a wrapper of the environment."""
+    found = {
+        "zero": (zero, {}, None),
+        "random": (random, {}, None),
+        "fast": (fast, {}, None),
+        "power and force": (power_and_force, {}, None),
+        "separation": (fast, {}, SpeedAndSeparation),
+        "admittance": (admittance, {"detector": "observer"}, None),
+    }
+    if task in ("ClothReach-v1", "TwoArms-v1"):  # nobody is there
+        del found["separation"]
+    for name, end in (("ppo", ""), ("ppo, budget", "-budget")):
+        if (file := POLICIES / f"{task}{end}.npz").is_file():
+            found[name] = (learned(file), {}, None)
+    return found
+
+
+def play(task, name, episodes, first=0):
+    """Success, targets, reward, force over limit and hard contact [s], a row an episode."""
+    act, more, wrapper = baselines(task)[name]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        env = gym.make(f"tauguard:tauguard/{task}", control="cartesian", disable_env_checker=True)
+        env = gym.make(f"tauguard:tauguard/{task}", disable_env_checker=True, **KEYWORDS, **more)
+    env = env if wrapper is None else wrapper(env)
     env.action_space.seed(first)
     rows = []
     for seed in range(first, first + episodes):
-        env.reset(seed=seed)
-        targets = reward = worst = force = 0.0
+        _, info = env.reset(seed=seed)
+        targets = reward = worst = hard = 0.0
         over = False
         while not over:
-            if policy in SPEEDS:
-                action = straight(env.unwrapped, SPEEDS[policy])
-            elif policy == "random":
-                action = env.action_space.sample()
-            else:
-                action = np.zeros(env.action_space.shape)
-            _, gained, ended, cut, info = env.step(action)
+            _, gained, ended, cut, info = env.step(act(env, info))
             over, reward = ended or cut, reward + gained
             targets += info["success"]
-            worst, force = max(worst, info["limit_ratio"]), max(force, info["force"])
-        rows.append((targets > 0, targets, reward, worst, force > 0))
+            worst = max(worst, info["limit_ratio"])
+            hard += min(info["force"] / HARD, 1.0) / KEYWORDS["control_rate"]
+        rows.append((targets > 0, targets, reward, worst, hard))
     env.close()
     return np.array(rows, dtype=float)
 
 
-def main(episodes=20, first=1000):
-    print("| task | policy | success | targets | reward | force over limit | episodes in contact |")
+def main(episodes=20, first=1000, *tasks):
+    print("| task | policy | success | targets | reward | force over limit | hard contact [s] |")
     print("|---|---|---|---|---|---|---|")
-    for task in TASKS:
-        for policy in ("zero", "random", *SPEEDS):
-            rows = play(task, policy, episodes, first)
-            interval = rate(int(rows[:, 0].sum()), episodes)
+    for task in tasks or TASKS:
+        for name in baselines(task):
+            rows = play(task, name, int(episodes), int(first))
+            interval = rate(int(rows[:, 0].sum()), len(rows))
             low, high = interval["low"], interval["high"]
-            success, targets, reward, worst, touched = rows.mean(axis=0)
+            success, targets, reward, worst, hard = rows.mean(axis=0)
             print(
-                f"| {task} | {policy} | {success:.2f} [{low:.2f}, {high:.2f}] | {targets:.1f} | "
-                f"{reward:.2f} | {worst:.2f} | {touched:.2f} |",
+                f"| {task} | {name} | {success:.2f} [{low:.2f}, {high:.2f}] | {targets:.1f} | "
+                f"{reward:.2f} | {worst:.2f} | {hard:.2f} |",
                 flush=True,
             )
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:3]))
+    main(*sys.argv[1:])

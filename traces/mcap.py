@@ -35,6 +35,8 @@ MEDIA_TYPES = {".xml": "text/xml", ".json": "application/json", ".toml": "applic
 def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = None) -> None:
     """Write a trace, and what a detector said about it, as one MCAP file.
 
+    Without ``detection`` it is that of the trace.
+
     The file is replaced atomically: it is written beside ``path`` and renamed.
 
     Raises:
@@ -43,6 +45,7 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
         OSError: the folder is missing or cannot be written.
     """
     path = Path(path)
+    detection = trace.detection if detection is None else detection
     groups = [Group(nanoseconds(trace.t), sample_topics(trace, detection))]
     if trace.truth is not None and trace.truth.collisions:
         groups.append(collision_group(trace.truth.collisions))
@@ -61,8 +64,10 @@ def write_mcap(path: str | Path, trace: Trace, detection: Detection | None = Non
         writer.finish()
 
 
-def read_mcap(path: str | Path) -> tuple[Trace, Detection | None]:
+def read_mcap(path: str | Path) -> Trace:
     """Read what :func:`write_mcap` wrote; every array is equal bit by bit.
+
+    What a detector said is in ``Trace.detection``.
 
     (An obstacle array without obstacles comes back in its default form, shape (0, 0, 4, 4).)
 
@@ -225,8 +230,8 @@ def alarm_group(alarms: tuple[Alarm, ...]) -> Group:
     return Group(nanoseconds(start), [topic])
 
 
-def decode(contents: Contents) -> tuple[Trace, Detection | None]:
-    """The trace and the detection in an MCAP file's records."""
+def decode(contents: Contents) -> Trace:
+    """The trace in an MCAP file's records, with its detection."""
     if "tauguard.trace" not in contents.metadata:
         topics = ", ".join(sorted(c.topic for c in contents.channels.values())) or "none"
         raise ValueError(f"no metadata record tauguard.trace (topics: {topics})")
@@ -250,7 +255,7 @@ def decode(contents: Contents) -> tuple[Trace, Detection | None]:
     truth = None
     if form["truth"]:
         truth = decode_truth(form, values, tables["/truth/collisions"])
-    trace = Trace(
+    return Trace(
         joint_names=tuple(form["joint_names"]),
         t=values["time"],
         q=values["q"],
@@ -261,14 +266,17 @@ def decode(contents: Contents) -> tuple[Trace, Detection | None]:
         contacts=mcap_contacts.decode(form, tables),
         meta=contents.metadata.get("tauguard.meta", {}),
         attachments={name: data.decode() for name, data in contents.attachments.items()},
+        detection=_detection(form, values, tables["/detection/alarms"]),
     )
+
+
+def _detection(form: Mapping[str, Any], values: Mapping[str, Any], alarms: Any) -> Detection | None:
     if "detector" not in form:
-        return trace, None
-    alarms = tables["/detection/alarms"]
+        return None
     spans = zip(alarms["start"].tolist(), alarms["end"].tolist(), strict=True)
-    return trace, Detection(
+    return Detection(
         detector=form["detector"],
-        t=trace.t.copy(),
+        t=values["time"].copy(),
         residual=values["residual"],
         score=values["score"],
         threshold=float.fromhex(form["threshold"]),

@@ -73,6 +73,7 @@ class Trace:
     """Seed, versions, configuration hash, model hash and whatever else describes the run."""
     attachments: Mapping[str, str] = field(default_factory=dict)
     """Text files that belong to the run, by name: the MJCF of the scene, the configuration."""
+    detection: Detection | None = None  #: what a detector said about it
 
     def __post_init__(self) -> None:
         """Check shapes and values.

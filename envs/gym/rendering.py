@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -14,19 +13,16 @@ from numpy.typing import NDArray
 
 from tauguard.envs.gym.compiled import CompiledScene
 from tauguard.envs.gym.second_arm import APART
+from tauguard.models.picture import opengl, staged
 
 #: Of a picture [px].
 HEIGHT, WIDTH = 480, 640
 #: Groups that are shown: bodies and obstacles, and the arm's visual shapes; not its collision ones.
 SHOWN = (0, 1, 2)
-#: Lights and background.
-AMBIENT, DIFFUSE, SKY = 0.35, 0.4, ((0.93, 0.95, 0.97), (0.78, 0.83, 0.90))
-#: The floor that is drawn, not simulated: half extents and grid [m], height [m] and colour.
-FLOOR, FLOOR_HEIGHT, FLOOR_COLOUR = (8.0, 8.0, 1.0), -0.001, (0.80, 0.82, 0.85, 1.0)
+#: Height of the floor that is drawn, not simulated, where nobody stands lower [m].
+FLOOR_HEIGHT = -0.001
 #: What an arm stands on where people stand lower: half its extents [m] and colour.
 PEDESTAL, PEDESTAL_COLOUR = (0.25, 0.3), (0.62, 0.64, 0.67, 1.0)
-#: The lamp that throws the shadows: where it stands [m], shining down, and how bright.
-LAMP, LAMP_COLOUR = (0.0, 0.0, 3.0), 0.35
 #: Shadows fall this far from the middle of the scene [m].
 SHADOW_REACH = 3.0
 #: Radius [m] and colour of the ball that marks a target.
@@ -47,32 +43,14 @@ def _need_display() -> None:
 def _staged(compiled: CompiledScene) -> mujoco.MjModel:
     """The scene with floor, sky and lamp, which are drawn and not simulated."""
     spec = mujoco.MjSpec.from_string(compiled.scene.xml)
-    bright, blue = SKY
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=blue,
-        rgb2=bright,
-        width=256,
-        height=256,
-    )
     person = compiled.person
     floor = FLOOR_HEIGHT if person is None else person.floor
-    _draw(spec, mujoco.mjtGeom.mjGEOM_PLANE, FLOOR, [0, 0, floor], FLOOR_COLOUR)
     if floor < FLOOR_HEIGHT:
         height = (FLOOR_HEIGHT - floor) / 2
         for base in _bases(compiled):
             place = [base[0], base[1], FLOOR_HEIGHT - height]
             _draw(spec, mujoco.mjtGeom.mjGEOM_BOX, [*PEDESTAL, height], place, PEDESTAL_COLOUR)
-    spec.worldbody.add_light(
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=LAMP,
-        dir=[0, 0, -1],
-        diffuse=[LAMP_COLOUR] * 3,
-        castshadow=True,
-    )
-    return spec.compile()
+    return staged(spec, floor)
 
 
 def _draw(
@@ -96,12 +74,7 @@ class Stage:
         self._world, self._data = compiled, data
         self.model = _staged(compiled)
         self.drawn = mujoco.MjData(self.model)
-        vis = self.model.vis
-        vis.quality.offsamples = 8
-        vis.quality.shadowsize = 2048
-        vis.map.shadowclip = SHADOW_REACH / self.model.stat.extent
-        vis.headlight.ambient[:] = AMBIENT
-        vis.headlight.diffuse[:] = DIFFUSE
+        self.model.vis.map.shadowclip = SHADOW_REACH / self.model.stat.extent
 
     def look(self, camera: Any) -> None:
         """From beside the first arm's front; two arms from the side, so that neither hides one."""
@@ -163,7 +136,7 @@ class Camera(Stage):
         self.look(self._camera)
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:] = [int(group in SHOWN) for group in range(6)]
-        with _no_picture():
+        with opengl():
             self._renderer = mujoco.Renderer(self.model, height, width)
 
     def colours(self, targets: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -206,7 +179,7 @@ class Window(Stage):
         """
         super().__init__(compiled, data)
         _need_display()
-        with _no_picture():
+        with opengl():
             from mujoco import viewer
 
             self._window: Any = viewer.launch_passive(
@@ -249,15 +222,3 @@ class Picture:
     def close(self) -> None:
         """Close window or renderer."""
         self._view.close()
-
-
-@contextmanager
-def _no_picture() -> Iterator[None]:
-    """Turn an error of OpenGL's start into one line that suggests what to change."""
-    try:
-        yield
-    except Exception as error:
-        raise RuntimeError(
-            f"no picture: {error}; without a display use render_mode='rgb_array' and set "
-            "MUJOCO_GL=egl (or osmesa) before Python starts"
-        ) from error

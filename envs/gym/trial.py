@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,11 +64,11 @@ def _tried(name: str, robot: str | Robot, episodes: int, seed: int) -> ArmTrial:
     begins_by_contact = getattr(env.task, "meets", False)
     for episode in range(episodes):
         env.reset(seed=seed + episode)
+        overlaps += not begins_by_contact and _inside(env)
         for step in range(ACTIONS):
             random = rng.uniform(-1, 1, still.shape)
             *_, ended, cut, info = env.step(still if step < ACTIONS // 2 else random)
             force = max(force, info["force"])
-            overlaps += step == 0 and info["force"] > 0 and not begins_by_contact
             diverged += info["reason"].startswith("diverged")
             if ended or cut:
                 break
@@ -74,6 +76,15 @@ def _tried(name: str, robot: str | Robot, episodes: int, seed: int) -> ArmTrial:
     env.close()
     bound, moved = compiled.force_bound.total, dict(compiled.layout.moved)
     return ArmTrial(name, episodes, overlaps, force, bound, diverged, moved)
+
+
+def _inside(env: Any) -> bool:
+    """Whether a link of an arm is inside anything, by MuJoCo's contacts of the state."""
+    model, data = env.model, copy.copy(env.data)
+    mujoco.mj_fwdPosition(model, data)
+    links = np.flatnonzero(np.isin(model.geom_bodyid, env.scene.link_bodies))
+    touching = np.isin(data.contact.geom, links).any(axis=1)
+    return bool((data.contact.dist[touching] < 0).any())
 
 
 def picture(name: str, robot: str | Robot, seed: int = 0) -> NDArray[np.uint8]:

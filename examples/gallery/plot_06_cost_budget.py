@@ -50,4 +50,4 @@ plt.ylabel("targets reached")
 plt.legend(title="slower within")
 
 # %%
-# ``examples/learn_safely.py`` learns a policy that keeps such a budget.
+# ``examples/learn.py --budget`` learns a policy that keeps such a budget.

@@ -55,7 +55,8 @@ def intact(tmp_path_factory):
         assert run(command, folder, *flags) == 0
     for number, path in enumerate(sorted((folder / "mcap").glob("*.mcap"))):
         path.rename(path.with_name(f"{number}.mcap"))
-    trace, detection = read_mcap(folder / "mcap" / "0.mcap")
+    trace = read_mcap(folder / "mcap" / "0.mcap")
+    detection = trace.detection
     short = folder / "short.mcap"
     write_mcap(short, trace, detection)
     write_rrd(folder / "short.rrd", trace, detection)

@@ -30,6 +30,21 @@ def test_what_ships_is_whole_and_survives_json(name):
     assert configuration.quick().hours < configuration.hours / 5
 
 
+def test_objects_stand_in_every_episode_and_survive_json(tmp_path):
+    (tmp_path / "cell.toml").write_text(
+        '[[object]]\nname = "post"\nposition = [0.9, 0.5, 0.2]\n'
+        '[[object.shapes]]\nkind = "cylinder"\nsize = [0.05, 0.2]\n'
+    )
+    configuration = parse(tomllib.loads('objects = "cell.toml"' + GOOD), tmp_path)
+    assert [one.name for one in configuration.objects] == ["post"]
+    assert Configuration.from_json(configuration.to_json()) == configuration
+    assert configuration.sha256 != parse(tomllib.loads(GOOD)).sha256
+    episode = planned(configuration, configuration.splits[0], 0).episode
+    assert episode.objects == configuration.objects
+    with pytest.raises(FileNotFoundError, match=r"none\.toml"):
+        parse(tomllib.loads('objects = "none.toml"' + GOOD), tmp_path)
+
+
 def test_the_benchmark_is_100_hours_of_four_arms():
     configuration = load("tauguard-collisions-v1")
     assert configuration.hours == pytest.approx(100)

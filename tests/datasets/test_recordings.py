@@ -67,7 +67,7 @@ def test_a_second_run_continues_and_keeps_whole_files(episodes, tmp_path):
     assert [re.sub("[0-9a-f]{6}[.]", "*.", p.name) for p in paths] == [
         f"{'episode' if e.collisions else 'free'}-0000{i}-*.mcap" for i, e in enumerate(episodes)
     ]
-    trace, _ = read_mcap(paths[2])
+    trace = read_mcap(paths[2])
     assert trace.meta["config_sha256"] == episodes[2].config_hash
 
 
@@ -91,7 +91,7 @@ def test_a_file_under_its_earlier_name_is_kept_and_folders_are_read_whole(episod
 
 def test_checkers_write_their_contacts_and_are_part_of_what_a_file_is(episodes, tmp_path):
     (path,) = write_dataset(episodes[:1], tmp_path, workers=1, checkers=["mujoco", "rigid"])
-    trace, _ = read_mcap(path)
+    trace = read_mcap(path)
     assert [one.checker for one in trace.contacts] == ["mujoco", "rigid"]
     before = path.read_bytes()
     write_dataset(episodes[:1], tmp_path, workers=1, checkers=["mujoco", "rigid"])

@@ -58,7 +58,7 @@ def test_an_unknown_checker_is_named_before_anything_runs():
 
 def test_the_file_gives_back_every_bit_and_notices_what_is_missing(trace, tmp_path):
     write_mcap(tmp_path / "a.mcap", trace)
-    (back,) = read_mcap(tmp_path / "a.mcap")[0].contacts
+    (back,) = read_mcap(tmp_path / "a.mcap").contacts
     (seen,) = trace.contacts
     for field in dataclasses.fields(CheckedContacts):
         a, b = getattr(seen, field.name), getattr(back, field.name)
@@ -89,7 +89,7 @@ def test_other_readers_decode_the_contacts(trace, tmp_path):
 def test_a_trace_without_checkers_is_the_file_it_was(trace, tmp_path):
     write_mcap(tmp_path / "a.mcap", dataclasses.replace(trace, contacts=()))
     assert b"/contacts" not in (tmp_path / "a.mcap").read_bytes()
-    assert read_mcap(tmp_path / "a.mcap")[0].contacts == ()
+    assert read_mcap(tmp_path / "a.mcap").contacts == ()
 
 
 def test_the_replay_shows_them(trace, tmp_path):

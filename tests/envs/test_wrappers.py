@@ -187,7 +187,8 @@ def test_a_recording_holds_what_the_environment_said(tmp_path):
     env.step(np.zeros(6))
     env.close()
     assert [path.name for path in env.files] == ["episode_00000.mcap", "episode_00001.mcap"]
-    trace, detection = read_mcap(env.files[0])
+    trace = read_mcap(env.files[0])
+    detection = trace.detection
     assert len(trace.t) == 10 * len(swing)
     assert trace.meta["seed"] == "7"
     assert trace.meta["environment"] == REACT

@@ -32,6 +32,7 @@ COMMANDS = {
     "listen": "a detector beside a running robot, read-only: free, collision or fault",
     "play-ur": "play a log as a UR controller would send it, to test against",
     "replay": "turn an MCAP recording into an .rrd for the rerun viewer",
+    "video": "a recording of the simulation as a moving picture, GIF or MP4",
     "report": "the studies and the hard cases in one HTML file",
     "hard-cases": "named cases with exact answers, for our kernels and anybody's",
     "bench": "run one study of speed against error: a table, a figure, --json",
@@ -106,7 +107,12 @@ def run_command(path: str, name: str, args: Sequence[str], debug: bool) -> None:
             raise
         if isinstance(error, ValueError | OSError):
             fail(f"{name}: {said(error)}")
-        kind = type(error).__name__
+        kind, wanted = type(error).__name__, os.environ.get("MUJOCO_GL")
+        if wanted and "mujoco" not in sys.modules:  # its import ends where its OpenGL is not there
+            fail(
+                f"{name}: MUJOCO_GL={wanted}: MuJoCo finds no such OpenGL; install libegl1 for egl "
+                "or libosmesa6 for osmesa, or unset it"
+            )
         fail(f"{name}: a defect of tauguard, --debug shows where: {kind}: {error}", 1)
 
 

@@ -84,9 +84,9 @@ def recorded(file: Path, out: Path | None, robot: Path | None, whole: bool) -> P
             f"{usual} is there already: name the file to write with --out; "
             f"`tauguard replay --web {usual}` shows that one"
         )
-    trace, detection = read_mcap(file)
+    trace = read_mcap(file)
     out = out or usual
-    write_rrd(out, trace, detection, robot, whole=whole)
+    write_rrd(out, trace, trace.detection, robot, whole=whole)
     print(f"{out}  ({out.stat().st_size / 1e6:.1f} MB; show it with: rerun {out})")
     return out
 

@@ -93,7 +93,7 @@ def described(path: Path, episode: Episode) -> dict[str, object]:
     """What one recording holds, printed as a line and given for JSON."""
     from tauguard.traces import read_mcap
 
-    trace, _ = read_mcap(path)
+    trace = read_mcap(path)
     found = trace.truth.collisions if trace.truth else ()
     contacts = {one.checker: len(one) for one in trace.contacts}
     print(

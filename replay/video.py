@@ -1,0 +1,122 @@
+"""A simulated recording as frames, and frames as a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauguard.traces import Trace
+
+#: Endings that Pillow writes, which comes with Matplotlib.
+PILLOW = (".gif", ".webp", ".png")
+#: Where the camera stands: azimuth and elevation [deg], distance in units of the arm's size.
+VIEW = (140.0, -18.0, 2.0)
+
+
+def frames(
+    trace: Trace,
+    start: float = 0.0,
+    seconds: float | None = None,
+    rate: float = 20.0,
+    size: tuple[int, int] = (480, 640),
+) -> Iterator[NDArray[np.uint8]]:
+    """Pictures of a recording that holds its scene, shape (height, width, 3).
+
+    Args:
+        trace: as :func:`tauguard.traces.read_mcap` gives it.
+        start: of what is drawn [s].
+        seconds: how much is drawn; None: to the end.
+        rate: pictures for each second of the recording.
+        size: height and width [px].
+
+    Raises:
+        ValueError: no scene in it, or nothing in that time.
+        RuntimeError: no OpenGL; one line that says what to change.
+    """
+    import mujoco
+
+    from tauguard.models.picture import opengl, staged
+    from tauguard.replay.robot import load_model
+
+    if "scene.xml" not in trace.attachments:
+        raise ValueError("the recording holds no scene: only those of a simulation can be drawn")
+    end = trace.t[-1] if seconds is None else min(trace.t[-1], start + seconds)
+    rows = np.searchsorted(trace.t, np.arange(start, end, 1 / rate))
+    if not len(rows) or start < trace.t[0] - 1:
+        raise ValueError(f"nothing from {start:g} s on: it has {trace.t[0]:g} to {trace.t[-1]:g} s")
+    load_model(trace.attachments["scene.xml"])  # refuses what MuJoCo does not survive
+    model = staged(mujoco.MjSpec.from_string(trace.attachments["scene.xml"]), -0.001)
+    model.vis.global_.offheight, model.vis.global_.offwidth = size
+    data = mujoco.MjData(model)
+    camera, options = mujoco.MjvCamera(), mujoco.MjvOption()
+    options.geomgroup[3:] = 0
+    place = _placer(model, data, trace)
+    place(int(rows[0]))
+    links = [int(model.joint(name).bodyid[0]) for name in trace.joint_names]
+    spread = float(np.linalg.norm(np.ptp(data.xpos[links], axis=0)))
+    camera.lookat[:] = data.xpos[links].mean(axis=0)
+    camera.azimuth, camera.elevation, distance = VIEW
+    camera.distance = distance * max(spread, 0.2)
+    with opengl():
+        renderer = mujoco.Renderer(model, *size)
+    try:
+        for row in rows:
+            place(int(row))
+            renderer.update_scene(data, camera, options)
+            yield renderer.render().copy()
+    finally:
+        renderer.close()
+
+
+def _placer(model: Any, data: Any, trace: Trace) -> Any:
+    """What puts the arm and the obstacles where a row of the recording has them."""
+    import mujoco
+
+    joints = [int(model.joint(name).qposadr[0]) for name in trace.joint_names]
+    names = trace.truth.obstacle_names if trace.truth is not None else ()
+    bodies = [model.body(name) for name in names]
+
+    def place(row: int) -> None:
+        data.qpos[joints] = trace.q[row]
+        for k, body in enumerate(bodies):
+            assert trace.truth is not None
+            pose, quat = trace.truth.obstacle_poses[row, k], np.zeros(4)
+            mujoco.mju_mat2Quat(quat, np.ascontiguousarray(pose[:3, :3]).ravel())
+            if (mocap := int(model.body_mocapid[body.id])) >= 0:
+                data.mocap_pos[mocap], data.mocap_quat[mocap] = pose[:3, 3], quat
+            else:
+                at = int(model.jnt_qposadr[body.jntadr[0]])
+                data.qpos[at : at + 3], data.qpos[at + 3 : at + 7] = pose[:3, 3], quat
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_camlight(model, data)
+
+    return place
+
+
+def write_video(path: Path, pictures: Iterable[NDArray[np.uint8]], rate: float) -> int:
+    """Write pictures of shape (height, width, 3), ``rate`` a second; returns how many.
+
+    Raises:
+        ValueError: an ending that is not known, or MP4 without the extra ``video``.
+    """
+    ending = path.suffix.lower()
+    if ending in PILLOW:
+        from PIL import Image
+
+        shown = [Image.fromarray(picture) for picture in pictures]
+        shown[0].save(path, save_all=True, append_images=shown[1:], duration=1000 / rate, loop=0)
+        return len(shown)
+    if ending != ".mp4":
+        raise ValueError(f"{path}: expected an ending of {', '.join(PILLOW)} or .mp4")
+    try:
+        from moviepy import ImageSequenceClip
+    except ModuleNotFoundError:
+        raise ValueError(f"{path}: MP4 needs the extra `video`; .gif needs nothing else") from None
+    shown = list(pictures)
+    ImageSequenceClip(shown, fps=rate).write_videofile(str(path), audio=False, logger=None)
+    return len(shown)

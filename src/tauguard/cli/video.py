@@ -1,0 +1,51 @@
+"""``tauguard video RECORDING``: a recording as a picture that moves, without a viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+def command(
+    recording: Annotated[Path, tyro.conf.Positional],
+    /,
+    out: Path | None = None,
+    start: float = 0.0,
+    seconds: float | None = None,
+    slower: float = 1.0,
+    rate: int = 20,
+    width: int = 640,
+    height: int = 480,
+) -> None:
+    """Draw an MCAP recording of the simulation: the scene, the arm and what moves around it.
+
+    GIF, WebP and PNG need nothing else; MP4 needs the extra `video`. Needs an OpenGL that MuJoCo
+    finds; without a display set MUJOCO_GL=egl or osmesa.
+
+    Args:
+        recording: an MCAP file written by tauguard, or a folder, whose newest is taken.
+        out: .gif, .webp, .png or .mp4 (default: RECORDING with the ending .gif).
+        start: of the part that is drawn [s].
+        seconds: of recording that are drawn (default: to the end).
+        slower: than real time, so many times.
+        rate: frames a second.
+        width: of the picture [px].
+        height: of the picture [px].
+    """
+    from tauguard.cli.replay import newest
+    from tauguard.replay.video import frames, write_video
+    from tauguard.traces import read_mcap
+
+    source = newest(recording)
+    target = out or source.with_suffix(".gif")
+    if target.exists() and out is None:
+        raise FileExistsError(f"{target} is there already: name the file to write with --out")
+    trace = read_mcap(source)
+    pictures = frames(trace, start, seconds, rate * slower, (height, width))
+    try:
+        count = write_video(target, pictures, rate)
+    except RuntimeError as error:  # no OpenGL
+        raise ValueError(str(error)) from None
+    print(f"{target}  ({count} frames, {target.stat().st_size / 1e6:.1f} MB)")

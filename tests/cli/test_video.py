@@ -1,0 +1,80 @@
+"""A recording becomes a moving picture; what is missing is named in one line."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tauguard.cli import main
+from tauguard.envs import Episode, simulate
+from tauguard.models import SceneObject, Shape
+from tauguard.replay.video import write_video
+from tauguard.traces import write_mcap
+
+MAIN = "from tauguard.cli import main; main()"
+CART = SceneObject(
+    "cart",
+    (Shape("box", (0.2, 0.2, 0.2), rgba=(1, 0, 1, 1)),),
+    path=((0, -0.5, 0.6, 0.3), (1, 0.5, 0.6, 0.3)),
+)
+
+
+def run(*arguments, gl="egl"):
+    return subprocess.run(
+        [sys.executable, "-c", MAIN, "video", *map(str, arguments)],
+        env={**os.environ, "MUJOCO_GL": gl},
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_the_arm_and_what_moves_are_drawn_where_they_are(tmp_path):
+    write_mcap(tmp_path / "a.mcap", simulate(Episode(3, seconds=1.0, objects=(CART,))))
+    out = run(tmp_path / "a.mcap", "--rate", 5, "--width", 160, "--height", 120)
+    if out.returncode == 2 and "no picture" in out.stderr:
+        pytest.skip("the EGL library cannot draw here")
+    assert out.returncode == 0, out.stderr
+    with Image.open(tmp_path / "a.gif") as file:
+        frames = []
+        for k in range(file.n_frames):
+            file.seek(k)
+            frames.append(np.asarray(file.convert("RGB")).astype(int))
+    assert len(frames) == 5
+    assert frames[0].shape == (120, 160, 3)
+    middles = []
+    for frame in frames:
+        magenta = (frame[..., 0] > frame[..., 1] + 60) & (frame[..., 2] > frame[..., 1] + 60)
+        assert magenta.sum() > 20
+        middles.append(np.argwhere(magenta)[:, 1].mean())
+    steps = np.diff(middles)
+    assert (np.sign(steps) == np.sign(steps[0])).all()  # the cart crosses the picture
+    assert abs(steps).min() > 2
+    again = run(tmp_path / "a.mcap")
+    assert again.returncode == 2
+    assert "--out" in again.stderr
+
+
+def test_an_opengl_that_is_not_there_is_one_line(tmp_path):
+    write_mcap(tmp_path / "a.mcap", simulate(Episode(3, seconds=0.5)))
+    out = run(tmp_path / "a.mcap", gl="osmesa")
+    if out.returncode == 0:
+        pytest.skip("OSMesa is installed here")
+    said = [line for line in out.stderr.splitlines() if line.startswith("tauguard video:")]
+    assert out.returncode == 2, out.stderr
+    assert "MUJOCO_GL=osmesa" in said[0]
+    assert "libosmesa6" in said[0]
+    assert "Traceback" not in out.stderr
+
+
+def test_what_cannot_be_drawn_is_named(tmp_path, capsys):
+    bare = simulate(Episode(3, seconds=0.5))
+    bare = type(bare)(bare.joint_names, bare.t, bare.q, bare.qd, bare.current)
+    write_mcap(tmp_path / "a.mcap", bare)
+    with pytest.raises(SystemExit, match="2"):
+        main(["video", str(tmp_path / "a.mcap")])
+    assert "holds no scene" in capsys.readouterr().err
+    with pytest.raises(ValueError, match=r"ending of \.gif"):
+        write_video(tmp_path / "a.avi", iter(()), 20.0)
