@@ -80,20 +80,20 @@ def _placer(model: Any, data: Any, trace: Trace) -> Any:
     names = trace.truth.obstacle_names if trace.truth is not None else ()
     bodies = [model.body(name) for name in names]
 
+    shapes = [np.flatnonzero(model.geom_bodyid == body.id).tolist() for body in bodies]
+
     def place(row: int) -> None:
         data.qpos[joints] = trace.q[row]
-        for k, body in enumerate(bodies):
-            assert trace.truth is not None
-            pose, quat = trace.truth.obstacle_poses[row, k], np.zeros(4)
-            mujoco.mju_mat2Quat(quat, np.ascontiguousarray(pose[:3, :3]).ravel())
-            if (mocap := int(model.body_mocapid[body.id])) >= 0:
-                data.mocap_pos[mocap], data.mocap_quat[mocap] = pose[:3, 3], quat
-            else:
-                at = int(model.jnt_qposadr[body.jntadr[0]])
-                data.qpos[at : at + 3], data.qpos[at + 3 : at + 7] = pose[:3, 3], quat
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
+        for k, geoms in enumerate(shapes):
+            assert trace.truth is not None
+            pose, turn = trace.truth.obstacle_poses[row, k], np.zeros(9)
+            for geom in geoms:
+                mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+                data.geom_xpos[geom] = pose[:3, 3] + pose[:3, :3] @ model.geom_pos[geom]
+                data.geom_xmat[geom] = (pose[:3, :3] @ turn.reshape(3, 3)).ravel()
 
     return place
 
