@@ -31,7 +31,6 @@ class FreeMotion {
   }
 
   std::size_t joints() const { return n_; }
-  bool started() const { return count_ > 0 || estimator_.started(); }
   const std::vector<double>& ratio() const { return ratio_; }
   const std::vector<double>& bound() const { return bound_; }
   const std::vector<double>& residual() const { return left_; }  // without slow errors

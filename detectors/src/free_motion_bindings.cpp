@@ -49,19 +49,9 @@ void run(FreeMotion& stream, In1 dt, In2 q, In2 qd, In2 current, Out2 ratio, Out
 void bind_free_motion(nb::module_& m) {
   nb::class_<FreeMotion>(m, "FreeMotion")
       .def(nb::new_(&make), "estimator"_a, "rest"_a, "stop"_a, "least"_a, "moving"_a, "start"_a)
-      .def("reset", &FreeMotion::reset)
       .def("run", &run, "dt"_a, "q"_a, "qd"_a, "current"_a, "ratio"_a.noconvert(),
            "bound"_a.noconvert(), "residual"_a.noconvert(), "qdd"_a.noconvert(),
-           "rest"_a.noconvert())
-      .def(
-          "step",
-          [](FreeMotion& stream, In1 q, In1 qd, In1 current, double dt) {
-            check_sample(stream.joints(), q, qd, current, "current");
-            require(dt > 0 && std::isfinite(dt), "dt: must be above 0");
-            stream.step(q.data(), qd.data(), current.data(), dt);
-            return *std::max_element(stream.ratio().begin(), stream.ratio().end());
-          },
-          "q"_a, "qd"_a, "current"_a, "dt"_a);
+           "rest"_a.noconvert());
   m.attr("REGIME_SLOW") = slow;
 }
 
