@@ -141,14 +141,14 @@ def test_every_known_arm_names_its_sources():
             if key != "file" and value != getattr(Robot(file=name), key)
         }
         assert stated == set(row.sources), name
-        assert row.urdf or row.menagerie
+        assert row.own or row.urdf or row.menagerie
 
 
 def test_a_known_arm_without_its_model_says_what_to_install(monkeypatch):
     monkeypatch.setattr("tauguard.models.known_robots.robot_data_folders", list)
     monkeypatch.setattr("tauguard.models.known_robots.menagerie_file", lambda name: None)
     with pytest.raises(FileNotFoundError, match=r"extra `arms`.*or give a file"):
-        load_arm("panda")
+        load_arm("xarm7")
 
 
 @pytest.mark.parametrize(("factor", "marked"), [(0.2, True), (1.5, False), (40.0, True)])
