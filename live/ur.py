@@ -169,7 +169,7 @@ class _Connection:
         deadline = time.monotonic() + within
         self._where = f"{host}:{port}"
         try:
-            self._socket = socket.create_connection((host, port), timeout=within)
+            self._socket = _connected(host, port, deadline)
         except OSError as error:
             raise ConnectionError(
                 f"{self._where} does not answer ({error.strerror or error}): is the "
@@ -264,6 +264,19 @@ class _Connection:
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
+
+
+def _connected(host: str, port: int, deadline: float) -> socket.socket:
+    """A connection to the first address of the host that answers; they share the time."""
+    addresses = [found[-1] for found in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)]
+    for waiting in range(len(addresses), 0, -1):
+        left = max(deadline - time.monotonic(), 0.001) / waiting
+        try:
+            return socket.create_connection(addresses[-waiting][:2], timeout=left)
+        except OSError:
+            if waiting == 1:
+                raise
+    raise OSError("no address")
 
 
 class _Reconnection:

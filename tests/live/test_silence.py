@@ -167,6 +167,26 @@ def test_a_handshake_without_end_is_one_error_in_time(monkeypatch):
         assert time.monotonic() - began < 0.5 + BUSY
 
 
+def test_all_addresses_of_a_host_share_the_time_to_connect(monkeypatch):
+    """An address that drops packets answers nothing at all."""
+    asked = []
+
+    def dropped(address, timeout):
+        asked.append(address)
+        time.sleep(timeout)
+        raise TimeoutError("timed out")
+
+    rows = [(0, 0, 0, "", (f"192.0.2.{k}", 30004)) for k in range(4)]
+    monkeypatch.setattr(ur, "HANDSHAKE", 0.4)
+    monkeypatch.setattr(ur.socket, "getaddrinfo", lambda *_, **__: rows)
+    monkeypatch.setattr(ur.socket, "create_connection", dropped)
+    began = time.monotonic()
+    with pytest.raises(ConnectionError, match="does not answer"):
+        UrStream("robot", 30004)
+    assert time.monotonic() - began < 0.4 + BUSY
+    assert [address for address, _ in asked] == [f"192.0.2.{k}" for k in range(4)]
+
+
 def test_a_handshake_without_end_after_a_lost_connection_is_a_fault():
     with Peer(closes, flood) as peer:
         session, _, silences = heard(stream_of(peer, reconnect=1.0), seconds=20.0)
