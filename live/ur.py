@@ -268,11 +268,12 @@ class _Connection:
 
 def _connected(host: str, port: int, deadline: float) -> socket.socket:
     """A connection to the first address of the host that answers; they share the time."""
-    addresses = [found[-1] for found in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)]
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    addresses = [(str(address[0]), port) for *_, address in found]
     for waiting in range(len(addresses), 0, -1):
         left = max(deadline - time.monotonic(), 0.001) / waiting
         try:
-            return socket.create_connection(addresses[-waiting][:2], timeout=left)
+            return socket.create_connection(addresses[-waiting], timeout=left)
         except OSError:
             if waiting == 1:
                 raise
