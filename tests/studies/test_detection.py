@@ -74,7 +74,6 @@ def test_a_robot_is_judged_by_its_own_torques(bench):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_slow_logs_have_a_row_for_each_rate(bench):
     file, _ = bench("detection-sampling")
     rows = {(row["hz"], row["detector"]): row for row in file["rows"]}
@@ -83,6 +82,7 @@ def test_slow_logs_have_a_row_for_each_rate(bench):
     assert 0.5 < slow <= fast
 
 
+@pytest.mark.slow
 def test_a_sample_online_has_the_score_of_the_batch(bench):
     file, _ = bench("detection_online")
     steps = [row for row in file["rows"] if row["study"] == "step"]
