@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.models import cura6, derive
 from tauguard.models.arm_drive import (
     PRESLIDING,
@@ -43,6 +43,8 @@ NAMED = cura6.NAMES
 @dataclass(frozen=True)
 class Facts:
     """What is known or assumed about an arm, joint by joint, and where each part comes from."""
+
+    __repr__ = in_a_line
 
     name: str
     joints: tuple[str, ...]
@@ -80,6 +82,8 @@ class Facts:
 @dataclass(frozen=True)
 class Arm:
     """An arm ready to be put into a scene; ``spec`` holds nothing else."""
+
+    __repr__ = in_a_line
 
     spec: mujoco.MjSpec
     links: tuple[str, ...]  #: the body of each joint, base to tip

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.models import cura6
 from tauguard.models.checks import above_zero, not_negative, shaped
 from tauguard.models.left_over import LeftOver, Player
@@ -30,6 +30,8 @@ class Friction:
     Source of the form: Canudas de Wit et al. 1995 (LuGre without micro-damping); load and
     temperature: Bittencourt & Gunnarsson 2012, Wolf & Iskandar 2018.
     """
+
+    __repr__ = in_a_line
 
     coulomb: Array  #: Fc [N m], shape (n,)
     static: Array  #: Fs, level at rest [N m], shape (n,); below Fc it rises with speed
@@ -77,6 +79,8 @@ class Friction:
 class Ripple:
     """Torque ripple: ``gain * sum_h amplitude_h sin(cycles_h * gear * q + phase_h)``."""
 
+    __repr__ = in_a_line
+
     cycles: Array  #: per motor revolution, shape (h,)
     amplitude: Array  #: [A], shape (n, h)
     phase: Array  #: [rad], shape (n, h)
@@ -99,6 +103,8 @@ class Ripple:
 @dataclass(frozen=True)
 class Sensors:
     """Measurement noise and quantisation; a quantum of 0 does not quantise."""
+
+    __repr__ = in_a_line
 
     current_noise: Array  #: standard deviation [A], shape (n,)
     current_quantum: Array  #: [A], shape (n,)
@@ -189,6 +195,8 @@ PARTS = ("friction", "stribeck", "load", "warmth", "ripple", "lag", "sensors")
 @dataclass(frozen=True)
 class Drive:
     """The drives of an arm. A part that is ``None`` is left out and costs nothing."""
+
+    __repr__ = in_a_line
 
     gain: Array  #: torque constant times gear [N m/A], shape (n,)
     gear: Array  #: gear ratio, shape (n,)

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.models.arm_file import read_arm
 from tauguard.models.nominal import compiled
 
@@ -25,6 +25,8 @@ class LinkSurface:
     Link i moves with joint i; its frame has the origin on the joint and the body's axes, which is
     Pinocchio's joint frame.
     """
+
+    __repr__ = in_a_line
 
     link: NDArray[np.int64]  #: 0-based, rising, shape (K,)
     point: Array  #: in the link's frame [m], shape (K, 3)

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.models.arm import NAMED, Arm, Facts, load_arm
 from tauguard.models.checks import rigid_pose
 from tauguard.models.cloth import Cloth, add_cloth
@@ -92,6 +92,8 @@ class SceneSpec:
 @dataclass(frozen=True)
 class Scene:
     """A compiled scene and where its parts are."""
+
+    __repr__ = in_a_line
 
     model: mujoco.MjModel
     text: SpecText  #: of the scene, see :attr:`xml`

@@ -12,6 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from tauguard.arrays import in_a_line
 from tauguard.models.checks import above_zero, not_negative, vector
 from tauguard.models.mjcf import inline_meshes, xml_text
 from tauguard.untrusted_input import read_text, reading
@@ -70,6 +71,8 @@ class SceneObject:
     Contacts with the arm are as stiff as ``stiffness`` says, are labelled, and count against the
     limits like those with people. An object is a region of the environment, by its name.
     """
+
+    __repr__ = in_a_line
 
     name: str
     shapes: tuple[Shape, ...] = ()

@@ -4,12 +4,21 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
 import tauguard
 from tauguard.envs import CollisionPlan, Episode, simulate
-from tauguard.models import cura6_drive, drive_text
+from tauguard.models import (
+    SceneObject,
+    SceneSpec,
+    compose,
+    cura6_drive,
+    drive_text,
+    link_surface,
+    load_arm,
+)
 from tests.models.arms import random_arm
 
 
@@ -84,3 +93,20 @@ def test_a_figure_has_a_panel_for_everything_and_shades_the_collisions(trace, tm
 def test_values_print_in_a_line(trace):
     assert repr(trace) == "Trace(6 joints, 2000 samples every 1 ms, 2.00 s, 1 collisions)"
     assert repr(trace.truth).startswith("Truth(2000 samples, 1 collisions, largest contact force 6")
+
+
+def test_every_value_that_one_meets_prints_in_a_few_lines(trace):
+    scene = compose(SceneSpec())
+    env = gymnasium.make("tauguard:tauguard/Reach-v0").unwrapped
+    values = [
+        *(scene, scene.facts, scene.drive, scene.drive.friction, scene.drive.ripple, scene.spec),
+        *(load_arm("cura6"), link_surface(scene.arm_xml, points=20), env.compiled, env.regions[0]),
+        *(trace, trace.truth, trace.truth.collisions[0], SceneObject("a", mjcf=scene.xml)),
+    ]
+    for value in values:
+        said = repr(value)
+        assert said.startswith(f"{type(value).__name__}(")
+        assert len(said) < 900, said
+        assert "\n" not in said
+    assert "gain=[10, 10.7, 8.5, 9, 9.5, 10.1]" in repr(scene.drive)
+    assert "point=array(120, 3)" in repr(link_surface(scene.arm_xml, points=20))

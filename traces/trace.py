@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array, Bools
+from tauguard.arrays import Array, Bools, in_a_line
 from tauguard.traces.contacts import CheckedContacts
 
 KINDS = ("strike", "clamp", "pulse")
@@ -17,6 +17,8 @@ KINDS = ("strike", "clamp", "pulse")
 @dataclass(frozen=True)
 class Collision:
     """One labelled collision: what hit the arm, when, where and how hard."""
+
+    __repr__ = in_a_line
 
     kind: str  #: "strike" (a moving obstacle), "clamp" (a fixed one) or "pulse" (a wrench pulse)
     onset: float  #: time of the first sample with a contact force above 0 N [s]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import mujoco
 import numpy as np
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.envs import _plant
 from tauguard.envs.episodes.motions import Motion
 from tauguard.envs.plant import Gains, make_plant
@@ -24,6 +24,8 @@ class SimulationDiverged(RuntimeError):
 @dataclass(frozen=True)
 class Rollout:
     """The record of a loop; row k belongs to the state before step k."""
+
+    __repr__ = in_a_line
 
     q: Array  #: true joint positions [rad], shape (T, n)
     qd: Array  #: true joint velocities [rad/s], shape (T, n)

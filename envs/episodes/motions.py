@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 
 #: Peak velocity and acceleration of the quintic 10 s^3 - 15 s^4 + 6 s^5 per unit path and time.
 _PEAK_VELOCITY = 1.875
@@ -18,6 +18,8 @@ _PEAK_ACCELERATION = 5.7735026918962575
 @dataclass(frozen=True)
 class Motion:
     """References of a joint motion, a row per sample."""
+
+    __repr__ = in_a_line
 
     t: Array  #: [s], shape (T,)
     q: Array  #: [rad], shape (T, n)

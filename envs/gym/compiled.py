@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, in_a_line
 from tauguard.envs.gym.placing import Layout, Usual
 from tauguard.envs.gym.randomization import check_names
 from tauguard.envs.gym.second_arm import APART, add_second_arm, both_drives
@@ -87,6 +87,8 @@ class ForceBound:
 @dataclass(frozen=True)
 class CompiledScene:
     """A scene, and what the controller and the observation need to know about it."""
+
+    __repr__ = in_a_line
 
     settings: Settings
     scene: Scene  #: without visual shapes

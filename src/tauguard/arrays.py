@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,3 +12,28 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 #: One mark for each element.
 Bools = NDArray[np.bool_]
+
+#: An array of so many elements is written out, a text of so many characters too.
+FEW, SHORT = 7, 60
+
+
+def in_a_line(value: Any) -> str:
+    """A dataclass's ``__repr__``: its fields, large arrays by shape, long texts by size."""
+    fields = [field for field in dataclasses.fields(value) if field.repr]
+    parts = [f"{field.name}={_brief(getattr(value, field.name))}" for field in fields]
+    return f"{type(value).__name__}({', '.join(parts)})"
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        if value.ndim == 1 and value.size <= FEW and value.dtype.kind in "fiub":
+            return f"[{', '.join(f'{x:.4g}' for x in value)}]"
+        return f"array{value.shape}"
+    if isinstance(value, str):
+        return repr(value) if len(value) <= SHORT else f"<text of {len(value)} characters>"
+    if dataclasses.is_dataclass(value) or (isinstance(value, dict) and len(value) > 2):
+        return f"<{type(value).__name__}>"
+    if isinstance(value, tuple) and len(repr(value)) > 2 * SHORT:
+        return f"<{len(value)} entries>"
+    said = repr(value)
+    return said if len(said) <= 2 * SHORT else f"<{type(value).__name__}>"
