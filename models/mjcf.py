@@ -111,14 +111,14 @@ def inline_meshes(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
         mujoco.mju_quat2Mat(turn, model.mesh_quat[at.id])
         vertices = model.mesh_vert[first : first + count] @ turn.reshape(3, 3).T
         vertices, triangles = vertices + model.mesh_pos[at.id], model.mesh_face[face : face + faces]
+        inertia, hull = mesh.inertia, mesh.maxhullvert
         if at.name not in solid:
             vertices, triangles = coarse(vertices, triangles)
-            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-        mesh.name = at.name
-        mesh.uservert = vertices.ravel().tolist()
-        mesh.userface = triangles.ravel().tolist()
-        mesh.file, mesh.scale = "", [1, 1, 1]
-        mesh.refpos, mesh.refquat = [0, 0, 0], [1, 0, 0, 0]
+            inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        spec.delete(mesh)  # the file's normals and texture coordinates would stay
+        plain = spec.add_mesh(name=at.name, inertia=inertia, maxhullvert=hull)
+        plain.uservert = vertices.ravel().tolist()
+        plain.userface = triangles.ravel().tolist()
     for texture in list(spec.textures):
         spec.delete(texture)
     for material in spec.materials:

@@ -139,3 +139,23 @@ def test_two_files_of_one_name_in_two_folders_stay_two(tmp_path, box):
     assert model.geom_aabb[0, 3] == pytest.approx(0.2)
     assert model.geom_aabb[1, 3] == pytest.approx(0.1)
     assert model.geom_type[1] == mujoco.mjtGeom.mjGEOM_MESH
+
+
+def test_detailed_meshes_of_an_mjcf_file_show_although_they_have_texture_coordinates(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.1)
+    lines = [f"v {x} {y} {z}" for x, y, z in ball.vertices] + ["vt 0 0"]
+    lines += [f"vn {x} {y} {z}" for x, y, z in ball.vertices / 0.1]
+    lines += ["f " + " ".join(f"{i + 1}/1/{i + 1}" for i in face) for face in ball.faces]
+    (tmp_path / "ball.obj").write_text("\n".join(lines))
+    (tmp_path / "arm.xml").write_text(
+        '<mujoco><asset><mesh file="ball.obj"/></asset><worldbody><body name="a">'
+        '<joint name="j" axis="0 1 0"/><geom type="mesh" mesh="ball" contype="0" conaffinity="0"/>'
+        '<geom type="box" size=".05 .05 .05"/></body></worldbody></mujoco>'
+    )
+    model = read_arm(tmp_path / "arm.xml").spec.compile()
+    assert model.nmesh == 1
+    assert 1000 < model.mesh_facenum[0] < 0.35 * len(ball.faces)
+    kinds = [mujoco.mjtGeom(int(kind)).name for kind in model.geom_type]
+    assert sorted(kinds) == ["mjGEOM_BOX", "mjGEOM_MESH"]
+    shown = kinds.index("mjGEOM_MESH")
+    assert model.geom_aabb[shown, 3:] == pytest.approx([0.1] * 3, abs=0.01)
