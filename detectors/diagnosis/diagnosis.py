@@ -15,11 +15,14 @@ from tauguard.detectors.diagnosis.contact_force import contact_belief, link_pose
 from tauguard.detectors.diagnosis.isolation import Trust, isolate, last_joint, moments
 from tauguard.detectors.diagnosis.post_alarm import AFTER, PostAlarmWindow, PostAlarmWindows
 from tauguard.detectors.diagnosis.severity import Severity, severity
+from tauguard.detectors.diagnosis.told_place import tool_severity
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.models.link_surface import LinkSurface, link_surface
 from tauguard.traces.trace import Alarm, Detection, Trace
 
+#: A link that is less likely than this is called not identifiable.
+SURE = 0.8
 #: Link and point are found from samples in this time after and before the alarm [s]. With a slow
 #: observer, the time after it is this number of lags.
 ISOLATE, EARLY, ISOLATE_LAGS = 0.1, 0.01, 3.0
@@ -53,8 +56,16 @@ class Diagnosis:
         """The diagnosis in a few words, with intervals that hold 90 %."""
         if not self.collision:
             return f"payload changed by {self.signs.mass:+.2f} kg, no collision"
-        likely, size = self.links[self.link - 1], self.severity.text(self.kind, self.joints)
+        size = self.severity.text(self.kind, self.joints)
+        if not self.link_identifiable:
+            return f"{self.kind}, link not identifiable, {size}"
+        likely = self.links[self.link - 1]
         return f"{self.kind}, link {self.link} (probability {likely:.2f}), {size}"
+
+    @property
+    def link_identifiable(self) -> bool:
+        """Whether the most likely link is much more likely than all others."""
+        return bool(self.links[self.link - 1] >= SURE)
 
 
 def diagnose(
@@ -97,17 +108,25 @@ class Diagnoser:
     surface: LinkSurface
     noise_model: NoiseModel | None = None  #: of free motion; None: the arm's noise at every speed
     trust: Trust = field(default_factory=Trust)
+    at_tool: bool = False  #: all contacts are at the origin of the last link
 
     @classmethod
-    def of(cls, arm: ArmModel, surface: LinkSurface) -> Diagnoser:
+    def of(cls, arm: ArmModel, surface: LinkSurface, at_tool: bool = False) -> Diagnoser:
         """With the noise model that the arm's detector has learned, if there is one.
 
         A detector that reduces the residual of joints with an uncertain payload has a smaller
         deviation than the residual itself, so the sensors' noise is a lower bound.
+
+        Args:
+            arm: what is believed of the arm.
+            surface: its sampled surface.
+            at_tool: contacts are known to be at the tool; their force is then sharper.
         """
         known = arm.noise_model
         least = None if known is None or arm.noise is None else known.at_least(arm.noise)
-        return cls(arm, surface, least)
+        if at_tool:
+            surface = surface.only([arm.robot.joints])
+        return cls(arm, surface, least, at_tool=at_tool)
 
     def diagnose(
         self, trace: Trace, alarms: Iterable[Alarm], after: float = AFTER
@@ -130,6 +149,10 @@ class Diagnoser:
             robot, self.surface, after.q[peak], after.residual[peak], self._noise(after)[peak]
         )
         force, point = at_peak.weighted(belief.probability).on(link)
+        sized = severity(robot, self.surface, after, belief, len(rows), self.trust)
+        if self.at_tool:
+            sized, force = tool_severity(self.arm, after)
+            point = link_poses(robot, after.q[peak]).origin[-1]
         kinds = signs(after, force, self._velocity(link, point, after, peak))
         fractions = kinds.probabilities()
         return Diagnosis(
@@ -143,7 +166,7 @@ class Diagnoser:
             max(fractions, key=lambda kind: fractions[kind]),
             fractions,
             kinds,
-            severity(robot, self.surface, after, belief, len(rows), self.trust),
+            sized,
             alarm.start + float(after.t[-1]),
             robot.joint_names,
         )

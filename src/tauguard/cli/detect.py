@@ -61,6 +61,7 @@ def command(
     model: Path | None = None,
     payload: str | None = None,
     torque: bool = False,
+    at_tool: bool = False,
     plain: Annotated[Plain, tyro.conf.arg(name="")] = Plain(),
     out: Path | None = None,
     json: Path | None = None,
@@ -87,6 +88,8 @@ def command(
             a model of `train --free`; 0 for nothing. Without it a load is found from the motion,
             and until then only hard contacts are.
         torque: the log holds joint torques in N m, see `tauguard calibrate`.
+        at_tool: all contacts are at the tool: with --model, the intervals of the forces are
+            narrower.
         plain: what goes without a model.
         out: folder for events.json, detect.mcap and detect.rrd.
         json: write the figures here as JSON.
@@ -100,6 +103,8 @@ def command(
         raise ValueError(f"--out {out}: is a file; expected a folder")
     if model is not None and plain.given():
         raise ValueError(f"{', '.join(plain.given())}: not beside --model, which brings its own")
+    if model is None and at_tool:
+        raise ValueError("--at-tool goes with --model only")
     if model is None and payload is not None:
         raise ValueError("--payload goes with --model only")
     causes: Sequence[dict[str, Any]] = ()
@@ -109,7 +114,7 @@ def command(
     trace = read.trace
     if model is not None:
         trace, detector, found = watched(model, trace, payload, robot)
-        causes, notes = explained(detector, trace, found, robot)
+        causes, notes = explained(detector, trace, found, robot, at_tool)
     else:
         trace, found, notes = plainly(log, trace, robot, columns, plain)
     print_notes((*found.notes, *notes))
@@ -175,7 +180,7 @@ def plainly(
 
 
 def explained(
-    detector: Any, trace: Trace, found: LogDetection, robot: Path
+    detector: Any, trace: Trace, found: LogDetection, robot: Path, at_tool: bool = False
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """What each alarm was; its torques alone where the robot's file gives no chain of links."""
     from tauguard.detectors import Diagnoser
@@ -201,7 +206,7 @@ def explained(
             "for link and force; with its meshes in or above the file's folder they are "
             "better",
         )
-    found_causes = Diagnoser.of(detector.arm, surface).diagnose(trace, alarms)
+    found_causes = Diagnoser.of(detector.arm, surface, at_tool).diagnose(trace, alarms)
     return [cause(one) for one in found_causes], notes
 
 
@@ -226,6 +231,7 @@ def cause(one: Diagnosis) -> dict[str, Any]:
         "kind": one.kind,
         "kinds": one.kinds,
         "link": one.link,
+        "link_identifiable": one.link_identifiable,
         "links": one.links.tolist(),
         "force_n": one.force.tolist(),
         "point_m": one.point.tolist(),
