@@ -15,7 +15,7 @@ from tauguard.detectors.diagnosis.contact_force import contact_belief, link_pose
 from tauguard.detectors.diagnosis.isolation import Trust, isolate, last_joint, moments
 from tauguard.detectors.diagnosis.post_alarm import AFTER, PostAlarmWindow, PostAlarmWindows
 from tauguard.detectors.diagnosis.severity import Severity, severity
-from tauguard.detectors.diagnosis.told_place import tool_severity
+from tauguard.detectors.diagnosis.tool_contact import tool_severity
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.noise_model import NoiseModel
 from tauguard.models.link_surface import LinkSurface, link_surface

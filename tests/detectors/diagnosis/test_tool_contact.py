@@ -6,7 +6,7 @@ import pytest
 from tauguard.detectors import ArmModel, FrictionModel
 from tauguard.detectors.diagnosis.contact_force import link_poses, point_jacobians
 from tauguard.detectors.diagnosis.diagnosis import SURE, Diagnoser
-from tauguard.detectors.diagnosis.told_place import tool_severity
+from tauguard.detectors.diagnosis.tool_contact import tool_severity
 from tests.detectors.diagnosis.test_severity import HOME, ROBOT, SURFACE, seen
 
 FRICTION = np.array([8.0, 6.0, 5.0, 2.0, 2.0, 2.0])
