@@ -1,11 +1,13 @@
 """``tauguard twin`` from logs to a file that simulation and detection take."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tauguard.cli import main
+from tauguard.detectors import load_model
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 
 COLUMNS = {
@@ -54,6 +56,39 @@ def test_from_logs_to_detection(folder, capsys):
     assert "identified from log0.csv, log1.csv, log2.csv" in said
     run(folder, "detect", free / "log0.csv", "--robot", out)
     assert "the calibration in twin.bodies.xml" in capsys.readouterr().out
+
+
+def test_contacts_are_learned_on_the_twin(folder, tmp_path, monkeypatch, capsys):
+    out, model = tmp_path / "twin.toml", tmp_path / "model.skops"
+    run(folder, "twin", folder / "free", "--robot", folder / "arm.xml", "--out", out)
+    for name, count in (("STRUCK", 4), ("CONTACTS", 2), ("FREE", 1)):
+        monkeypatch.setattr(f"tauguard.cli.train_twin.{name}", count)
+    run(folder, "train", "--twin", out, "--free", folder / "free", "--model", model)
+    said = capsys.readouterr().out
+    assert "contacts of the twin and 3 logs" in said
+    assert load_model(model).detector.arm.robot.joint_names == ("a", "b", "c")
+    other = tmp_path / "plain.toml"
+    other.write_text(f'file = "{folder / "arm.xml"}"')
+    with pytest.raises(SystemExit):
+        run(folder, "train", "--twin", other, "--free", folder / "free", "--model", model)
+    assert "not a file that `tauguard twin` wrote" in capsys.readouterr().err
+
+
+def test_clipped_currents_and_gaps_are_named(folder, tmp_path, capsys):
+    log = record(4)
+    flat = log.current.copy()
+    flat[500:600, 2] = 3.0
+    write(tmp_path / "clipped.csv", replace(log, current=flat))
+    flags = ("--robot", folder / "arm.xml", "--out", tmp_path / "t.toml")
+    with pytest.raises(SystemExit):
+        run(folder, "twin", tmp_path / "clipped.csv", *flags)
+    assert "clipped.csv: the current of" in capsys.readouterr().err
+    keep = np.r_[0:1000, 1300:2500]
+    gapped = replace(log, t=log.t[keep], q=log.q[keep], qd=log.qd[keep], current=log.current[keep])
+    write(tmp_path / "gap.csv", gapped)
+    with pytest.raises(SystemExit):
+        run(folder, "twin", tmp_path / "gap.csv", folder / "free" / "log0.csv", *flags)
+    assert "nothing for 3.01 s before it" in capsys.readouterr().err
 
 
 def test_what_the_logs_do_not_show_is_named(folder, tmp_path, capsys):

@@ -23,6 +23,7 @@ def command(
     false_alarms_per_hour: float | None = None,
     confidence: float | None = None,
     free: tuple[Path, ...] = (),
+    twin: Path | None = None,
     robot: Path | None = None,
     columns: str | None = None,
     gains: tuple[float, ...] = (),
@@ -55,6 +56,8 @@ def command(
         confidence: with --calibration, the confidence of the guarantee (default: 0.95).
         free: collision-free logs of a real arm, files or a folder. A contact in them would raise
             the bounds; a log that stands out by its alarms is named and left out.
+        twin: with --free, the TOML file that `tauguard twin` wrote of that arm: contacts are
+            learned on it and quietness from the logs, as with --traces; --robot is not needed.
         robot: URDF or MJCF of that arm; one that `tauguard calibrate` wrote brings its gains,
             and so does the TOML file of `tauguard twin`.
         columns: of CSV files, see `tauguard detect`.
@@ -73,6 +76,15 @@ def command(
     if (traces is None) == (not free):
         raise ValueError("give --traces (labelled recordings) or --free (collision-free logs)")
     target = _target(model)
+    if twin is not None:
+        given = [robot, calibration, confidence, card, gains, payload, accept, arm]
+        if not free or any(given):
+            raise ValueError("--twin goes with --free, --columns, --detector, --torque alone")
+        from tauguard.cli.train_twin import twin_contacts
+
+        rate = 10.0 if false_alarms_per_hour is None else false_alarms_per_hour
+        twin_contacts(twin, free, target, columns, detector, rate, torque)
+        return
     if free and (calibration or confidence is not None or detector != "srq-svr"):
         raise ValueError("--detector, --calibration and --confidence go with --traces only")
     if calibration is None and confidence is not None:
@@ -153,7 +165,7 @@ def labelled_motion(
         f"threshold {alarm.threshold:.3g}"
     )
     if guarantee is None:
-        print(_aimed_at(alarm, scores, rate))
+        print(aimed_at(alarm, scores, rate))
     else:
         hours = two_digits(guarantee.hours)
         print(
@@ -163,7 +175,7 @@ def labelled_motion(
         )
 
 
-def _aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -> str:
+def aimed_at(alarm: CollisionAlarm, scores: Sequence[FreeScores], rate: float) -> str:
     """What the threshold aims at, and what its motion can tell of it."""
     from tauguard.detectors.thresholds.expected_rate import ExpectedRate
     from tauguard.report import two_digits
