@@ -14,6 +14,7 @@ from tauguard.datasets.logs import Log, read_log
 from tauguard.datasets.real_arms import is_torque, robot_numbers, unnamed
 from tauguard.detectors import RobotNumbers
 from tauguard.detectors.calibration.recording import Load, Recording, moves
+from tauguard.detectors.features.free_bound import SHOWN_SECONDS, motion_seconds
 from tauguard.traces import Trace
 
 #: Heaviest load that is accepted [kg]; a larger number probably means grams.
@@ -195,3 +196,17 @@ def _load(text: str, value: str, form: str) -> Load:
         )
     centre = (parts[1], parts[2], parts[3]) if len(parts) == 4 else None
     return Load(parts[0], centre)
+
+
+def never_moved(traces: Sequence[Trace]) -> list[str]:
+    """A note on the joints that hardly move in any log."""
+    seconds = motion_seconds([Recording(trace) for trace in traces])
+    names = traces[0].joint_names
+    still = [name for name, s in zip(names, seconds, strict=True) if s < SHOWN_SECONDS]
+    if not still:
+        return []
+    return [
+        f"{', '.join(still)}: moves in none of the logs, so its friction is not known: "
+        "while it moves nothing is watched, and at rest its bound is prior knowledge; add a log in "
+        "which it moves"
+    ]

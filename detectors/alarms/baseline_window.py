@@ -14,6 +14,7 @@ from tauguard.detectors.calibration.checks import check_torques, drive_torque
 from tauguard.detectors.dynamics.robot import RobotNumbers
 from tauguard.detectors.estimation.observer import LOG_GAIN, observe
 from tauguard.detectors.events import SERIES, confirmation_samples, confirmed, find_alarms
+from tauguard.detectors.scores.free_motion import FittedFreeMotion
 from tauguard.traces.trace import Detection, Trace
 
 CONFIRMATION = 0.05  # [s]
@@ -155,6 +156,13 @@ def detect_with(alarm: CollisionAlarm, trace: Trace) -> LogDetection:
             "alarms fill much of this log; if it was not touched as often as that, tell what the "
             "arm carried (--payload), and check that model, robot file and log are of one arm"
         )
+    if isinstance(alarm.detector, FittedFreeMotion):
+        seconds, names = alarm.detector.unwatched(trace)
+        if names:
+            notes.append(
+                f"{', '.join(names)}: moves here, but in none of the training logs: nothing is "
+                f"watched in {seconds:.1f} s of this log"
+            )
     return LogDetection(
         detection,
         np.asarray(arm.noise),

@@ -44,10 +44,10 @@ class Monitor:
     A sample with a fault never reaches the detector. While faults last, and afterwards until the
     detector has settled again, the state is ``fault``. A collision whose alarm was up before the
     fault stays a collision. An alarm that starts within 20 ms before the fault is attributed to
-    the fault. Torques that are impossible for this arm are a fault as well. A hard contact looks
-    the same for half a second, so the detector continues, and an alarm that is up stays a
-    collision with that reason. A sample takes one native call that allocates only the answer,
-    unless the detector's stream is written in Python.
+    the fault. Torques that are impossible for this arm are a fault as well. A contact looks the
+    same, so the detector continues, an alarm that is up stays a collision with that reason, and
+    the torques are judged anew when it ends. A sample takes one native call that allocates only
+    the answer, unless the detector's stream is written in Python.
     """
 
     def __init__(self, alarm: CollisionAlarm, usual: UsualInput) -> None:
@@ -189,6 +189,8 @@ def detect_with_faults(alarm: CollisionAlarm, trace: Trace) -> Monitored:
     spans, seconds, dt = Spans(), 0.0, trace.dt  # a median: asked once
     for k, t in enumerate(trace.t):
         interval = None if k == 0 else float(t - trace.t[k - 1])
+        if k and detection.alarm[k - 1] and not detection.alarm[k]:
+            torques.reset()
         reason = torques.step(trace.q[k], trace.qd[k], trace.current[k], interval)
         if t - trace.t[0] < alarm.settle:
             continue

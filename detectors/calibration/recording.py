@@ -12,6 +12,8 @@ from tauguard.traces.trace import Trace
 
 #: An axis slower than this in every sample of a log does not move in it [rad/s].
 MOVING = 0.01
+#: A joint whose position changes less is moved by noise, or yields to a touch [rad].
+SHIFTED = 0.01
 #: Shortest part of a log that is cut [s].
 SHORTEST = 8.0
 
@@ -43,8 +45,9 @@ class Recording:
 
 
 def moves(trace: Trace) -> bool:
-    """Whether any joint ever moves."""
-    return bool((np.abs(trace.qd) > MOVING).any())
+    """Whether any joint ever moves: faster than :data:`MOVING`, and not to and fro by noise."""
+    quick = (np.abs(trace.qd) > MOVING).any(axis=0)
+    return bool((quick & (np.ptp(trace.q, axis=0) > SHIFTED)).any())
 
 
 def moving_span(trace: Trace, margin: float = 1.0, stop: float = 0.0) -> Bools:

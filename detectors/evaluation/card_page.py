@@ -34,8 +34,7 @@ def text(card: ThresholdCard) -> str:
     from tauguard.report import table
 
     rows = [
-        {"found from [N m]": joint}
-        | {name: f"{values[j]:.1f}" for name, values in _levels(card).items()}
+        {"found from [N m]": joint} | {name: _torque(card, name, j) for name in _levels(card)}
         for j, joint in enumerate(card.joints)
     ]
     return "\n".join([table(rows), *(line for part in _lines(card) for line in _wrapped(part))])
@@ -49,6 +48,24 @@ def _levels(card: ThresholdCard) -> dict[str, Array]:
         "moving": card.moving,
         "starting": card.starting,
     }
+
+
+#: The regime of :attr:`ThresholdCard.unseen` that each column is about.
+REGIMES = {
+    "standing": "standing for 2 s",
+    "just stopped": "just stopped",
+    "moving": "",
+    "starting": "starting",
+}
+
+
+def _torque(card: ThresholdCard, name: str, j: int) -> str:
+    """A joint's number: in brackets if no log shows its regime, "-" if nothing is watched there."""
+    value = _levels(card)[name][j]
+    if value != value:
+        return "-"
+    shown = card.joints[j] not in card.unseen.get(REGIMES[name], ())
+    return f"{value:.1f}" if shown else f"({value:.1f})"
 
 
 def printed_from(begin: float) -> float:
@@ -94,7 +111,10 @@ def _lines(card: ThresholdCard) -> list[str]:
             f"{name}: {'all joints' if len(joints) == len(card.joints) else ', '.join(joints)}"
             for name, joints in card.unseen.items()
         )
-        lines.append(f"not in the logs, bounded by prior knowledge of other arms: {parts}")
+        lines.append(
+            "not in the logs, so left out or bounded by prior knowledge of other arms (in brackets): "
+            f"{parts}"
+        )
 
     def numbers(values: list[float]) -> str:
         return "{" + ", ".join(f"{value:.1f}" for value in values) + "}"
@@ -108,6 +128,8 @@ def _lines(card: ThresholdCard) -> list[str]:
     if franka := card.franka:
         lines.append("as Franka's setCollisionBehavior takes them (7 joints; x, y, z, R, P, Y):")
         lines += [f"  {name} {numbers(franka[name])}" for name in order]
+    elif not card.ur:
+        lines.append("no thresholds for a robot's settings: some joints move in none of the logs")
     else:
         lines.append(
             f"as UR's safety settings: tool force limit {card.ur['tool_force_limit_n']:.0f} N "
@@ -118,8 +140,15 @@ def _lines(card: ThresholdCard) -> list[str]:
 
 
 def _force(card: ThresholdCard, name: str) -> str:
-    half, most = (f"{n:.0f}" if n >= 10 else f"{n:.1f}" for n in card.tool[name])
-    return f"{half:>4} N ({most} N)".ljust(16)
+    half, most = map(_newton, card.tool[name])
+    return f"{half.rjust(4)} ({most})".ljust(16)
+
+
+def _newton(force: float) -> str:
+    """A force, where any is found in so many poses and directions."""
+    if not force < float("inf"):
+        return "none"
+    return f"{force:.0f} N" if force >= 10 else f"{force:.1f} N"
 
 
 def _alarms(card: ThresholdCard) -> str:

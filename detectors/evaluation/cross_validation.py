@@ -18,7 +18,12 @@ from tauguard.detectors.calibration.recording import Recording, moves, moving_sp
 from tauguard.detectors.calibration.regression import filtered
 from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.events import SERIES, find_alarms
-from tauguard.detectors.features.free_bound import UNKNOWN_LOAD, Bound, friction_level
+from tauguard.detectors.features.free_bound import (
+    UNKNOWN_LOAD,
+    Bound,
+    friction_levels,
+    standing_positions,
+)
 from tauguard.detectors.scores.free_motion import (
     CALIBRATION_RATE,
     FOLDS,
@@ -153,7 +158,7 @@ def _seen(parts: Sequence[Recording], arm: ArmModel) -> list[tuple[tuple[Alarm, 
     def detector(others: Sequence[int]) -> FittedFreeMotion:
         own, known = [parts[k] for k in others], [data[k] for k in others]
         found = identify(arm, own, friction=bare, rate=CALIBRATION_RATE, data=known).arm
-        bound = Bound.prior(friction_level(found, own))
+        bound = Bound.prior(*friction_levels(found, own), *standing_positions(parts))
         return FittedFreeMotion(found, dt, bound, UNKNOWN_LOAD, 0.0, 0)
 
     fitted = {one: detector([k for k in moving if turn[k] != one]) for one in set(turn.values())}

@@ -36,8 +36,8 @@ class ThresholdCard:
     joints: tuple[str, ...]
     standing: Array  #: torque that is found on a joint that has long been at rest [N m], (n,)
     stopped: Array  #: on one that has just stopped [N m], (n,)
-    moving: Array  #: on one in motion, median over the logs [N m], (n,)
-    starting: Array  #: on one that starts [N m], (n,)
+    moving: Array  #: on one in motion, median over the logs; NaN: no log shows it [N m], (n,)
+    starting: Array  #: on one that starts, NaN as well [N m], (n,)
     tool: dict[str, tuple[float, float]]
     """Force at the last link's origin [N]: "standing" and pushed within 0.1 s, "slowly" (the same,
     pushed over 1 s), "stopped" or held by static friction, "moving"; found in half and in 95 % of
@@ -53,9 +53,11 @@ class ThresholdCard:
     @property
     def franka(self) -> dict[str, list[float]]:
         """What ``setCollisionBehavior`` takes: torques of 7 joints [N m], forces and moments
-        along and about three axes [N, N m]; empty for an arm with other joints.
+        along and about three axes [N, N m]; empty for an arm with other joints, or where a number
+        is not known.
         """
-        if len(self.joints) != FRANKA_JOINTS:
+        numbers = (*self.moving, *self.starting, self.tool["moving"][0], self.moment)
+        if len(self.joints) != FRANKA_JOINTS or not np.isfinite(numbers).all():
             return {}
         tool = np.repeat([self.tool["moving"][0], self.moment], 3)
         lower = {
@@ -70,8 +72,10 @@ class ThresholdCard:
 
     @property
     def ur(self) -> dict[str, float]:
-        """In the form of UR's safety settings: the tool force limit [N]."""
-        return {"tool_force_limit_n": UPPER * self.tool["moving"][1]}
+        """In the form of UR's safety settings: the tool force limit [N]; empty: not known."""
+        limit = UPPER * self.tool["moving"][1]
+        known = np.isfinite([limit, *self.moving]).all()
+        return {"tool_force_limit_n": limit} if known else {}
 
 
 def threshold_card(
@@ -95,6 +99,7 @@ def threshold_card(
             for b, m, least in zip(bounds.T, moving.T, sliding, strict=True)
         ]
     )
+    usual = np.where(bound.shown, usual, np.nan)
     poses = np.concatenate([t.q[:: max(1, len(t.q) // POSES)] for t in traces])
     poses = poses[:: max(1, len(poses) // POSES)]
     levels = {
@@ -140,7 +145,7 @@ def _tool(
         slides = point_jacobians(robot, placed, last, placed.origin[-1:])[0]
         torque = np.abs(directions @ (turns.T if moment else slides))
         with np.errstate(divide="ignore"):
-            least.append(1 / (torque / level).max(axis=1))
+            least.append(1 / np.nan_to_num(torque / level).max(axis=1))
     forces = np.concatenate(least)
     half, most = np.quantile(forces, (0.5, 0.95), method="higher")  # no means with infinity
     return float(half), float(most)

@@ -78,6 +78,10 @@ class TorqueCheck:
         number, joint, value = self.native.step(self._out[0], current, dt or self._dt)
         return torque_fault(self._names, number, joint, value) if number else ""
 
+    def reset(self) -> None:
+        """Forget the ratios so far: a contact has ended, which changed them."""
+        self.native.reset()
+
     @property
     def extremes(self) -> Array:
         """Least fast, least slow and largest slow ratio so far, shape (3, n)."""

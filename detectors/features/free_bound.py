@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tauguard.arrays import Array
+from tauguard.arrays import Array, Bools
 from tauguard.detectors import _observer
 from tauguard.detectors.calibration.recording import Recording
 from tauguard.detectors.dynamics.robot import gravity_torque
@@ -76,19 +76,29 @@ def upper_quantile(
 
 
 #: Bound at rest: deviations of the noise, and multiples of the friction level.
-NOISE, REST = 8.0, 0.12
+NOISE, REST = 6.5, 0.12
 
-#: What motion of any joint adds to the bound at rest, and a start to that in motion.
-STOP, START = 1.2, 1.0
+#: What motion of any joint adds to the bound at rest, a contact to that of a joint that it turned,
+#: and a start to that in motion.
+STOP, TURNED, START = 1.2, 0.6, 1.0
 
 #: The bound in motion over the 99 % quantile of left-out residuals, and its least value.
 MARGIN, LEAST = 1.7, 0.6
 
-#: Prior of that quantile, in friction levels per 1, rad/s, own and largest acceleration [rad/s^2].
-PRIOR = np.array([0.3, 0.02, 0.05, 0.03])
+#: Prior of that quantile, in friction levels per 1, rad/s, own and largest acceleration [rad/s^2],
+#: and slowness, exp(-|qd| / CREEP).
+PRIOR = np.array([0.3, 0.02, 0.05, 0.03, 0.3])
 
 #: A friction level from T seconds of motion is widened by hypot(1, this / T).
 WIDENING_SECONDS = 40.0
+
+#: Seconds of a joint's own motion, faster than this [rad/s], that half tell its friction.
+KNOWN_SECONDS, FULL_SPEED = 4.0, 0.05
+
+#: Seconds of its motion without which nothing is known of a joint's motion, and how far beyond
+#: where it stood it may stand [rad]. Positions of other joints are not limited.
+SHOWN_SECONDS, BEYOND, ANYWHERE = 1.0, 0.1, 1e6
+_ENDS = ("min", "max")
 
 #: Where the logs' gravity torques stand that the friction level is taken at.
 LOADED = 0.9
@@ -98,63 +108,105 @@ LOADED = 0.9
 class Bound:
     """Bound of one arm's residual in collision-free motion, at rest and while joints move."""
 
-    friction: Array  #: level of each joint's friction [N m], shape (n,)
+    friction: Array  #: level of each joint's error in motion [N m], shape (n,)
+    static: Array  #: friction that may hold each joint at rest [N m], shape (n,)
     noise: Array  #: deviation of the residual of a joint at rest [N m], shape (n,)
     quantile: Array
-    """99 % of the residual in motion [N m per 1, rad/s, rad/s^2, rad/s^2], shape (n, 4)."""
+    """99 % of the residual in motion [N m per 1, rad/s, rad/s^2, rad/s^2, 1], shape (n, 5)."""
+    low: Array
+    """Where joints stood whose motion no log shows, from here [rad], -ANYWHERE for others, (n,)"""
+    high: Array  #: to here, ANYWHERE for others
+    scale: Array
+    """What left-out logs showed of the bounds at rest, of what motion adds to them, and in motion,
+    over the prior's, shape (3, n)."""
 
     @classmethod
-    def prior(cls, friction: Array) -> Bound:
+    def prior(cls, friction: Array, static: Array, low: Array, high: Array) -> Bound:
         """The bound to start from, before it is fitted to recordings."""
-        return cls(friction, 0.02 * friction, friction[:, None] * PRIOR)
+        return cls(
+            friction,
+            static,
+            0.02 * static,
+            friction[:, None] * PRIOR,
+            low,
+            high,
+            np.ones((3, len(friction))),
+        )
+
+    @property
+    def shown(self) -> Bools:
+        """Which joints' motion the logs show, shape (n,)."""
+        return self.high >= ANYWHERE
 
     @property
     def rest(self) -> Array:
         """Bound of a joint that has long been at rest [N m], shape (n,)."""
-        level: Array = np.maximum(NOISE * self.noise, REST * self.friction)
+        least = np.where(self.shown | ~self.shown.any(), REST, REST + STOP)
+        level: Array = np.maximum(NOISE * self.noise, self.scale[0] * least * self.static)
         return level
 
     @property
     def stop(self) -> Array:
         """What motion of any joint adds to the bound at rest [N m], shape (n,)."""
-        return STOP * self.friction
+        return STOP * self.scale[1] * self.static
 
     @property
     def start(self) -> Array:
         """What a start adds to the bound in motion [N m], shape (n,)."""
-        return START * self.friction
+        return START * self.static
 
     @property
     def moving(self) -> Array:
-        """Bound in motion per 1, |qd_j|, |qdd_j| and the largest |qdd|, shape (n, 4)."""
-        return MARGIN * self.quantile
+        """Bound in motion per 1, |qd_j|, |qdd_j|, the largest |qdd| and slowness, (n, 5)."""
+        return MARGIN * self.scale[2][:, None] * self.quantile
 
     @property
     def least(self) -> Array:
         """Least bound in motion [N m], shape (n,)."""
-        level: Array = np.maximum(NOISE * self.noise, LEAST * self.friction)
+        level: Array = np.maximum(NOISE * self.noise, LEAST * self.scale[2] * self.friction)
         return level
 
 
-def friction_level(arm: ArmModel, recordings: Sequence[Recording]) -> Array:
-    """What a joint's bounds are measured in [N m], shape (n,).
+def friction_levels(arm: ArmModel, recordings: Sequence[Recording]) -> tuple[Array, Array]:
+    """What a joint's bounds are measured in, in motion and at rest [N m], shapes (n,).
 
-    Friction at 0.1 rad/s under the load that gravity puts on the joint in the logs, or 1.5 times
-    the error in motion where that is more. Without the load, a joint that carries the arm would
-    count as one of half its friction. Widened by hypot(1, 40 s / T), chosen on a UR5 with 30 s; T:
-    seconds of pieces in which a joint moves.
+    At rest: its friction at 0.1 rad/s under the load that gravity puts on it in the logs; without
+    the load, a joint that carries the arm would count as one of half its friction. In motion: that,
+    or 1.5 times the error where it is more. Widened by hypot(1, 40 s / T), T: seconds of pieces in
+    which a joint moves. A joint's own friction counts as far as the joint moved: by T_j / (T_j +
+    4 s); else it is taken for the largest of the arm's.
     """
     n = arm.robot.joints
-    level = 1.5 * np.asarray(arm.noise)
+    error = 1.5 * np.asarray(arm.noise)
+    static = np.zeros(n)
     if arm.friction is not None:
         poses = np.concatenate([r.trace.q[:: max(1, len(r.trace.q) // 100)] for r in recordings])
         load = np.quantile(np.abs(gravity_torque(arm.robot, poses)), LOADED, axis=0)
-        level = np.maximum(level, arm.friction.coulomb(load=load))
+        static = arm.friction.coulomb(load=load)
     seconds = sum(float(r.trace.t[-1] - r.trace.t[0]) for r in recordings)
-    level = level * np.hypot(1.0, WIDENING_SECONDS / seconds)
-    least: Array = np.maximum(level, max(0.02 * float(level.max()), 1e-3))
-    assert least.shape == (n,)
-    return least
+    own = motion_seconds(recordings)
+    known = own / (own + KNOWN_SECONDS)
+    levels = []
+    for level in (np.maximum(error, static), static):
+        widened = level * np.hypot(1.0, WIDENING_SECONDS / seconds)
+        most = float((known * widened).max())
+        widened = known * widened + (1 - known) * most
+        levels.append(np.maximum(widened, max(0.02 * most, 1e-3)))
+        assert levels[-1].shape == (n,)
+    return levels[0], levels[1]
+
+
+def motion_seconds(recordings: Sequence[Recording]) -> Array:
+    """How long each joint moved faster than :data:`FULL_SPEED` [s], shape (n,)."""
+    return np.sum([(np.abs(r.trace.qd) > FULL_SPEED).sum(0) * r.trace.dt for r in recordings], 0)
+
+
+def standing_positions(recordings: Sequence[Recording]) -> tuple[Array, Array]:
+    """Positions of joints that hardly moved, a little beyond, as in :class:`Bound` [rad]."""
+    shown = motion_seconds(recordings) >= SHOWN_SECONDS
+    q = [r.trace.q for r in recordings]
+    low, high = (getattr(np, name)([getattr(x, name)(axis=0) for x in q], axis=0) for name in _ENDS)
+    return np.where(shown, -ANYWHERE, low - BEYOND), np.where(shown, ANYWHERE, high + BEYOND)
 
 
 #: Rate of the observer [1/s].
@@ -165,6 +217,9 @@ ERROR = 0.3
 
 #: A joint slower than this [rad/s] for a while is at rest.
 SLOW = _observer.REGIME_SLOW
+
+#: Slowness of a joint falls to 1/e at this speed [rad/s].
+CREEP = _observer.REGIME_CREEP
 
 
 def native(arm: ArmModel, bound: Bound, load: LoadDeviation) -> _observer.FreeMotion:
@@ -184,4 +239,7 @@ def native(arm: ArmModel, bound: Bound, load: LoadDeviation) -> _observer.FreeMo
         bound.least.tolist(),
         bound.moving.ravel().tolist(),
         bound.start.tolist(),
+        (TURNED * bound.static).tolist(),
+        bound.low.tolist(),
+        bound.high.tolist(),
     )

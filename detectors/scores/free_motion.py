@@ -27,13 +27,15 @@ from tauguard.detectors.estimation.estimator import ArmModel
 from tauguard.detectors.estimation.observer import intervals
 from tauguard.detectors.events import SERIES, find_alarms, sustained
 from tauguard.detectors.features.free_bound import (
+    CREEP,
     PRIOR,
     SLOW,
     UNKNOWN_LOAD,
     Bound,
     LoadDeviation,
-    friction_level,
+    friction_levels,
     native,
+    standing_positions,
     upper_quantile,
 )
 from tauguard.detectors.features.front_end import NativeStream
@@ -50,7 +52,7 @@ CONFIRMATION = 0.0
 QUANTILE = 0.99
 
 #: Seconds of motion that the prior is worth, where speed and accelerations are these [rad/s, ...].
-WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0])
+WORTH, USUAL = 20.0, np.array([1.0, 0.5, 2.0, 4.0, 0.3])
 
 #: Time between two rows of the regression [s].
 EVERY = 0.04
@@ -60,6 +62,15 @@ FOLDS = 5
 
 #: Rate of the filter that the calibration looks through [1/s].
 CALIBRATION_RATE = 20.0
+
+#: What left-out logs showed at most counts so many times, between these fractions of the bounds at
+#: rest, after motion and in motion, and against so many seconds of the prior.
+SCALE_MARGIN, SCALE_LEAST, SCALE_MOST = (1.5, 1.5, 1.3), (1.0, 1.0, 0.4), 3.0
+SCALE_WORTH = (30.0, 20.0, 60.0)
+
+#: Of an arm that no log shows moving: a joint's noise over the largest at least, and what static
+#: friction is taken to keep in deviations of the noise.
+QUIETEST, KEEPS = 0.2, 10.0
 
 #: Seconds at a log's beginning that nothing is learned from, nor an alarm raised in.
 SETTLE = 0.5
@@ -111,6 +122,20 @@ class FittedFreeMotion(Frozen):
         scores = _observer.free_scores(native(self.arm, self.bound, self.load))
         return NativeStream(scores, self.dt)
 
+    def unwatched(self, trace: Trace) -> tuple[float, tuple[str, ...]]:
+        """Seconds in which joints move whose motion no log showed, and their names."""
+        hidden = ~self.bound.shown
+        moved = (np.abs(trace.qd) > _observer.REGIME_FULL_SPEED) | (trace.q < self.bound.low)
+        moved = (moved | (trace.q > self.bound.high)) & hidden
+        names = tuple(np.array(trace.joint_names)[moved.any(axis=0)].tolist())
+        rows = np.flatnonzero(moved.any(axis=1))
+        after = np.searchsorted(trace.t, trace.t[rows] + _observer.REGIME_SETTLES)
+        blind = np.zeros(len(trace.t) + 1, dtype=np.int64)
+        np.add.at(blind, rows, 1)
+        np.add.at(blind, after, -1)
+        steps = np.diff(trace.t, append=trace.t[-1])
+        return float(steps[np.cumsum(blind)[:-1] > 0].sum()), names
+
     def judge(self, trace: Trace) -> Judged:
         """Ratios, bounds and residuals of a trace.
 
@@ -157,12 +182,9 @@ class FreeMotion:
         moving = [r for r in parts if moves(r.trace)]
         standing = [r for r in parts if not moves(r.trace)]
         if not moving:
-            raise ValueError(
-                "no joint moves in any of these logs: friction and the arm's bounds in motion "
-                "cannot be learned from standing alone; add 20 s of motion"
-            )
+            return _standing(arm, standing)
         models, whole = _calibrations(arm, moving)
-        bound = Bound.prior(friction_level(whole, moving))
+        bound = Bound.prior(*friction_levels(whole, moving), *standing_positions(parts))
         dt = max(r.trace.dt for r in recordings)
         prior = FittedFreeMotion(whole, dt, bound, UNKNOWN_LOAD, 0.0, 0)
         left_out = [replace(prior, arm=model) for model in models] + [prior] * len(standing)
@@ -180,6 +202,23 @@ class FreeMotion:
                 alarms += _alarms(judge, parts[k])
         seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
         return replace(prior, bound=learned(bound, judged), seconds=seconds, alarms=alarms)
+
+
+def _standing(arm: ArmModel, recordings: Sequence[Recording]) -> FittedFreeMotion:
+    """The detector of an arm that no log shows moving: it watches while the arm stands."""
+    n, dt = arm.robot.joints, max(r.trace.dt for r in recordings)
+    bare = replace(REAL_FRICTION, weights=np.zeros((n, REAL_FRICTION.columns)))
+    arm = replace(arm, friction=bare, noise=np.ones(n))
+    bound = Bound.prior(np.ones(n), np.ones(n), *standing_positions(recordings))
+    prior = FittedFreeMotion(arm, dt, bound, LoadDeviation(), 0.0, 0)
+    judged = [with_load_of(r, prior).judge(r.trace) for r in recordings]
+    noise = _noise(judged, np.full(n, np.nan))
+    if not np.isfinite(noise).all():
+        raise ValueError("no joint moves in these logs, and they are too short: give 5 s or more")
+    noise = np.maximum(noise, max(QUIETEST * float(noise.max()), 1e-6))
+    bound = replace(bound, noise=noise, static=KEEPS * noise, friction=KEEPS * noise)
+    seconds = sum(float(part.t[-1] - part.t[0]) for part in judged)
+    return replace(prior, bound=bound, seconds=seconds)
 
 
 def _recording(trace: Trace | Recording) -> Recording:
@@ -222,13 +261,63 @@ def with_load_of(recording: Recording, detector: FittedFreeMotion) -> FittedFree
 
 def learned(prior: Bound, judged: Sequence[Judged]) -> Bound:
     """The prior bounds moved by what left-out logs show."""
-    return replace(
-        prior, noise=_noise(judged, prior.noise), quantile=_quantiles(judged, prior.friction)
-    )
+    quantile = _quantiles(judged, prior.friction)
+    bound = replace(prior, noise=_noise(judged, prior.noise), quantile=quantile)
+    return replace(bound, scale=_scale(prior, bound, judged))
+
+
+def _scale(prior: Bound, bound: Bound, judged: Sequence[Judged]) -> Array:
+    """How far the logs' largest signals are from the bounds, as :attr:`Bound.scale`, (3, n).
+
+    The second largest of pieces of 2 s counts, so that one contact in the logs does not, as far as
+    the logs are long: seconds against :data:`SCALE_WORTH`.
+
+    Args:
+        prior: under which the logs were judged.
+        bound: with the quantiles and the noise that the logs show.
+        judged: left-out logs.
+    """
+    n = len(prior.friction)
+    peaks: list[list[Array]] = [[], [], []]
+    seconds = np.zeros((3, n))
+    for part in judged:
+        dt = float(np.median(np.diff(part.t)))
+        settled = (part.t - part.t[0] > 2 * SETTLE)[:, None]
+        signal = part.ratio * part.bound
+        stirred = (part.bound - prior.rest) / prior.stop
+        moving = ~part.rest & settled
+        calm, soon = (part.rest & settled & on for on in (stirred < 0.1, stirred > 0.2))
+        added = np.maximum(signal - prior.rest, 0.0) / np.where(soon, prior.stop * stirred, 1.0)
+        over = np.abs(part.residual) / _in_motion(bound, part)
+        length = max(1, round(0.04 / dt))
+        lasting = np.stack([sustained(column, length) for column in over.T], axis=1)
+        pieces_of = np.arange(0, len(part.t), max(1, round(2.0 / dt)))
+        for k, (on, x) in enumerate(
+            ((calm, signal / prior.rest), (soon, added), (moving, lasting))
+        ):
+            seconds[k] += on.sum(axis=0) * dt
+            peaks[k].append(np.maximum.reduceat(np.where(on, x, 0.0), pieces_of, axis=0))
+    scale = np.ones((3, n))
+    for k, own in enumerate(peaks):
+        blocks = np.sort(np.concatenate(own), axis=0) if own else np.zeros((0, n))
+        if len(blocks) < 2:
+            continue
+        known = seconds[k] / (seconds[k] + SCALE_WORTH[k])
+        seen = np.clip(SCALE_MARGIN[k] * blocks[-2], SCALE_LEAST[k], SCALE_MOST)
+        scale[k] = known * seen + 1 - known
+    return scale
+
+
+def _in_motion(bound: Bound, part: Judged) -> Array:
+    """The bound of joints in motion without starts and biases [N m], shape (T, n)."""
+    speed, own = np.abs(part.qd), np.abs(part.qdd)
+    hardest = np.broadcast_to(own.max(axis=1, keepdims=True), own.shape)
+    terms = np.stack([np.ones_like(speed), speed, own, hardest, np.exp(-speed / CREEP)])
+    return np.maximum(np.einsum("ktj,jk->tj", terms, bound.moving), bound.least)
 
 
 def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
-    """Each joint's quantile of the residual in motion, shape (n, 4)."""
+    """Each joint's quantile of the residual in motion, shape (n, 5)."""
     rows = [np.flatnonzero(p.t - p.t[0] > 2 * SETTLE)[:: _stride(p)] for p in judged]
     pairs = list(zip(judged, rows, strict=True))
 
@@ -241,7 +330,9 @@ def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
     found = np.empty((len(friction), len(PRIOR)))
     for j, level in enumerate(friction):
         on = qd[:, j] >= SLOW
-        x = np.column_stack([np.ones(on.sum()), qd[on, j], qdd[on, j], hardest[on]])
+        speed = qd[on, j]
+        slowness = np.exp(-speed / CREEP)
+        x = np.column_stack([np.ones(on.sum()), speed, qdd[on, j], hardest[on], slowness])
         weight = WORTH / EVERY * USUAL
         y = residual[on, j] / level
         found[j] = level * upper_quantile(x, y, QUANTILE, PRIOR, weight)
@@ -264,7 +355,7 @@ def _noise(judged: Sequence[Judged], prior: Array) -> Array:
     if len(all_of) < 100:
         return prior
     noise: Array = np.median(np.abs(all_of), axis=0) / 0.6745 / np.sqrt(2)
-    return np.maximum(noise, 1e-3 * prior)
+    return np.fmax(noise, 1e-3 * prior)
 
 
 def _alarms(detector: FittedFreeMotion, recording: Recording) -> int:

@@ -79,6 +79,7 @@ void bind_faults(nb::module_& m) {
             return numbers(check.step(residual.data(), current.data(), dt));
           },
           "residual"_a, "current"_a, "dt"_a)
+      .def("reset", &TorqueCheck::reset)
       .def("extremes", &TorqueCheck::extremes);
 }
 

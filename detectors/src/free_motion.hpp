@@ -24,8 +24,7 @@ class FreeMotion {
         regimes_(std::move(bounds)),
         sum_(3 * n_),
         motion_(motion_numbers * n_) {
-    for (auto* v : {&residual_, &left_, &moved_, &spread_, &current_, &ratio_, &bound_})
-      v->resize(n_);
+    for (auto* v : {&residual_, &left_, &spread_, &current_, &ratio_, &bound_}) v->resize(n_);
     for (Sample& s : last_) s.values.resize(3 * n_);
     reset();
   }
@@ -85,19 +84,16 @@ class FreeMotion {
       current_[j] = std::max(std::min(a, b), std::min(std::max(a, b), c));
     }
     estimator_.step(q, qd, current_.data(), dt, residual_.data(), left_.data(), motion_.data());
-    for (std::size_t j = 0; j < n_; ++j) {
-      moved_[j] = estimator_.moved(j);
-      spread_[j] = estimator_.spread(j);
-    }
-    regimes_.motion(qd, dt);
-    regimes_.judge(residual_.data(), left_.data(), spread_.data(), moved_.data(), qd, qdd().data(),
-                   dt, ratio_.data(), bound_.data());
+    for (std::size_t j = 0; j < n_; ++j) spread_[j] = estimator_.spread(j);
+    regimes_.motion(q, qd, dt);
+    regimes_.judge(residual_.data(), left_.data(), spread_.data(), qd, qdd().data(), dt,
+                   ratio_.data(), bound_.data());
   }
 
   Estimator estimator_;
   std::size_t n_;
   Regimes regimes_;
-  std::vector<double> sum_, motion_, residual_, left_, moved_, spread_, current_, ratio_, bound_;
+  std::vector<double> sum_, motion_, residual_, left_, spread_, current_, ratio_, bound_;
   std::array<Sample, 3> last_;
   std::size_t count_ = 0;
   double time_ = 0.0;

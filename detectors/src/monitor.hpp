@@ -73,6 +73,8 @@ class Monitor {
     known_ = true;
     time_ = t;
     const bool up = alarm_.step(q, qd, current, usual ? passed : alarm_.dt());
+    // What a contact did to the torques is no fault of theirs once it has ended.
+    if (said_.alarm && !up) torques_.reset();
     const Verdict torques = judge_torques(q, qd, current, usual ? passed : set_.dt);
     if (t < ready_ && reason_.fault != Fault::none)
       return {said_.alarm ? State::collision : State::fault, said_.alarm, alarm_.score(), reason_,

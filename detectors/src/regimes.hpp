@@ -4,14 +4,21 @@
 // At rest static friction may hold any torque, so only a change counts: the residual less a
 // baseline that follows it. Motion of any joint stirs the torques of all that stand: integral
 // action of the controllers, changing loads. That adds to the bound, fully from `full_speed` on,
-// and is forgotten within about a second. A contact stirs the joint that it turned, too: when its
-// excess ends, what that joint does next may be its controller. For a second after an excess only a
-// change away from what was before counts, so that letting go is no new push. Other joints go on as
-// before.
+// and is forgotten within about a second.
 //
-// In motion the residual without slow errors counts. The bound is linear in speed and
-// accelerations; while a joint starts, its friction is between static and sliding, and more is
-// allowed.
+// A contact with a standing arm lasts from its beginning to its release. While it lasts, the
+// residual less its level before the contact counts, on all joints that stood. It is released
+// where the joint of the largest ratio falls below half of that, or where nothing has changed for
+// a second and what is left is no more than static friction may keep. For a second after it only a
+// change away from the former level counts, so that letting go is no new contact, and what a joint
+// does that the contact turned may be its controller.
+//
+// In motion the residual without slow errors counts. The bound is linear in speed, accelerations
+// and slowness: near standstill friction is between static and sliding. While a joint starts, more
+// is allowed.
+//
+// A joint whose motion no log shows has `low` and `high`: where it stood. While it moves,
+// and soon after, nothing is judged; while it stands elsewhere, no joint in motion is.
 //
 // A ratio above 1 counts as 1 until it has lasted: in motion and soon after it ripple and jerks
 // pass a bound for longer than noise does at rest. A gap between samples confirms no more than a
@@ -27,114 +34,224 @@
 namespace tauguard::detectors {
 
 struct RegimeBounds {
-  std::vector<double> rest;    // of a joint that has long been at rest [N m], n
-  std::vector<double> stop;    // what motion of any joint adds to it [N m], n
-  std::vector<double> least;   // in motion at least [N m], n
-  std::vector<double> moving;  // per 1, |qd_j|, |qdd_j|, largest |qdd|, n x 4
-  std::vector<double> start;   // what a start adds [N m], n
+  static constexpr std::size_t terms = 5;  // of the bound in motion
+  std::vector<double> rest;                // of a joint that has long been at rest [N m], n
+  std::vector<double> stop;                // what motion of any joint adds to it [N m], n
+  std::vector<double> least;               // in motion at least [N m], n
+  std::vector<double> moving;     // per 1, |qd_j|, |qdd_j|, largest |qdd|, slowness, n x terms
+  std::vector<double> start;      // what a start adds [N m], n
+  std::vector<double> turned;     // what a contact leaves on a joint that it turned [N m], n
+  std::vector<double> low, high;  // positions of joints whose motion is not known [rad], n
+  static constexpr double anywhere = 1e6;  // `high` of all others [rad]
 };
 
 class Regimes {
  public:
   static constexpr double wait = 0.1;        // a joint that is slow for so long [s] is at rest
+  static constexpr double gives = 0.2;       // a standing arm yields to a push for so long [s]
   static constexpr double full_speed = 0.1;  // motion from which `stop` counts fully [rad/s]
-  static constexpr double settles = 1.0;     // time constant with which that is forgotten [s]
+  static constexpr double settling = 0.3;    // of the observer at the beginning [s]
+  static constexpr double creep = 0.05;      // slowness falls to 1/e at this speed [rad/s]
+  static constexpr double settles = 0.7;     // time constant with which motion is forgotten [s]
   static constexpr double follow = 0.15;     // time constant of the baseline [s]
-  static constexpr double after = 1.0;       // change away only, for so long after an excess [s]
+  static constexpr double after = 1.0;       // only change away counts, after a contact [s]
   static constexpr double starts = 0.15;     // time constant with which a start is forgotten [s]
-  static constexpr double contact = 0.5;     // of `stop` that an excess leaves on its own joint
+  static constexpr double released = 0.5;    // of a contact's peak
+  static constexpr double kept = 1.0;        // still for so long: static friction keeps it [s] ...
+  static constexpr double remembers = 10.0;  // ... and letting go so much later is no contact [s]
   static constexpr double lasts_at_rest = 0.024, lasts_moving = 0.04;  // confirmation [s] ...
   static constexpr double forget = 1.05;  // rate at which the shortest interval is forgotten
   static constexpr int samples = 3;       // ... and in samples at least
 
-  explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), n_(of_.rest.size()) { reset(); }
-
-  void reset() {
-    slow_for_.assign(n_, 10.0);
-    base_.assign(n_, 0.0);
-    before_.assign(n_, 0.0);
-    rest_.assign(n_, 0);
-    since_.assign(n_, after);
-    own_.assign(n_, 0.0);
-    above_.assign(n_, 0.0);
-    count_.assign(n_, 0);
-    stirred_ = usual_ = 1.0;
+  explicit Regimes(RegimeBounds bounds) : of_(std::move(bounds)), joints_(of_.rest.size()) {
+    reset();
   }
 
-  bool rest(std::size_t j) const { return rest_[j]; }
+  void reset() {
+    std::fill(joints_.begin(), joints_.end(), Joint{});
+    touched_ = suspected_ = false;
+    peak_ = still_ = 0.0;
+    stirred_ = usual_ = 1.0;
+    age_ = unknown_for_ = 0.0;
+    elsewhere_ = false;
+  }
 
-  // Speeds [rad/s], `dt` s after the last; goes before judge().
-  void motion(const double* qd, double dt) {
+  bool rest(std::size_t j) const { return joints_[j].rest; }
+
+  // Positions [rad] and speeds [rad/s], `dt` s after the last; goes before judge().
+  void motion(const double* q, const double* qd, double dt) {
     double fastest = 0.0;
-    for (std::size_t j = 0; j < n_; ++j) {
+    elsewhere_ = false;
+    const double keep = std::exp(-dt / settles), own = std::exp(-dt / after);
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      Joint& one = joints_[j];
       const double speed = std::fabs(qd[j]);
-      fastest = std::max(fastest, speed);
-      slow_for_[j] = speed < slow ? slow_for_[j] + dt : 0.0;
+      const bool pushed = one.rest && (touched_ || suspected_);
+      one.quick_for = speed < slow ? 0.0 : one.quick_for + dt;
+      const bool unknown = of_.high[j] < RegimeBounds::anywhere;
+      const bool away = unknown && (q[j] < of_.low[j] || q[j] > of_.high[j]);
+      const bool yields =
+          speed < full_speed && ((unknown && !away) || (pushed && one.quick_for < gives));
+      const bool stands = speed < slow || yields;
+      if (!pushed) fastest = std::max(fastest, speed);
+      one.slow_for = stands ? one.slow_for + dt : 0.0;
+      one.moved = stands ? 0.0 : one.moved + dt;
+      one.own *= own;
+      if (unknown && !stands) unknown_for_ = settles;
+      elsewhere_ = elsewhere_ || away;
     }
-    const double keep = std::exp(-dt / settles);
+    unknown_for_ = std::max(0.0, unknown_for_ - dt);
     stirred_ = std::max(keep * stirred_, std::min(1.0, fastest / full_speed));
-    for (double& x : own_) x *= keep;
     usual_ = std::min(dt, forget * usual_);
+    age_ += dt;
   }
 
   // Ratios of what counts to its bound, at most 1 until confirmed, and the bounds [N m]. `residual`
   // is the observer's, `left` it less slow errors, `spread` the deviation that they leave, all
-  // [N m]; `moved` is the time for which each joint has been in motion [s]; n numbers each.
-  void judge(const double* residual, const double* left, const double* spread, const double* moved,
-             const double* qd, const double* qdd, double dt, double* ratio, double* bound) {
+  // [N m], n.
+  void judge(const double* residual, const double* left, const double* spread, const double* qd,
+             const double* qdd, double dt, double* ratio, double* bound) {
     double hardest = 0.0;
-    for (std::size_t j = 0; j < n_; ++j) hardest = std::max(hardest, std::fabs(qdd[j]));
-    for (std::size_t j = 0; j < n_; ++j) {
-      const bool was = rest_[j];
-      since_[j] += dt;
-      rest_[j] = slow_for_[j] >= wait;
+    for (std::size_t j = 0; j < joints_.size(); ++j) hardest = std::max(hardest, std::fabs(qdd[j]));
+    bool begins = false;
+    suspected_ = false;
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      Joint& one = joints_[j];
+      const bool was = one.rest;
+      one.since += dt;
+      one.rest = one.slow_for >= wait;
+      one.held = one.held && one.rest;
       double signal = left[j];
-      if (rest_[j]) {
-        signal = changed(j, residual[j], !was, dt);
-        bound[j] = of_.rest[j] + of_.stop[j] * std::max(stirred_, own_[j]);
+      if (one.rest) {
+        if (!was || age_ < settling) one.base = one.before = residual[j];
+        signal = changed(one, residual[j], dt);
+        bound[j] = of_.rest[j] + std::max(of_.stop[j] * stirred_, of_.turned[j] * one.own);
       } else {
-        const double* per = &of_.moving[4 * j];
-        const double linear =
-            per[0] + per[1] * std::fabs(qd[j]) + per[2] * std::fabs(qdd[j]) + per[3] * hardest;
-        bound[j] = std::max(linear, of_.least[j]) + spread[j] +
-                   of_.start[j] * std::exp(-moved[j] / starts);
+        bound[j] = moving(j, qd[j], qdd[j], hardest) + spread[j];
       }
-      ratio[j] = confirmed(j, std::fabs(signal) / bound[j], dt);
+      const bool judged = unknown_for_ <= 0.0 && (one.rest || !elsewhere_);
+      ratio[j] = confirmed(one, judged ? std::fabs(signal) / bound[j] : 0.0, dt);
+      suspected_ = suspected_ || (one.rest && one.count > 0);
+      if (one.rest && !one.held && ratio[j] > 1.0) begins = true;
     }
+    if (unknown_for_ > 0.0) {
+      touched_ = false;
+      for (Joint& one : joints_) one.held = false;
+      std::fill(ratio, ratio + joints_.size(), 0.0);
+      return;
+    }
+    if (begins) begin(bound);
+    if (touched_) hold(residual, dt, ratio, bound);
   }
 
  private:
-  double confirmed(std::size_t j, double ratio, double dt) {
-    if (ratio > 1.0) {
-      since_[j] = 0.0;
-      above_[j] += std::min(dt, usual_);
-      ++count_[j];
-    } else {
-      if (above_[j] > 0.0 && rest_[j]) own_[j] = contact;
-      above_[j] = 0.0;
-      count_[j] = 0;
-    }
-    const double stirred = rest_[j] ? stirred_ : 1.0;
+  struct Joint {
+    double slow_for = 10.0, quick_for = 0.0, moved = 0.0;  // [s]
+    double base = 0.0, before = 0.0;  // what the residual is compared with, and earlier [N m]
+    double home = 0.0;                // `before` at the beginning of a contact [N m]
+    double most = 0.0;                // the contact's largest change from there [N m]
+    double bound = 1.0;               // at the contact's beginning [N m]
+    double since = after;             // a contact's end [s]
+    double own = 0.0;                 // of `stop`, after a contact
+    double above = 0.0;               // for so long above the bound [s] ...
+    int count = 0;                    // ... in so many samples
+    bool rest = false, held = false;  // held: takes part in a contact
+  };
+
+  double moving(std::size_t j, double qd, double qdd, double hardest) const {
+    const double* per = &of_.moving[RegimeBounds::terms * j];
+    const double speed = std::fabs(qd);
+    const double linear = per[0] + per[1] * speed + per[2] * std::fabs(qdd) + per[3] * hardest +
+                          per[4] * std::exp(-speed / creep);
+    return std::max(linear, of_.least[j]) + of_.start[j] * std::exp(-joints_[j].moved / starts);
+  }
+
+  double confirmed(Joint& one, double ratio, double dt) const {
+    if (ratio <= 1.0 && one.above > 0.0 && one.rest) one.own = 1.0;
+    one.above = ratio > 1.0 ? one.above + std::min(dt, usual_) : 0.0;
+    one.count = ratio > 1.0 ? one.count + 1 : 0;
+    const double stirred = one.rest ? stirred_ : 1.0;
     const double needs = lasts_at_rest + stirred * (lasts_moving - lasts_at_rest);
-    const bool lasted = count_[j] >= samples && above_[j] > needs - 0.5 * usual_;
+    const bool lasted = one.count >= samples && one.above > needs - 0.5 * usual_;
     return lasted ? ratio : std::min(ratio, 1.0);
   }
 
-  double changed(std::size_t j, double residual, bool begins, double dt) {
-    if (begins) base_[j] = before_[j] = residual;
-    if (since_[j] >= after) before_[j] = base_[j];
-    const double change = residual - base_[j];
-    const bool back = change * (base_[j] - before_[j]) < 0.0;
-    base_[j] = residual - change * std::exp(-dt / follow);
-    return since_[j] < after && back ? 0.0 : change;
+  // What counts of a standing joint's residual. Soon after a contact the way back does not.
+  static double changed(Joint& one, double residual, double dt) {
+    const double side = one.most;
+    if (one.since < after && (residual - one.base) * side < 0.0 &&
+        (residual - one.home) * side > 0.0)
+      one.base = one.before = residual;
+    const double change = residual - one.base, keep = std::exp(-dt / follow);
+    one.base = residual - change * keep;
+    one.before = one.base + (one.before - one.base) * keep;
+    return change;
+  }
+
+  // A contact, or one more joint in it.
+  void begin(const double* bound) {
+    if (!touched_) peak_ = still_ = 0.0;
+    touched_ = true;
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      Joint& one = joints_[j];
+      if (!one.rest || one.held) continue;
+      one.held = true;
+      one.home = one.before;
+      one.bound = bound[j];
+      one.most = 0.0;
+    }
+  }
+
+  void hold(const double* residual, double dt, double* ratio, double* bound) {
+    bool still = true;
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      Joint& one = joints_[j];
+      if (!one.held) continue;
+      const double change = residual[j] - one.home, now = std::fabs(change) / one.bound;
+      if (std::fabs(change) > std::fabs(one.most)) one.most = change;
+      bound[j] = one.bound;
+      ratio[j] = std::min(now, 1.0);
+      if (now > peak_) {
+        peak_ = now;
+        lead_ = j;
+      }
+      still = still && std::fabs(residual[j] - one.base) < 0.5 * of_.rest[j] &&
+              std::fabs(change) < 2.0 * of_.turned[j];
+    }
+    still_ = still ? still_ + dt : 0.0;
+    const Joint& lead = joints_[lead_];
+    const double now = std::fabs(residual[lead_] - lead.home) / lead.bound;
+    if (!lead.held || now < released * peak_ || still_ > kept)
+      end(residual, ratio);
+    else
+      ratio[lead_] = std::max(now, std::nextafter(1.0, 2.0));
+  }
+
+  void end(const double* residual, double* ratio) {
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      Joint& one = joints_[j];
+      if (!one.held) continue;
+      one.held = false;
+      one.base = one.before = residual[j];
+      one.since = still_ > kept ? after - remembers : 0.0;
+      if (std::fabs(one.most) > released * one.bound) one.own = 1.0;
+      one.above = 0.0;
+      one.count = 0;
+      ratio[j] = 0.0;
+    }
+    touched_ = false;
   }
 
   RegimeBounds of_;
-  std::size_t n_;
-  std::vector<double> slow_for_, base_, before_, since_, own_, above_;
-  std::vector<int> count_;
-  std::vector<char> rest_;
+  std::vector<Joint> joints_;
+  bool touched_ = false;                // a contact with joints at rest lasts ...
+  bool suspected_ = false;              // ... or begins, but for its confirmation
+  std::size_t lead_ = 0;                // the joint of its largest ratio ...
+  double peak_ = 0.0, still_ = 0.0;     // ... and that ratio; unchanged for so long [s]
   double stirred_ = 1.0, usual_ = 1.0;  // interval of samples, gaps aside [s]
+  double age_ = 0.0;                    // since the first sample [s]
+  double unknown_for_ = 0.0;            // nothing is judged for so long [s]
+  bool elsewhere_ = false;              // a joint stands where no log shows it
 };
 
 }  // namespace tauguard::detectors

@@ -57,6 +57,7 @@ def command(
     """
     from tauguard.cli.free_logs import free_logs
     from tauguard.cli.help_text import print_notes
+    from tauguard.datasets.arm_logs import never_moved
     from tauguard.datasets.real_arms import calibration_notes
     from tauguard.detectors.calibration.arm_file import save_arm
     from tauguard.detectors.calibration.assessment import check_loads, left_out
@@ -78,7 +79,8 @@ def command(
             "they held joint torques: if they are in N m, say --torque"
         )
     held = left_out(arm, recordings, scale=given.scale) if len(recordings) > 1 else []
-    print_notes(calibration_notes(found.arm, traces, recordings, held))
+    unmoved = never_moved(list(traces.values()))
+    print_notes((*calibration_notes(found.arm, traces, recordings, held), *unmoved))
     target = out or robot.with_name(f"{robot.stem}.calibrated{robot.suffix}")
     save_arm(found.arm, robot, target, scale=given.scale, logs=list(traces))
     result = summary(list(traces), found, held, target) | {"scale": given.source}

@@ -202,7 +202,7 @@ def free_motion(
 ) -> None:
     """Train on logs in which nothing touched the arm, as far as that is known."""
     from tauguard.cli.help_text import print_notes
-    from tauguard.datasets.arm_logs import read_logs, with_loads
+    from tauguard.datasets.arm_logs import never_moved, read_logs, with_loads
     from tauguard.datasets.real_arms import (
         calibration_notes,
         check_named,
@@ -300,20 +300,6 @@ def odd_notes(sifted: CrossValidation) -> list[str]:
 def _others(logs: Sequence[CrossValidatedLog]) -> str:
     count = sum(len(log.alarms) for log in logs)
     return f"{count or 'none'} in {sum(log.seconds for log in logs) / 60:.1f} min"
-
-
-def never_moved(traces: list[Trace]) -> list[str]:
-    """A note on each joint that all logs show standing still only."""
-    from tauguard.detectors.calibration.recording import MOVING
-
-    joints = range(len(traces[0].joint_names))
-    fastest = [max(abs(trace.qd[:, j]).max() for trace in traces) for j in joints]
-    return [
-        f"{name} moves in none of the logs: its friction is not known, and moving it may raise an "
-        "alarm; add a log in which it moves"
-        for name, speed in zip(traces[0].joint_names, fastest, strict=True)
-        if speed <= MOVING
-    ]
 
 
 def show_card(
