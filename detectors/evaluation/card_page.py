@@ -112,8 +112,7 @@ def _lines(card: ThresholdCard) -> list[str]:
             for name, joints in card.unseen.items()
         )
         lines.append(
-            "not in the logs, so left out or bounded by prior knowledge of other arms (in brackets): "
-            f"{parts}"
+            f"not in the logs, so left out, or bounded by what other arms do (in brackets): {parts}"
         )
 
     def numbers(values: list[float]) -> str:

@@ -158,7 +158,8 @@ class Bound:
     @property
     def moving(self) -> Array:
         """Bound in motion per 1, |qd_j|, |qdd_j|, the largest |qdd| and slowness, (n, 5)."""
-        return MARGIN * self.scale[2][:, None] * self.quantile
+        bound: Array = MARGIN * self.scale[2][:, None] * self.quantile
+        return bound
 
     @property
     def least(self) -> Array:
@@ -198,7 +199,8 @@ def friction_levels(arm: ArmModel, recordings: Sequence[Recording]) -> tuple[Arr
 
 def motion_seconds(recordings: Sequence[Recording]) -> Array:
     """How long each joint moved faster than :data:`FULL_SPEED` [s], shape (n,)."""
-    return np.sum([(np.abs(r.trace.qd) > FULL_SPEED).sum(0) * r.trace.dt for r in recordings], 0)
+    own = [(np.abs(r.trace.qd) > FULL_SPEED).sum(axis=0) * r.trace.dt for r in recordings]
+    return np.asarray(np.sum(own, axis=0), dtype=np.float64)
 
 
 def standing_positions(recordings: Sequence[Recording]) -> tuple[Array, Array]:

@@ -313,7 +313,8 @@ def _in_motion(bound: Bound, part: Judged) -> Array:
     speed, own = np.abs(part.qd), np.abs(part.qdd)
     hardest = np.broadcast_to(own.max(axis=1, keepdims=True), own.shape)
     terms = np.stack([np.ones_like(speed), speed, own, hardest, np.exp(-speed / CREEP)])
-    return np.maximum(np.einsum("ktj,jk->tj", terms, bound.moving), bound.least)
+    bounds: Array = np.maximum(np.einsum("ktj,jk->tj", terms, bound.moving), bound.least)
+    return bounds
 
 
 def _quantiles(judged: Sequence[Judged], friction: Array) -> Array:
