@@ -148,7 +148,8 @@ class Bound:
     @property
     def stop(self) -> Array:
         """What motion of any joint adds to the bound at rest [N m], shape (n,)."""
-        return STOP * self.scale[1] * self.static
+        added: Array = STOP * self.scale[1] * self.static
+        return added
 
     @property
     def start(self) -> Array:
