@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tauguard.cli import main
-from tauguard.cli.train import never_moved
 from tauguard.datasets import arm_logs, columns, real_arms
 from tauguard.datasets.drives import DRIVES, preset_drive
 from tauguard.detectors.calibration.arm_file import load_arm
@@ -147,10 +146,10 @@ def test_a_joint_that_no_log_moves_is_named(folder, calibrated, capsys):
     model = str(folder / "held.skops")
     robot = flags(folder, calibrated.name)
     main(["train", "--free", *logs, *robot, "--model", model])
-    assert "note: c moves in none of the logs" in capsys.readouterr().out
+    assert "note: c: moves in none of the logs" in capsys.readouterr().out
     main(["detect", written(folder, "held.csv", held_joint(8)), *robot, "--model", model])
     assert "0 alarms" in capsys.readouterr().out
-    assert never_moved([held_joint(0), record(0)]) == []
+    assert arm_logs.never_moved([held_joint(0), record(0)]) == []
 
 
 def test_logs_of_a_standing_arm_are_left_out_of_calibration(folder, tmp_path, capsys):
@@ -333,8 +332,19 @@ def test_a_log_of_pushes_among_free_ones_is_named_and_left_out(folder, calibrate
     assert "--accept other: no log 'other'" in fails(capsys, *arguments, "--accept", "other")
 
 
-def test_a_standing_arm_alone_teaches_no_motion(folder, tmp_path, capsys):
+def test_a_standing_arm_alone_is_watched_while_it_stands(folder, tmp_path, capsys):
     trace = record(5, dwell=(-1.0, 99.0))
-    log = written(tmp_path, "still.csv", trace)
-    given = [*flags(folder), "--gains", *GAINS, "--model", str(tmp_path / "m.skops")]
-    assert "no joint moves in any of these logs" in fails(capsys, "train", "--free", log, *given)
+    log, model = written(tmp_path, "still.csv", trace), str(tmp_path / "m.skops")
+    main(["train", "--free", log, *flags(folder), "--gains", *GAINS, "--model", model])
+    out = capsys.readouterr().out
+    assert "a, b, c: moves in none of the logs" in out
+    assert "none (none)      moving" in out
+    pushed = add_contact(trace, GAIN, Added(12.0, 2.0, (4.0, 4.0, 2.0), "push"))
+    main(["detect", written(tmp_path, "pushed.csv", pushed), *flags(folder), "--model", model])
+    said = capsys.readouterr().out
+    assert "1 alarm in" in said
+    assert "nothing is watched" not in said
+    main(["detect", written(tmp_path, "moves.csv", record(6)), *flags(folder), "--model", model])
+    assert "moves here, but in none of the training logs: nothing is watched" in (
+        capsys.readouterr().out
+    )
