@@ -86,7 +86,8 @@ inline FreeMotion free_motion_of(Random& random, const Chain& chain, const Frict
   Estimator estimator(chain, basis, settings_of(random, n, basis.columns(), true));
   return {std::move(estimator),
           {uniforms(random, n, 0.1, 1), uniforms(random, n, 0, 1), uniforms(random, n, 0.1, 1),
-           uniforms(random, 4 * n, 0, 1), uniforms(random, n, 0, 1)}};
+           uniforms(random, RegimeBounds::terms * n, 0, 1), uniforms(random, n, 0, 1),
+           uniforms(random, n, 0, 1), Numbers(n, -1e6), uniforms(random, n, 1, 2e6)}};
 }
 
 // The three kinds of streams that are native, of one arm.
