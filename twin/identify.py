@@ -22,7 +22,7 @@ PRESLIDING, USUAL = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2), 1e-3
 TURNING = 0.1
 #: Prior of the gear ratio.
 GEAR = 101.0
-#: Least half width of an interval: no law of friction is truer [relative].
+#: Least half width of an interval, of the largest joint's number: no law of friction is truer.
 FORM = 0.02
 #: The identified numbers that have an interval.
 NUMBERS = ("gain", "rotor", "coulomb", "static", "viscous", "load")
@@ -94,7 +94,7 @@ def with_intervals(twin: Twin, others: Sequence[Twin]) -> Twin:
         values = np.array([other.number(name) for other in others])
         deviation = np.sqrt((count - 1) * values.var(axis=0))
         known = np.array([fit is not None for fit in twin.fits]) | (name in ("gain", "rotor"))
-        form = 0.0 if name == "gain" else FORM * np.abs(twin.number(name))
+        form = 0.0 if name == "gain" else FORM * np.abs(twin.number(name)).max()
         intervals[name] = np.where(known, np.maximum(wide * deviation, form), np.nan)
     return replace(twin, intervals=intervals)
 
