@@ -20,6 +20,7 @@ from tauguard.detectors.faults.inputs import UsualInput
 from tauguard.detectors.features.front_end import NativeStream, plain_residual
 from tauguard.detectors.frozen import Frozen
 from tauguard.detectors.samples import same_rate
+from tauguard.detectors.scores.baselines import FittedThresholds
 from tauguard.detectors.scores.detector import FittedDetector
 from tauguard.detectors.thresholds.free_scores import FreeScores
 from tauguard.detectors.thresholds.speed_normalisation import (
@@ -143,9 +144,10 @@ class CollisionAlarm(Frozen):
         return AlarmStream(self)
 
 
-def floor_of(alarm: CollisionAlarm) -> FittedDetector | None:
+def floor_of(alarm: CollisionAlarm) -> FittedThresholds | None:
     """The plain thresholds beneath a learned score; None: it has none."""
-    return getattr(alarm.detector, "floor", None)
+    plain = getattr(alarm.detector, "floor", None)  # of another's detector it may be anything
+    return plain if isinstance(plain, FittedThresholds) else None
 
 
 def _finite(score: Array, trace: Trace) -> Array:

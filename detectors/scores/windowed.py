@@ -199,8 +199,11 @@ class FittedWindowed(OnFrontEnd):
 
     @property
     def floor(self) -> FittedThresholds | None:
-        """Plain thresholds on the same residual: what passes them is an alarm, too."""
-        if self.limits is None:
+        """Plain thresholds on the same residual: what passes them is an alarm, too.
+
+        A kernel machine has them: its native stream gives their score beside its own.
+        """
+        if self.limits is None or not isinstance(self.regressor, KernelMachine):
             return None
         return FittedThresholds(
             self.front, self.front.scaling(), self.limits, MovingThresholds.name

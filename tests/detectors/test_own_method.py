@@ -27,6 +27,7 @@ def mypackage(tmp_path, monkeypatch):
 
 def test_it_streams_and_gets_a_threshold(mypackage, training, unseen, arm):
     fitted = make_detector("mypackage:CurrentSize").fit(training, arm)
+    object.__setattr__(fitted, "floor", 2.0)  # a name that means something else to them
     alarm, trace = with_rate(fitted, training, 10.0), unseen[0]
     stream, whole = alarm.stream(), alarm.detect(trace)
     up = [stream.step(*row) for row in zip(trace.q, trace.qd, trace.current, strict=True)]
