@@ -69,7 +69,7 @@ class Regimes {
 
   void reset() {
     std::fill(joints_.begin(), joints_.end(), Joint{});
-    touched_ = suspected_ = false;
+    touched_ = false;
     peak_ = still_ = 0.0;
     stirred_ = usual_ = 1.0;
     age_ = unknown_for_ = 0.0;
@@ -86,7 +86,7 @@ class Regimes {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       Joint& one = joints_[j];
       const double speed = std::fabs(qd[j]);
-      const bool pushed = one.rest && (touched_ || suspected_);
+      const bool pushed = one.rest && touched_;
       one.quick_for = speed < slow ? 0.0 : one.quick_for + dt;
       const bool unknown = of_.high[j] < RegimeBounds::anywhere;
       const bool away = unknown && (q[j] < of_.low[j] || q[j] > of_.high[j]);
@@ -114,7 +114,6 @@ class Regimes {
     double hardest = 0.0;
     for (std::size_t j = 0; j < joints_.size(); ++j) hardest = std::max(hardest, std::fabs(qdd[j]));
     bool begins = false;
-    suspected_ = false;
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       Joint& one = joints_[j];
       const bool was = one.rest;
@@ -131,7 +130,6 @@ class Regimes {
       }
       const bool judged = unknown_for_ <= 0.0 && (one.rest || !elsewhere_);
       ratio[j] = confirmed(one, judged ? std::fabs(signal) / bound[j] : 0.0, dt);
-      suspected_ = suspected_ || (one.rest && one.count > 0);
       if (one.rest && !one.held && ratio[j] > 1.0) begins = true;
     }
     if (unknown_for_ > 0.0) {
@@ -244,8 +242,7 @@ class Regimes {
 
   RegimeBounds of_;
   std::vector<Joint> joints_;
-  bool touched_ = false;                // a contact with joints at rest lasts ...
-  bool suspected_ = false;              // ... or begins, but for its confirmation
+  bool touched_ = false;                // a contact with joints at rest lasts
   std::size_t lead_ = 0;                // the joint of its largest ratio ...
   double peak_ = 0.0, still_ = 0.0;     // ... and that ratio; unchanged for so long [s]
   double stirred_ = 1.0, usual_ = 1.0;  // interval of samples, gaps aside [s]
