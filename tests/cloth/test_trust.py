@@ -187,7 +187,7 @@ def test_a_child_forked_during_a_call_is_told_so():
 import os, sys, threading, time
 import numpy as np
 from tauguard.cloth import MeshCCD
-n = 700
+n = 6000
 faces = np.arange(3 * (n // 3)).reshape(-1, 3)
 x = np.zeros((n, 3))
 ccd = MeshCCD(faces, method="exact")
