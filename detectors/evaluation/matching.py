@@ -1,9 +1,9 @@
 """From a boolean series to alarms, and from alarms to detected collisions and false alarms.
 
 An alarm is a maximal run of True; alarms less than 0.5 s apart are one. An alarm that starts
-between onset and onset + 0.5 s (clamping: its end) detects that collision, and the first one
-counts. Any other alarm is false, one during a payload change too; an alarm already up at onset is
-false and detects nothing.
+between onset and onset + 0.5 s (clamping: or its end, if that is later) detects that collision,
+and the first one counts. Any other alarm is false, one during a payload change too; an alarm
+already up at onset is false and detects nothing.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: Meaning of the words in the charts.
 LEGEND = (
-    "  sensitivity: collisions that raise an alarm within 0.5 s (a clamp: while it lasts)",
+    "  sensitivity: collisions that raise an alarm within 0.5 s (a longer clamp: while it is held)",
     "  specificity: pieces of 2 s without a collision that raise none; ppv: tp / (tp + fp)",
     "  delay: from the first touch to the alarm; p95: 19 of 20 are faster",
     "  peak |tau_ext|: largest torque at joints 1-4 that the collision reached",
