@@ -95,10 +95,11 @@ def torque_ratios(traces: Sequence[Trace], arm: ArmModel) -> Array:
     """
     found = np.ones((3, arm.robot.joints))
     for trace in traces:
-        check = TorqueCheck(arm, trace.dt)
+        dt = trace.dt  # a median over the trace: asked once
+        check = TorqueCheck(arm, dt)
         residuals = check.observer.run(trace.t, trace.q, trace.qd, trace.current).residual
         for residual, current in zip(residuals, trace.current, strict=True):
-            check.native.step(residual, current, trace.dt)
+            check.native.step(residual, current, dt)
         own = check.extremes
         found = np.vstack([np.minimum(found[:2], own[:2]), np.maximum(found[2:], own[2:])])
     return found
