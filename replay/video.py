@@ -23,6 +23,7 @@ def frames(
     seconds: float | None = None,
     rate: float = 20.0,
     size: tuple[int, int] = (480, 640),
+    view: tuple[float, float, float] = VIEW,
 ) -> Iterator[NDArray[np.uint8]]:
     """Pictures of a recording that holds its scene, shape (height, width, 3).
 
@@ -32,6 +33,7 @@ def frames(
         seconds: how much is drawn; None: to the end.
         rate: pictures for each second of the recording.
         size: height and width [px].
+        view: of the camera: azimuth and elevation [deg], distance in units of the arm's size.
 
     Raises:
         ValueError: no scene in it, or nothing in that time.
@@ -59,7 +61,7 @@ def frames(
     links = [int(model.joint(name).bodyid[0]) for name in trace.joint_names]
     spread = float(np.linalg.norm(np.ptp(data.xpos[links], axis=0)))
     camera.lookat[:] = data.xpos[links].mean(axis=0)
-    camera.azimuth, camera.elevation, distance = VIEW
+    camera.azimuth, camera.elevation, distance = view
     camera.distance = distance * max(spread, 0.2)
     with opengl():
         renderer = mujoco.Renderer(model, *size)
