@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -28,10 +27,10 @@ from tauguard.models.arm_file import (
     ArmFile,
     read_arm,
 )
+from tauguard.models.calibrated import calibrated
 from tauguard.models.drive import Drive, cura6_drive
 from tauguard.models.known_robots import ROBOTS, find_file, known_names
 from tauguard.models.robot import Robot, per_joint
-from tauguard.models.robot_file import read_note
 
 __all__ = ["ARM_BITS", "NAMED", "OBSTACLE_BITS", "STICK_RADIUS", "Arm", "Facts", "load_arm"]
 
@@ -175,26 +174,7 @@ def _from_file(
     known = dict(sources)
     if robot.source is not None:
         known["drive"] = robot.source
-    return _completed(_calibrated(robot, path, file, known), file, known)
-
-
-def _calibrated(robot: Robot, path: Path, file: ArmFile, sources: dict[str, str]) -> Robot:
-    """The robot with the gains and rotors of a calibrated file, where its drive states no gain."""
-    drive = robot.drive
-    if drive.gain is not None or drive.torque_constant is not None:
-        return robot
-    note = read_note(path)
-    values = json.loads(note) if note and note.lstrip().startswith("{") else {}
-    if values.get("joints") != list(file.joints):
-        return robot
-    gear = drive.row("gear", len(file.joints))
-    turns = np.full(len(file.joints), 100.0) if gear is None else gear
-    sources["drive"] = "the file's calibration; friction and ripple: see `tauguard twin`"
-    rotors = tuple((np.array(values["armature"]) / turns**2).tolist())
-    known = replace(
-        drive, gear=tuple(turns), gain=tuple(values["drive_gain"]), rotor_inertia=rotors
-    )
-    return replace(robot, drive=known)
+    return _completed(calibrated(robot, path, file, known), file, known)
 
 
 def _by_name(robot: Robot) -> tuple[Robot, Path, dict[str, str]]:

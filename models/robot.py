@@ -81,7 +81,7 @@ class RobotDrive:
     current_limit: float | Numbers | None = None  #: [A]
     coulomb: float | Numbers | None = None  #: [N m]
     viscous: float | Numbers | None = None  #: [N m s/rad]
-    static: float | Numbers | None = None  #: breakaway, at least Coulomb friction [N m]
+    static: float | Numbers | None = None  #: level at rest [N m]
     stribeck_velocity: float | Numbers | None = None  #: [rad/s]
     presliding: float | Numbers | None = None  #: Coulomb friction over bristle stiffness [rad]
     load: float | Numbers | None = None  #: rise of the level per transmitted torque [1/(N m)]

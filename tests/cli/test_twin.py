@@ -3,11 +3,14 @@
 import json
 from dataclasses import replace
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 from tauguard.cli import main
+from tauguard.datasets.recordings import labelled
 from tauguard.detectors import load_model
+from tauguard.models import load_arm
 from tests.detectors.synthetic_arm import GAIN, XML, held_joint, record
 
 COLUMNS = {
@@ -17,6 +20,21 @@ COLUMNS = {
     "current": ["i0", "i1", "i2"],
 }
 HEAD = ",".join(["t", *COLUMNS["q"], *COLUMNS["qd"], *COLUMNS["current"]])
+DATASET = """
+name = "of-a-twin"
+seed = 1
+rate = 100
+episodes_per_shard = 2
+[episodes]
+seconds = 7.0
+arms = ["a.toml"]
+speeds = [30]
+struck = 0.5
+[[splits]]
+name = "train"
+individuals = [0]
+episodes = 2
+"""
 
 
 def write(path, trace):
@@ -39,6 +57,33 @@ def run(folder, command, *flags):
     gains = ["--gains", *map(str, GAIN)]
     common = ["--columns", str(folder / "columns.json")]
     main([command, *map(str, flags), *common, *(gains if command == "twin" else [])])
+
+
+@pytest.fixture(scope="module")
+def made(folder):
+    run(folder, "twin", folder / "free", "--robot", folder / "arm.xml", "--out", folder / "a.toml")
+    return folder / "a.toml"
+
+
+def test_every_command_and_environment_takes_the_twin(made, tmp_path):
+    friction = load_arm(str(made)).facts.drive.friction
+    assert (friction.coulomb + friction.slope.sum(axis=1) > 1).all()
+    flags = ["--episodes", "1", "--collisions", "1", "--workers", "1", "--payloads-g", "0", "--mismatch-seed", "None"]
+    main(["simulate", "--robot", str(made), "--out", str(tmp_path / "struck"), *flags])
+    (trace,) = labelled(tmp_path / "struck")
+    assert trace.dt == pytest.approx(0.01, rel=1e-3)  # the logs' rate
+    (made.parent / "set.toml").write_text(DATASET)
+    where = str(tmp_path / "set")
+    main(["generate", str(made.parent / "set.toml"), "--out", where, "--workers", "1"])
+    main(["inspect", where, "--verify"])
+    one = gym.make("tauguard:tauguard/Reach-v0", robot=str(made), detector="observer")
+    many = gym.make_vec("tauguard:tauguard/Reach-v0", num_envs=2, robot=str(made))
+    for env in (one, many):
+        env.reset(seed=0)
+        for _ in range(20):
+            seen, *_ = env.step(0.5 * np.ones(env.action_space.shape, np.float32))
+        assert np.isfinite(seen).all()
+        env.close()
 
 
 def test_from_logs_to_detection(folder, capsys):
