@@ -1,4 +1,4 @@
-"""ClothReach-v0: work past a hanging cloth."""
+"""ClothReach-v1: work round a hanging cloth."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.compiled import tool_position
-from tauguard.envs.gym.reach import CarefulReach, Reach
+from tauguard.envs.gym.reach import CarefulReach
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import Cloth
 
@@ -20,13 +20,7 @@ SHEET = Cloth(count=8, size=0.5, mass=0.1, position=(0.55, 0.0, 0.55))
 ASIDE = 0.12
 
 
-class ClothReach(Reach):
-    """Reach across a hanging cloth, with contact checkers if they are asked for."""
-
-    defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "cloth": SHEET}
-
-
-class ClothBetween(CarefulReach):
+class ClothReach(CarefulReach):
     """Targets on both sides of the sheet in turn, whose straight path goes through it."""
 
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "cloth": SHEET}
@@ -46,12 +40,14 @@ class ClothBetween(CarefulReach):
 
 
 class ClothReachEnv(ArmEnv):
-    """Bring the tool to places on both sides of a hanging cloth.
+    """Go round a hanging cloth to targets on its other side.
 
-    Actions, reward and end are those of Reach-v0; there is no person unless ``obstacles`` says so.
-    The cloth is MuJoCo's; ``cloth=`` takes another :class:`tauguard.models.Cloth` and
+    Each target lies beyond the sheet as seen from the tool, so that the straight path to it goes
+    through the cloth. Actions are those of Reach-v0; there is no person unless ``obstacles`` says
+    so. The cloth is MuJoCo's; ``cloth=`` takes another :class:`tauguard.models.Cloth` and
     ``checkers=("rigid",)`` and others from :func:`tauguard.contacts.registered` watch every physics
-    step: ``info["contacts"]`` counts the pairs that each reported.
+    step: ``info["contacts"]`` counts the pairs that each reported. A fast tool can pass through the
+    sheet (contacts of thin things are soft): compare a checker's count with ``info["force"]``.
 
     ## Observations (n joints; 3 n + 6 numbers, then the body regions as in Reach-v0)
 
@@ -63,19 +59,6 @@ class ClothReachEnv(ArmEnv):
     | 3n .. 3n+2 | position of the tool | -100 to 100 | m |
     | 3n+3 .. 3n+5 | target less tool | -100 to 100 | m |
 
-    A fast tool can pass through the sheet (contacts of thin things are soft): compare a checker's
-    count with ``info["force"]``.
-    """
-
-    task_type = ClothReach
-
-
-class ClothBetweenEnv(ArmEnv):
-    """Go round a hanging cloth to targets on its other side.
-
-    Actions, observations and keywords are those of ClothReach-v0. Each target lies beyond the sheet
-    as seen from the tool, so that the straight path to it goes through the cloth.
-
     ## Reward
 
     | term | value |
@@ -85,16 +68,10 @@ class ClothBetweenEnv(ArmEnv):
     | contact | -1 for each second at 100 N or more on a link, less force less |
     """
 
-    task_type = ClothBetween
-
-
-class ClothBetweenVectorEnv(VectorArmEnv):
-    """Many ClothReach-v1 at once; see :class:`ClothBetweenEnv`."""
-
-    task_type = ClothBetween
+    task_type = ClothReach
 
 
 class ClothReachVectorEnv(VectorArmEnv):
-    """Many ClothReach-v0 at once; see :class:`ClothReachEnv`."""
+    """Many ClothReach-v1 at once; see :class:`ClothReachEnv`."""
 
     task_type = ClothReach

@@ -61,10 +61,9 @@ def _tried(name: str, robot: str | Robot, episodes: int, seed: int) -> ArmTrial:
     force = 0.0
     rng = np.random.default_rng(seed)
     still = np.zeros(env.action_space.shape)
-    begins_by_contact = getattr(env.task, "meets", False)
     for episode in range(episodes):
         env.reset(seed=seed + episode)
-        overlaps += not begins_by_contact and _inside(env)
+        overlaps += _inside(env)
         for step in range(ACTIONS):
             random = rng.uniform(-1, 1, still.shape)
             *_, ended, cut, info = env.step(still if step < ACTIONS // 2 else random)

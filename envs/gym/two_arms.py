@@ -1,4 +1,4 @@
-"""TwoArms-v0: two arms over one table, whose workspaces overlap."""
+"""TwoArms-v1: two arms over one table, whose workspaces overlap."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from tauguard.arrays import Array
 from tauguard.envs.gym.base import ArmEnv
 from tauguard.envs.gym.placing import Layout
-from tauguard.envs.gym.reach import CarefulReach, Reach
+from tauguard.envs.gym.reach import CarefulReach
 from tauguard.envs.gym.second_arm import APART
 from tauguard.envs.gym.vector import VectorArmEnv
 from tauguard.models import Person, Scene, Table
@@ -23,8 +23,8 @@ MIDDLE, GAP = 0.15, (0.15, 0.35)
 BOARD = Table(position=(0.55, 0.0, 0.05), half_extents=(0.3, 0.6, 0.02))
 
 
-class TwoArms(Reach):
-    """Reach with both tools at once; a success needs both at their targets."""
+class TwoArms(CarefulReach):
+    """Both targets close to one another, in the part of the workspace that the arms share."""
 
     arms: ClassVar[int] = 2
     defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "table": BOARD}
@@ -34,14 +34,6 @@ class TwoArms(Reach):
         """Beside the table, looking at it."""
         middle, beside = layout.apart(APART) / 2, max(BESIDE * layout.reach, 0.6)
         return layout.someone(middle, -beside, np.pi / 2)
-
-
-class TwoArmsShared(CarefulReach):
-    """Both targets close to one another, in the part of the workspace that the arms share."""
-
-    arms: ClassVar[int] = 2
-    defaults: ClassVar[dict[str, Any]] = {"obstacles": (), "table": BOARD}
-    person = TwoArms.person
 
     def suits(self, i: int, arm: int, place: Array) -> bool:
         """The first arm's in the middle, the second's near to it."""
@@ -54,7 +46,9 @@ class TwoArmsShared(CarefulReach):
 
 
 class TwoArmsEnv(ArmEnv):
-    """Bring two tools to two places at once, without the arms touching.
+    """Bring two tools to two places 15 to 35 cm apart, without the arms touching.
+
+    Arms that go straight to their targets meet.
 
     The second, nominal arm of the same kind stands opposite, 1.1 m away. Joints and actions of the
     first arm come first. ``info["force"]`` and ``tau_ext`` are those of contacts with the other
@@ -79,19 +73,6 @@ class TwoArmsEnv(ArmEnv):
     | 6n .. 6n+5 | positions of both tools | -100 to 100 | m |
     | 6n+6 .. 6n+11 | targets less tools | -100 to 100 | m |
 
-    The reward is how much less far the farther tool is from its target [m], and 1 when both are
-    within 3 cm; then come the next targets.
-    """
-
-    task_type = TwoArms
-
-
-class TwoArmsSharedEnv(ArmEnv):
-    """Bring two tools to two places 15 to 35 cm apart, without the arms touching.
-
-    Actions, observations and keywords are those of TwoArms-v0. Arms that go straight to their
-    targets meet.
-
     ## Reward
 
     | term | value |
@@ -101,16 +82,10 @@ class TwoArmsSharedEnv(ArmEnv):
     | contact | -1 for each second at 100 N or more on a link, less force less |
     """
 
-    task_type = TwoArmsShared
-
-
-class TwoArmsSharedVectorEnv(VectorArmEnv):
-    """Many TwoArms-v1 at once; see :class:`TwoArmsSharedEnv`."""
-
-    task_type = TwoArmsShared
+    task_type = TwoArms
 
 
 class TwoArmsVectorEnv(VectorArmEnv):
-    """Many TwoArms-v0 at once; see :class:`TwoArmsEnv`."""
+    """Many TwoArms-v1 at once; see :class:`TwoArmsEnv`."""
 
     task_type = TwoArms

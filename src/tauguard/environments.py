@@ -5,12 +5,9 @@ from __future__ import annotations
 #: Name -> module and class prefix, and how many actions an episode has.
 ENVIRONMENTS = {
     "tauguard/Reach-v0": ("reach", "Reach", 1000),
-    "tauguard/React-v0": ("react", "React", 200),
-    "tauguard/React-v1": ("react", "ReactOnward", 500),
-    "tauguard/ClothReach-v0": ("cloth_reach", "ClothReach", 1000),
-    "tauguard/ClothReach-v1": ("cloth_reach", "ClothBetween", 1000),
-    "tauguard/TwoArms-v0": ("two_arms", "TwoArms", 1000),
-    "tauguard/TwoArms-v1": ("two_arms", "TwoArmsShared", 1000),
+    "tauguard/React-v1": ("react", "React", 500),
+    "tauguard/ClothReach-v1": ("cloth_reach", "ClothReach", 1000),
+    "tauguard/TwoArms-v1": ("two_arms", "TwoArms", 1000),
 }
 
 

@@ -30,9 +30,9 @@ def entities(path):
             ["Reach-v0", "--set", "detector=observer"],
             ["/scene/link6", "/scene/person_left_hand", "/residual"],
         ),
-        (["ClothReach-v0"], ["/scene/cloth_0"]),
-        (["React-v0", "--policy", "still", "--reaction", "stop0"], ["/scene/chest"]),
-        (["TwoArms-v0", "--policy", "random"], ["/scene/arm2_link6"]),
+        (["ClothReach-v1"], ["/scene/cloth_0"]),
+        (["React-v1", "--policy", "still", "--reaction", "stop0"], ["/scene/chest"]),
+        (["TwoArms-v1", "--policy", "random"], ["/scene/arm2_link6"]),
     ],
 )
 def test_a_file_holds_a_row_an_action(arguments, shown, tmp_path, capsys):
@@ -56,7 +56,7 @@ def test_a_file_holds_a_row_an_action(arguments, shown, tmp_path, capsys):
         (["Reach-v0", "--set", "control=torque"], "--policy random"),
         (["Reach-v0", "--set", "wings=2"], "expected one of"),
         (["Reach-v0", "--seconds", "0"], "above 0"),
-        (["React-v0", "--reaction", "panic"], "stop0"),
+        (["React-v1", "--reaction", "panic"], "stop0"),
     ],
 )
 def test_bad_input_is_one_line(arguments, words, capsys, tmp_path):

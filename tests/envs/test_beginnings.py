@@ -40,7 +40,7 @@ def small(path):
 
 
 def test_the_base_of_the_second_arm_does_not_touch_its_own_first_link(tmp_path):
-    env = gym.make("tauguard:tauguard/TwoArms-v0", robot=small(tmp_path / "arm.xml")).unwrapped
+    env = gym.make("tauguard:tauguard/TwoArms-v1", robot=small(tmp_path / "arm.xml")).unwrapped
     model = env.model
     bases = [g for g in range(model.ngeom) if model.geom_bodyid[g] == 0 and model.geom_contype[g]]
     second = [g for g in bases if model.geom(g).name.startswith("arm2_")]

@@ -95,7 +95,7 @@ def test_keywords_that_cannot_be_say_what_would_work(keywords, words):
 
 def test_react_needs_somebody_to_strike():
     with pytest.raises(ValueError, match="chest"):
-        gym.make("tauguard/React-v0", obstacles=())
+        gym.make("tauguard/React-v1", obstacles=())
 
 
 def test_a_robot_that_is_not_there():

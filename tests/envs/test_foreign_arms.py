@@ -40,7 +40,7 @@ def test_random_actions_neither_diverge_nor_alarm(arm, seed, control):
 
 def test_a_passive_gripper_works_in_every_environment(arm):
     robot = Robot(arm(20, "fingers"), gripper="passive")
-    for name in ("Reach-v0", "React-v0", "TwoArms-v0"):
+    for name in ("Reach-v0", "React-v1", "TwoArms-v1"):
         env = gym.make(f"tauguard:tauguard/{name}", robot=robot, detector="observer")
         env.reset(seed=0)
         _, _, _, _, info = env.step(np.zeros(env.action_space.shape))

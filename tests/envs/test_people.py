@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import SyncVectorEnv
 
+from oracles.reaction_swings import planned
 from tauguard.environments import ENVIRONMENTS
 from tauguard.envs.gym.people import draw_script
 from tauguard.models import Person
@@ -74,14 +75,12 @@ def test_who_stands_still_stands_still():
 
 def struck(**keywords):
     """The arm runs into a person who stands in front of it; infos of every action."""
-    standing = gym.make("tauguard/React-v0", obstacles=("person",)).unwrapped.compiled.person
+    standing = gym.make("tauguard/React-v1", obstacles=("person",)).unwrapped.compiled.person
     someone = replace(standing, **keywords)
-    env = gym.make(
-        "tauguard/React-v0", obstacles=(someone,), approach=False, detector="observer"
-    ).unwrapped
+    env = gym.make("tauguard/React-v1", obstacles=(someone,), detector="observer").unwrapped
     env.reset(seed=3)
     infos = []
-    for speeds in np.diff(env.task.swing[0], axis=0) * 100:
+    for speeds in planned(env, 0.5):
         env.batch.plants[0].override(1, speeds)
         infos.append(env.step(np.zeros(6))[4])
     env.batch.plants[0].override(1, np.zeros(6))

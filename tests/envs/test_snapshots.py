@@ -11,9 +11,9 @@ import tauguard  # noqa: F401
 
 CASES = {
     "Reach-v0": {"detector": "observer", "control": "cartesian", "noise": True},
-    "React-v0": {"mismatch": 3},
-    "TwoArms-v0": {},
-    "ClothReach-v0": {"checkers": ()},
+    "React-v1": {"mismatch": 3},
+    "TwoArms-v1": {},
+    "ClothReach-v1": {"checkers": ()},
 }
 
 
@@ -44,7 +44,7 @@ def test_a_snapshot_goes_on_with_the_same_bits(name):
 
 def test_a_person_goes_on_in_another_environment_from_any_moment():
     # A reach may begin where the body was a step before: a snapshot holds that, too.
-    one, other = (gym.make("tauguard/React-v0", obstacles=("person",)).unwrapped for _ in "ab")
+    one, other = (gym.make("tauguard/React-v1", obstacles=("person",)).unwrapped for _ in "ab")
     one.reset(seed=3)
     other.reset(seed=4)
     action = np.zeros(one.action_space.shape)
@@ -60,14 +60,14 @@ def test_a_person_goes_on_in_another_environment_from_any_moment():
 
 
 def test_a_state_of_another_scene_is_refused():
-    one, other = (gym.make(f"tauguard/{n}").unwrapped for n in ("Reach-v0", "React-v0"))
+    one, other = (gym.make(f"tauguard/{n}").unwrapped for n in ("Reach-v0", "React-v1"))
     one.reset(seed=0)
     with pytest.raises(ValueError, match="another scene"):
         other.set_state(one.get_state())
 
 
 def test_a_state_with_numbers_that_no_plant_gives_is_refused_and_changes_nothing():
-    env = gym.make("tauguard/React-v0", obstacles=("person",)).unwrapped
+    env = gym.make("tauguard/React-v1", obstacles=("person",)).unwrapped
     env.reset(seed=3)
     still = np.zeros((1, *env.action_space.shape))
     played(env, still)

@@ -5,13 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
 
 from tauguard.envs.adapters.reactions import Reaction
+from tauguard.envs.gym.compiled import tool_position
 from tauguard.envs.gym.react import ReactEnv
 from tauguard.models import body_region
 
-REACT = "tauguard:tauguard/React-v0"
+REACT = "tauguard:tauguard/React-v1"
+#: Length of a swing, its acceleration over half its speed squared [1/m], and spread of its speed.
+LENGTH, STEEPNESS, SPREAD = 0.5, 10.0, 0.2
 #: Speeds of the swings [m/s].
 SPEEDS = (0.25, 0.5, 1.0)
 #: Results of a swing.
@@ -23,6 +27,30 @@ OUTCOMES = (
 NEAR = 5e-4
 
 
+def planned(inner: Any, speed: float) -> np.ndarray:
+    """Joint speeds [rad/s], one row an action, of a straight swing along the path of React-v1."""
+    model, scene, period = inner.model, inner.scene, 1 / inner.compiled.settings.control_rate
+    data, jac = mujoco.MjData(model), np.zeros((3, model.nv))
+    data.qpos[:] = inner.data.qpos
+    mujoco.mj_kinematics(model, data)
+    begin = tool_position(inner.compiled, data)
+    rows, travelled = [data.qpos[scene.qpos_adr].copy()], 0.0
+    while travelled < LENGTH:
+        ramp = speed * np.sqrt(STEEPNESS * max(travelled, 1e-4))
+        travelled += min(speed, ramp) * period
+        for _ in range(2):
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            tool = tool_position(inner.compiled, data)
+            mujoco.mj_jac(model, data, jac, None, tool, inner.compiled.tools[0][1])
+            part = jac[:, scene.dof_adr]
+            left = begin + travelled * inner.task.along - tool
+            change = part.T @ np.linalg.solve(part @ part.T + 1e-4 * np.eye(3), left)
+            data.qpos[scene.qpos_adr] += np.clip(change, -0.2, 0.2)
+        rows.append(data.qpos[scene.qpos_adr].copy())
+    return np.diff(rows, axis=0) / period
+
+
 def swing(speed: float, detector: Any, reaction: str, arm: int, seed: int) -> dict[str, float]:
     """One swing into the chest: peak force, energy, stopping time and distance.
 
@@ -31,17 +59,17 @@ def swing(speed: float, detector: Any, reaction: str, arm: int, seed: int) -> di
     """
     made = gymnasium.make(
         REACT,
-        speed=speed,
         detector=detector,
         mismatch=arm,
-        approach=False,
+        disable_env_checker=True,
         max_episode_steps=10**6,
     )
     env = Reaction(made, reaction, "contact" if detector is None else "alarm")
     env.reset(seed=seed)
     inner = env.unwrapped
     assert isinstance(inner, ReactEnv)
-    path = np.diff(inner.task.swing[0], axis=0) * 100 / inner.compiled.max_speed  # type: ignore[attr-defined]
+    speed *= 1 + np.random.default_rng(seed).uniform(-SPREAD, SPREAD)
+    path = planned(inner, speed) / inner.compiled.max_speed
     n = len(inner.compiled.scene.joint_names)
     tools, times, force, onset, begun = [], [], 0.0, -1.0, -1.0
     for step in range(len(path) + 150):

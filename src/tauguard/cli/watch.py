@@ -27,7 +27,7 @@ def command(
     """Run an environment and show it as it happens: the scene, forces, limits, the detector.
 
     Args:
-        environment: such as Reach-v0, React-v0, ClothReach-v0 or TwoArms-v0.
+        environment: such as Reach-v0, React-v1, ClothReach-v1 or TwoArms-v1.
         policy: go straight to the target (Cartesian control), random actions, or none.
         seconds: how long, in simulated time; episodes follow one another.
         seed: of the first episode.
