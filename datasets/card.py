@@ -52,8 +52,8 @@ was recorded.
 |---|---|---|---|---|---|
 {splits}
 
-An episode is a run of one arm. No motion occurs in two splits; `unseen` in `dataset.json` lists the
-properties of which a split has no value in common with the first split.
+An episode is a run of one arm.{pairs} No motion occurs in two splits; `unseen` in
+`dataset.json` lists the properties of which a split has no value in common with the first split.
 
 ## Files
 
@@ -125,6 +125,10 @@ By tauguard {tauguard} on MuJoCo {mujoco}, from the configuration with the SHA-2
 `{sha256}`. The same configuration and versions give the same bytes.
 """
 
+#: What the card of a dataset of pairs adds.
+PAIRS = """ Episodes 2k and 2k + 1 of a split are a pair: the same arm, load, temperature, noise and
+commanded motion, first without and then with collisions."""
+
 
 def write_cards(folder: Path) -> None:
     """Write card, metadata and checksums; a file with the right content is left alone."""
@@ -166,6 +170,7 @@ def card(
         files=files,
         sentence=describe(configuration),
         splits=_split_rows(summary),
+        pairs=PAIRS if all(split.paired for split in configuration.splits) else "",
         columns=_column_rows(configuration),
         joints=configuration.most_joints,
         first=first,

@@ -15,15 +15,19 @@ from typing import Any
 
 from tauguard.datasets.configuration_checks import (
     KEYS,
+    SPLIT,
     checked_table,
     closest,
     refuse,
 )
+from tauguard.datasets.plans import CLAMP_SECONDS, SLOT
 from tauguard.datasets.robots import RobotSource, find_robot
 from tauguard.models import ROBOTS, SceneObject, cura6, load_objects
 
 #: The configurations that ship, by name.
-NAMED = ("tauguard-collisions-v1", "cura6-twin")
+NAMED = ("tauguard-collisions-v2", "tauguard-collisions-v1", "cura6-twin")
+#: Keys of a split that came after the first datasets were published.
+LATER_KEYS = ("clamp_seconds", "paired")
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,8 @@ class Split:
     temperature: tuple[float, float]  #: temperature of the gears, drawn between these [degC]
     picks: float  #: fraction of collision-free episodes with a payload picked up
     unseen: tuple[str, ...]  #: properties without a value of the first split: "arm", ...
+    clamp_seconds: tuple[float, float] = CLAMP_SECONDS  #: how long a clamp lasts, drawn [s]
+    paired: bool = False  #: episodes 2k and 2k + 1 have one motion, without and with collisions
 
 
 @dataclass(frozen=True)
@@ -68,6 +74,10 @@ class Configuration:
         for name in ("robots", "objects"):
             if not values[name]:
                 del values[name]
+        for split in values["splits"]:  # later keys, left out at their defaults: hashes stay
+            for name in LATER_KEYS:
+                if split[name] == SPLIT[name].default:
+                    del split[name]
         return json.dumps(values, sort_keys=True)
 
     @classmethod
@@ -196,8 +206,8 @@ def parse(values: Mapping[str, Any], folder: Path = Path()) -> Configuration:
 
 
 TABLES = ("mismatch", "episodes", "splits")
-#: Length of a collision's slot; total time before the first and after the last slot [s].
-SLOT, MARGIN = 3.0, 3.5
+#: Total time before the first slot of a collision and after the last one [s].
+MARGIN = 3.5
 
 
 def _named_arms(
@@ -227,7 +237,8 @@ def _split(where: str, values: dict[str, Any], joints: int) -> Split:
         refuse(f"{where}.links", values["links"], f"1 to {joints}, which every arm of it has")
     quick = values["quick_episodes"]
     if quick is None:
-        values["quick_episodes"] = max(1, round(0.02 * values["episodes"]))
+        quick = max(1, round(0.02 * values["episodes"]))
+        values["quick_episodes"] = quick + quick % 2 if values["paired"] else quick
     elif quick > values["episodes"]:
         refuse(f"{where}.quick_episodes", quick, f"at most the split's {values['episodes']}")
     room = int((values["seconds"] - MARGIN) / SLOT)
@@ -240,6 +251,15 @@ def _split(where: str, values: dict[str, Any], joints: int) -> Split:
             f"1 to {room}, as many as {values['seconds']:g} s have room for "
             f"({SLOT:g} s each after {MARGIN:g} s)",
         )
+    if values["paired"]:
+        if values["struck"] != 0.5 or values["picks"] > 0:
+            raise ValueError(
+                f"{where}.paired: one of two episodes has collisions, and none a pick; expected "
+                f"struck = 0.5 and picks = 0, found {values['struck']:g} and {values['picks']:g}"
+            )
+        if values["episodes"] % 2 or values["quick_episodes"] % 2:
+            counts = values["episodes"], values["quick_episodes"]
+            refuse(f"{where}.episodes, quick_episodes", counts, "even numbers, as they are paired")
     return Split(**values)
 
 

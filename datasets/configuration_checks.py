@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, NoReturn
 
+from tauguard.datasets.plans import CLAMP_SECONDS, OFFSET, SLOT, SPREAD
 from tauguard.models import Mismatch, cura6
 from tauguard.traces import KINDS, STRATA
 
@@ -169,6 +170,8 @@ def rows_a_second(value: Any) -> int:
 
 _LARGEST = {f.name: 0.09 if f.name == "com" else 0.5 for f in fields(Mismatch) if f.name != "seed"}
 _DEFAULT = Mismatch(seed=0)
+#: A clamp ends half a second before its slot [s].
+LONGEST_CLAMP = round(SLOT - OFFSET - SPREAD - 0.5, 6)
 SPLIT = {
     "name": Key(split_name, "letters, digits, - and _, at most 40"),
     "episodes": Key(integer(1, 10_000_000), "a whole number, 1 to 10,000,000"),
@@ -205,6 +208,12 @@ SPLIT = {
         "a list of arm, individual, payload, speed",
         (),
     ),
+    "clamp_seconds": Key(
+        span(0.05, LONGEST_CLAMP, equal=True),
+        f"[low, high] in seconds, 0.05 to {LONGEST_CLAMP:g}",
+        CLAMP_SECONDS,
+    ),
+    "paired": Key(flag, "true or false", False),
 }
 KEYS: dict[str, dict[str, Key]] = {
     "top": {

@@ -18,8 +18,10 @@ TRAINING_PAYLOADS = (0, 0, 0, 782, 782, 1016, 1016, 1282, 1282, 2298, 2298, 2757
 KIND_CYCLE = ("strike", "pulse", "strike", "clamp")
 #: No collision before this time, as a detector settles first [s].
 BEGIN = 3.0
-#: Length of a collision's slot, and its onset within the slot [s].
-SLOT, OFFSET = 3.0, 0.9
+#: Length of a collision's slot, its earliest onset in it, and how much later it may begin [s].
+SLOT, OFFSET, SPREAD = 3.0, 0.9, 0.2
+#: How long a clamp lasts: drawn between these [s].
+CLAMP_SECONDS = (0.4, 0.8)
 
 
 def collision_plans(
@@ -29,6 +31,7 @@ def collision_plans(
     strata: Sequence[tuple[float, float]] = STRATA,
     kinds: Sequence[str] = KIND_CYCLE,
     links: Sequence[int] = (2, 3, 4, 5, 6),
+    clamp_seconds: tuple[float, float] = CLAMP_SECONDS,
 ) -> tuple[CollisionPlan, ...]:
     """``count`` collisions, one a slot, spread over kinds, links and strata.
 
@@ -39,6 +42,7 @@ def collision_plans(
         strata: severities, cycled [N m].
         kinds: cycled.
         links: cycled, 1-based.
+        clamp_seconds: shortest and longest clamp [s].
     """
     kind_of = rng.permutation([kinds[i % len(kinds)] for i in range(count)])
     link_of = rng.permutation([links[i % len(links)] for i in range(count)])
@@ -49,11 +53,11 @@ def collision_plans(
         plans.append(
             CollisionPlan(
                 kind=kind,
-                time=begin + SLOT * i + OFFSET + float(rng.uniform(0, 0.2)),
+                time=begin + SLOT * i + OFFSET + float(rng.uniform(0, SPREAD)),
                 link=int(link_of[i]),
                 severity=strata[int(levels[i])],
                 duration=float(
-                    rng.uniform(0.4, 0.8) if kind == "clamp" else rng.uniform(0.03, 0.2)
+                    rng.uniform(*clamp_seconds) if kind == "clamp" else rng.uniform(0.03, 0.2)
                 ),
                 at_rest=kind != "clamp" and bool(rng.random() < 0.15),
             )

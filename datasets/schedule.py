@@ -58,20 +58,22 @@ def planned(configuration: Configuration, split: Split, number: int) -> Planned:
     if not 0 <= number < split.episodes:
         raise IndexError(f"{split.name}: no episode {number}; it has {split.episodes}")
     seed = [configuration.seed, zlib.crc32(split.name.encode())]
-    rng = np.random.default_rng([*seed, 0, number])
-    arm = dealt(split.arms, [*seed, 1], number)
-    individual = dealt(split.individuals, [*seed, 2], number)
-    payload = dealt(split.payloads_g, [*seed, 4], number)
-    struck = dealt(_fraction(split.struck), [*seed, 5], number)
-    picked = not struck and payload > 0 and dealt(_fraction(split.picks), [*seed, 6], number)
+    draw, struck = _draw(split, seed, number)
+    rng = np.random.default_rng([*seed, 0, draw])
+    arm = dealt(split.arms, [*seed, 1], draw)
+    individual = dealt(split.individuals, [*seed, 2], draw)
+    payload = dealt(split.payloads_g, [*seed, 4], draw)
+    picked = not struck and payload > 0 and dealt(_fraction(split.picks), [*seed, 6], draw)
     picks = (PayloadPick(split.seconds / 2, payload),) if picked else ()
     widths = dict(configuration.mismatch)
+    # A pair has one temperature, so its collisions are drawn by a generator of their own.
+    hits = np.random.default_rng([*seed, 10, draw]) if split.paired else rng
     episode = Episode(
         seed=int(rng.integers(2**62)),
         seconds=split.seconds,
-        speed=dealt(split.speeds, [*seed, 3], number),
+        speed=dealt(split.speeds, [*seed, 3], draw),
         payload_g=0.0 if picked else payload,
-        collisions=_collisions(split, seed, number, rng) if struck else (),
+        collisions=_collisions(split, seed, draw, hits) if struck else (),
         picks=picks,
         mismatch=None if individual < 0 else Mismatch(seed=individual, **widths),
         temperature=float(rng.uniform(*split.temperature)),
@@ -80,6 +82,16 @@ def planned(configuration: Configuration, split: Split, number: int) -> Planned:
     )
     source = configuration.source_of(arm)
     return Planned(split.name, number, arm, individual, episode, source)
+
+
+def _draw(split: Split, seed: list[int], number: int) -> tuple[int, bool]:
+    """The number by which an episode is drawn, and whether it has collisions.
+
+    Both episodes of a pair are drawn by the number of the pair; the second has the collisions.
+    """
+    if split.paired:
+        return number // 2, bool(number % 2)
+    return number, dealt(_fraction(split.struck), [*seed, 5], number)
 
 
 def all_planned(configuration: Configuration) -> Iterator[Planned]:
@@ -104,10 +116,12 @@ def _fraction(fraction: float) -> tuple[bool, ...]:
 
 
 def _collisions(
-    split: Split, seed: list[int], number: int, rng: np.random.Generator
+    split: Split, seed: list[int], draw: int, rng: np.random.Generator
 ) -> tuple[CollisionPlan, ...]:
     """The collisions of an episode; dealing continues from the episode with collisions before."""
-    before = _dealt_counts(_fraction(split.struck), [*seed, 5], number)[True]
+    before = (
+        draw if split.paired else _dealt_counts(_fraction(split.struck), [*seed, 5], draw)[True]
+    )
     cards = range(before * split.collisions, (before + 1) * split.collisions)
     return collision_plans(
         rng,
@@ -115,6 +129,7 @@ def _collisions(
         strata=[dealt(split.severities, [*seed, 9], card) for card in cards],
         kinds=[dealt(split.kinds, [*seed, 7], card) for card in cards],
         links=[dealt(split.links, [*seed, 8], card) for card in cards],
+        clamp_seconds=split.clamp_seconds,
     )
 
 
@@ -129,13 +144,18 @@ def stated_balance(configuration: Configuration) -> dict[str, Balance]:
 
 def _stated(configuration: Configuration, split: Split) -> Balance:
     seed = [configuration.seed, zlib.crc32(split.name.encode())]
-    count = split.episodes
-    struck = _dealt_counts(_fraction(split.struck), [*seed, 5], count)[True]
+    fold = 2 if split.paired else 1
+    count = split.episodes // fold
+    struck = (
+        count if split.paired else _dealt_counts(_fraction(split.struck), [*seed, 5], count)[True]
+    )
     found: dict[str, Counter[Any]] = {
         "arm": _dealt_counts(split.arms, [*seed, 1], count),
         "speed": _dealt_counts([f"{v:g}" for v in split.speeds], [*seed, 3], count),
         "payload_g": _dealt_counts([f"{v:g}" for v in split.payloads_g], [*seed, 4], count),
     }
+    for counts in found.values():
+        counts.update({value: (fold - 1) * n for value, n in counts.items()})
     levels = [_level(low, high) for low, high in split.severities]
     links = [str(link) for link in split.links]
     for name, values, card in (

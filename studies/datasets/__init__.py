@@ -14,8 +14,8 @@ STUDY = Study(
         ),
         "entries": Part(
             "datasets.entries",
-            "every detector of the registry on tauguard-collisions-v1",
-            ("keep",),
+            "every detector of the registry, and your own, on tauguard-collisions-v2",
+            ("keep", "detector"),
             alias="entries",
         ),
     },

@@ -1,4 +1,4 @@
-"""The leaderboard of the fixed dataset tauguard-collisions-v1: every detector of the registry.
+"""The leaderboard of the fixed dataset tauguard-collisions-v2: every detector of the registry.
 
 Each detector is trained on the first split of one arm, with a threshold for 10 false alarms an
 hour. It is judged on the test splits, as by ``tauguard train --traces`` and ``tauguard evaluate
@@ -34,7 +34,7 @@ from tauguard.detectors.calibration.nominal import nominal_arm
 from tauguard.report import Row
 
 #: The dataset, and the wanted rate of false alarms [1/h].
-NAME, PER_HOUR = "tauguard-collisions-v1", 10.0
+NAME, PER_HOUR = "tauguard-collisions-v2", 10.0
 #: The quick run: its detector, the episodes of each split, and the length of each [s].
 QUICK, QUICK_EPISODES, QUICK_SECONDS = ("residual-thresholds",), {"train": 6, "test": 2}, 30.0
 
@@ -55,19 +55,22 @@ class Entry:
     splits: tuple[tuple[str, tuple[Matching, ...]], ...]
 
 
-def measure(quick: bool, seed: int, keep: str | None = None) -> list[Row]:
+def measure(
+    quick: bool, seed: int, keep: str | None = None, detector: str | None = None
+) -> list[Row]:
     """Return a row for each detector and split.
 
     Args:
         quick: one detector on a few episodes of one arm.
         seed: of the dataset; 0 is the dataset that is published.
         keep: folder of the dataset; it is made, or completed, there (default: a temporary one).
+        detector: a method of one's own as module:Class, beside those of the registry.
     """
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "dataset" if keep is None else Path(keep)
         generate_dataset(configuration(quick, seed), folder)
         arms = arms_of(folder, ("train",))
-        names = QUICK if quick else tuple(DETECTORS)
+        names = (*(QUICK if quick else tuple(DETECTORS)), *filter(None, [detector]))
         with Workers() as each:
             jobs = [(folder, arm, name) for arm in arms for name in names]
             entries = list(each(_entry, jobs))

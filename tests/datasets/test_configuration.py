@@ -1,6 +1,7 @@
 """Configurations: checked whole, with errors that name key, value and range."""
 
 import tomllib
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -45,9 +46,10 @@ def test_objects_stand_in_every_episode_and_survive_json(tmp_path):
         parse(tomllib.loads('objects = "none.toml"' + GOOD), tmp_path)
 
 
-def test_the_benchmark_is_100_hours_of_four_arms():
-    configuration = load("tauguard-collisions-v1")
-    assert configuration.hours == pytest.approx(100)
+@pytest.mark.parametrize("version", ["v1", "v2"])
+def test_the_benchmark_is_100_hours_of_four_arms(version):
+    configuration = load(f"tauguard-collisions-{version}")
+    assert configuration.hours == pytest.approx(100, rel=1e-3)
     assert configuration.quick().hours == pytest.approx(2, rel=0.01)
     assert len({arm for split in configuration.splits for arm in split.arms}) == 4
 
@@ -79,6 +81,9 @@ def test_the_twin_has_15_slices_of_7_minutes_and_65_collisions_a_speed():
         ("episodes = 4", "episodes = 4\nspeeds = [nan]", "speeds"),
         ('name = "a"', 'name = "../a"', "name = '../a': expected small letters"),
         ('name = "train"', 'name = "../a"', r"splits\[0\]\.name"),
+        ("episodes = 4", "episodes = 3\npaired = true", "expected even numbers"),
+        ("episodes = 4", "episodes = 4\npaired = true\nstruck = 0.3", "struck = 0.5 and picks = 0"),
+        ("episodes = 4", "episodes = 4\nclamp_seconds = [1, 2]", "seconds, 0.05 to 1.4"),
         ("episodes = 4", "episodes = 4\n[mismatch]\nmass = 3", r"mismatch\.mass = 3: expected a"),
     ],
 )  # fmt: skip
@@ -115,8 +120,26 @@ def test_a_deck_deals_every_value_equally_often(values, seed, count):
         assert abs(found.count(value) - count / values) < 1
 
 
-def test_the_stated_balance_is_that_of_the_episodes():
-    configuration = load("tauguard-collisions-v1").quick()
+def test_hashes_of_published_descriptions_stay():
+    assert load("tauguard-collisions-v1").sha256.startswith("ba6ceca843d9d137")
+
+
+def test_a_pair_has_one_motion_and_the_second_has_the_collisions():
+    configuration = load("tauguard-collisions-v2").quick()
+    episodes = [p for p in all_planned(configuration) if p.split == "test"]
+    assert len(episodes) == configuration.splits[2].episodes
+    for free, struck in zip(episodes[::2], episodes[1::2], strict=True):
+        assert free.number + 1 == struck.number
+        assert not free.episode.collisions
+        assert struck.episode.collisions
+        assert replace(struck.episode, collisions=()) == free.episode
+    motions = {p.episode.seed for p in all_planned(configuration)}
+    assert len(motions) == sum(split.episodes for split in configuration.splits) // 2
+
+
+@pytest.mark.parametrize("version", ["v1", "v2"])
+def test_the_stated_balance_is_that_of_the_episodes(version):
+    configuration = load(f"tauguard-collisions-{version}").quick()
     stated = stated_balance(configuration)
     for split in configuration.splits:
         episodes = [p.episode for p in all_planned(configuration) if p.split == split.name]

@@ -19,6 +19,7 @@ def command(
     data: Path | None = None,
     splits: tuple[str, ...] = (),
     model: Path = Path("model.skops"),
+    alarms: Path | None = None,
     detector: str | None = None,
     json: Path | None = None,
     figure: Path | None = None,
@@ -33,6 +34,9 @@ def command(
             split.
         splits: with --data, which ones (default: those whose name begins with "test").
         model: a model file that `tauguard train` wrote.
+        alarms: with --data, instead of a model: the alarms of any other detector, a CSV file with
+            the columns episode (SPLIT/NUMBER, as `tauguard inspect --episode` takes it), start and
+            end [s], a line an alarm. Judged are all arms of the splits.
         detector: module:Class of the method, if it is not one of tauguard's own.
         json: write the figures here.
         figure: draw them here (PNG).
@@ -42,6 +46,11 @@ def command(
             --episode` takes.
         late: with --events, a collision found later than this is an event [s].
     """
+    if alarms is not None:
+        if data is None or detector is not None or events is not None:
+            raise ValueError("--alarms goes with --data, and not with --detector or --events")
+        _evaluate_alarms(data, alarms, splits, json, figure)
+        return
     from tauguard.datasets.reader import episodes_of_splits
     from tauguard.datasets.recordings import labelled
     from tauguard.detectors import load_model
@@ -76,6 +85,27 @@ def command(
     if wrong is not None:
         page = wrong.finish()
         print(f"{page}: open it with `{command_to_open(page.parent)}`")
+    if json is not None:
+        write_json(json, measured("evaluate", rows))
+
+
+def _evaluate_alarms(
+    data: Path, alarms: Path, splits: tuple[str, ...], json: Path | None, figure: Path | None
+) -> None:
+    """Judge a file of alarms on a dataset, split by split."""
+    from tauguard.datasets.alarm_files import judged_alarms
+    from tauguard.detectors import detection_metrics
+    from tauguard.detectors.evaluation.metrics_page import draw, text
+    from tauguard.report import measured, write_json
+
+    rows: list[dict[str, Any]] = []
+    for name, matchings in judged_alarms(data, alarms, splits):
+        summary = detection_metrics(matchings)
+        rows.append({"split": name, **summary})
+        print(f"{len(matchings)} recordings in {name}")
+        print(text(summary))
+        if figure is not None:
+            draw(figure.with_stem(f"{figure.stem}-{name}"), summary, matchings)
     if json is not None:
         write_json(json, measured("evaluate", rows))
 

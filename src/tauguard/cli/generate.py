@@ -22,7 +22,8 @@ def command(
     the bytes are the same for any number of workers.
 
     Args:
-        config: a TOML file, or a name that ships: tauguard-collisions-v1, cura6-twin.
+        config: a TOML file, or a name that ships: tauguard-collisions-v2, tauguard-collisions-v1,
+            cura6-twin.
         out: folder of the dataset: a new or empty one, or one that holds a part of this dataset.
         workers: processes (default: all processors).
         ray: address of a Ray cluster to work on instead; "local" starts one on this machine.

@@ -1,0 +1,106 @@
+"""Alarms of a detector that runs elsewhere, in any language, judged on a dataset.
+
+The file is CSV with the columns ``episode`` (SPLIT/NUMBER, from 0), ``start`` and ``end`` [s of the
+episode's clock], a line an alarm. An episode without a line had no alarm.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from tauguard.datasets.dataset_folder import configuration_in
+from tauguard.datasets.plans import BEGIN
+from tauguard.datasets.reader import read, splits_of
+from tauguard.detectors.evaluation.matching import Matching, match
+from tauguard.detectors.events import MERGE_GAP
+from tauguard.traces import Alarm
+
+COLUMNS = ("episode", "start", "end")
+
+
+def read_alarm_file(path: Path) -> dict[str, tuple[Alarm, ...]]:
+    """The alarms of each episode, in order; those less than 0.5 s apart are one.
+
+    Raises:
+        ValueError: other columns, or a line with a wrong value; file and line are named.
+        OSError: no such file.
+    """
+    found: dict[str, list[Alarm]] = {}
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            rows = csv.DictReader(stream)
+            if tuple(rows.fieldnames or ()) != COLUMNS:
+                raise ValueError(
+                    f"{path}: columns {', '.join(rows.fieldnames or ('none',))}; expected "
+                    f"{', '.join(COLUMNS)}"
+                )
+            for row in rows:
+                alarm = _alarm(row, f"{path}, line {rows.line_num}")
+                found.setdefault(row["episode"].strip(), []).append(alarm)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: not a CSV file ({error})") from None
+    return {name: _merged(alarms) for name, alarms in found.items()}
+
+
+def judged_alarms(
+    folder: Path, path: Path, splits: Sequence[str] = ()
+) -> Iterator[tuple[str, list[Matching]]]:
+    """Each split's episodes, their truth matched with the alarms of a file.
+
+    The first 3 s of an episode do not count: no collision is planned there, and detectors settle.
+
+    Args:
+        folder: a dataset.
+        path: the file of alarms.
+        splits: by name (default: those whose name begins with "test"); all arms.
+
+    Raises:
+        ValueError: a file that cannot be read, or that names an episode which the splits do not
+            have.
+        OSError: no such file or folder.
+    """
+    alarms = read_alarm_file(path)
+    every = configuration_in(folder).splits
+    chosen = splits_of(folder, splits or [s.name for s in every if s.name.startswith("test")])
+    episodes = {s.name: s.episodes for s in every if s.name in chosen}
+    for name in alarms:
+        split, _, number = name.partition("/")
+        if not (number.isdecimal() and int(number) < episodes.get(split, 0)):
+            there = ", ".join(f"{s}/0 to {s}/{n - 1}" for s, n in episodes.items())
+            raise ValueError(f"{path}: no episode {name!r} among those that are judged: {there}")
+    for split in chosen:
+        yield (
+            split,
+            [
+                match(
+                    alarms.get(trace.meta["episode"], ()),
+                    trace.truth.collisions,
+                    (float(min(trace.t[0] + BEGIN, trace.t[-1])), float(trace.t[-1])),
+                )
+                for trace in read(folder, [split])
+                if trace.truth is not None
+            ],
+        )
+
+
+def _alarm(row: dict[str, str], where: str) -> Alarm:
+    try:
+        start, end = float(row["start"]), float(row["end"])
+    except (TypeError, ValueError):
+        start = end = math.nan
+    if not (0 <= start <= end < math.inf) or None in row:
+        raise ValueError(f"{where}: expected an episode and two times in seconds, start <= end")
+    return Alarm(start, end)
+
+
+def _merged(alarms: list[Alarm]) -> tuple[Alarm, ...]:
+    merged: list[Alarm] = []
+    for alarm in sorted(alarms, key=lambda a: a.start):
+        if merged and alarm.start - merged[-1].end < MERGE_GAP:
+            merged[-1] = Alarm(merged[-1].start, max(merged[-1].end, alarm.end))
+        else:
+            merged.append(alarm)
+    return tuple(merged)
