@@ -93,7 +93,7 @@ def with_intervals(twin: Twin, others: Sequence[Twin]) -> Twin:
     for name in NUMBERS:
         values = np.array([other.number(name) for other in others])
         deviation = np.sqrt((count - 1) * values.var(axis=0))
-        known = np.array([fit is not None for fit in twin.fits]) | (name in ("gain", "rotor"))
+        known = np.array([fit is not None for fit in twin.fits]) | (name == "gain")
         form = 0.0 if name == "gain" else FORM * np.abs(twin.number(name)).max()
         intervals[name] = np.where(known, np.maximum(wide * deviation, form), np.nan)
     return replace(twin, intervals=intervals)

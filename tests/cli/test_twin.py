@@ -68,8 +68,8 @@ def made(folder):
 def test_every_command_and_environment_takes_the_twin(made, tmp_path):
     friction = load_arm(str(made)).facts.drive.friction
     assert (friction.coulomb + friction.slope.sum(axis=1) > 1).all()
-    flags = ["--episodes", "1", "--collisions", "1", "--workers", "1", "--payloads-g", "0", "--mismatch-seed", "None"]
-    main(["simulate", "--robot", str(made), "--out", str(tmp_path / "struck"), *flags])
+    flags = "--episodes 1 --collisions 1 --workers 1 --payloads-g 0 --mismatch-seed None"
+    main(["simulate", "--robot", str(made), "--out", str(tmp_path / "struck"), *flags.split()])
     (trace,) = labelled(tmp_path / "struck")
     assert trace.dt == pytest.approx(0.01, rel=1e-3)  # the logs' rate
     (made.parent / "set.toml").write_text(DATASET)
@@ -134,6 +134,27 @@ def test_clipped_currents_and_gaps_are_named(folder, tmp_path, capsys):
     with pytest.raises(SystemExit):
         run(folder, "twin", tmp_path / "gap.csv", folder / "free" / "log0.csv", *flags)
     assert "nothing for 3.01 s before it" in capsys.readouterr().err
+
+
+def test_a_load_that_was_not_told_is_named_and_left_out(folder, tmp_path, capsys):
+    write(tmp_path / "carried.csv", record(5, load=2.0))
+    flags = ("--robot", folder / "arm.xml", "--out", tmp_path / "t.toml")
+    run(folder, "twin", folder / "free", tmp_path / "carried.csv", *flags)
+    said = capsys.readouterr().out
+    assert "carried.csv is left out" in said
+    assert "--payload carried.csv=KG" in said
+    text = (tmp_path / "t.toml").read_text()
+    assert 'source = "identified from log0.csv, log1.csv, log2.csv"' in text
+    run(
+        folder,
+        "twin",
+        folder / "free",
+        tmp_path / "carried.csv",
+        *flags,
+        "--payload",
+        "carried.csv=2,0.3,0,0.05",
+    )
+    assert "left out" not in capsys.readouterr().out
 
 
 def test_what_the_logs_do_not_show_is_named(folder, tmp_path, capsys):

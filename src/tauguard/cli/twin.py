@@ -62,7 +62,7 @@ def command(
 
     if out.suffix != ".toml":
         raise ValueError(f"--out {out}: expected a name that ends in .toml")
-    given = free_logs(logs, robot, columns, gains, payload, torque)
+    given, left = of_one_arm(free_logs(logs, robot, columns, gains, payload, torque))
     recordings, names = given.recordings, list(given.traces)
     limit = load_arm(str(robot)).torque_limit
     twin = made(given, recordings, limit)
@@ -80,7 +80,7 @@ def command(
             judged = made(given, [r for k, r in enumerate(recordings) if k not in held], limit)
     likeness = compare(judged.arm, judged.drive, tried) if tried else None
     apart = left_out(given.arm, recordings, scale=given.scale) if len(recordings) > 1 else []
-    notes = (*calibration_notes(twin.arm, given.traces, recordings, apart), *twin.notes)
+    notes = (*left, *calibration_notes(twin.arm, given.traces, recordings, apart), *twin.notes)
     print_notes(notes)
     written = write_twin(replace(twin, notes=tuple(notes)), robot, out, names, given.source)
     rows = report(twin.arm.robot.joint_names, likeness, told)
@@ -93,6 +93,32 @@ def command(
     if json is not None:
         result = {"name": "twin", "twin": str(out), "scale": given.source, "notes": list(notes)}
         write_json(json, result | {"judged_on": told, "rows": rows})
+
+
+def of_one_arm(given: FreeLogs) -> tuple[FreeLogs, list[str]]:
+    """The logs without those that the others do not predict, and a note on each of these.
+
+    Raises:
+        ValueError: logs of two arms.
+    """
+    from tauguard.detectors import ArmModel
+    from tauguard.detectors.calibration.identification import identify
+    from tauguard.twin.sorting import odd_logs
+
+    names, arm = list(given.traces), given.arm
+    if given.scale != "gains":
+        found = identify(arm, given.recordings, scale=given.scale).arm
+        arm = ArmModel(arm.robot, found.drive_gain)
+    odd = odd_logs(arm, names, given.recordings)
+    kept = [k for k in range(len(names)) if k not in odd]
+    notes = [
+        f"{names[k]} is left out: the other logs do not predict it. Did the arm carry something "
+        f"(then give --payload {names[k]}=KG or =unknown), is it another arm, or did something "
+        "touch it?"
+        for k in odd
+    ]
+    traces = {names[k]: given.traces[names[k]] for k in kept}
+    return replace(given, traces=traces, recordings=[given.recordings[k] for k in kept]), notes
 
 
 def made(given: FreeLogs, used: list[Recording], limit: Array) -> Twin:

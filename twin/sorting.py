@@ -1,0 +1,111 @@
+"""Are all logs of one arm, with the loads that were told? Those of another would spoil a twin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tauguard.arrays import Array, Bools
+from tauguard.detectors import ArmModel
+from tauguard.detectors.calibration.assessment import OUTLYING, outlier, residual_rms
+from tauguard.detectors.calibration.identification import REAL_FRICTION, identify
+from tauguard.detectors.calibration.recording import Load, Recording
+from tauguard.detectors.calibration.regression import filtered
+
+#: Logs are of two arms if each half predicts its own so many times better than all together do.
+#: Splitting the logs of one arm by program brings 1.0 to 1.2 (UR5, UR3, UR10e); two arms, or a load
+#: in some logs that was not told, bring 2.9 to 66.
+TWO = 2.0
+ROUNDS = 4
+
+
+def odd_logs(arm: ArmModel, names: Sequence[str], recordings: Sequence[Recording]) -> list[int]:
+    """Logs without a load that the others do not predict: indices, at most a third of them.
+
+    Args:
+        arm: nominal numbers; its gains hold.
+        names: of the logs.
+        recordings: with their loads, all with motion.
+
+    Raises:
+        ValueError: the logs are of two arms, or two loads; it names those of each.
+    """
+    told = [k for k, r in enumerate(recordings) if r.load == Load()]
+    errors = _Errors(arm, [recordings[k] for k in told])
+    odd: list[int] = []
+    while len(told) - len(odd) >= 3 and 3 * len(odd) < len(told):
+        rest = [k for k in range(len(told)) if k not in odd]
+        found = outlier([np.array([errors(k, rest)]) for k in rest], OUTLYING)
+        if found is None:
+            break
+        odd.append(rest[found[0]])
+    rest = [k for k in range(len(told)) if k not in odd]
+    if len(rest) >= 4:
+        side = _two_sides(errors, rest)
+        if side is not None:
+            one, two = (", ".join(names[told[k]] for k in np.array(rest)[s]) for s in (side, ~side))
+            raise ValueError(
+                f"{one} and {two} do not predict each other: logs of two arms, or a load in some "
+                "that was not told (then give --payload LOG=KG or LOG=unknown of each)"
+            )
+    return [told[k] for k in odd]
+
+
+class _Errors:
+    """Residual of a log under a calibration from others [N m]; inf where they are too short."""
+
+    def __init__(self, arm: ArmModel, recordings: Sequence[Recording]) -> None:
+        self._arm, self._recordings = arm, recordings
+        self._data = [
+            filtered(r, arm.robot, arm.drive_gain, REAL_FRICTION, 20.0) for r in recordings
+        ]
+        self._known: dict[tuple[int, ...], ArmModel | None] = {}
+
+    def __call__(self, k: int, group: Sequence[int]) -> float:
+        own = tuple(sorted(set(group) - {k})) or (k,)
+        if own not in self._known:
+            parts, data = [self._recordings[i] for i in own], [self._data[i] for i in own]
+            try:
+                self._known[own] = identify(self._arm, parts, data=data).arm
+            except ValueError:  # too little motion
+                self._known[own] = None
+        arm = self._known[own]
+        if arm is None:
+            return np.inf
+        return float(np.linalg.norm(residual_rms(arm, self._recordings[k].trace)))
+
+
+def _two_sides(errors: _Errors, logs: Sequence[int]) -> Bools | None:
+    """Which logs are of the second of two arms, shape (len(logs),); None: all are of one.
+
+    As k-means does: a log goes to the group whose other logs predict it better, in turn.
+    """
+
+    def of(side: Bools) -> tuple[Array, Array]:
+        groups = [[m for m, s in zip(logs, side, strict=True) if s == which] for which in (0, 1)]
+        values = [
+            [errors(k, g) if set(g) - {k} else np.inf for k in logs] for g in groups
+        ]  # fmt: skip
+        return np.array(values[0]), np.array(values[1])
+
+    whole = np.array([errors(k, logs) for k in logs])
+    first = logs[int(np.argmax(whole))]
+    far = np.array([errors(k, [first]) if k != first else 0.0 for k in logs])
+    second = logs[int(np.argmax(far))]
+    side = np.array(
+        [
+            k == second or (k != first and errors(k, [second]) < f)
+            for k, f in zip(logs, far, strict=True)
+        ]
+    )
+    for _ in range(ROUNDS):
+        one, two = of(side)
+        closer = two < one
+        if (closer == side).all():
+            break
+        side = closer
+    best = np.minimum(*of(side))
+    if min(side.sum(), (~side).sum()) < 2 or not np.isfinite(best).all():
+        return None
+    return side if whole.sum() > TWO * best.sum() else None
