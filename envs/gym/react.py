@@ -103,7 +103,7 @@ class React(Task):
             part = jac[:, dofs]
             weight = np.linalg.solve(part @ part.T + 1e-4 * np.eye(3), place - tool)
             data.qpos[adr] += np.clip(part.T @ weight, -0.2, 0.2)
-        return data.qpos[adr].copy()
+        return np.array(data.qpos[adr])
 
     def score(self, step: StepMetrics, memory: Any) -> Outcome:
         """Progress, and what it costs. It remembers the last distance [m]."""

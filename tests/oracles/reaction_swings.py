@@ -48,7 +48,7 @@ def planned(inner: Any, speed: float) -> np.ndarray:
             change = part.T @ np.linalg.solve(part @ part.T + 1e-4 * np.eye(3), left)
             data.qpos[scene.qpos_adr] += np.clip(change, -0.2, 0.2)
         rows.append(data.qpos[scene.qpos_adr].copy())
-    return np.diff(rows, axis=0) / period
+    return np.asarray(np.diff(rows, axis=0) / period)
 
 
 def swing(speed: float, detector: Any, reaction: str, arm: int, seed: int) -> dict[str, float]:
